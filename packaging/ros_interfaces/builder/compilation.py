@@ -140,8 +140,8 @@ class _Targets:
 def _join_sources(target: _Target, directory: Path) -> list[Path]:
     """Write the files that the compiler is given for a library: one that includes nearly all of its sources.
 
-    The compiler reads the headers of ROS, which take most of its time, once for each file that it is given. Sources that
-    describe types are given to it one by one, as each defines static names that the next one defines again.
+    The compiler reads the headers of ROS, which take most of its time, once for each file that it is given. Sources
+    that describe types are given to it one by one, as each defines static names that the next one defines again.
     """
     joined = [source for source in target.sources if not source.stem.endswith(_DESCRIPTION)]
     if not joined:

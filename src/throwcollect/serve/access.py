@@ -1,7 +1,7 @@
-"""Who may do what: the token, the Host and the Origin of every request and every socket, and how much a body may hold.
+"""Checks of every request and every socket: the token, the headers Host and Origin, and the size of the body.
 
-A page that somebody else serves can neither read nor do anything here: browsers tell whose page asks (Origin), a name
-that was turned to this address is not ours (Host), and there are no cookies.
+The page of another site can neither read nor do anything here: its browser sends its Origin, a foreign name that was
+pointed at this address (DNS rebinding) stands in Host, and there are no cookies that a browser would add.
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ _MOST_BODY = 1_000_000
 """Bytes of a request's body."""
 _TOO_LONG = 413, f"a body may have {_MOST_BODY} bytes"
 MAY_ONLY_LOOK = 403, "this token may only look"
-"""Status and sentence for whoever asks for a change with the token that does not allow any."""
+"""Status and sentence for a request to change something with the token that may only look."""
 _GROUPS = {True: "full", False: "read-only", None: "anybody"}
-"""Who asks, in lines that are written down."""
+"""Names of clients in the log, by what they may do."""
 _PLAIN = "/-_.~{}:@!$&'()*+,;="
 _CODE_S = 600.0
 """Time for which a one-time code can be exchanged."""
@@ -48,11 +48,11 @@ _AUDIT = logging.getLogger("throwcollect.serve")
 
 @dataclass
 class Keys:
-    """What lets somebody in.
+    """The tokens of a server, and one-time codes for the full one.
 
     Attributes:
-        full: Token of those who may do everything.
-        read_only: Token of those who may only look.
+        full: Token of clients that may do everything.
+        read_only: Token of clients that may only look.
     """
 
     full: str = field(default_factory=lambda: secrets.token_urlsafe(32))
@@ -60,14 +60,14 @@ class Keys:
     _codes: dict[str, float] = field(default_factory=dict)
 
     def may_change(self, token: str) -> bool | None:
-        """Whether whoever has a token may change anything; None if nobody has that token."""
+        """Whether the owner of a token may change anything; None if it is no token of this server."""
         given = token.encode()
         full = hmac.compare_digest(given, self.full.encode())
         read_only = hmac.compare_digest(given, self.read_only.encode())
         return full if full or read_only else None
 
     def new_code(self) -> str:
-        """A code that can be exchanged for the full token once, within ten minutes: what an address may hold."""
+        """Make a code for an address: it can be exchanged for the full token once, within ten minutes."""
         now = time.monotonic()
         self._codes = {code: until for code, until in self._codes.items() if until > now}
         code = secrets.token_urlsafe(16)
@@ -75,19 +75,19 @@ class Keys:
         return code
 
     def exchange(self, code: str) -> str | None:
-        """The full token for a code that nobody has exchanged yet; None for any other."""
+        """Take a code, and return the full token for it; None if the code is wrong, used or too old."""
         until = self._codes.pop(code, None)
         return self.full if until is not None and until > time.monotonic() else None
 
 
 class Access:
-    """Lets requests and sockets through to an application that may pass.
+    """Lets only permitted requests and sockets through to an application.
 
     Args:
         app: The application.
-        keys: What lets somebody in.
-        hosts: Values of the header Host that are ours, with ports.
-        origins: Origins of pages that may connect, besides our own.
+        keys: The tokens of the server.
+        hosts: Accepted values of the header Host, with ports.
+        origins: Further origins of pages that may connect.
     """
 
     def __init__(self, app: Any, keys: Keys, hosts: frozenset[str], origins: frozenset[str] = frozenset()) -> None:
@@ -97,7 +97,7 @@ class Access:
         self._origins = origins | {f"{scheme}://{host}" for scheme in ("http", "https") for host in hosts}
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Take a request or a socket, as ASGI has it."""
+        """Handle a request or a socket, as ASGI defines it."""
         if scope["type"] not in ("http", "websocket"):
             await self._app(scope, receive, send)
             return
@@ -118,19 +118,20 @@ class Access:
             await self._app(scope, receive, answer)
 
     def _judge(self, scope: Scope, headers: dict[str, str]) -> tuple[tuple[int, str] | None, bool | None]:
-        """Why somebody is refused, as status and sentence, None if not; and whether they may change anything.
+        """Decide on a request.
 
-        The latter is None if it is not known who it is.
+        Returns:
+            Status and sentence of a refusal, or None; and whether the client may change anything, None if it has shown
+            no token.
         """
-        # Names first: a page of a foreign name that leads to this address must not learn even whether its token is
-        # right.
+        # Host and Origin come first: a foreign page must not even learn whether a token is right.
         if headers.get("host", "") not in self._hosts:
             return (421, "this server is not known by that name"), None
         if "origin" in headers and headers["origin"] not in self._origins:
             return (403, "pages of another origin may not connect"), None
         length = headers.get("content-length", "0")
         too_long = None if length.isdecimal() and int(length) <= _MOST_BODY else _TOO_LONG
-        # The page itself holds no secret: it gets its token by the address that was printed.
+        # The page itself holds no secret: it gets its token by the code in the printed address.
         if scope["type"] == "http" and _is_public(scope["path"]):
             return too_long, None
         may_change = self._keys.may_change(_token(scope, headers))
@@ -142,12 +143,12 @@ class Access:
 
 
 def _is_public(path: str) -> bool:
-    """Whether anybody may have what is at a path: the page and its parts, which hold nothing of a user."""
+    """Whether a path needs no token: health, the exchange of codes, and the page, which has no data of users."""
     return path in ("/api/v1/health", "/api/v1/exchange") or not path.startswith(("/api/", "/openapi.json"))
 
 
 def _token(scope: Scope, headers: dict[str, str]) -> str:
-    """The token that somebody shows; empty if none."""
+    """The token of a request; empty if it has none."""
     scheme, _, given = headers.get("authorization", "").partition(" ")
     if scheme.lower() == "bearer":
         return given.strip()
@@ -156,30 +157,30 @@ def _token(scope: Scope, headers: dict[str, str]) -> str:
     for protocol in scope.get("subprotocols", ()):
         if protocol.startswith(_SUBPROTOCOL):
             return str(protocol).removeprefix(_SUBPROTOCOL)
-    # Clients of rosbridge have no other way to show it.
+    # Clients of rosbridge can set neither headers nor subprotocols.
     return str(parse_qs(scope["query_string"].decode("latin-1")).get("token", [""])[0])
 
 
 class _Body:
-    """Receives a body, and breaks off if that is too long, whatever its header says.
+    """Receives a body, and breaks off as if the client had left when the body is too long, whatever its header says.
 
     Attributes:
-        is_too_long: Whether it has done so.
+        is_too_long: Whether the body was too long.
     """
 
     def __init__(self, receive: Receive) -> None:
         self.is_too_long = False
         self._receive = receive
-        self._left = _MOST_BODY
+        self._allowed = _MOST_BODY
 
     async def receive(self) -> MutableMapping[str, Any]:
         message = await self._receive()
-        self._left -= len(message.get("body", b""))
-        self.is_too_long = self._left < 0
+        self._allowed -= len(message.get("body", b""))
+        self.is_too_long = self._allowed < 0
         return {"type": "http.disconnect"} if self.is_too_long else message
 
     def unless_too_long(self, send: Send) -> Send:
-        """What sends an answer, unless one is to be sent in its place."""
+        """Make a function that drops the application's answer if the body was too long, as a refusal is sent then."""
 
         async def send_some(message: MutableMapping[str, Any]) -> None:
             if not self.is_too_long:
@@ -202,7 +203,7 @@ async def _refuse(scope: Scope, receive: Receive, send: Any, status: int, title:
 
 
 class _Answer:
-    """Sends what an application answers, with the headers that all answers have, and writes down that it did."""
+    """Sends the answer to a request with the headers that all answers have, and writes a line to the log."""
 
     def __init__(self, scope: Scope, send: Send, group: str) -> None:
         self._send = send
@@ -227,6 +228,6 @@ class _Answer:
         if self._is_noted:
             return
         self._is_noted = True
-        # Without what follows the path, which may hold a token; and in one line, whatever is in it.
+        # Without the query, which may hold a token; and quoted, so that no path can forge a second line.
         path = quote(self._scope["path"], safe=_PLAIN)
         _AUDIT.info("%s %s %d %s", self._scope.get("method", "SOCKET"), path, status, self._group)

@@ -30,7 +30,7 @@ from throwcollect.version import __version__
 
 PREFIX = "/api/v1"
 _ALWAYS = (400, 403, 413, 421, 500)
-"""Statuses of problems that any request may be answered with."""
+"""Statuses with which any request may fail."""
 _PAGE = Path(__file__).parent / "page"
 
 
@@ -47,23 +47,10 @@ class Token(BaseModel):
 
 
 def make_app(instances: Instances, models: Models, keys: Keys) -> FastAPI:
-    """The application, to be put behind `access.Access`.
-
-    Args:
-        instances: All runs, and what can be done with them.
-        models: All models.
-        keys: What lets somebody in.
-    """
-
-    @asynccontextmanager
-    async def let_go(_: FastAPI) -> AsyncIterator[None]:
-        letting_go = asyncio.create_task(keep_letting_go())
-        yield
-        letting_go.cancel()
-
+    """Make the application, which belongs behind `access.Access`."""
     app = FastAPI(
         title="throwcollect",
-        lifespan=let_go,
+        lifespan=_let_go_meanwhile,
         version=__version__,
         openapi_url="/openapi.json",
         docs_url=None,
@@ -78,15 +65,26 @@ def make_app(instances: Instances, models: Models, keys: Keys) -> FastAPI:
         make_component_routes(watch), prefix=PREFIX, responses=describe_problems(*_ALWAYS, 401, 404, 422)
     )
     of_runs = describe_problems(*_ALWAYS, 401, 404, 409, 422, 503)
-    app.include_router(make_instance_routes(instances, lookout), prefix=PREFIX, responses=of_runs)
-    app.include_router(make_log_routes(instances), prefix=PREFIX, responses=of_runs)
-    app.include_router(make_dataset_routes(instances), prefix=PREFIX, responses=of_runs)
-    app.include_router(make_description_routes(instances), prefix=PREFIX, responses=of_runs)
-    app.include_router(make_view_routes(instances), prefix=PREFIX, responses=of_runs)
+    for routes in (
+        make_instance_routes(instances, lookout),
+        make_log_routes(instances),
+        make_dataset_routes(instances),
+        make_description_routes(instances),
+        make_view_routes(instances),
+    ):
+        app.include_router(routes, prefix=PREFIX, responses=of_runs)
     app.include_router(make_model_routes(models), prefix=PREFIX, responses=describe_problems(*_ALWAYS, 401, 404, 422))
     app.include_router(make_rosbridge_routes(instances, Bridges()))
     app.mount("/", StaticFiles(directory=_PAGE, html=True))
     return app
+
+
+@asynccontextmanager
+async def _let_go_meanwhile(_: FastAPI) -> AsyncIterator[None]:
+    """Let go of simulations that nobody watches any more, as long as the application lives."""
+    letting_go = asyncio.create_task(keep_letting_go())
+    yield
+    letting_go.cancel()
 
 
 def _public(keys: Keys) -> APIRouter:
@@ -124,12 +122,12 @@ def _general(watch: StateWatch, keys: Keys) -> APIRouter:
     @router.websocket("/state")
     async def states(socket: WebSocket) -> None:
         await socket.accept()
-
-        async def tell() -> None:
-            async with aclosing(watch.states()) as found:  # type: ignore[type-var]
-                async for text in found:
-                    await socket.send_text(text.decode())
-
-        await keep_telling(socket, tell)
+        await keep_telling(socket, _send_states(socket, watch))
 
     return router
+
+
+async def _send_states(socket: WebSocket, watch: StateWatch) -> None:
+    async with aclosing(watch.states()) as states:  # type: ignore[type-var]
+        async for text in states:
+            await socket.send_text(text.decode())

@@ -1,4 +1,4 @@
-"""One bridge for each run that somebody is connected to by rosbridge, as long as anybody is."""
+"""Bridges of rosbridge: one for each run that clients are connected to, as long as there is a client."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class _Shared:
 
 
 class Bridges:
-    """Counts the clients of each bridge."""
+    """Makes the bridge of a run for its first client, and closes it after its last."""
 
     def __init__(self) -> None:
         self._shared: dict[str, _Shared] = {}
@@ -33,11 +33,8 @@ class Bridges:
     async def bridge(self, run: Run) -> AsyncIterator[Bridge]:
         """The bridge of a run, for one more client.
 
-        Args:
-            run: The run.
-
         Raises:
-            ConflictError: If as many clients as there may be are connected, to all runs together.
+            ConflictError: If there are as many clients, of all runs together, as there may be.
         """
         if sum(each.clients for each in self._shared.values()) >= _MOST_CLIENTS:
             raise ConflictError(f"{_MOST_CLIENTS} clients are connected by rosbridge, as many as there may be")
@@ -57,12 +54,12 @@ class Bridges:
 
 
 async def _follow(run: Run, bridge: Bridge) -> None:
-    """Tell a bridge where the router of its run is, whenever that changes."""
+    """Tell a bridge the way to the router of its run, whenever that changes."""
     known = run.connection
     while True:
         await asyncio.sleep(_LOOK_S)
         connection: Connection | None = None
-        # A run that was forgotten has no router either.
+        # A forgotten run has no router.
         with suppress(ThrowcollectError):
             connection = (await asyncio.to_thread(run.now)).connection
         if connection != known:

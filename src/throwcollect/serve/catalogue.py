@@ -1,4 +1,4 @@
-"""The catalogue of components: what clients may have instances of, as the operator's YAML file says."""
+"""The catalogue of components that clients may have instances of, from the operator's YAML file."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 from pydantic import AfterValidator, Field, PositiveFloat, PositiveInt, ValidationError, model_validator
 
@@ -24,15 +24,15 @@ from throwcollect.config.containers import (
 from throwcollect.config.document import Document
 from throwcollect.config.kinds import ContradictionError
 from throwcollect.config.loader import load
-from throwcollect.config.problems import Finding, findings
+from throwcollect.config.problems import findings
 from throwcollect.config.section import Section
 from throwcollect.config.shape import Shape
-from throwcollect.errors import ConfigError, NotFoundError
+from throwcollect.errors import ConfigError, NotFoundError, Problem
 from throwcollect.robots.appearance import read_urdf
 from throwcollect.runs.record import Kind
 
 NAME = r"[a-z0-9][a-z0-9_-]{0,62}"
-"""What names of components and ids of instances look like: words that files, URLs and containers can be named with."""
+"""Names of components and ids of instances, which become names of files and containers, and parts of URLs."""
 
 
 def _name(text: str) -> str:
@@ -47,7 +47,7 @@ Name = Annotated[str, AfterValidator(_name)]
 class ComponentSection(Section):
     """One component; exactly one of `config`, `session` and `image` says what its instances are.
 
-    What is below `image` is for components that have one alone.
+    The fields below `image` are only for components that have an image.
     """
 
     pretty_name: str | None = None
@@ -102,15 +102,15 @@ class CatalogueFile(Section):
 
 @dataclass(frozen=True)
 class Component:
-    """What clients may have instances of.
+    """Something that clients may have instances of.
 
     Attributes:
         name: Its name.
-        pretty_name: What people are shown.
+        pretty_name: The name that people see.
         kind: Whether its instances collect datasets, have simulations for clients alone, or are containers.
-        source: The configuration's file, or what a container is made from.
+        source: File of the configuration; of a container, what it is made from.
         max_instances: How many instances may live at once.
-        urdf: File of a description of the robot that viewers are told; None for that of the configuration, if any.
+        urdf: File of the robot's description for viewers of a container; None if it has none.
     """
 
     name: str
@@ -142,7 +142,7 @@ class Catalogue:
 
     @classmethod
     def find(cls, path: Path) -> Catalogue:
-        """Read a catalogue if there is one; else runs can be looked at, and none can be begun.
+        """Read a catalogue if the file exists; otherwise the catalogue is empty, so that no run can be begun.
 
         Raises:
             ConfigError: As `read`.
@@ -157,35 +157,29 @@ class Catalogue:
             path: YAML file with the key ``components``, or a configuration.
 
         Raises:
-            ConfigError: If it cannot be read or anything in it is wrong, or in a configuration that it names.
+            ConfigError: If the file, or one that it names, cannot be read or has errors.
         """
         document = Document(path)
         if "components" not in document.values:
             config = load(path)
             return cls({config.name: Component(config.name, config.name, "collection", path.absolute(), 1)})
         try:
-            found = CatalogueFile.model_validate(document.values, strict=True)
+            sections = CatalogueFile.model_validate(document.values, strict=True).components
         except ValidationError as error:
-            problems = [document.problem(each.location, each.sentence) for each in _find(error, document)]
-            raise ConfigError([*document.problems, *problems]) from error
+            raise ConfigError([*document.problems, *_find_problems(error, document)]) from error
         if document.problems:
             raise ConfigError(document.problems)
-        components = {}
-        for name, section in found.components.items():
-            kind, source, urdf = _read_source(section, name, document, path.absolute().parent)
-            pretty_name = section.pretty_name or name
-            components[name] = Component(name, pretty_name, kind, source, section.max_instances, urdf)
-        return cls(components)
+        directory = path.absolute().parent
+        return cls({name: _read_component(name, section, document, directory) for name, section in sections.items()})
 
 
-def _read_source(
-    section: ComponentSection, name: str, document: Document, directory: Path
-) -> tuple[Kind, Path | ContainerSpec, Path | None]:
-    """Kind of a component, what its instances are made from, and the file of its description.
+def _read_component(name: str, section: ComponentSection, document: Document, directory: Path) -> Component:
+    """Make a component from its section, and read the file that the section names.
 
     Raises:
-        ConfigError: If a file that it names has errors.
+        ConfigError: If that file has errors.
     """
+    pretty_name = section.pretty_name or name
     if section.image is not None:
         urdf = None if section.urdf is None else directory / section.urdf
         if urdf is not None:
@@ -195,19 +189,21 @@ def _read_source(
                 raise ConfigError([document.problem(("components", name, "urdf"), error.message)]) from error
         general = section.model_dump(include={"environment", "networks", "ports", "cpus", "memory", "options"})
         node = NodeContainerConfig(**general, mounts=section.volumes)
-        command = None if section.command is None else tuple(section.command)
-        return "container", ContainerSpec(section.image, command, node), urdf
-    key: Literal["config", "session"] = "config" if section.session is None else "session"
-    named = directory / (section.config or section.session or "")
+        source = ContainerSpec(section.image, None if section.command is None else tuple(section.command), node)
+        return Component(name, pretty_name, "container", source, section.max_instances, urdf)
+    config = directory / (section.config or section.session or "")
     try:
-        load(named)
+        load(config)
     except ConfigError as error:
+        key = "config" if section.session is None else "session"
         problem = document.problem(("components", name, key), "names a file with errors")
         raise ConfigError([problem, *error.problems], hint=error.hint) from error
-    return "collection" if key == "config" else "session", named, None
+    kind: Kind = "collection" if section.session is None else "session"
+    return Component(name, pretty_name, kind, config, section.max_instances)
 
 
-def _find(error: ValidationError, document: Document) -> list[Finding]:
-    """What is wrong in a catalogue."""
+def _find_problems(error: ValidationError, document: Document) -> list[Problem]:
+    """Errors of a catalogue, with their lines."""
     components = {"type": "object", "additionalProperties": ComponentSection.model_json_schema()}
-    return findings(error, document.values, shape=Shape({"type": "object", "properties": {"components": components}}))
+    shape = Shape({"type": "object", "properties": {"components": components}})
+    return [document.problem(each.location, each.sentence) for each in findings(error, document.values, shape=shape)]

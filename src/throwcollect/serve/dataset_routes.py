@@ -1,4 +1,4 @@
-"""REST on collections: what they have collected, to be downloaded, and gone on with."""
+"""REST on collections: to download their datasets, and to resume them."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ from throwcollect.sweep.parquet_file import read_parquet
 
 _PIECE_BYTES = 1 << 20
 _OWN_FILES = {CARD, PROVENANCE}
-"""Files that no manifest covers, as they say how and when a dataset was collected."""
+"""Files that the manifest leaves out, because they differ between two collections of the same dataset."""
 _LANDING = ("landing_x_m", "landing_y_m", "outcome", "trial")
 _MOST_LANDINGS = 20_000
 _JOURNAL_BYTES = 4_000_000
-"""Bounds of one answer; so long a part of a journal is of some 15,000 throws."""
+"""Bounds of one answer; this much of a journal has about 15,000 throws."""
 _MOST_FIRST = 2**53
 
 
@@ -62,11 +62,7 @@ class Landings(BaseModel):
 
 
 def make_dataset_routes(instances: Instances) -> APIRouter:
-    """Routes on collections.
-
-    Args:
-        instances: All runs.
-    """
+    """Make the routes on collections."""
     router = APIRouter(prefix="/collections/{instance}")
 
     @router.post("/resume", status_code=202)
@@ -90,7 +86,7 @@ def make_dataset_routes(instances: Instances) -> APIRouter:
         """A finished dataset as one file."""
         directory = _find_finished(instances, instance)
         for path in _list_names(directory):
-            # Once bytes are on their way, there is no answer any more that could say what is wrong.
+            # Check every file first: once the first bytes are sent, the answer cannot become an error any more.
             size_of_file(directory / path)
         name = f'attachment; filename="{instance}.tar"'
         return StreamingResponse(
@@ -134,8 +130,8 @@ def _find_file(directory: Path, path: str) -> Path:
     """A file of a dataset.
 
     Raises:
-        NotFoundError: If the dataset has none of that name.
-        DatasetError: If that name leads elsewhere.
+        NotFoundError: If the dataset has no file of that name.
+        DatasetError: If the file is a link, or no regular file.
     """
     if path not in _list_names(directory) or not (directory / path).exists():
         raise NotFoundError(f"{directory}: the dataset has no file {path!r}")
@@ -144,7 +140,7 @@ def _find_file(directory: Path, path: str) -> Path:
 
 
 def _is_finished(directory: Path) -> bool:
-    # A run that goes on with it is one of its own.
+    # Another run may go on with the dataset in this directory.
     grows = any(each.status == "running" and each.place.directory == directory for each in Records().all())
     return not grows and (directory / MANIFEST).is_file()
 
@@ -153,8 +149,8 @@ def _find_finished(instances: Instances, instance: str) -> Path:
     """Directory of the finished dataset of a run.
 
     Raises:
-        NotFoundError: If the run does not exist, or has none.
-        ConflictError: If it is not finished.
+        NotFoundError: If the run does not exist, or has no dataset.
+        ConflictError: If the dataset is not finished.
     """
     run = _get_collection(instances, instance)
     directory = run.place.directory
@@ -172,7 +168,7 @@ def _list_names(directory: Path) -> list[str]:
 
 
 def _read_landings(directory: Path) -> Landings:
-    """Landings of a finished dataset."""
+    """Read the landings of a finished dataset."""
     table = read_parquet(directory / THROWS)
     if not set(_LANDING) <= set(table.column_names):
         return Landings(landings=[], total=0, following=0, is_finished=True, has_more=False)
@@ -183,13 +179,13 @@ def _read_landings(directory: Path) -> Landings:
 
 
 def _read_landings_so_far(directory: Path, first: int) -> Landings:
-    """Landings of a dataset that grows, from a byte of its journal on."""
+    """Read the landings of a dataset that grows, from a byte of its journal on."""
     rows, following, has_more = read_commits(directory / JOURNAL, _LANDING, first=first, most_bytes=_JOURNAL_BYTES)
     return Landings(landings=rows, total=len(rows), following=following, is_finished=False, has_more=has_more)
 
 
 def _archive(directory: Path, name: str) -> Iterator[bytes]:
-    """The bytes of a tar archive of a dataset; equal datasets give equal archives."""
+    """Write a tar archive of a dataset piece by piece; equal files give equal archives."""
     for path in _list_names(directory):
         with open(open_regular(directory / path), "rb") as file:
             entry = tarfile.TarInfo(f"{name}/{path}")
@@ -197,9 +193,9 @@ def _archive(directory: Path, name: str) -> Iterator[bytes]:
             entry.mode = 0o644
             file.seek(0)
             yield entry.tobuf(tarfile.PAX_FORMAT)
-            left = entry.size
-            while piece := file.read(min(left, _PIECE_BYTES)):
-                left -= len(piece)
+            rest = entry.size
+            while piece := file.read(min(rest, _PIECE_BYTES)):
+                rest -= len(piece)
                 yield piece
             yield bytes(-entry.size % tarfile.BLOCKSIZE)
     yield bytes(2 * tarfile.BLOCKSIZE)

@@ -1,4 +1,4 @@
-"""How programs of the same user find the server that lives, start one in the background, and get an address to open."""
+"""Find the server of this user, start one in the background, and get an address of its page."""
 
 from __future__ import annotations
 
@@ -35,14 +35,14 @@ _POLL_S = 0.05
 
 @dataclass(frozen=True)
 class Address:
-    """Where somebody serves, for programs of the same user.
+    """How programs of the same user reach a server.
 
     Attributes:
-        url: Where, without a path.
-        token: Lets its owner do everything.
-        read_only_token: Lets its owner look.
-        pid: Process id.
-        certificate: Path of the certificate that it shows; None if it speaks in the clear.
+        url: Scheme, host and port.
+        token: Token that may do everything.
+        read_only_token: Token that may only look.
+        pid: Process id of the server.
+        certificate: Path of the server's certificate; None if it has no TLS.
     """
 
     url: str
@@ -52,7 +52,7 @@ class Address:
     certificate: str | None = None
 
     def page(self, code: str, run: str | None = None) -> str:
-        """The address of the page, with a one-time code in the part that is never sent.
+        """Address of the page, with a one-time code in the fragment, which browsers send to nobody.
 
         Args:
             code: The code.
@@ -63,16 +63,13 @@ class Address:
 
 @contextmanager
 def publish(address: Address) -> Iterator[None]:
-    """Have programs of this user find this process, as long as the block lasts.
+    """Let programs of this user find this server as long as the block lasts.
 
-    If another server is to be found already, this one is as soon as that has ended.
-
-    Args:
-        address: Where this process serves.
+    If there is another server already, programs find this one after the other has ended.
 
     Raises:
-        DatasetError: If the file cannot be written.
-        WorkerError: If its lock cannot be had.
+        DatasetError: If the file with the address cannot be written.
+        WorkerError: If the lock of that file cannot be opened.
         ConfigError: If runs cannot be remembered.
     """
     path = _path()
@@ -88,14 +85,14 @@ def publish(address: Address) -> Iterator[None]:
             if has_left.is_set():
                 os.close(lock)
                 return
-            # The disk may be full by now; this server can do without.
+            # The disk may be full by now; this server works without the file.
             with suppress(DatasetError):
                 write_secret(path, _ADDRESS.dump_json(address))
 
     try:
         fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
-        # The lock goes with the process that has it, however that ends.
+        # The other server holds the lock until it ends, however it ends.
         threading.Thread(target=wait, name="next to be found", daemon=True).start()
     else:
         write_secret(path, _ADDRESS.dump_json(address))
@@ -110,7 +107,7 @@ def publish(address: Address) -> Iterator[None]:
 
 
 def log_path() -> Path:
-    """File of what a server prints that was started in the background.
+    """Log of a server that was started in the background.
 
     Raises:
         ConfigError: If runs cannot be remembered.
@@ -119,14 +116,14 @@ def log_path() -> Path:
 
 
 def find_server() -> Address | None:
-    """Where somebody of this user serves by now; None if nobody answers.
+    """Find the server of this user; returns None if none answers.
 
     Raises:
         ConfigError: If runs cannot be remembered.
     """
     address = _read()
-    # Nobody else's process, which may have got its port or its pid since, has the lock.
-    if address is None or not _is_locked():
+    # Another process may have the port or the pid of a server that was killed, but it does not hold the lock.
+    if address is None or not is_locked(_path().with_name(_LOCK)):
         return None
     try:
         _ask(address, "GET", "/api/v1/health")
@@ -136,10 +133,10 @@ def find_server() -> Address | None:
 
 
 def ensure_server() -> Address:
-    """Where somebody of this user serves; if nobody does, a server is started, which outlives this process.
+    """Find the server of this user; if there is none, start one, which outlives this process.
 
     Raises:
-        WorkerError: If it does not start.
+        WorkerError: If no server starts.
         ConfigError: If runs cannot be remembered.
     """
     if (address := find_server()) is not None:
@@ -147,7 +144,7 @@ def ensure_server() -> Address:
     log = log_path()
     words = [sys.executable, "-m", "throwcollect", "serve", "--json"]
     with open(open_log(log), "ab") as output:
-        # What it prints has a code, and others may be allowed to read the log.
+        # Standard output has a one-time code, and the user may have allowed others to read the log.
         process = subprocess.Popen(
             words, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=output, start_new_session=True
         )
@@ -155,22 +152,22 @@ def ensure_server() -> Address:
     while time.monotonic() < deadline and process.poll() is None:
         if (address := find_server()) is not None:
             if address.pid != process.pid:
-                # Somebody else was faster.
+                # Another process has started a server at the same time, and was faster.
                 process.terminate()
             return address
         time.sleep(_POLL_S)
     process.terminate()
-    said = ""
+    last_lines = ""
     with suppress(OSError):
-        said = "\n".join(log.read_text(errors="replace").splitlines()[-5:])
-    raise WorkerError("no server starts", evidence=said or None, hint="throwcollect serve tells more")
+        last_lines = "\n".join(log.read_text(errors="replace").splitlines()[-5:])
+    raise WorkerError("no server starts", evidence=last_lines or None, hint="throwcollect serve tells more")
 
 
 def make_page_address(address: Address, run: str | None = None) -> str:
-    """An address of the page that can be opened once, within ten minutes.
+    """Make an address of the page that can be opened once, within ten minutes.
 
     Args:
-        address: Where somebody serves.
+        address: Address of the server.
         run: Id of the run that the page is to show; None for all.
 
     Raises:
@@ -188,10 +185,9 @@ def _ask(address: Address, method: str, path: str) -> dict[str, str]:
     if address.certificate is None:
         connection = http.client.HTTPConnection(host, port, timeout=_ANSWER_S)
     else:
-        # It is the very certificate that is expected, whatever names it was made for.
+        # Only this very certificate is accepted, so its names and who has signed it do not matter.
         context = ssl.create_default_context(cafile=address.certificate)
         context.check_hostname = False
-        # Whoever has signed it need not be known here.
         context.verify_flags |= ssl.VERIFY_X509_PARTIAL_CHAIN
         connection = http.client.HTTPSConnection(host, port, timeout=_ANSWER_S, context=context)
     with closing(connection):
@@ -208,11 +204,6 @@ _ADDRESS = TypeAdapter(Address)
 
 def _path() -> Path:
     return state_directory() / _FILE
-
-
-def _is_locked() -> bool:
-    """Whether a server lives that is to be found."""
-    return is_locked(_path().with_name(_LOCK))
 
 
 def _read() -> Address | None:

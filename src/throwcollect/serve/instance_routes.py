@@ -37,13 +37,13 @@ class Wish(BaseModel):
     @field_validator("component", "set", "joins")
     @classmethod
     def _is_text(cls, value: JsonValue) -> JsonValue:
-        # JSON has escapes of halves of characters, which no file can hold.
+        # JSON can escape half a character (a lone surrogate), which no file can hold.
         json.dumps(value, ensure_ascii=False).encode()
         return value
 
     @property
     def origin(self) -> Origin:
-        """What the run remembers of it."""
+        """The request as the record of the run holds it."""
         return Origin(self.component, self.simulations, self.set, self.joins)
 
 
@@ -56,11 +56,7 @@ class Scaling(BaseModel):
 
 
 def make_component_routes(watch: StateWatch) -> APIRouter:
-    """Routes on components.
-
-    Args:
-        watch: Looks at the state.
-    """
+    """Make the routes on components."""
     router = APIRouter(prefix="/components")
 
     @router.get("")
@@ -71,19 +67,15 @@ def make_component_routes(watch: StateWatch) -> APIRouter:
     @router.get("/{name}", response_model=ComponentState)
     async def component(name: str) -> Any:
         """A component."""
-        found = [each for each in (await watch.current()).components if each.name == name]
-        return found[0] if found else problem(404, f"no component {name!r}")
+        components = (await watch.current()).components
+        found = next((each for each in components if each.name == name), None)
+        return found or problem(404, f"no component {name!r}")
 
     return router
 
 
 def make_instance_routes(instances: Instances, lookout: Lookout) -> APIRouter:
-    """Routes on instances.
-
-    Args:
-        instances: All runs, and what can be done with them.
-        lookout: Looks at everything.
-    """
+    """Make the routes on instances."""
     router = APIRouter(prefix="/instances")
 
     @router.get("")
@@ -133,17 +125,13 @@ def make_instance_routes(instances: Instances, lookout: Lookout) -> APIRouter:
 
 
 def make_log_routes(instances: Instances) -> APIRouter:
-    """Routes on what nodes have printed, and what has happened.
-
-    Args:
-        instances: All runs.
-    """
+    """Make the routes on logs of nodes and events of runs."""
     router = APIRouter(prefix="/instances")
 
     @router.get("/{instance}/log/{node}", response_class=PlainTextResponse)
     def log(instance: str, node: str, tail: Annotated[int, Query(ge=1, le=10_000)] = 200) -> Any:
         """The last lines of what a node has printed."""
-        # Only what lies there is offered, so no name leads out of the directory.
+        # The name is looked up among the files of the directory, so it cannot lead out of it.
         files = NodeLogs(Path(instances.get(instance).record.logs)).files()
         try:
             with open(open_log(files[node], os.O_RDONLY), encoding="utf-8", errors="replace") as file:
@@ -157,7 +145,7 @@ def make_log_routes(instances: Instances) -> APIRouter:
         """What has happened in a run, one event in JSON a line."""
         path = Path(instances.get(instance).record.logs) / EVENTS
         text = b""
-        # There are none before the first.
+        # The file does not exist before the first event.
         with suppress(OSError), open(open_log(path, os.O_RDONLY), "rb") as file:
             text = file.read()
         return Response(text, media_type="application/x-ndjson")

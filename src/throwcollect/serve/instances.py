@@ -14,6 +14,7 @@ from pathlib import Path
 from pydantic import JsonValue
 
 from throwcollect.config.containers import ContainerSpec
+from throwcollect.config.loader import load
 from throwcollect.dataset.directory import config_path
 from throwcollect.errors import ConfigError, ConflictError, NotFoundError, Problem, WorkerError
 from throwcollect.robots.appearance import check_appearance
@@ -25,23 +26,23 @@ from throwcollect.runs.records import Records, Run
 from throwcollect.runs.selection import require_living
 from throwcollect.runs.state_directory import state_directory
 from throwcollect.serve.catalogue import NAME, Catalogue, Component
-from throwcollect.serve.live import find_node
+from throwcollect.serve.live import name_node
 from throwcollect.serve.robot_files import description_of
 from throwcollect.serve.state import simulations_of
 
 _KEPT = ("run", "containers", "cluster", "sweep.file")
-"""Keys of a configuration that are the operator's alone: what they name is of this machine."""
+"""Keys of a configuration that only the operator sets, because they name files and resources of this machine."""
 _KEY = r"[A-Za-z0-9_-]+(\.[A-Za-z0-9_-]+)*"
 _LOCK = "instances.lock"
 
 
 @dataclass(frozen=True)
 class Instances:
-    """All runs of this machine, and what can be done with them; nothing of it is kept here.
+    """All runs of this machine, and what clients can do with them; records on disk are the only state.
 
     Attributes:
-        catalogue: What there may be instances of.
-        datasets: Directory in which the datasets of instances are made, each in one of its id.
+        catalogue: Components that clients may have instances of.
+        datasets: Directory of the datasets of instances, each in a directory named by the id.
     """
 
     catalogue: Catalogue
@@ -54,7 +55,7 @@ class Instances:
             NotFoundError: If there is none.
             ConflictError: If its record cannot be read.
         """
-        # Ids name files.
+        # Ids become names of files.
         if not re.fullmatch(r"(?!\.)[A-Za-z0-9_.-]{1,80}", instance):
             raise NotFoundError(f"no run {instance!r}", expected="at most 80 of letters, digits, -, _ and .")
         try:
@@ -65,11 +66,11 @@ class Instances:
             raise ConflictError(error.problems, hint=error.hint) from error
 
     def put(self, instance: str, origin: Origin) -> tuple[Run, bool]:
-        """Begin an instance, unless it has been begun by the same request already.
+        """Begin an instance, unless the same request has begun it already.
 
         Args:
-            instance: Its id.
-            origin: What is asked for.
+            instance: Id of the instance.
+            origin: The client's request.
 
         Returns:
             The run, and whether it is new.
@@ -77,8 +78,8 @@ class Instances:
         Raises:
             NotFoundError: If there is no such component.
             ConflictError: If there is another run of that id, or as many instances live as may, or a container cannot
-                join the run that it is to join.
-            ConfigError: If the configuration cannot be used, or something is asked for that such a component has not.
+                join the run that the request names.
+            ConfigError: If the configuration cannot be used, or the request does not fit such a component.
             WorkerError: If it cannot be begun.
         """
         component = self.catalogue.get(origin.component)
@@ -87,15 +88,12 @@ class Instances:
         _check_wish(origin, component)
         overrides = _overrides(origin)
         with _one_at_a_time():
-            try:
-                found = self.get(instance)
-            except NotFoundError:
-                pass
-            else:
-                if found.record.origin == origin:
-                    return found, False
+            with suppress(NotFoundError):
+                run = self.get(instance)
+                if run.record.origin == origin:
+                    return run, False
                 raise ConflictError(f"there is an instance {instance} already, of another request")
-            self._check_room(component)
+            _check_room(component)
             if isinstance(component.source, ContainerSpec):
                 order = ContainerOrder(component.name, component.source, origin.joins)
                 return begin_container(order, run=instance, origin=origin, urdf=component.urdf), True
@@ -127,26 +125,13 @@ class Instances:
             if run.record.kind != "collection" or run.record.volume is not None or not config.is_file():
                 raise ConflictError(f"run {run.id} has no dataset in a directory to go on with")
             if origin is not None and origin.component in self.catalogue.components:
-                self._check_room(self.catalogue.get(origin.component))
+                _check_room(self.catalogue.get(origin.component))
             return begin_run(config, overrides=(), output=run.place.directory, origin=origin, resumed=True)
 
-    def _check_room(self, component: Component) -> None:
-        """Refuse one more instance, if as many live as may.
-
-        Raises:
-            ConflictError: If so.
-        """
-        living = [run for run in Records().all() if _is_instance(run, component.name) and run.status == "running"]
-        if len(living) >= component.max_instances:
-            raise ConflictError(
-                f"component {component.name}: {len(living)} instances live, as many as max_instances allows",
-                hint=f"stop one of {', '.join(run.id for run in living)}",
-            )
-
     def stop(self, instance: str, *, force: bool = False) -> None:
-        """Have an instance drain and end, without waiting for that; by force, at once, and forget it.
+        """Ask an instance to finish its running trials and end; by force, end it at once, and forget it.
 
-        Whoever asks once more does not hurry it.
+        To ask once more does not hurry it.
 
         Raises:
             NotFoundError: If there is no such run.
@@ -160,14 +145,14 @@ class Instances:
             control.stop(run, keep_on=lambda: False)
 
     def stop_all(self) -> list[str]:
-        """Have all runs that clients have begun and that live drain and end; returns their ids.
+        """Ask all living runs that clients have begun to finish their running trials and end; returns their ids.
 
         Raises:
-            WorkerError: If one of them cannot be told.
+            WorkerError: If the launcher of one of them died, or does not answer.
         """
         living = [run.id for run in Records().all() if run.record.origin is not None and run.status == "running"]
         for run in living:
-            # One may have ended just now.
+            # A run may have ended since its record was read.
             with suppress(ConflictError):
                 self.stop(run)
         return living
@@ -187,16 +172,16 @@ class Instances:
         return run.now()
 
     def show(self, instance: str, urdf: str | None) -> None:
-        """Have viewers of all simulations of an instance draw another description, or that of its configuration again.
+        """Set the description of the robot that viewers of an instance draw.
 
         Args:
-            instance: Its id.
-            urdf: URDF text, which may differ in what is seen; None for that of the configuration.
+            instance: Id of the instance.
+            urdf: URDF text, which may differ in what is seen; None for the description of the configuration.
 
         Raises:
             NotFoundError: If there is no such run.
             ConflictError: If it has ended or has no simulation that runs, or more than what is seen differs.
-            ConfigError: If it is no URDF.
+            ConfigError: If the text is no URDF.
             WorkerError: If a simulation does not answer.
         """
         run = self.get(instance)
@@ -205,7 +190,8 @@ class Instances:
         if urdf is not None:
             check_appearance(own, urdf)
         record = require_living(run)
-        nodes = [find_node(run, name) for name in simulations_of(record)]
+        config = load(config_path(run.place.directory))
+        nodes = [name_node(config, name) for name in simulations_of(record)]
         if not nodes:
             raise ConflictError(f"run {run.id}: no simulation runs")
         for result in control.set_parameter(run, nodes, "robot_description", urdf or own):
@@ -214,20 +200,20 @@ class Instances:
 
 
 def _check_simulations(run: Run) -> None:
-    """Refuse a run that is a container of the catalogue.
+    """Refuse a run that is a container of the catalogue, as it has no simulations.
 
     Raises:
-        ConflictError: If it is one.
+        ConflictError: If the run is one.
     """
     if run.record.kind == "container":
         raise ConflictError(f"run {run.id}: is a container, and has no simulations")
 
 
 def _check_wish(origin: Origin, component: Component) -> None:
-    """Refuse what an instance of a component cannot have.
+    """Refuse a request for something that an instance of the component cannot have.
 
     Raises:
-        ConfigError: If it is asked for.
+        ConfigError: If the request is such a one.
     """
     problems = []
     if component.kind != "container" and origin.joins is not None:
@@ -240,13 +226,24 @@ def _check_wish(origin: Origin, component: Component) -> None:
         raise ConfigError(problems)
 
 
-def _is_instance(run: Run, component: str) -> bool:
-    return run.record.origin is not None and run.record.origin.component == component
+def _check_room(component: Component) -> None:
+    """Refuse one more instance if as many live as may.
+
+    Raises:
+        ConflictError: If so.
+    """
+    runs = (run for run in Records().all() if run.record.origin and run.record.origin.component == component.name)
+    living = [run.id for run in runs if run.status == "running"]
+    if len(living) >= component.max_instances:
+        raise ConflictError(
+            f"component {component.name}: {len(living)} instances live, as many as max_instances allows",
+            hint=f"stop one of {', '.join(living)}",
+        )
 
 
 @contextmanager
 def _one_at_a_time() -> Iterator[None]:
-    """Keep all others who begin instances waiting, so that nobody begins one too many; servers may be several.
+    """Hold a lock of the machine, so that several requests or servers together do not begin one instance too many.
 
     Raises:
         ConfigError: If runs cannot be remembered.
@@ -265,10 +262,10 @@ def _one_at_a_time() -> Iterator[None]:
 
 
 def _overrides(origin: Origin) -> list[str]:
-    """What replaces keys of the component's configuration, as ``--set`` takes it.
+    """Write the keys that a request sets as ``--set`` takes them.
 
     Raises:
-        ConfigError: If a key is the operator's alone.
+        ConfigError: If only the operator sets one of them.
     """
     problems = [
         *(
@@ -292,7 +289,7 @@ def _overrides(origin: Origin) -> list[str]:
 
 
 def _sets(key: str, value: JsonValue, kept: str) -> bool:
-    """Whether a change of a key changes another one, too: that itself, one below it, or one in what it is set to."""
+    """Whether setting a key to a value also sets another key: the same, one above it, or one inside the value."""
     if key == kept or key.startswith(f"{kept}."):
         return True
     first, _, rest = kept.partition(".")

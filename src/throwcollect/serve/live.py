@@ -1,7 +1,7 @@
 """Simulations that are slowed down to real time as long as somebody watches them live.
 
-Whoever watches one shares the lock of a file beside the key of its run. The lock goes with its process, so any server
-sees at the file which simulations nobody watches any more, be it that the watchers' server was killed.
+Each watcher shares the lock of a file beside the key of the run. The lock ends with the server that holds it, so any
+server sees at the file which simulations nobody watches any more, even if the watchers' server was killed.
 """
 
 from __future__ import annotations
@@ -11,14 +11,15 @@ import fcntl
 import os
 from contextlib import suppress
 from dataclasses import dataclass
-from functools import lru_cache
 from pathlib import Path
 
 from throwcollect.config.loader import load
+from throwcollect.config.schema import Config
 from throwcollect.dataset.directory import config_path
 from throwcollect.errors import ConfigError, NotFoundError, ThrowcollectError, WorkerError
 from throwcollect.runs.control import set_parameter
 from throwcollect.runs.records import Records, Run
+from throwcollect.serve.state import simulations_of
 
 _PARAMETER = "sim.real_time_factor"
 _REAL_TIME, _FULL_SPEED = 1.0, 0.0
@@ -41,21 +42,35 @@ class Hold:
     lock: int
 
     def let_go(self) -> None:
-        """Leave; the last one gives the simulation the speed back that its configuration asks for."""
-        _leave(self.run, self.simulation, self.lock)
+        """Watch no longer; after its last watcher, the simulation gets the speed of its configuration again."""
+        try:
+            fcntl.flock(self.lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            # Somebody else still watches it.
+            return
+        else:
+            try:
+                run = self.run.now()
+                if _runs(run, self.simulation):
+                    _set_speed(run, self.simulation, None)
+            except ConfigError:
+                # The run was forgotten, so nothing of it can be slow.
+                pass
+            except WorkerError:
+                # The simulation may be busy: the file stays, so that `let_go_of_left` tries again.
+                return
+            _note(self.run, self.simulation).unlink(missing_ok=True)
+        finally:
+            os.close(self.lock)
 
 
 def take(run: Run, simulation: str) -> Hold:
     """Slow a simulation down to real time.
 
-    Args:
-        run: The run.
-        simulation: Name of the simulation.
-
     Raises:
-        NotFoundError: If the run has no such simulation that runs.
-        WorkerError: If that does not answer, or does not do so.
-        ConfigError: If the run's key cannot be read.
+        NotFoundError: If the run has no such simulation, or it does not run.
+        WorkerError: If the simulation does not answer, or refuses.
+        ConfigError: If the configuration or the key of the run cannot be read.
     """
     if not _runs(run, simulation):
         raise NotFoundError(f"run {run.id}: no simulation {simulation!r} runs")
@@ -66,14 +81,14 @@ def take(run: Run, simulation: str) -> Hold:
     try:
         _set_speed(run, simulation, _REAL_TIME)
     except ThrowcollectError:
-        # It may do so yet; the file says that somebody has to let go of it.
+        # The simulation may slow down after all; because of the file, `let_go_of_left` gives it its speed back.
         os.close(lock)
         raise
     return Hold(run, simulation, lock)
 
 
 async def keep_letting_go() -> None:
-    """Let go again and again of simulations that nobody watches any more, as when a server was killed."""
+    """Let go every few seconds of simulations whose watchers' server was killed, or which did not answer."""
     while True:
         await asyncio.to_thread(let_go_of_left)
         await asyncio.sleep(_SWEEP_S)
@@ -81,20 +96,21 @@ async def keep_letting_go() -> None:
 
 def let_go_of_left() -> None:
     """Let go of simulations that nobody watches any more."""
-    # Where records cannot be read for a while, the next attempt may find what is left.
+    # If records cannot be read for a while, the next attempt finds the same files.
     with suppress(ThrowcollectError, OSError):
         for run in Records().all():
             for note in sorted(_note(run, "").glob("*")) if run.status == "running" else ():
                 with suppress(FileNotFoundError):
-                    _leave(run, note.name, os.open(note, os.O_RDWR))
+                    Hold(run, note.name, os.open(note, os.O_RDWR)).let_go()
 
 
 def _note(run: Run, simulation: str) -> Path:
+    """File whose lock the watchers of a simulation share."""
     return run.key.directory.parent / _DIRECTORY / simulation
 
 
 def _share(path: Path) -> int:
-    """Descriptor of a file whose lock is shared."""
+    """Descriptor of a file whose lock this process shares from now on."""
     path.parent.mkdir(exist_ok=True)
     while True:
         lock = os.open(path, os.O_RDWR | os.O_CREAT, 0o600)
@@ -102,62 +118,28 @@ def _share(path: Path) -> int:
         with suppress(FileNotFoundError):
             if os.path.samestat(os.fstat(lock), path.stat()):
                 return lock
-        # The last one who left has removed it meanwhile.
-        os.close(lock)
-
-
-def _leave(run: Run, simulation: str, lock: int) -> None:
-    """Close the file of a simulation; without others who share its lock, the simulation gets its speed back."""
-    try:
-        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        return
-    else:
-        try:
-            now = run.now()
-            if _runs(now, simulation):
-                _set_speed(now, simulation, None)
-        except ConfigError:
-            # The run was forgotten, so there is nothing left that could be slow.
-            pass
-        except WorkerError:
-            # It may be busy just now: the file stays, and says that somebody has to try again.
-            return
-        _note(run, simulation).unlink(missing_ok=True)
-    finally:
+        # The last watcher has removed the file between the opening and the lock.
         os.close(lock)
 
 
 def _runs(run: Run, simulation: str) -> bool:
-    nodes = run.record.nodes if run.status == "running" else ()
-    return any(node.name == simulation and node.status == "running" for node in nodes)
+    return run.status == "running" and simulation in simulations_of(run.record)
 
 
 def _set_speed(run: Run, simulation: str, factor: float | None) -> None:
-    """Have a simulation keep to a real-time factor; None for that of its configuration.
+    """Set the real-time factor of a simulation; None for that of its configuration.
 
     Raises:
-        ConfigError: If the run's configuration or key cannot be read.
-        WorkerError: If the simulation does not do so.
+        ConfigError: If the configuration or the key of the run cannot be read.
+        WorkerError: If the simulation does not answer, or refuses.
     """
     config = load(config_path(run.place.directory))
-    wanted = (config.sim.real_time_factor or _FULL_SPEED) if factor is None else factor
-    (result,) = set_parameter(run, [find_node(run, simulation)], _PARAMETER, wanted)
+    value = (config.sim.real_time_factor or _FULL_SPEED) if factor is None else factor
+    (result,) = set_parameter(run, [name_node(config, simulation)], _PARAMETER, value)
     if not result.successful:
         raise WorkerError(f"run {run.id}: {simulation} cannot change its speed: {result.reason}")
 
 
-def find_node(run: Run, simulation: str) -> str:
-    """Name of the node of a simulation, with its namespace.
-
-    Raises:
-        ConfigError: If the run's configuration cannot be read.
-    """
-    path = config_path(run.place.directory)
-    changed_ns = path.stat().st_mtime_ns if path.is_file() else 0
-    return f"/{simulation}" if _has_root_namespace(path, changed_ns) else f"/{simulation}/{simulation}"
-
-
-@lru_cache(maxsize=64)
-def _has_root_namespace(path: Path, _changed_ns: int) -> bool:
-    return load(path).run.root_namespace
+def name_node(config: Config, simulation: str) -> str:
+    """Name of the node of a simulation, with its namespace."""
+    return f"/{simulation}" if config.run.root_namespace else f"/{simulation}/{simulation}"

@@ -1,4 +1,4 @@
-"""REST on models: what was learned from datasets, and where to aim."""
+"""REST on models: to look at them, and to aim with them."""
 
 from __future__ import annotations
 
@@ -10,11 +10,7 @@ from throwcollect.serve.models import AimView, Models, ModelView
 
 
 def make_model_routes(models: Models) -> APIRouter:
-    """Routes on models, which they look at alone.
-
-    Args:
-        models: All models.
-    """
+    """Make the routes on models, none of which changes a model."""
     router = APIRouter(prefix="/models")
 
     @router.get("")

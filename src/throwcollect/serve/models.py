@@ -7,6 +7,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import islice
 from pathlib import Path
 
 from pydantic import BaseModel
@@ -62,10 +63,10 @@ class AimView(BaseModel):
 
 @dataclass(frozen=True)
 class Models:
-    """The models in a directory; nothing of them is changed here.
+    """The models in a directory, which are only read.
 
     Attributes:
-        directory: Where they are, each in a directory of its own. It need not exist.
+        directory: Each model is in a directory of its own in there. It need not exist.
     """
 
     directory: Path
@@ -77,16 +78,13 @@ class Models:
         except OSError:
             return []
         found = (each for each in names if re.fullmatch(_NAME, each) and (self.directory / each / MODEL).is_file())
-        return [name for name, _ in zip(found, range(_MOST_MODELS), strict=False)]
+        return list(islice(found, _MOST_MODELS))
 
     def view(self, name: str) -> ModelView:
-        """What is seen of a model.
-
-        Args:
-            name: Its name.
+        """Describe a model.
 
         Raises:
-            NotFoundError: If there is none.
+            NotFoundError: If there is none of that name.
             DatasetError: If it is damaged.
         """
         model = self._load(name)
@@ -109,7 +107,7 @@ class Models:
 
         Args:
             name: Name of the model.
-            target: Where to: values of its targets and of what is given with them.
+            target: Values of the model's targets, then of what is given with them.
 
         Raises:
             NotFoundError: If there is no such model.
@@ -126,7 +124,7 @@ class Models:
         )
 
     def _load(self, name: str) -> Model:
-        # Names of models are names of directories.
+        # Names of models become names of directories.
         if not re.fullmatch(_NAME, name) or not (self.directory / name / MODEL).is_file():
             raise NotFoundError(
                 f"no model {name!r}", hint=f"throwcollect fit makes models; they belong in {self.directory}"

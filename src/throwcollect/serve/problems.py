@@ -14,7 +14,6 @@ from starlette.routing import Match
 from throwcollect.errors import (
     ConfigError,
     ConflictError,
-    DatasetError,
     NotFoundError,
     ThrowcollectError,
     WorkerError,
@@ -28,10 +27,8 @@ _STATUS: tuple[tuple[type[ThrowcollectError], int], ...] = (
     (MissingExtraError, 503),
     (MissingLibraryError, 503),
     (WorkerError, 503),
-    (DatasetError, 500),
 )
-"""Status of each kind of error; the first that fits counts."""
-
+"""Status of each kind of error, the first that fits; that of any other is 500."""
 
 _SCHEMA = {
     "type": "object",
@@ -54,31 +51,31 @@ class ProblemResponse(JSONResponse):
 
 
 def problem(status: int, title: str, headers: dict[str, str] | None = None, **facts: Any) -> ProblemResponse:
-    """The answer that tells of a problem.
+    """Make the answer that tells of a problem.
 
     Args:
         status: Status of HTTP.
         title: Where and what.
-        headers: Headers besides.
-        facts: What else is known, such as ``hint``; those that are None are left out.
+        headers: Further headers.
+        facts: Further members, such as ``hint``; those that are None are left out.
     """
     content = {"title": title, "status": status, **{key: value for key, value in facts.items() if value is not None}}
     return ProblemResponse(content, status_code=status, headers=headers)
 
 
 def describe_bytes(*media_types: str) -> dict[int | str, dict[str, Any]]:
-    """What the description of a request says of an answer that is no JSON."""
+    """Describe an answer that is no JSON, for the description of a request."""
     return {200: {"description": "OK", "content": {each: {} for each in media_types}}}
 
 
 def describe_problems(*statuses: int) -> dict[int | str, dict[str, Any]]:
-    """What the description of a request says of statuses that are answered with a problem."""
+    """Describe the problems of some statuses, for the description of a request."""
     content = {ProblemResponse.media_type: {"schema": _SCHEMA}}
     return {status: {"description": HTTPStatus(status).phrase, "content": content} for status in statuses}
 
 
 def answer(error: ThrowcollectError) -> ProblemResponse:
-    """The answer that tells of one of the product's errors."""
+    """Make the answer that tells of one of the product's errors."""
     status = next((status for kind, status in _STATUS if isinstance(error, kind)), 500)
     problems = None
     if isinstance(error, ConfigError):
@@ -89,34 +86,30 @@ def answer(error: ThrowcollectError) -> ProblemResponse:
 
 
 def add_handlers(app: FastAPI) -> None:
-    """Have an application answer with problems."""
+    """Make an application answer errors with problems."""
 
-    async def own(_: Request, error: Exception) -> ProblemResponse:
-        return answer(error) if isinstance(error, ThrowcollectError) else problem(500, "internal error")
+    @app.exception_handler(ThrowcollectError)
+    async def own(_: Request, error: ThrowcollectError) -> ProblemResponse:
+        return answer(error)
 
+    @app.exception_handler(Exception)
     async def unexpected(_: Request, __: Exception) -> ProblemResponse:
         return problem(500, "internal error", hint="the log of the server says where; please report it")
 
-    async def http(request: Request, error: Exception) -> ProblemResponse:
-        if isinstance(error, HTTPException):
-            headers = dict(error.headers or {})
-            if "Allow" in headers:
-                # Each method is a route of its own, of which one alone has been asked.
-                headers["Allow"] = ", ".join(sorted(_methods_at(request)))
-            return problem(error.status_code, str(error.detail), headers=headers)
-        return problem(500, "internal error")
+    @app.exception_handler(HTTPException)
+    async def http(request: Request, error: HTTPException) -> ProblemResponse:
+        headers = dict(error.headers or {})
+        if "Allow" in headers:
+            # Each method is a route of its own, and Starlette names only the method of the first one.
+            headers["Allow"] = ", ".join(sorted(_methods_at(request)))
+        return problem(error.status_code, str(error.detail), headers=headers)
 
-    async def request(_: Request, error: Exception) -> ProblemResponse:
-        found = error.errors() if isinstance(error, RequestValidationError) else []
-        problems = [{"key": ".".join(map(str, each["loc"])), "message": each["msg"]} for each in found]
+    @app.exception_handler(RequestValidationError)
+    async def invalid(_: Request, error: RequestValidationError) -> ProblemResponse:
+        problems = [{"key": ".".join(map(str, each["loc"])), "message": each["msg"]} for each in error.errors()]
         return problem(422, "the request is not as it should be", problems=problems)
-
-    app.add_exception_handler(ThrowcollectError, own)
-    app.add_exception_handler(HTTPException, http)
-    app.add_exception_handler(Exception, unexpected)
-    app.add_exception_handler(RequestValidationError, request)
 
 
 def _methods_at(request: Request) -> set[str]:
-    there = [route for route in request.app.routes if route.matches(request.scope)[0] is not Match.NONE]
-    return {method for route in there for method in getattr(route, "methods", None) or ()}
+    routes = [route for route in request.app.routes if route.matches(request.scope)[0] is not Match.NONE]
+    return {method for route in routes for method in getattr(route, "methods", None) or ()}

@@ -1,4 +1,4 @@
-"""What browsers draw a robot from: its description, and the files of its meshes."""
+"""The description of the robot of a run, and the files of its meshes, for browsers that draw it."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def description_of(run: Run) -> str:
         ConfigError: If the robot's files cannot be read.
     """
     if run.record.kind == "container":
-        path = Path(run.record.directory) / DESCRIPTION
+        path = run.place.directory / DESCRIPTION
         if not path.is_file():
             raise NotFoundError(f"run {run.id}: its component has no urdf")
         return read_urdf(path)
@@ -56,7 +56,7 @@ class SceneFacts:
 
 
 def scene_of(run: Run) -> SceneFacts:
-    """The scene of a run.
+    """Read the scene of a run.
 
     Raises:
         NotFoundError: If the run has no configuration yet.
@@ -78,7 +78,7 @@ def _find_config(run: Run) -> Path:
     Raises:
         NotFoundError: If there is none yet.
     """
-    path = config_path(Path(run.record.directory))
+    path = config_path(run.place.directory)
     if not path.is_file():
         raise NotFoundError(f"run {run.id} has no configuration yet")
     return path
@@ -90,7 +90,7 @@ def _describe(path: Path, _changed_ns: int) -> str:
 
 
 def find_mesh(package: str, path: str) -> Path:
-    """The file of a mesh of one of the robots.
+    """Find the file of a mesh of one of the robots.
 
     Args:
         package: Name of the package in its URL.
@@ -101,7 +101,7 @@ def find_mesh(package: str, path: str) -> Path:
         ConfigError: If the description of a robot cannot be read.
     """
     root = _find_packages().get(package)
-    # What no file can be called raises an error, and neither dots nor links lead out of the package.
+    # Neither dots nor links may lead out of the package; a path that no file can have raises an error.
     with suppress(OSError, ValueError):
         if root is not None and ".." not in PurePosixPath(path).parts:
             file = (root / path).resolve(strict=True)
@@ -126,10 +126,7 @@ class MeshFile:
 
 
 def list_meshes(description: str) -> list[MeshFile]:
-    """The files of meshes that a description names, each once; without those of packages that no robot has.
-
-    Args:
-        description: URDF text.
+    """List the files of meshes that a description (URDF text) names, without those of packages that no robot has.
 
     Raises:
         ConfigError: If the description of a robot cannot be read.
@@ -142,10 +139,7 @@ def list_meshes(description: str) -> list[MeshFile]:
 
 
 def find_mesh_by_content(sha256: str) -> Path:
-    """The file of a mesh that the description of a robot names.
-
-    Args:
-        sha256: SHA-256 of what is in it, in hexadecimal.
+    """Find the file of a mesh of one of the robots by the SHA-256 of its content, in hexadecimal.
 
     Raises:
         NotFoundError: If no robot has such a mesh.
@@ -159,7 +153,7 @@ def find_mesh_by_content(sha256: str) -> Path:
 
 
 def _find_files(description: str) -> Iterator[tuple[str, str, Path]]:
-    """Package and path of each mesh that a description names, and its file."""
+    """Find the mesh files that a description names, each with its package and its path in there."""
     named = dict.fromkeys(re.findall(_PACKAGE + r"([\w.-]+)/([^\"'<>]+)", description))
     for package, path in named:
         with suppress(NotFoundError):
@@ -187,16 +181,16 @@ def _find_packages() -> Mapping[str, Path]:
 
 @lru_cache(maxsize=1)
 def _read_descriptions() -> Sequence[tuple[str, Robot]]:
-    """The descriptions of all robots.
+    """Read the descriptions of all robots.
 
     Raises:
         ConfigError: If one cannot be read.
     """
-    found = []
+    descriptions = []
     for name in names_of("robots"):
         robot: Robot = load_member("robots", name)
         try:
-            found.append((robot.urdf_path.read_text(encoding="utf-8"), robot))
+            descriptions.append((robot.urdf_path.read_text(encoding="utf-8"), robot))
         except (OSError, UnicodeDecodeError) as error:
             raise ConfigError(f"{robot.urdf_path}: cannot be read: {error}") from error
-    return found
+    return descriptions

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Callable
 
 from fastapi import APIRouter, WebSocket
 
@@ -15,37 +16,23 @@ from throwcollect.serve.sockets import NOT_FOUND
 
 
 def make_rosbridge_routes(instances: Instances, bridges: Bridges) -> APIRouter:
-    """Routes of rosbridge.
-
-    Args:
-        instances: All runs.
-        bridges: One bridge for each run that somebody is connected to.
-    """
+    """Make the routes of rosbridge."""
     router = APIRouter()
 
     @router.websocket("/rosbridge/{instance}")
     async def one(socket: WebSocket, instance: str) -> None:
-        try:
-            run = await asyncio.to_thread(instances.get, instance)
-        except ThrowcollectError as error:
-            await socket.close(NOT_FOUND, error.message[:120])
-            return
-        await _attend(socket, bridges, run)
+        await _attend(socket, bridges, lambda: instances.get(instance))
 
     @router.websocket("/")
     async def only(socket: WebSocket) -> None:
-        try:
-            run = await asyncio.to_thread(_find_only_run)
-        except ThrowcollectError as error:
-            await socket.close(NOT_FOUND, error.message[:120])
-            return
-        await _attend(socket, bridges, run)
+        await _attend(socket, bridges, _find_only_run)
 
     return router
 
 
-async def _attend(socket: WebSocket, bridges: Bridges, run: Run) -> None:
+async def _attend(socket: WebSocket, bridges: Bridges, find_run: Callable[[], Run]) -> None:
     try:
+        run = await asyncio.to_thread(find_run)
         async with bridges.bridge(run) as bridge:
             await attend(socket, bridge, read_only=not socket.scope["state"]["may_change"])
     except ThrowcollectError as error:

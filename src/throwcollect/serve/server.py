@@ -1,4 +1,4 @@
-"""The process that serves: its port, its file for programs, and how others find it."""
+"""The process that serves: its port, its settings, and its log."""
 
 from __future__ import annotations
 
@@ -26,15 +26,15 @@ from throwcollect.serve.finding import Address, log_path, publish
 from throwcollect.serve.instances import Instances
 from throwcollect.serve.models import Models
 
-PORT = 8080
-"""Where to serve if nobody says otherwise, and it is free."""
+_PORT = 8080
+"""Port to serve at if the user names none and it is free."""
 WEBSOCKETS: Literal["websockets-sansio"] = "websockets-sansio"
-"""The implementation of WebSockets; it waits for clients that read slowly, and keeps nothing for them meanwhile."""
+"""Implementation of WebSockets: it waits for a client that reads slowly, instead of collecting frames in memory."""
 _MOST_FRAME = 10_000_000
 _MOST_CLIENTS = 256
 _LOG_BYTES = 1_000_000
 _END_S = 2.5
-"""Time in which it ends when it is told to."""
+"""Time within which the process ends after a signal."""
 
 
 @dataclass(frozen=True)
@@ -62,23 +62,24 @@ def serve(
         instances: All runs, and what can be done with them.
         models: All models.
         host: Address to listen at.
-        port: Port to listen at, 0 for any that is free; None for 8080, or any that is free if that is not.
+        port: Port to listen at, 0 for any free one; None for 8080, or any free one if 8080 is taken.
         tls: Certificate and key; None to speak in the clear.
-        origins: Origins of pages that may connect, besides our own.
+        origins: Further origins of pages that may connect.
         names: Host names by which clients know this machine, besides the address.
-        tell: Is told once where it serves, and a one-time code, when it can be reached.
+        tell: Called once, when the server can be reached, with its address and a one-time code.
 
     Raises:
         ConfigError: If the port is taken, or the certificate or its key cannot be used.
     """
     keys = Keys()
-    with _listen(host, PORT if port is None else port, otherwise_any=port is None) as listener:
+    with _listen(host, port) as listener:
         bound = listener.getsockname()[1]
         scheme = "https" if tls else "http"
         known = {"127.0.0.1", "localhost", "[::1]", host if ":" not in host else f"[{host}]", *names}
-        hosts = frozenset(f"{name}:{bound}" for name in known) | (
-            frozenset(known) if bound in (80, 443) else frozenset()
-        )
+        hosts = frozenset(f"{name}:{bound}" for name in known)
+        if bound in (80, 443):
+            # Clients leave the default port of a scheme out of the header Host.
+            hosts |= known
         url = f"{scheme}://{_reachable(host)}:{bound}"
         certificate = None if tls is None else str(tls.certificate.absolute())
         address = Address(url, keys.full, keys.read_only, os.getpid(), certificate)
@@ -89,11 +90,11 @@ def serve(
             access_log=False,
             ws=WEBSOCKETS,
             ws_max_size=_MOST_FRAME,
-            # On this machine it would cost time and spare nothing.
+            # Most clients are on this machine, where compression only costs time.
             ws_per_message_deflate=False,
             limit_concurrency=_MOST_CLIENTS,
             timeout_graceful_shutdown=1,
-            # Who asks, and how, is seen from the connection alone.
+            # A client could forge the headers of a proxy.
             proxy_headers=False,
             ssl_certfile=None if tls is None else tls.certificate,
             ssl_keyfile=None if tls is None else tls.key,
@@ -103,15 +104,15 @@ def serve(
         _write_lines()
         with publish(address):
             tell(address, keys.new_code())
-            # The signal that ends it is raised once more afterwards; it is how a server ends, and no error.
+            # uvicorn raises the signal that ended it once more; for a server, that is the usual end and no error.
             with contextlib.suppress(KeyboardInterrupt):
                 _Server(config).run(sockets=[listener])
 
 
 class _Server(uvicorn.Server):
-    """A server that ends soon after it is told to, whatever still goes on in its threads.
+    """A server that ends soon after a signal, whatever its threads are doing.
 
-    Nothing there has to be finished: whoever serves next finds out what is left to be done.
+    Nothing has to be finished there, because the next server finds on disk what is left to do.
     """
 
     def handle_exit(self, sig: int, frame: FrameType | None) -> None:
@@ -123,10 +124,10 @@ class _Server(uvicorn.Server):
 
 
 def _load(config: uvicorn.Config) -> None:
-    """Read what the server needs besides.
+    """Load the configuration of uvicorn.
 
     Raises:
-        ConfigError: If its certificate or key cannot be used.
+        ConfigError: If the certificate or its key cannot be used.
     """
     try:
         config.load()
@@ -138,9 +139,9 @@ def _load(config: uvicorn.Config) -> None:
 
 
 class _CutLog(logging.handlers.RotatingFileHandler):
-    """The log of a server that was started in the background, which has at most two files of 1 MB.
+    """The log of a server that was started in the background: at most two files of 1 MB.
 
-    All else that is printed goes there, too.
+    Standard error is redirected to each new file, so that everything else that is printed is in the log, too.
     """
 
     def __init__(self, path: Path) -> None:
@@ -153,9 +154,9 @@ class _CutLog(logging.handlers.RotatingFileHandler):
 
 
 def _write_lines() -> None:
-    """Have a line written for each request."""
+    """Write a line for each request: to the log of a server in the background, else to standard error."""
     lines: logging.Handler = logging.StreamHandler()
-    # Where there is no such log, or no standard error, it is none either.
+    # Without that log, or without standard error, this server is not in the background.
     with contextlib.suppress(OSError, ValueError):
         if os.path.samestat(os.fstat(sys.stderr.fileno()), log_path().stat()):
             lines = _CutLog(log_path())
@@ -166,28 +167,28 @@ def _write_lines() -> None:
 
 
 @contextlib.contextmanager
-def _listen(host: str, port: int, *, otherwise_any: bool) -> Iterator[socket.socket]:
+def _listen(host: str, port: int | None) -> Iterator[socket.socket]:
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     listener = socket.socket(family, socket.SOCK_STREAM)
     with contextlib.closing(listener):
         listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
             try:
-                listener.bind((host, port))
+                listener.bind((host, _PORT if port is None else port))
             except OSError:
-                if not otherwise_any:
+                if port is not None:
                     raise
                 listener.bind((host, 0))
             listener.listen()
         except OSError as error:
             raise ConfigError(
-                f"--host {host} --port {port}: nobody can be served there: {error.strerror}",
+                f"--host {host} --port {_PORT if port is None else port}: nobody can be served there: {error.strerror}",
                 hint="--port 0 takes one that is free; throwcollect view finds who serves already",
             ) from error
         yield listener
 
 
 def _reachable(host: str) -> str:
-    """The address at which this machine reaches a server that listens at one."""
+    """Address at which programs of this machine reach a server that listens at ``host``."""
     own = {"0.0.0.0": "127.0.0.1", "::": "::1"}.get(host, host)  # noqa: S104 - nothing is bound here
     return f"[{own}]" if ":" in own else own

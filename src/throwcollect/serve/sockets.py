@@ -1,31 +1,32 @@
-"""Sockets that only tell."""
+"""Sockets on which the server sends and the client only listens."""
 
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Awaitable, Callable
+from collections.abc import Coroutine
+from typing import Any
 
 from starlette.websockets import WebSocket
 
 from throwcollect.errors import ThrowcollectError
 
 NOT_FOUND = 4404
-"""Code with which a socket to what does not exist is closed."""
+"""Close code of a socket to something that does not exist."""
 MAY_NOT = 4403
-"""The same for one that would change something, while its token may only look."""
+"""Close code of a socket that would change something, while its token may only look."""
 FAILED = 4503
-"""The same for one to what does not answer."""
+"""Close code of a socket to something that does not answer."""
 _MOST_REASON = 123
-"""Bytes of a reason that a frame has room for."""
+"""Bytes of a reason that fit into a frame."""
 
 
 async def refuse(socket: WebSocket, code: int, reason: str) -> None:
-    """Close a socket at once, so that its client learns why: of one that is not accepted, browsers tell nothing.
+    """Accept a socket and close it at once, because browsers tell a page nothing of a socket that was not accepted.
 
     Args:
         socket: The socket, not accepted yet.
-        code: The code.
-        reason: The reason; its first line, as far as there is room for it.
+        code: The close code.
+        reason: The reason; the frame holds its first line, as far as that fits.
     """
     await socket.accept()
     await socket.close(code, _cut(reason))
@@ -36,23 +37,20 @@ def _cut(reason: str) -> str:
     return first.encode()[:_MOST_REASON].decode(errors="ignore")
 
 
-async def keep_telling(socket: WebSocket, tell: Callable[[], Awaitable[object]]) -> None:
-    """Tell a client something until it has gone, or there is nothing more to tell.
+async def keep_telling(socket: WebSocket, telling: Coroutine[Any, Any, object]) -> None:
+    """Send to a client until it has gone, or there is nothing more to send.
 
     Args:
-        socket: Its socket, accepted.
-        tell: Tells all there is, one message after the other.
+        socket: The socket of the client, accepted.
+        telling: Sends everything, one message after the other.
     """
 
-    async def hear() -> None:
-        # Nothing is heeded; but without this, nobody would notice that the client has gone.
+    async def wait_until_gone() -> None:
+        # What the client sends is ignored, but only reading shows that it has gone.
         while (await socket.receive())["type"] != "websocket.disconnect":
             pass
 
-    async def speak() -> None:
-        await tell()
-
-    tasks = [asyncio.create_task(hear()), asyncio.create_task(speak())]
+    tasks = [asyncio.create_task(wait_until_gone()), asyncio.create_task(telling)]
     try:
         await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
     finally:

@@ -1,4 +1,4 @@
-"""The state of everything, always whole: what this machine remembers of its runs, and the catalogue."""
+"""The whole state that clients are told: the runs that this machine remembers, and the catalogue."""
 
 from __future__ import annotations
 
@@ -20,14 +20,9 @@ from throwcollect.runs.records import Records, Run
 from throwcollect.runtimes.runtime import NodeState
 from throwcollect.serve.catalogue import Catalogue, Component
 
-VERSION: Literal[1] = 1
-"""Version of the layout of the state."""
-
 _MOST_OVER = 100
 
 Status = Literal["starting", "running", "ended", "died"]
-
-
 _LIVING: tuple[Status, ...] = ("starting", "running")
 
 
@@ -109,25 +104,21 @@ class State:
     components: list[ComponentState]
     instances: list[InstanceState]
     revision: int = 0
-    version: Literal[1] = VERSION
+    version: Literal[1] = 1
 
 
 STATES: TypeAdapter[State] = TypeAdapter(State)
 
 
 class Lookout:
-    """Looks at everything; what has ended, and was not written since, is not read again.
-
-    Args:
-        catalogue: All components.
-    """
+    """Reads the state; the record of a run that has ended is read again only if it was written since."""
 
     def __init__(self, catalogue: Catalogue) -> None:
         self._catalogue = catalogue
         self._ended: dict[tuple[str, int | None], InstanceState] = {}
 
     def look(self) -> State:
-        """The state by now: all runs that live, and the latest of those that are over."""
+        """Read the state: all runs that live, and the latest of those that are over."""
         instances = self.list_instances()
         living = [each for each in instances if each.status in _LIVING]
         over = [each for each in instances if each.status not in _LIVING]
@@ -151,27 +142,27 @@ class Lookout:
         instances = []
         for run in records.ids():
             written = run, records.read_change_ns(run)
-            if (found := known.get(written)) is None:
+            if (instance := known.get(written)) is None:
                 try:
-                    found = describe(records.get(run))
+                    instance = describe(records.get(run))
                 except ConfigError:
-                    # It was forgotten just now, or cannot be read, which `throwcollect ps` says.
+                    # The record was removed just now, or is damaged; `throwcollect ps` tells of damaged ones.
                     continue
-            instances.append(found)
-            if found.status == "ended":
-                ended[written] = found
+            instances.append(instance)
+            if instance.status == "ended":
+                ended[written] = instance
         self._ended = ended
         return sorted(instances, key=lambda each: each.started, reverse=True)
 
 
 def _find_targets(component: Component) -> list[str]:
-    """Landing targets that a collection of a component can be spread over."""
+    """Keys of landing targets that a collection of a component can be spread over."""
     if component.kind != "collection" or not isinstance(component.source, Path):
         return []
     try:
         return _read_targets(component.source, component.source.stat().st_mtime_ns)
     except (ConfigError, OSError):
-        # Whoever starts an instance is told what is wrong with the file.
+        # The error is told to the client that starts an instance.
         return []
 
 
@@ -186,7 +177,7 @@ def _read_targets(path: Path, _changed_ns: int) -> list[str]:
 
 
 def describe(run: Run) -> InstanceState:
-    """What is seen of a run."""
+    """Describe a run for clients."""
     record = run.record
     error = record.error if record.failure else None
     return InstanceState(
@@ -211,7 +202,7 @@ def describe(run: Run) -> InstanceState:
 
 
 def simulations_of(record: Record) -> list[str]:
-    """Names of the simulations of a run that run."""
+    """Names of the simulations of a run that are running."""
     return [node.name for node in record.nodes if node.name.startswith("sim_") and node.status == "running"]
 
 

@@ -1,4 +1,4 @@
-"""The newest throws of a run, as the page draws them: heard in the run's graph as long as anybody looks."""
+"""The newest throws of a run, as the page draws them: received in the run's graph as long as somebody watches."""
 
 from __future__ import annotations
 
@@ -32,12 +32,12 @@ _LANDING = ("landing_x_m", "landing_y_m", "landing_z_m")
 
 
 def encode_throw(delivery: Delivery, simulation: str, values: Mapping[str, float]) -> bytes:
-    """An episode as the page takes it.
+    """Encode an episode for the page.
 
     Args:
-        delivery: The episode, and what came of it.
-        simulation: Name of the simulation that it is of.
-        values: What the sweep chose for it, by dotted key.
+        delivery: The episode and its result.
+        simulation: Name of the simulation that recorded it.
+        values: Swept values of the trial, by dotted key.
 
     Returns:
         Length of a JSON header as uint32, the header, zero bytes up to a multiple of four, then float32: angles of the
@@ -70,22 +70,14 @@ def encode_throw(delivery: Delivery, simulation: str, values: Mapping[str, float
 
 
 class PlannedValues:
-    """What the sweep of a run chose for its trials; the plan is read when somebody asks, and again when it has grown.
-
-    Args:
-        directory: Of the run's dataset.
-    """
+    """Swept values of the trials of a run; its plan is read when they are first needed, and again when it has grown."""
 
     def __init__(self, directory: Path) -> None:
         self._directory = directory
         self._plan: Plan | None = None
 
     def of(self, trial: int) -> Mapping[str, float]:
-        """Values of a trial, by dotted key; none if its plan cannot be read here.
-
-        Args:
-            trial: Number of the trial.
-        """
+        """Swept values of a trial, by dotted key; empty if the plan cannot be read on this machine."""
         try:
             if self._plan is None or trial not in self._plan.trials.numbers:
                 self._plan = Plan.read(self._directory / PLAN, load(config_path(self._directory)))
@@ -95,28 +87,24 @@ class PlannedValues:
 
 
 class ThrowWatch:
-    """Hears the newest throws of one run in a thread of its own, while there are listeners.
-
-    Args:
-        run: The run.
-    """
+    """Receives the newest throws of one run in a thread of its own, while there are listeners."""
 
     def __init__(self, run: Run) -> None:
         self._run = run
         self._listeners: dict[asyncio.Queue[bytes], asyncio.AbstractEventLoop] = {}
-        self._unwanted = threading.Event()
+        self._is_over = threading.Event()
         self._newest: bytes | None = None
-        self._values = PlannedValues(Path(run.record.directory))
+        self._values = PlannedValues(run.place.directory)
 
     @asynccontextmanager
     async def throws(self) -> AsyncIterator[Callable[[], Awaitable[bytes]]]:
-        """Listen; what is given waits for the next throw, and misses those that come while nobody waits."""
+        """Listen; the function that is given waits for the next throw, or takes the newest that came meanwhile."""
         queue: asyncio.Queue[bytes] = asyncio.Queue(maxsize=1)
         if not self._listeners:
-            # Each thread has a word of its own by which it ends: one that does so slowly does not take the next one's.
-            self._unwanted = threading.Event()
+            # Each thread has an event of its own: a thread that ends slowly must not see the event of its successor.
+            self._is_over = threading.Event()
             name = f"throws of {self._run.id}"
-            threading.Thread(target=self._listen, args=(self._unwanted,), name=name, daemon=True).start()
+            threading.Thread(target=self._listen, args=(self._is_over,), name=name, daemon=True).start()
         self._listeners[queue] = asyncio.get_running_loop()
         if self._newest is not None:
             queue.put_nowait(self._newest)
@@ -125,18 +113,18 @@ class ThrowWatch:
         finally:
             del self._listeners[queue]
             if not self._listeners:
-                self._unwanted.set()
+                self._is_over.set()
 
     @property
     def is_idle(self) -> bool:
         """Whether nobody listens."""
         return not self._listeners
 
-    def _listen(self, unwanted: threading.Event) -> None:
+    def _listen(self, is_over: threading.Event) -> None:
         run = self._run
         subscriptions = _Subscriptions(self._hear)
         with RunListener(lambda _: None, on_connect=subscriptions.move) as listener:
-            while not unwanted.is_set():
+            while not is_over.is_set():
                 try:
                     run = run.now()
                     if run.connection is not None:
@@ -144,8 +132,8 @@ class ThrowWatch:
                     subscriptions.add(simulations_of(run.record))
                     listener.spin(run.connection, _SPIN_S)
                 except ThrowcollectError:
-                    # The run has ended, and was forgotten, or cannot be joined; whoever looks on sees so in the state.
-                    unwanted.wait(_SPIN_S)
+                    # The run was forgotten, or cannot be joined; clients see that in the state.
+                    is_over.wait(_SPIN_S)
 
     def _hear(self, simulation: str, message: bytes) -> None:
         try:
@@ -154,7 +142,7 @@ class ThrowWatch:
                 return
             frame = encode_throw(delivery, simulation, self._values.of(delivery.episode.header.trial))
         except ThrowcollectError:
-            # Somebody else has published something else there.
+            # Another node has published something else on this topic.
             return
         self._newest = frame
         for queue, loop in list(self._listeners.items()):
@@ -162,7 +150,7 @@ class ThrowWatch:
 
 
 class _Subscriptions:
-    """Hears all simulations of a run, those that come later, too.
+    """Subscribes to all simulations of a run, including those that are started later.
 
     Args:
         hear: Called with the name of a simulation and the message that carries its newest episode.
@@ -174,13 +162,13 @@ class _Subscriptions:
         self._heard: set[str] = set()
 
     def move(self, node: Node) -> None:
-        """Go on with another node."""
+        """Subscribe again with another node."""
         self._node = node
         heard, self._heard = self._heard, set()
         self.add(heard)
 
     def add(self, simulations: Iterable[str]) -> None:
-        """Hear some simulations, unless they are heard already."""
+        """Subscribe to those simulations that are not subscribed to yet."""
         if self._node is None:
             return
         for name in set(simulations) - self._heard:
@@ -190,7 +178,7 @@ class _Subscriptions:
 
 
 def _replace(queue: asyncio.Queue[bytes], frame: bytes) -> None:
-    """Put the newest into a queue for one, whatever is in it."""
+    """Put a frame into a queue that holds one, in place of the one in it."""
     while not queue.empty():
         queue.get_nowait()
     queue.put_nowait(frame)

@@ -1,4 +1,4 @@
-"""What the page draws: descriptions, meshes, the newest throws, and simulations that are slowed down to be watched."""
+"""REST and sockets on what the page draws: descriptions, meshes, the newest throws, and simulations in real time."""
 
 from __future__ import annotations
 
@@ -29,11 +29,7 @@ _XML = {"requestBody": {"required": True, "content": {"application/xml": {"schem
 
 
 def make_description_routes(instances: Instances) -> APIRouter:
-    """Routes on what the robot of a run looks like.
-
-    Args:
-        instances: All runs, and what can be done with them.
-    """
+    """Make the routes on what the robot of a run looks like."""
     router = APIRouter()
 
     @router.get("/instances/{instance}/urdf", response_class=Response, responses=describe_bytes("application/xml"))
@@ -66,11 +62,7 @@ def make_description_routes(instances: Instances) -> APIRouter:
 
 
 def make_view_routes(instances: Instances) -> APIRouter:
-    """Routes on what the page draws.
-
-    Args:
-        instances: All runs.
-    """
+    """Make the routes on what the page draws."""
     router = APIRouter()
     watches: dict[str, ThrowWatch] = {}
 
@@ -96,9 +88,9 @@ def make_view_routes(instances: Instances) -> APIRouter:
         watch = watches.setdefault(instance, ThrowWatch(run))
         try:
             async with watch.throws() as next_throw:
-                await keep_telling(socket, lambda: _send_next(socket, next_throw))
+                await keep_telling(socket, _send_throws(socket, next_throw))
         finally:
-            # The next run of this id has other throws.
+            # A later run of this id must not get the throws of this one.
             if watch.is_idle and watches.get(instance) is watch:
                 del watches[instance]
 
@@ -114,13 +106,13 @@ def make_view_routes(instances: Instances) -> APIRouter:
             return
         try:
             await socket.accept()
-            await keep_telling(socket, asyncio.Event().wait)
+            await keep_telling(socket, asyncio.Event().wait())
         finally:
             await asyncio.to_thread(hold.let_go)
 
     return router
 
 
-async def _send_next(socket: WebSocket, next_throw: Callable[[], Awaitable[bytes]]) -> None:
+async def _send_throws(socket: WebSocket, next_throw: Callable[[], Awaitable[bytes]]) -> None:
     while True:
         await socket.send_bytes(await next_throw())

@@ -1,4 +1,4 @@
-"""Looks at the state several times a second for everybody who wants to hear of changes."""
+"""Reads the state several times a second for all clients that want to be told of changes."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ _LOOK_S = 0.2
 
 
 class StateWatch:
-    """Looks at the state as long as anybody listens, and tells all listeners of each change, always the whole state.
+    """Reads the state as long as there are listeners, and sends them the whole state after each change.
 
     Args:
-        look: Looks at everything; called in another thread.
+        look: Reads the state; called in another thread.
     """
 
     def __init__(self, look: Callable[[], State]) -> None:
@@ -30,12 +30,12 @@ class StateWatch:
         self._looking: asyncio.Task[None] | None = None
 
     async def current(self) -> State:
-        """The state by now.
+        """Read the state.
 
         Raises:
             ConfigError: If runs cannot be remembered.
         """
-        # One after the other, so that nobody tells what was seen before something that has been told.
+        # One at a time, so that an older state can never get a higher revision than a newer one.
         async with self._one_look:
             state = await asyncio.to_thread(self._look)
             return await self._take(state)
@@ -49,7 +49,7 @@ class StateWatch:
             return self._state
 
     async def states(self) -> AsyncIterator[bytes]:
-        """The state as JSON, at first as it is and then after each change; one who is slow gets the latest alone."""
+        """The state as JSON, at first as it is and then after each change; a slow listener gets only the latest."""
         async with self._listening():
             state = await self.current()
             while True:
@@ -76,6 +76,6 @@ class StateWatch:
     async def _keep_looking(self) -> None:
         while True:
             await asyncio.sleep(_LOOK_S)
-            # Where records cannot be read for a while, as on a full disk, there is nothing new to tell.
+            # If records cannot be read for a while, as on a full disk, listeners keep the last state.
             with suppress(ThrowcollectError, OSError):
                 await self.current()

@@ -39,7 +39,7 @@ class Teller:
                 self.told[number] += 1
                 await asyncio.sleep(0)
 
-        await keep_telling(socket, speak)
+        await keep_telling(socket, speak())
 
 
 @pytest.fixture

@@ -1,4 +1,4 @@
-/** Boards that stand in a room, as nothing of the page can be seen there: what a run does, and plots. */
+/** Boards that stand in a room, where the page cannot be seen: the state of a run, plots, and the landing map. */
 
 import {
   BufferGeometry, CanvasTexture, Line, LineBasicMaterial, Mesh, MeshBasicMaterial, PlaneGeometry, SRGBColorSpace, Vector3,
@@ -44,12 +44,6 @@ class Board {
   }
 
   /**
-   * Act as pressed.
-   * @param {{x: number, y: number}} _uv where, from the left lower corner, as shares
-   */
-  press(_uv) {}
-
-  /**
    * Draw again, if anything is new.
    * @param {unknown} facts what is drawn
    * @param {(pen: CanvasRenderingContext2D, width: number, height: number) => void} draw
@@ -81,7 +75,7 @@ class Board {
  * @property {string[]} lines
  */
 
-/** Tells what a run does, and has buttons. */
+/** A board with the state of a run, and with buttons. */
 export class InfoBoard extends Board {
   /** @param {{text: string, isOffered: () => boolean, act: () => void}[]} buttons */
   constructor(buttons) {
@@ -128,6 +122,10 @@ export class InfoBoard extends Board {
     return y * 680 < BUTTON_HEIGHT + EDGE / 2 ? Math.min(Math.floor(x * this.buttons.length), this.buttons.length - 1) : null;
   }
 
+  /**
+   * Press the button at a place.
+   * @param {{x: number, y: number}} uv place, from the left lower corner, as shares
+   */
   press(uv) {
     const button = this.buttonAt(uv);
     if (button !== null && this.buttons[button].isOffered()) this.buttons[button].act();
@@ -179,6 +177,7 @@ export class PlotBoard extends Board {
     });
   }
 
+  /** Show only the head of the plot, or all of it again. */
   press() {
     this.panel.collapse();
   }

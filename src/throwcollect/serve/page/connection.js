@@ -22,7 +22,7 @@ export class Problem extends Error {
 /**
  * The token: for the code in the address, which is removed from there, or as it was kept for this tab.
  * @returns {Promise<string | null>} null if there is none
- * @throws {Problem} if the code is no good and no token is kept
+ * @throws {Problem} if the code is used or too old and no token is kept
  */
 export async function takeToken() {
   const kept = sessionStorage.getItem(KEPT);
@@ -39,7 +39,7 @@ export async function takeToken() {
   }
 }
 
-/** @param {string | null} token what this tab is to keep; null to forget it */
+/** @param {string | null} token that this tab keeps; null to forget it */
 export function keepToken(token) {
   if (token === null) sessionStorage.removeItem(KEPT);
   else sessionStorage.setItem(KEPT, token);
@@ -57,12 +57,13 @@ async function ask(token, method, path, body) {
   const headers = token === null ? {} : { Authorization: `Bearer ${token}` };
   if (body !== undefined) headers["Content-Type"] = "application/json";
   const request = { method, headers, body: body === undefined ? null : JSON.stringify(body) };
+  // Only a request that changes nothing may be sent again.
   const response = await attempt(() => fetch(PREFIX + path, request), method === "GET" ? TRIES : 1);
   if (!response.ok) throw new Problem(response.status, await response.json().catch(() => ({})));
   return response;
 }
 
-/** Browsers break requests off when any network of the machine changes; what changes nothing is asked for again. */
+/** Try a request again: browsers break requests off when any network of the machine changes. */
 async function attempt(act, tries) {
   try {
     return await act();
@@ -93,7 +94,7 @@ export class Connection {
   }
 
   /**
-   * Open a socket, and again whenever it is lost, later each time.
+   * Open a socket, and open it again whenever it is lost, after a wait that grows.
    * @param {string} path below the interface
    * @param {SocketEvents} events
    * @returns {Socket}
@@ -120,7 +121,7 @@ export class Connection {
  * @property {(waitMs: number) => void} [lost] it is not, and will be tried again after a while
  */
 
-/** A socket that comes back. */
+/** A socket that is opened again when it is lost. */
 export class Socket {
   #socket = null;
   #timer = 0;
@@ -139,12 +140,12 @@ export class Socket {
     this.#connect();
   }
 
-  /** @param {string} text is dropped when the socket is not open */
+  /** @param {string} text to send; it is dropped if the socket is not open */
   send(text) {
     if (this.#socket?.readyState === WebSocket.OPEN) this.#socket.send(text);
   }
 
-  /** Try at once, if it is lost. */
+  /** Open the socket at once, if it is lost. */
   hurry() {
     if (this.#timer) this.#connect();
   }
@@ -170,7 +171,7 @@ export class Socket {
     };
     socket.onclose = () => {
       if (this.#closed) return;
-      // Not all pages of a server that comes back should ask at the same instant.
+      // The wait is random, so that not all pages connect at the same instant when a server is back.
       const wait = this.#wait * (0.75 + Math.random() / 2);
       this.#wait = Math.min(this.#wait * 2, LONGEST_WAIT_MS);
       this.#timer = setTimeout(() => this.#connect(), wait);

@@ -1,6 +1,6 @@
 /** Components to start, and runs to look after. */
 
-import { get, make, setText, showProblem } from "./dom.js";
+import { get, make, setChoices, setText, showProblem } from "./dom.js";
 import { legendItem } from "./landing_map.js";
 import { RunRecords } from "./run_records.js";
 import { lives, steps } from "./state.js";
@@ -16,7 +16,7 @@ const WORDS = { starting: "is starting", running: "runs", ended: "has ended", di
  * Read changed keys, one a line.
  * @param {string} text lines such as `trials: 50`; a value is JSON, or a text
  * @returns {Record<string, unknown>}
- * @throws {Error} if a line is none
+ * @throws {Error} if a line is malformed
  */
 export function readChanges(text) {
   const changes = {};
@@ -40,7 +40,7 @@ export class Controls {
 
   /**
    * @param {import("./connection.js").Connection} connection
-   * @param {(id: string) => void} watch has a run shown
+   * @param {(id: string) => void} watch shows a run
    */
   constructor(connection, watch) {
     this.connection = connection;
@@ -53,7 +53,7 @@ export class Controls {
     keep(get("components"), this.#components, state.components, (each) => each.name, () => new ComponentCard(this));
     const living = state.instances.filter(lives);
     const ended = state.instances.filter((each) => !lives(each));
-    const make_ = () => new InstanceCard(this);
+    const makeCard = () => new InstanceCard(this);
     const known = new Set(state.instances.map(({ id }) => id));
     for (const [id, card] of this.#instances) {
       if (!known.has(id)) {
@@ -61,15 +61,15 @@ export class Controls {
         this.#instances.delete(id);
       }
     }
-    keep(get("instances"), this.#instances, living, (each) => each.id, make_);
-    keep(get("ended"), this.#instances, ended, (each) => each.id, make_);
+    keep(get("instances"), this.#instances, living, (each) => each.id, makeCard);
+    keep(get("ended"), this.#instances, ended, (each) => each.id, makeCard);
     get("no-instances").hidden = living.length > 0;
     get("ended-box").hidden = ended.length === 0;
     setText(get("ended-count"), String(ended.length));
   }
 }
 
-/** Have the cards of some things in a place, in their order; elements that are there already are not touched. */
+/** Put the cards of things into a place, in their order; a card that is in its place already is not touched. */
 function keep(place, cards, things, keyOf, makeCard) {
   things.forEach((thing, i) => {
     const key = keyOf(thing);
@@ -114,13 +114,7 @@ class ComponentCard {
     const isContainer = component.kind === "container";
     for (const element of [this.count, this.more]) element.hidden = isContainer;
     this.run.hidden = !isContainer;
-    const runs = ["", ...this.controls.joinable];
-    const offered = [...this.joins.options].map(({ value }) => value);
-    if (isContainer && JSON.stringify(runs) !== JSON.stringify(offered)) {
-      const chosen = this.joins.value;
-      this.joins.replaceChildren(...runs.map((id) => make("option", { value: id }, id || "no run")));
-      this.joins.value = runs.includes(chosen) ? chosen : "";
-    }
+    if (isContainer) setChoices(this.joins, [["", "no run"], ...this.controls.joinable.map((id) => [id, id])]);
   }
 
   async #start() {
@@ -132,8 +126,8 @@ class ComponentCard {
         if (this.joins.value) body.joins = this.joins.value;
       } else {
         body.set = readChanges(this.changes.value);
+        if (this.simulations.value) body.simulations = Number(this.simulations.value);
       }
-      if (this.simulations.value && this.component.kind !== "container") body.simulations = Number(this.simulations.value);
       const instance = await (await this.controls.connection.ask("POST", "/instances", body)).json();
       if (instance.kind !== "container") this.controls.watch(instance.id);
     } catch (error) {
@@ -161,7 +155,6 @@ class InstanceCard {
     this.resume = button("Resume", () => this.#resume());
     this.report = button("Report", () => this.#save("report", "html"));
     this.download = button("Download", () => this.#save("dataset.tar", "tar"));
-    this.joins = make("select");
     this.simulations = make("input", { type: "number", min: "0", max: "256", inputMode: "numeric" });
     this.scale = make("form", { className: "row" }, make("label", {}, "Simulations ", this.simulations),
       make("button", { type: "submit" }, "Scale"));
@@ -234,7 +227,7 @@ class InstanceCard {
     });
   }
 
-  /** Save what the server makes of a finished dataset; a link alone could not show the token. */
+  /** Save a file that the server makes of a finished dataset; a plain link could not send the token. */
   #save(what, suffix) {
     return this.#attempt(async () => {
       const answer = await this.controls.connection.ask("GET", `/collections/${this.#id}/${what}`);

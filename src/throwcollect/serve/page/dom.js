@@ -14,14 +14,14 @@ export function get(id) {
 /**
  * Make an element.
  * @param {string} tag
- * @param {Record<string, unknown>} [properties] properties; those with a dash, `role` and `for` are attributes
+ * @param {Record<string, unknown>} [properties] properties; those with a dash and `role` are attributes
  * @param {...(Node | string)} children
  * @returns {any} the element
  */
 export function make(tag, properties = {}, ...children) {
   const element = document.createElement(tag);
   for (const [name, value] of Object.entries(properties)) {
-    if (name.includes("-") || name === "role" || name === "for") element.setAttribute(name, String(value));
+    if (name.includes("-") || name === "role") element.setAttribute(name, String(value));
     else element[name] = value;
   }
   element.append(...children);
@@ -29,7 +29,7 @@ export function make(tag, properties = {}, ...children) {
 }
 
 /**
- * Set the text of an element, if it is another: screen readers say each change.
+ * Set the text of an element only if it differs, because screen readers read out each change.
  * @param {Element} element
  * @param {string} text
  */
@@ -38,7 +38,7 @@ export function setText(element, text) {
 }
 
 /**
- * Have a list of choices in a select, and keep what is chosen if it is still there.
+ * Set the choices of a select, and keep the chosen one if it is still among them.
  * @param {HTMLSelectElement} select
  * @param {[string, string][]} choices values and texts
  */
@@ -52,7 +52,7 @@ export function setChoices(select, choices) {
 }
 
 /**
- * Show a problem where it happened, with what would be right and a hint; nothing of it if there is none.
+ * Show a problem where it happened, with what would be right and a hint; without a problem, clear the place.
  * @param {Element} place
  * @param {unknown} error
  */

@@ -5,7 +5,7 @@ import { get, make } from "./dom.js";
 /** @typedef {{keys: string[], text: string, act: (key: string) => void}} Shortcut */
 
 /**
- * Have shortcuts act wherever nobody types, and be listed.
+ * Make shortcuts act wherever the user is not typing, and list them.
  * @param {Shortcut[]} shortcuts for the whole page
  * @param {Shortcut[]} ofCanvas for the view while it has the focus
  */

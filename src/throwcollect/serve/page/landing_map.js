@@ -1,4 +1,4 @@
-/** The landing map: where throws have landed, seen from above; the robot stands at the origin and throws upwards. */
+/** The landing map: landings seen from above; the robot stands at the origin, and its x points up in the picture. */
 
 import { get, make, setText } from "./dom.js";
 import { describeModel, drawModel } from "./model_map.js";
@@ -6,7 +6,7 @@ import { TARGET_COLOR, colorOf } from "./outcomes.js";
 
 const DOT_PX = 2.5;
 const MARGIN_PX = 26;
-/** Of more landings, every second one is drawn, and so on. */
+/** Most landings that are kept; beyond that, every second one is dropped. */
 const MOST = 20000;
 
 const SHOWN = "of throws that were shown";
@@ -35,7 +35,7 @@ export class LandingMap {
   /** Grows with each change. */
   revision = 0;
 
-  /** @param {(x: number, y: number) => void} choose is told of a place on the ground that was clicked [m], frame world */
+  /** @param {(x: number, y: number) => void} choose called with the place of each click on the ground [m], frame world */
   constructor(choose) {
     this.canvas = get("map");
     this.canvas.addEventListener("click", ({ offsetX, offsetY }) => choose(...this.#frame(this.canvas.clientWidth, this.canvas.clientHeight).from(offsetX, offsetY)));
@@ -64,7 +64,7 @@ export class LandingMap {
     this.#draw();
   }
 
-  /** @param {Landing[]} landings of a dataset that grows, which come in order; those that are known are left out */
+  /** @param {Landing[]} landings of a dataset that grows; those that are known already are left out */
   addAll(landings) {
     this.#which = SO_FAR;
     for (const landing of landings) this.#push(landing);
@@ -79,7 +79,7 @@ export class LandingMap {
     this.#draw();
   }
 
-  /** @param {number[] | null} place that a target was set at [m], frame world; null if there is none */
+  /** @param {number[] | null} place of the target [m], frame world; null if there is none */
   choose(place) {
     this.#chosen = place;
     this.#draw();
@@ -92,7 +92,7 @@ export class LandingMap {
     this.#draw();
   }
 
-  /** @param {import("./throws.js").Throw} shown was handed out by a run that goes on */
+  /** @param {import("./throws.js").Throw} shown a new throw of a run that is collecting */
   add({ trial, outcome, landing }) {
     if (this.#which === ALL) return;
     this.#push([landing?.[0] ?? null, landing?.[1] ?? null, outcome, trial]);
@@ -109,7 +109,7 @@ export class LandingMap {
     if (this.#landings.length > MOST) this.#landings = this.#landings.filter((_, i) => i % 2 === 0);
   }
 
-  /** @param {import("./throws.js").Throw | null} shown is marked */
+  /** @param {import("./throws.js").Throw | null} shown the throw to mark */
   mark(shown) {
     this.#newest = shown;
     this.#draw();
@@ -144,7 +144,7 @@ export class LandingMap {
     if (width && height) this.paint(canvas, width, height, Math.min(devicePixelRatio, 2));
   }
 
-  /** How places on the ground lie in a picture. World's x points up there, and its y to the left. */
+  /** Scale and conversions between places on the ground and in a picture, in which x points up and y to the left. */
   #frame(width, height) {
     const placed = this.#placed();
     const [chosenX, chosenY] = this.#chosen ?? [0, 0];

@@ -1,13 +1,13 @@
-/** All landings of a run that is watched: those there are so far while it collects, and those of the dataset then. */
+/** All landings of the watched run: those so far while it collects, then those of the finished dataset. */
 
-/** Time between two questions, while there are new throws. */
+/** Time between two requests, while there are new throws. */
 const PERIOD_MS = 2000;
 
-/** Fetches landings for the map, whether their throws were shown or not. */
+/** Fetches landings for the map, also of throws that were not shown. */
 export class Landings {
   #id = null;
   #following = 0;
-  /** How many trials had ended when it was asked last. */
+  /** How many trials had ended at the last request. */
   #ended = 0;
   #hasAll = false;
   #timer = 0;
@@ -29,7 +29,7 @@ export class Landings {
     this.#hasAll = false;
   }
 
-  /** @param {import("./state.js").Instance} instance is asked for what is new of it, not more often than now and then */
+  /** @param {import("./state.js").Instance} instance whose new landings are fetched, if the last request is old enough */
   follow(instance) {
     this.instance = instance;
     if (this.#timer || this.#hasAll || instance.kind !== "collection") return;
@@ -58,7 +58,7 @@ export class Landings {
         else this.map.addAll(found.landings);
       }
     } catch {
-      // Datasets in volumes of a container engine are not read by the server; the map has the throws that were shown.
+      // The server cannot read a dataset in a volume of a container engine; the map keeps the throws that were shown.
       this.#hasAll = id === this.#id && Boolean(this.instance.summary);
     }
   }

@@ -1,4 +1,4 @@
-/** Simulations as they move right now, by rosbridge; and descriptions of robots, which may change at any time. */
+/** Simulations as they move at the moment, and descriptions of robots, which may change at any time; both by rosbridge. */
 
 import { get, setText } from "./dom.js";
 import { Rosbridge } from "./rosbridge.js";
@@ -30,7 +30,7 @@ export class Live {
   /** Sockets that hold simulations at real time for as long as they are open. */
   #holds = new Map();
   #wanted = false;
-  /** @type {(text: string) => void} is told why something that was published is not heard */
+  /** @type {(text: string) => void} called with the reason why something was not published */
   refused = () => {};
   #instance = null;
   #alone = "";
@@ -69,7 +69,7 @@ export class Live {
 
   /**
    * @param {string} simulation
-   * @returns {Moment[]} what it did lately
+   * @returns {Moment[]} its last moments, the newest last
    */
   momentsOf(simulation) {
     return this.#moments.get(simulation) ?? [];
@@ -110,7 +110,7 @@ export class Live {
   }
 
   #connect(run) {
-    this.#leaveAll();
+    for (const name of [...this.simulations]) this.#leave(name);
     this.#bridge?.close();
     this.#bridge = null;
     this.#described.clear();
@@ -152,10 +152,6 @@ export class Live {
     this.#holds.delete(name);
   }
 
-  #leaveAll() {
-    for (const name of [...this.simulations]) this.#leave(name);
-  }
-
   #move(name, { name: joints, position, velocity, effort }) {
     const station = this.view.stations.get(name);
     const pairs = (values) => joints.map((joint, i) => [joint, values[i]]);
@@ -170,7 +166,7 @@ export class Live {
     if (moments.length > KEPT) moments.shift();
   }
 
-  /** At full speed nothing could be seen. The server gives the speed back when no page holds the simulation any more. */
+  /** Slow a simulation down, as nothing could be seen at full speed; the server undoes that when the last page leaves. */
   #slowDown(name) {
     const path = `/instances/${encodeURIComponent(this.#run)}/live/${encodeURIComponent(name)}`;
     this.#holds.set(name, this.connection.open(path, {

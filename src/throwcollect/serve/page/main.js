@@ -12,13 +12,13 @@ import { Plots } from "./plots.js";
 import { Meshes } from "./robot.js";
 import { Room } from "./room.js";
 import { View } from "./scene.js";
-import { Store, inOrder, lives, steps } from "./state.js";
+import { inOrder, lives, steps } from "./state.js";
 import { Target } from "./target.js";
 import { Watching } from "./watching.js";
 
-/** Simulations in a grid; more are on further pages of it. */
+/** Most simulations in a grid; the others are on further pages of it. */
 const MOST_TILES = 16;
-/** Pictures a second at most. */
+/** Most pictures a second. */
 const RATE_HZ = 30;
 
 function say(kind, text) {
@@ -49,9 +49,10 @@ function signIn(why) {
   };
 }
 
-/** The page of somebody who has a token. */
+/** The page of a user who has a token. */
 class Page {
-  #store = new Store();
+  /** @type {import("./state.js").Instance[]} runs, as the newest state has them */
+  #instances = [];
   #first = 0;
   #before = 0;
 
@@ -75,13 +76,12 @@ class Page {
     this.room = new Room({ view, map, target: this.target, plots: this.plots, tell, advance: (seconds) => this.#advance(seconds), facts: () => this.#facts() });
     this.controls = new Controls(connection, watch);
     if (matchMedia("(prefers-reduced-motion: reduce)").matches) this.playback.playing = false;
-    this.#store.listen((state) => this.#put(state));
     this.#listen();
     this.#connect();
     requestAnimationFrame((now) => this.#frame(now));
   }
 
-  /** @param {string} text what is wrong in the view */
+  /** @param {string} text says what is wrong in the view */
   tell(text) {
     setText(get("view-note"), text);
   }
@@ -92,7 +92,7 @@ class Page {
         say("connected", "connected");
         this.models.list();
       },
-      receive: (text) => this.#store.put(JSON.parse(text)),
+      receive: (text) => this.#put(JSON.parse(text)),
       lost: (waitMs) => this.#lost(waitMs),
     });
   }
@@ -112,6 +112,7 @@ class Page {
   }
 
   #put(state) {
+    this.#instances = state.instances;
     this.controls.put(state);
     this.target.put(state);
     const ids = state.instances.filter((each) => lives(each) || each.id === this.watching.id).map(({ id }) => id);
@@ -120,14 +121,14 @@ class Page {
     this.#watch(ids.includes(wanted) ? wanted : (ids[0] ?? ""));
   }
 
-  /** @param {string} id of the run that is to be seen */
+  /** @param {string} id of the run to show */
   #watch(id) {
     const select = get("watched");
     if (id && ![...select.options].some(({ value }) => value === id)) {
       setChoices(select, [...[...select.options].filter(({ value }) => value).map(({ value }) => [value, value]), [id, id]]);
     }
     select.value = id;
-    const instance = this.#store.instance(id);
+    const instance = this.#instances.find((each) => each.id === id);
     if (this.watching.id !== (instance?.id ?? null)) {
       this.#first = 0;
       this.tell("");
@@ -250,7 +251,7 @@ class Page {
   #frame(now) {
     requestAnimationFrame((next) => this.#frame(next));
     const since = now - this.#before;
-    // As long as a room is seen, the device says when it wants a picture.
+    // In a room, the device asks for pictures by itself.
     if (since < 1000 / RATE_HZ - 4 || this.room.isEntered) return;
     this.#before = now;
     this.#advance(since / 1000);
@@ -264,7 +265,7 @@ class Page {
     this.#showTransport();
   }
 
-  /** What is going on, for where the page cannot be seen. */
+  /** What the info board of a room shows, where the page cannot be seen. */
   #facts() {
     const { instance } = this.watching;
     const place = get("connection");
@@ -294,7 +295,7 @@ class Page {
   }
 }
 
-/** Swept values, with keys as short as tell them. */
+/** Swept values in words, with short keys. */
 function inWords(values) {
   return Object.entries(values).map(([key, value]) => `${key.replace(/^(task|ball|scene)\./, "")} ${Number(value.toPrecision(4))}`).join(", ");
 }
@@ -319,7 +320,7 @@ async function begin() {
     return;
   }
   get("page").hidden = false;
-  // For people who look into it, and for tests.
+  // Tests and curious people reach the page by this name.
   window.throwcollect = new Page(token);
 }
 

@@ -1,4 +1,4 @@
-/** A model of the server's directory: how it hits, what adapting did, and the parameters of a throw at a place. */
+/** A model of the server's directory: its errors, what adapting did, and the parameters of a throw at a place. */
 
 import { get, make, setChoices, setText } from "./dom.js";
 import { drawErrors } from "./model_chart.js";
@@ -13,7 +13,7 @@ export class Models {
   #names = [];
   /** The model that is shown; null if none is. */
   #model = null;
-  /** Questions so far; answers to others than the last ones come too late. */
+  /** Numbers of the last requests; answers to earlier requests are ignored. */
   #chosen = 0;
   #aimed = 0;
 
@@ -21,7 +21,7 @@ export class Models {
    * @param {object} parts
    * @param {import("./connection.js").Connection} parts.connection
    * @param {import("./landing_map.js").LandingMap} parts.map
-   * @param {() => void} parts.changed is called when another model is shown, or none any more
+   * @param {() => void} parts.changed called when another model is shown, or none any more
    */
   constructor({ connection, map, changed }) {
     Object.assign(this, { connection, map, changed });
@@ -31,7 +31,7 @@ export class Models {
       event.preventDefault();
       this.#aim();
     });
-    // Models are made and scored elsewhere, by commands.
+    // Commands make and score models while the user looks elsewhere.
     window.addEventListener("focus", () => this.list());
   }
 
@@ -40,12 +40,12 @@ export class Models {
     return this.#model !== null && PLACE.every((name, i) => this.#model.targets[i] === name);
   }
 
-  /** Ask which models there are, and for what is new of the one that is shown. */
+  /** Fetch the names of all models, and the shown model again. */
   async list() {
     try {
       this.#names = await this.#ask("/models");
     } catch {
-      // The connection is lost, which the page says.
+      // The page says already that the connection is lost.
       return;
     }
     get("model-box").hidden = !this.#names.length && !this.#model;

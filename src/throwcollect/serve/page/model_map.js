@@ -1,9 +1,9 @@
-/** What a model adds to the landing map: where its throws came down, targets, and misses. */
+/** Draws a model into the landing map: where its throws came down, targets, and misses. */
 
 import { TARGET_COLOR } from "./outcomes.js";
 
-/** Misses are drawn so many times as long. */
-export const ARROWS = 10;
+/** Factor by which misses are drawn longer than they are. */
+const ARROWS = 10;
 const ARM_PX = 3.5;
 
 /** @typedef {{name: string, reached: number[][], throws: {target: number[], place: number[] | null}[]}} ModelOnMap */
@@ -43,7 +43,7 @@ export function drawModel(pen, style, at, { reached, throws }) {
 
 /**
  * @param {ModelOnMap | null} model
- * @returns {string} what is drawn of it, in a sentence that follows others; empty if there is nothing
+ * @returns {string} a description of the drawing; empty without a model
  */
 export function describeModel(model) {
   if (model === null) return "";

@@ -1,6 +1,6 @@
-/** Colours of outcomes, told apart in the dark, in the light and by most eyes that see few colours. */
+/** Colours of outcomes, which differ in the dark, in the light, and for most users who are colour-blind. */
 
-/** Of the place that is aimed at. */
+/** Colour of the target. */
 export const TARGET_COLOR = "#d6246e";
 
 const COLORS = {

@@ -1,7 +1,7 @@
-/** Replays the newest throw of each simulation; a newer one takes its place when it has come to its end. */
+/** Replays the newest throw of each simulation again and again, until a newer one follows at its end. */
 
 const REST_S = 0.7;
-/** Most of the time that may pass between two pictures; a page that was out of sight does not catch up. */
+/** Longest step between two pictures, so that a page that was out of sight does not catch up. */
 const LONGEST_STEP_S = 0.2;
 
 /** @typedef {import("./throws.js").Throw} Throw */
@@ -13,7 +13,7 @@ export class Playback {
   /** @type {Map<string, {shown: Throw, time: number, next: Throw | null}>} */
   #tracks = new Map();
 
-  /** @param {(shown: Throw) => void} began is told of each throw that begins to be shown */
+  /** @param {(shown: Throw) => void} began called with each throw whose replay begins */
   constructor(began) {
     this.began = began;
   }

@@ -25,9 +25,9 @@ export class PlotPanel {
   #y = [];
 
   /**
-   * @param {Choice} choice what is plotted, and the link that it is bound to
-   * @param {boolean} follows whether it follows the link
-   * @param {() => void} closed is called when it has been closed
+   * @param {Choice} choice what is plotted, and its link
+   * @param {boolean} follows whether the panel follows the link
+   * @param {() => void} closed called when the user has closed the panel
    */
   constructor(choice, follows, closed) {
     this.choice = choice;
@@ -63,7 +63,7 @@ export class PlotPanel {
   }
 
   /**
-   * Draw what is new.
+   * Draw new values.
    * @param {{shown: import("./throws.js").Throw, time: number} | undefined} replay
    * @param {import("./live.js").Moment[] | null} moments of a live simulation; null if it is replayed
    */
@@ -74,7 +74,7 @@ export class PlotPanel {
   }
 
   /**
-   * Go to where the link is.
+   * Move the panel to its link.
    * @param {{x: number, y: number}} at on the stage [px]
    * @param {Element} stage
    * @returns {{x1: number, y1: number, x2: number, y2: number}} line from the panel to the link
@@ -93,7 +93,7 @@ export class PlotPanel {
   }
 
   /**
-   * What it shows: its number of now, its curve unless it is collapsed, and how far from the left of that now is [px].
+   * What the panel shows: its present value, its curve unless it is collapsed, and the place of the present in it [px].
    * @returns {{title: string, now: string, canvas: HTMLCanvasElement | null, at: number | null}}
    */
   get picture() {

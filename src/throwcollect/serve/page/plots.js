@@ -36,7 +36,7 @@ export class Plots {
   }
 
   /**
-   * Plot what a description binds to links, unless that is plotted already.
+   * Add the plots that a description binds to links, unless they are there already.
    * @param {string} simulation whose robot it describes
    * @param {string} urdf
    */
@@ -48,7 +48,7 @@ export class Plots {
     }
   }
 
-  /** Draw what is new, and put panels where their links are. */
+  /** Draw new values, and move panels to their links. */
   draw() {
     const lines = [];
     for (const panel of this.panels) {
@@ -73,7 +73,7 @@ export class Plots {
     return this.view.stations.get(get("plot-simulation").value)?.robot;
   }
 
-  /** Offer what the chosen field can be of, and the links. */
+  /** Offer the names that fit the chosen field, and the links. */
   #offer() {
     const robot = this.#robot();
     const isBall = get("plot-field").value === "ball";

@@ -1,4 +1,4 @@
-/** Robots from their descriptions; each mesh is fetched once, whatever number of robots has it. */
+/** Robots from their descriptions; each mesh is fetched once for all robots. */
 
 import { Group, Mesh, Vector3 } from "./vendor/three/build/three.module.js";
 import { ColladaLoader } from "./vendor/three/examples/jsm/loaders/ColladaLoader.js";
@@ -57,7 +57,7 @@ export class Meshes {
     if (!this.#files.has(path)) {
       const file = this.fetchMesh(path).then((bytes) => coarsenAll(parse(path, bytes)));
       this.#files.set(path, file);
-      // Another robot may have more luck.
+      // The next robot tries again.
       file.catch(() => this.#files.delete(path));
     }
     return (await this.#files.get(path)).clone();
@@ -74,7 +74,7 @@ function parse(path, bytes) {
   const kind = path.slice(path.lastIndexOf(".") + 1).toLowerCase();
   if (kind === "stl") {
     const mesh = new Mesh(new STLLoader().parse(bytes));
-    // Its colour is that of the description.
+    // STL has no colour; the description has one.
     mesh.userData.bare = true;
     return mesh;
   }
@@ -96,8 +96,8 @@ export class Robot {
    * @param {string} urdf description
    * @param {number} baseHeight of the base above the ground [m]
    * @param {Meshes} meshes
-   * @param {() => void} changed is called when there is something new to draw
-   * @param {(error: Error) => void} failed is told of meshes that cannot be had
+   * @param {() => void} changed called when there is something new to draw
+   * @param {(error: Error) => void} failed called for each mesh that cannot be fetched
    * @throws {Error} if the description cannot be read
    */
   constructor(urdf, baseHeight, meshes, changed, failed) {
@@ -126,7 +126,7 @@ export class Robot {
     };
     this.#robot = loader.parse(urdf);
     this.object.add(this.#robot);
-    /** All meshes are there, or cannot be had. */
+    /** Resolves when each mesh is there, or cannot be fetched. */
     this.whole = Promise.all(loading).then(() => {
       this.isWhole = true;
       changed();
@@ -176,14 +176,14 @@ export class Robot {
     return Boolean(found);
   }
 
-  /** @param {boolean} coarse whether meshes with fewer triangles will do */
+  /** @param {boolean} coarse whether to draw meshes with fewer triangles */
   setCoarse(coarse) {
     if (coarse === this.#coarse) return;
     this.#coarse = coarse;
     this.#robot.traverse((part) => this.#choose(part));
   }
 
-  /** Give back what it has that others do not share. */
+  /** Free the geometries that no other robot shares. */
   dispose() {
     this.object.removeFromParent();
     this.#robot.traverse((part) => {

@@ -1,4 +1,4 @@
-/** The view in the room of whoever wears a headset (WebXR, immersive-ar): placed on the floor, with a target in the hand. */
+/** The view in the room of a user with a headset (WebXR, immersive-ar): placed on the floor, with a target in the hand. */
 
 import {
   BufferGeometry, Line, LineBasicMaterial, Mesh, MeshBasicMaterial, PerspectiveCamera, Quaternion, Raycaster, RingGeometry, Vector3,
@@ -10,18 +10,18 @@ import { TARGET_COLOR } from "./outcomes.js";
 
 const FEATURES = { requiredFeatures: ["local-floor"], optionalFeatures: ["hit-test", "hand-tracking"] };
 const UP = new Vector3(0, 1, 0);
-/** Turns the frame world, whose z points up, as rooms have it, whose y does. */
+/** Turns the frame world, whose z points up, into that of a room, whose y points up. */
 const UPRIGHT = new Quaternion().setFromAxisAngle(new Vector3(1, 0, 0), -Math.PI / 2);
-/** Where robots stand if the device knows no floor: so far before who looks [m]. */
+/** Distance of robots in front of the user if the device knows no floor [m]. */
 const AHEAD_M = 2;
 const RAY_M = 1.5;
-/** Size of a target that is held, of one that was set. */
+/** Size of the target in a hand, relative to one that was set. */
 const HELD = 0.6;
-/** Where the board with what a run does stands, and how far below it plots that follow no link [m], frame world. */
+/** Place of the info board, and how far below it plots stand that follow no link [m], frame world. */
 const BOARD = new Vector3(-1.1, 0, 1.45);
 const BELOW_M = 0.5;
 const PLOT_HEIGHT_M = 0.33;
-/** How far before its link a plot stands that follows it, so that no robot hides it [m]. */
+/** Distance of a plot in front of the link that it follows, so that no robot hides it [m]. */
 const BEFORE_M = 0.4;
 
 /** Enters and leaves a room. */
@@ -32,7 +32,7 @@ export class Room {
   #eye = new Vector3();
   #ahead = new Vector3(0, 0, -1);
   #before = 0;
-  /** Finds the floor; undefined until it is known whether the device can, null if it cannot. */
+  /** Hit test that finds the floor; undefined until the device has answered, null if it has none. */
   #finder;
   #isPlaced = false;
   /** @type {Map<XRInputSource, {marker: import("./marker.js").Group, ray: Line}>} */
@@ -46,9 +46,9 @@ export class Room {
    * @param {import("./landing_map.js").LandingMap} parts.map
    * @param {import("./target.js").Target} parts.target
    * @param {import("./plots.js").Plots} parts.plots
-   * @param {(text: string) => void} parts.tell says what is wrong
-   * @param {(seconds: number) => void} parts.advance has everything move on
-   * @param {() => import("./boards.js").Facts} parts.facts tells what is going on
+   * @param {(text: string) => void} parts.tell shows what is wrong
+   * @param {(seconds: number) => void} parts.advance moves replays and live simulations on
+   * @param {() => import("./boards.js").Facts} parts.facts returns what the info board shows
    */
   constructor({ view, map, target, plots, tell, advance, facts }) {
     Object.assign(this, { view, map, target, plots, tell, advance, facts });
@@ -58,7 +58,7 @@ export class Room {
     this.#offer();
   }
 
-  /** Have the button there where there is a device, or where an address of another kind might have one. */
+  /** Show the button if there is a device, or if there might be one at an address with HTTPS. */
   async #offer() {
     const { xr } = navigator;
     const isThere = Boolean(xr) && (await xr.isSessionSupported("immersive-ar").catch(() => false));
@@ -147,7 +147,7 @@ export class Room {
     this.view.drawRoom(this.#camera);
   }
 
-  /** Show where on the floor a press of the trigger would place everything; do so at once if the device knows no floor. */
+  /** Show where on the floor the trigger would place everything; place it at once if the device knows no floor. */
   #find(frame, space) {
     const hit = this.#finder && frame.getHitTestResults(this.#finder)[0]?.getPose(space);
     this.reticle.visible = Boolean(hit);
@@ -168,7 +168,7 @@ export class Room {
     this.view.world.visible = false;
   }
 
-  /** Have the first robot stand at a place of the floor, and throw to the right of who looks. */
+  /** Place the first robot on the floor so that it throws to the right of the user. */
   #place(floor) {
     const { world } = this.view;
     world.position.copy(floor);
@@ -288,7 +288,7 @@ export class Room {
   }
 }
 
-/** What finds the floor where who looks looks at; null if the device cannot. */
+/** Request a hit test that finds the floor in front of the user; null if the device has none. */
 async function findFloor(session) {
   try {
     const space = await session.requestReferenceSpace("viewer");
@@ -298,7 +298,7 @@ async function findFloor(session) {
   }
 }
 
-/** Where the tip of a controller or of a forefinger is in the room; null if that is not known, or it is neither. */
+/** Place of the tip of a controller or of a forefinger in the room; null if the input is neither, or its place unknown. */
 function placeOf(frame, source, space) {
   if (source.targetRayMode !== "tracked-pointer") return null;
   const finger = source.hand?.get("index-finger-tip");
@@ -306,7 +306,7 @@ function placeOf(frame, source, space) {
   return pose ? new Vector3().copy(pose.transform.position) : null;
 }
 
-/** What an input points at, as a caster of its ray; null if that is not known. */
+/** Raycaster along the direction in which an input points; null if that is unknown. */
 function rayOf(frame, source, space) {
   const pose = frame.getPose(source.targetRaySpace, space);
   if (!pose) return null;

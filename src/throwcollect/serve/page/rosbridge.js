@@ -1,4 +1,4 @@
-/** A small client of rosbridge v2: topics that are heard and published, services that are called. */
+/** A small client of rosbridge v2 that subscribes to topics and publishes them. */
 
 const PERIOD_MS = 33;
 
@@ -7,8 +7,6 @@ export class Rosbridge {
   #socket;
   #topics = new Map();
   #advertised = new Map();
-  #calls = new Map();
-  #count = 0;
   #open = false;
 
   /**
@@ -17,7 +15,7 @@ export class Rosbridge {
    * @param {object} events
    * @param {() => void} [events.opened]
    * @param {() => void} [events.lost]
-   * @param {(text: string) => void} [events.refused] is told why something was not published
+   * @param {(text: string) => void} [events.refused] called with the reason why something was not published
    */
   constructor(connection, run, events = {}) {
     this.#socket = connection.openRosbridge(run, {
@@ -30,15 +28,13 @@ export class Rosbridge {
       receive: (text) => this.#take(JSON.parse(text), events),
       lost: () => {
         this.#open = false;
-        for (const { reject } of this.#calls.values()) reject(new Error("the connection to the run is lost"));
-        this.#calls.clear();
         events.lost?.();
       },
     });
   }
 
   /**
-   * Hear a topic, also after the connection was lost; at most 30 messages a second.
+   * Subscribe to a topic, again after the connection was lost; at most 30 messages a second.
    * @param {string} topic
    * @param {string} type such as std_msgs/msg/String
    * @param {(message: any) => void} hear
@@ -48,31 +44,16 @@ export class Rosbridge {
     if (this.#open) this.#ask(topic, type);
   }
 
-  /** @param {string} topic is not heard any more */
+  /** @param {string} topic to unsubscribe from */
   unsubscribe(topic) {
     if (this.#topics.delete(topic)) this.#send({ op: "unsubscribe", topic });
   }
 
   /**
-   * @param {string} service
-   * @param {string} type
-   * @param {object} args the request
-   * @returns {Promise<any>} the response
-   * @throws {Error} if it cannot be had
-   */
-  call(service, type, args) {
-    if (!this.#open) return Promise.reject(new Error("there is no connection to the run"));
-    const id = `call-${(this.#count += 1)}`;
-    const answer = new Promise((resolve, reject) => this.#calls.set(id, { resolve, reject }));
-    this.#send({ op: "call_service", id, service, type, args });
-    return answer;
-  }
-
-  /**
-   * Publish a message; whoever joins late hears the last one. What the bridge refuses is told as an event.
+   * Publish a message, which is latched. If the bridge refuses it, the event `refused` says why.
    * @param {string} topic
    * @param {string} type such as geometry_msgs/msg/PointStamped
-   * @param {object} message a stamp that it lacks is the present time
+   * @param {object} message without a stamp, the bridge sets the present time
    * @throws {Error} if there is no connection
    */
   publish(topic, type, message) {
@@ -103,10 +84,5 @@ export class Rosbridge {
   #take(message, { refused }) {
     if (message.op === "status" && message.level === "error" && message.id?.startsWith("publish-")) refused?.(message.msg);
     if (message.op === "publish") this.#topics.get(message.topic)?.hear(message.msg);
-    if (message.op !== "service_response") return;
-    const call = this.#calls.get(message.id);
-    this.#calls.delete(message.id);
-    if (message.result) call?.resolve(message.values);
-    else call?.reject(new Error(typeof message.values === "string" ? message.values : "the service failed"));
   }
 }

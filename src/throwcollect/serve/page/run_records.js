@@ -1,4 +1,4 @@
-/** Events and logs of a run, fetched as long as they are looked at. */
+/** Events and logs of a run, fetched again and again as long as they are shown. */
 
 import { make, setChoices, showProblem } from "./dom.js";
 import { lives } from "./state.js";

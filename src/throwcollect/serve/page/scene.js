@@ -14,13 +14,13 @@ const TARGET = new Vector3(0.6, 0, 1);
 const EYE = new Vector3(3.3, -4, 1.9);
 const TURN_RAD = 0.12;
 const ZOOM = 1.15;
-/** Robots that are drawn with all of their triangles; more are drawn with fewer. */
+/** Number of robots that are drawn with all triangles; if more are shown, all are drawn with fewer. */
 const MOST_FINE = 1;
 /** A picture that takes longer than this on average [ms] is drawn with less. */
 const SLOW_MS = 70;
-/** Least time between pictures [ms] that are drawn by software: it leaves the processors to whoever simulates on them. */
+/** Least time between pictures that are drawn by software [ms], which leaves the processors to the simulations. */
 const SOFTWARE_STEP_MS = 95;
-/** How far robots stand from each other in a room. */
+/** Distance between two robots in a room [m]. */
 const SPACING_M = 1.5;
 
 /** One simulation in the view. */
@@ -80,9 +80,9 @@ export class View {
   stations = new Map();
   /** @type {string[]} names of the stations that are shown, in order */
   shown = [];
-  /** What has its place in the frame world, which lies elsewhere as long as it is seen in a room. */
+  /** Objects in the frame world, which is moved to the floor of a room while it is shown there. */
   world = new Group();
-  /** What has its place in the room, while there is one. */
+  /** Objects in the frame of the room, while there is one. */
   room = new Group();
   /** @type {number[] | null} */
   #target = null;
@@ -112,7 +112,7 @@ export class View {
     this.orbit.minDistance = 0.6;
     this.orbit.maxDistance = 20;
     this.orbit.addEventListener("change", () => {
-      // Whoever turns the view with a hand wants to see that at once.
+      // A user who turns the view wants to see that at once.
       this.#waited = Infinity;
       this.touch();
     });
@@ -129,12 +129,12 @@ export class View {
     this.#resize();
   }
 
-  /** Have the next picture drawn. */
+  /** Draw a picture next time, because something has changed. */
   touch() {
     this.#changed = true;
   }
 
-  /** Look from where it began. */
+  /** Look from the first point of view again. */
   reset() {
     this.#camera.position.copy(EYE);
     this.orbit.target.copy(TARGET);
@@ -142,8 +142,8 @@ export class View {
   }
 
   /**
-   * @param {number} right turns, to the right and up
-   * @param {number} up
+   * @param {number} right steps to the right
+   * @param {number} up steps up
    */
   turn(right, up) {
     this.orbit.rotateLeft(-right * TURN_RAD);
@@ -189,7 +189,7 @@ export class View {
     this.touch();
   }
 
-  /** Have everything ready to be drawn into a room. */
+  /** Prepare to draw into a room. */
   enterRoom() {
     this.#isInRoom = true;
     this.renderer.xr.enabled = true;
@@ -199,7 +199,7 @@ export class View {
 
   /**
    * Draw all that is shown, side by side, into a room.
-   * @param {PerspectiveCamera} camera whose place and projections are those of the eyes
+   * @param {PerspectiveCamera} camera for the eyes of the user
    */
   drawRoom(camera) {
     this.#choose();
@@ -222,7 +222,7 @@ export class View {
     return place;
   }
 
-  /** Have everything as it was before the room. */
+  /** Undo `enterRoom`. */
   leaveRoom() {
     this.#isInRoom = false;
     this.renderer.xr.enabled = false;
@@ -263,8 +263,8 @@ export class View {
   }
 
   /**
-   * Draw a picture, if anything is new and it is time for one.
-   * @param {number} sinceMs time since this was called before
+   * Draw a picture, if something has changed and the last one is old enough.
+   * @param {number} sinceMs time since the last call [ms]
    */
   draw(sinceMs) {
     this.#waited += sinceMs;
@@ -313,14 +313,14 @@ export class View {
     const box = this.canvas.parentElement;
     this.#width = Math.max(1, box.clientWidth);
     this.#height = Math.max(1, box.clientHeight);
-    // In a room, the size is that of the device; the page has its own again when that is left.
+    // In a room, the device determines the size; `leaveRoom` calls this again.
     if (this.#isInRoom) return;
     this.renderer.setPixelRatio(this.#plain ? 1 : Math.min(devicePixelRatio, 2));
     this.renderer.setSize(this.#width, this.#height, false);
     this.#arrange();
   }
 
-  /** Have as many columns as make tiles that are nearest to squares. */
+  /** Choose the number of columns whose tiles are nearest to squares. */
   #arrange() {
     const count = Math.max(1, this.shown.length);
     let best = Infinity;

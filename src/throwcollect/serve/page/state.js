@@ -1,4 +1,4 @@
-/** The state of everything, as the server tells it: always whole, so the newest message alone matters. */
+/** The state of everything, as the server tells it: always whole, so that only the newest message matters. */
 
 /**
  * @typedef {object} Component
@@ -42,32 +42,6 @@
  */
 
 /** @typedef {{components: Component[], instances: Instance[], revision: number}} State */
-
-/** Holds the state, and tells of each new one. */
-export class Store {
-  /** @type {State | null} */
-  state = null;
-  #listeners = [];
-
-  /** @param {(state: State) => void} listener */
-  listen(listener) {
-    this.#listeners.push(listener);
-  }
-
-  /** @param {State} state */
-  put(state) {
-    this.state = state;
-    for (const listener of this.#listeners) listener(state);
-  }
-
-  /**
-   * @param {string} id
-   * @returns {Instance | undefined}
-   */
-  instance(id) {
-    return this.state?.instances.find((each) => each.id === id);
-  }
-}
 
 /**
  * @param {Instance} instance

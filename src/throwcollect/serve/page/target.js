@@ -1,4 +1,4 @@
-/** The place that is aimed at: set by hand, published in the run that is watched, and collected for. */
+/** The target: set by the user, published in the watched run, and the aim of collections. */
 
 import { get, setChoices, setText, showProblem } from "./dom.js";
 
@@ -6,14 +6,14 @@ const TOPIC = "/target";
 const TYPE = "geometry_msgs/msg/PointStamped";
 /** Frame of places: below the robot's base on the ground, x forward, y to the left, z up. */
 const FRAME = "world";
-/** How far from the target a collection for it aims [m], and into how many equal rings. */
+/** How far around the target a collection aims [m], and its number of rings. */
 const AROUND_M = 0.1;
 const RINGS = 4;
 /** How far above and below the target the landing plane of such a collection may lie [m]. */
 const ABOVE_M = 0.05;
 
 /**
- * Keys that have a collection cover a place.
+ * Keys with which a collection throws around a place.
  * @param {number[]} place [m], frame world
  * @param {string[]} targets keys that may stand in `sweep.target` of the collection
  * @returns {Record<string, unknown>}
@@ -24,7 +24,7 @@ export function coverPlace([x, y, z], targets) {
   const height = Math.max(0, z);
   return {
     "sweep.target.distance_m": between(distance, AROUND_M, RINGS),
-    // The height of the plane is one of the sweep's, or one for all.
+    // The sweep may vary the height of the landing plane; otherwise it is the same in all trials.
     ...(targets.includes("height_m") ? { "sweep.target.height_m": between(height, ABOVE_M, 1) } : { "scene.landing_height_m": round(height) }),
   };
 }
@@ -37,7 +37,7 @@ function round(metres) {
 export class Target {
   /** @type {number[] | null} [m], frame world; null before it is set */
   place = null;
-  /** What became of it, for people. */
+  /** What became of the target, in words. */
   note = "";
   #components = [];
 
@@ -47,8 +47,8 @@ export class Target {
    * @param {import("./scene.js").View} parts.view
    * @param {import("./landing_map.js").LandingMap} parts.map
    * @param {import("./live.js").Live} parts.live
-   * @param {(id: string) => void} parts.watch has a run shown
-   * @param {(place: number[]) => void} parts.aim is told of each place that is set
+   * @param {(id: string) => void} parts.watch shows a run
+   * @param {(place: number[]) => void} parts.aim called with each place that is set
    */
   constructor({ connection, view, map, live, watch, aim }) {
     Object.assign(this, { connection, view, map, live, watch, aim });
@@ -76,7 +76,7 @@ export class Target {
   }
 
   /**
-   * Set the target where somebody points at the ground; its height stays.
+   * Set the target to a place on the ground that the user has pointed at, at its present height.
    * @param {number} x [m], frame world
    * @param {number} y
    */

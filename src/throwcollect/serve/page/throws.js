@@ -1,4 +1,4 @@
-/** Finished throws as the server hands them out: decoding, and where joints and ball are at a time. */
+/** Finished throws as the server sends them: decoding, and the places of joints and ball at a time. */
 
 /**
  * @typedef {object} Throw
@@ -26,7 +26,7 @@ export function decodeThrow(buffer) {
   const header = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 4, length)));
   const start = 4 + Math.ceil(length / 4) * 4;
   const { samples, joints } = header;
-  // Little-endian as all machines with a browser are.
+  // The numbers are little-endian, as all machines with a browser are.
   const positions = new Float32Array(buffer, start, samples * joints.length);
   const ball = new Float32Array(buffer, start + positions.byteLength, samples * 3);
   return { ...header, positions, ball, duration: Math.max(0, samples - 1) / header.rate_hz };
@@ -79,7 +79,7 @@ export function ballAt(shown, time) {
 }
 
 /**
- * A number of each sample: of the ball, of a joint, or how fast a joint's position changes.
+ * One number of each sample: of the ball, of a joint, or the velocity of a joint as the slope of its positions.
  * @param {Throw} shown
  * @param {"position" | "velocity" | "effort" | "ball"} field
  * @param {string} name of a joint, or x, y, z

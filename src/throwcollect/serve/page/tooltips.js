@@ -1,10 +1,10 @@
-/** Data sources that a robot's description binds to links, as `<tooltip name topic field><parent link/></tooltip>`. */
+/** Plots that a robot's description binds to links, as `<tooltip name topic field><parent link/></tooltip>`. */
 
 const JOINT = /^(position|velocity|effort)\[([^\]]+)\]$/;
 const BALL = /^pose\.pose\.position\.([xyz])$/;
 
 /**
- * What a description has plotted.
+ * Read the plots of a description.
  * @param {string} urdf
  * @returns {{field: "position" | "velocity" | "effort" | "ball", name: string, link: string}[]} those that can be plotted
  */

@@ -1,4 +1,4 @@
-/** What is seen of one run: its newest throws, its robots, its landings. */
+/** The view of one run: its newest throws, its robots, its landings. */
 
 import { Landings } from "./landings.js";
 import { Robot } from "./robot.js";
@@ -12,7 +12,7 @@ export class Watching {
   #socket = null;
   #urdf = null;
   #scene = null;
-  /** @type {(simulation: string, urdf: string) => void} is told of each description that is drawn */
+  /** @type {(simulation: string, urdf: string) => void} called with each description that is drawn */
   described = () => {};
 
   /**
@@ -52,7 +52,7 @@ export class Watching {
   }
 
   /**
-   * Have a simulation's robot look as a description says, in the posture that it has.
+   * Draw the robot of a simulation as a description says, in its present posture.
    * @param {string} name of the simulation
    * @param {string} urdf
    */

@@ -8,17 +8,14 @@ import logging
 import threading
 import time
 from collections.abc import Callable
-from pathlib import Path
 from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING
 
 from throwcollect import ros
 from throwcollect.errors import ThrowcollectError
 from throwcollect.ros.endpoint import answers
-from throwcollect.serve.robot_files import find_mesh
 from throwcollect.serve.rosbridge.client import Client
 from throwcollect.serve.rosbridge.codec import Frame
-from throwcollect.serve.rosbridge.file_server import FileServer
 from throwcollect.serve.rosbridge.session import Session
 
 if TYPE_CHECKING:
@@ -30,7 +27,7 @@ _LOOK_S = 1.0
 """Time between two looks at the router and at what publishers offer."""
 _RETRY_S = 0.2
 _MISSES = 2
-"""Looks at the router in a row without an answer by which it has gone: a busy machine may let one of them wait."""
+"""Looks in a row without an answer after which the router counts as gone; on a busy machine, one answer may be late."""
 
 
 class Bridge:
@@ -40,14 +37,9 @@ class Bridge:
 
     Args:
         connection: The way into the run; None while its router has no address, until `move` tells it.
-        find: Finds the files that clients name as ``package://NAME/PATH``, by these two.
-
-    Attributes:
-        files: What gives clients such files.
     """
 
-    def __init__(self, connection: Connection | None, find: Callable[[str, str], Path] = find_mesh) -> None:
-        self.files = FileServer(find)
+    def __init__(self, connection: Connection | None) -> None:
         self._connection = connection
         self._session: Session | None = None
         self._joined: Connection | None = None
@@ -63,31 +55,26 @@ class Bridge:
         self._thread.start()
 
     def attach(self, send: Callable[[Frame], None], *, read_only: bool = False) -> Client:
-        """Have one more client.
+        """Add a client.
 
         Args:
-            send: Called with each frame for the client, in the bridge's thread: a text, or bytes for a binary frame. It
-                may neither wait nor fail.
+            send: Called with each frame for the client, in the bridge's thread; it may neither wait nor fail.
             read_only: Whether the client may only look.
 
         Returns:
-            The client, which whoever calls this has to close.
+            The client, which the caller has to close.
         """
         client = Client(self, send, read_only=read_only)
         self.submit(lambda: self._clients.append(client))
         return client
 
     def move(self, connection: Connection | None) -> None:
-        """Go on by another way into the run, as its router has got another address.
-
-        Args:
-            connection: The way by now; None while the router has no address.
-        """
+        """Use another way into the run, whose router has another address; None while the router has no address."""
         self._connection = connection
         self.submit(_nothing)
 
     def close(self) -> None:
-        """End, and with it all that clients had."""
+        """End the bridge, and withdraw all that its clients have."""
         self._closing.set()
         self.submit(_nothing)
         self._thread.join()
@@ -99,7 +86,7 @@ class Bridge:
 
     @property
     def session(self) -> Session:
-        """The place in the ROS graph, in the bridge's thread.
+        """The place in the ROS graph; only for the bridge's thread.
 
         Raises:
             ThrowcollectError: If there is no router.
@@ -109,18 +96,18 @@ class Bridge:
         return self._session
 
     def later(self, seconds: float, action: Callable[[], None]) -> None:
-        """Have something done after a time [s]; in the bridge's thread alone."""
+        """Call an action after a time [s]; only for the bridge's thread."""
         heapq.heappush(self._timers, (time.monotonic() + seconds, next(self._numbers), action))
 
     def submit(self, action: Callable[[], None]) -> None:
-        """Have something done soon, in the bridge's thread."""
+        """Call an action soon, in the bridge's thread."""
         self._work.put(action)
         with self._lock:
             if self._session is not None:
                 self._session.executor.create_task(self._do_next)
 
     def forget(self, client: Client) -> None:
-        """Know a client no longer."""
+        """Take a client off the list."""
         self._clients.remove(client)
 
     def _run(self) -> None:
@@ -142,7 +129,7 @@ class Bridge:
         try:
             self._attempt(lambda: session.executor.spin_once(timeout_sec=seconds))
         except ros.ExternalShutdownException:
-            # Somebody has ended all contexts of this process.
+            # Something has shut down all contexts of this process.
             self._lose()
 
     def _do_next(self, seconds: float = 0.0) -> None:
@@ -158,7 +145,7 @@ class Bridge:
         except ros.ExternalShutdownException:
             raise
         except Exception:
-            # Whatever becomes of one thing, the others go on.
+            # One action that fails must not end the thread, which all clients share.
             _logger.exception("the bridge could not do something")
 
     def _call_timers(self) -> None:
@@ -172,14 +159,13 @@ class Bridge:
         if now < self._looked_at + wait_s and self._joined == self._connection:
             return
         self._looked_at = now
-        wanted = self._connection
-        there = wanted is not None and answers(wanted.endpoint)
-        # A router that is busy may miss one answer; clients are not cut off for that.
-        self._misses = 0 if there else self._misses + 1
-        if self._session is not None and (self._misses >= _MISSES or wanted != self._joined):
+        connection = self._connection
+        has_answered = connection is not None and answers(connection.endpoint)
+        self._misses = 0 if has_answered else self._misses + 1
+        if self._session is not None and (self._misses >= _MISSES or connection != self._joined):
             self._lose()
-        if self._session is None and wanted is not None and there:
-            self._join(wanted)
+        if self._session is None and connection is not None and has_answered:
+            self._join(connection)
         if self._session is not None:
             self._session.look_around()
 

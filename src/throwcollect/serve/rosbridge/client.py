@@ -1,4 +1,4 @@
-"""One client of a bridge: what it asks, and all that it has in the ROS graph."""
+"""One client of a bridge: its requests, and all that it has in the ROS graph."""
 
 from __future__ import annotations
 
@@ -9,12 +9,13 @@ from collections.abc import Callable, Mapping
 from typing import Protocol
 
 from throwcollect.errors import ConfigError, ThrowcollectError
-from throwcollect.serve.rosbridge.codec import Frame, cbor_bytes, fragments, json_text, read_frame
-from throwcollect.serve.rosbridge.file_server import GET_FILE, FileServer
+from throwcollect.serve.rosbridge.codec import Frame, encode, fragments, read_frame
+from throwcollect.serve.rosbridge.file_server import GET_FILE, give_file
 from throwcollect.serve.rosbridge.goals import Goal, Goals
-from throwcollect.serve.rosbridge.offered_actions import OfferedActions
-from throwcollect.serve.rosbridge.offered_services import OfferedServices
-from throwcollect.serve.rosbridge.peer import Level, Part
+from throwcollect.serve.rosbridge.offered_actions import OfferedAction
+from throwcollect.serve.rosbridge.offered_services import OfferedService
+from throwcollect.serve.rosbridge.offers import Offers
+from throwcollect.serve.rosbridge.peer import Level
 from throwcollect.serve.rosbridge.publishers import Publishers
 from throwcollect.serve.rosbridge.questions import Questions
 from throwcollect.serve.rosbridge.reassembly import Reassembly
@@ -37,34 +38,24 @@ class Host(Protocol):
 
     @property
     def session(self) -> Session:
-        """Its place in the ROS graph."""
+        """The bridge's place in the ROS graph."""
 
     @property
     def is_connected(self) -> bool:
-        """Whether it has one."""
-
-    @property
-    def files(self) -> FileServer:
-        """Files of the robot."""
+        """Whether the bridge has a place in the ROS graph by now."""
 
     def later(self, seconds: float, action: Callable[[], None]) -> None:
-        """Have something done after a time [s], in the bridge's thread."""
+        """Call an action after a time [s], in the bridge's thread."""
 
     def submit(self, action: Callable[[], None]) -> None:
-        """Have something done soon, in the bridge's thread; may be called in any."""
+        """Call an action soon, in the bridge's thread; may be called in any thread."""
 
     def forget(self, client: Client) -> None:
-        """Know a client no longer."""
+        """Take a client off the list."""
 
 
 class Client:
-    """One client. `receive` and `close` may be called in any thread, all else in that of the bridge.
-
-    Args:
-        host: The bridge.
-        send: Takes each frame that leaves.
-        read_only: Whether it may only look.
-    """
+    """One client. `receive` and `close` may be called in any thread, everything else only in that of the bridge."""
 
     def __init__(self, host: Host, send: Callable[[Frame], None], *, read_only: bool) -> None:
         self._host = host
@@ -76,11 +67,12 @@ class Client:
         self._questions = Questions(self)
         self._goals = Goals(self)
         subscriptions, publishers = Subscriptions(self), Publishers(self)
-        services, actions = OfferedServices(self), OfferedActions(self)
-        self._parts: tuple[Part, ...] = (subscriptions, publishers, services, actions, self._questions, self._goals)
+        services = Offers(self, "service", OfferedService)
+        actions = Offers(self, "action", OfferedAction, probe="/_action/send_goal")
+        self._parts = (subscriptions, publishers, services, actions, self._questions, self._goals)
         self._reassembly = Reassembly()
         rosapi = Rosapi(self, self._questions).answers
-        self._answers: Mapping[str, Answer] = {**rosapi, GET_FILE: host.files.answer}
+        self._answers: Mapping[str, Answer] = {**rosapi, GET_FILE: give_file}
         self._looking: Mapping[str, Operation] = {
             "subscribe": subscriptions.subscribe,
             "unsubscribe": subscriptions.unsubscribe,
@@ -96,14 +88,14 @@ class Client:
             "publish": publishers.publish,
             "advertise_service": services.advertise,
             "unadvertise_service": services.unadvertise,
-            "service_response": services.respond,
+            "service_response": services.pass_on(OfferedService.respond),
             "send_action_goal": self._send_goal,
             "cancel_action_goal": self._goals.cancel,
             "advertise_action": actions.advertise,
             "unadvertise_action": actions.unadvertise,
-            "action_feedback": actions.tell,
-            "action_result": actions.end,
-            "action_status": actions.settle,
+            "action_feedback": actions.pass_on(OfferedAction.publish_feedback),
+            "action_result": actions.pass_on(OfferedAction.end),
+            "action_status": actions.pass_on(OfferedAction.settle),
         }
 
     @property
@@ -113,11 +105,11 @@ class Client:
 
     @property
     def waiting(self) -> int:
-        """Number of frames that were received and are not worked off."""
+        """Number of received frames that wait to be handled."""
         return len(self._frames)
 
     def receive(self, frame: Frame) -> None:
-        """Take a frame that the client has sent; what is wrong with it, the client is told."""
+        """Take a frame of the client; the client is told what is wrong with it."""
         self._frames.append(frame)
         self._host.submit(self.work_off)
 
@@ -126,18 +118,18 @@ class Client:
         self._host.submit(self._close)
 
     def work_off(self) -> None:
-        """Do what the client has asked for; without a router, that waits."""
+        """Handle the frames of the client; without a router, they wait."""
         while self._frames and self._host.is_connected and not self._is_closed:
             self._handle(self._frames.popleft())
 
     def lose(self) -> None:
-        """Know that the router has gone, and with it all that the client had."""
+        """Forget the session, as the router has gone, and tell the client."""
         for part in self._parts:
             part.lose()
         self.say("error", "the router of the run has gone; what is asked for now waits until it is back")
 
     def restore(self) -> None:
-        """Have everything again, in a new session."""
+        """Make everything that the client had again, in a new session."""
         for part in self._parts:
             part.restore()
         if self._level != "none":
@@ -145,7 +137,7 @@ class Client:
         self.work_off()
 
     def later(self, seconds: float, action: Callable[[], None]) -> None:
-        """Have something done after a time [s]."""
+        """Call an action after a time [s]."""
         self._host.later(seconds, action)
 
     def send(self, frame: Frame, fragment_size: int = 0) -> None:
@@ -160,11 +152,11 @@ class Client:
 
     def answer(self, fields: Mapping[str, object], form: Form) -> None:
         """Send an operation; what is None is left out."""
-        there = {name: value for name, value in fields.items() if value is not None}
-        self.send(json_text(there) if form.compression == "none" else cbor_bytes(there), form.fragment_size)
+        filled = {name: value for name, value in fields.items() if value is not None}
+        self.send(encode(filled, form.compression), form.fragment_size)
 
     def say(self, level: Level, text: str, request: RequestId = None) -> None:
-        """Send a status message about a request, unless the client does not want those of its level."""
+        """Send a status message about a request, if the client wants messages of this level."""
         if _LEVELS.index(level) <= _LEVELS.index(self._level):
             self.answer({"op": "status", "id": request, "level": level, "msg": text}, Form())
 
@@ -190,7 +182,7 @@ class Client:
         except ThrowcollectError as error:
             self.say("error", sentence(error), number)
         except Exception as error:
-            # Whatever one client sends, the others go on.
+            # A frame of one client must not end the bridge, which serves the others, too.
             _logger.exception("a client of the bridge sent what could not be done")
             self.say("error", f"this could not be done: {type(error).__name__}: {error}", number)
 

@@ -1,7 +1,7 @@
 """Frames of the protocol: JSON in text frames, CBOR in binary ones, and messages in either.
 
-Numbers as rosbridge_suite writes them. In JSON, octets are Base64, and what is no finite number is null. In CBOR,
-octets are bytes and other arrays of numbers are typed arrays (RFC 8746), little endian.
+Numbers are written as rosbridge_suite writes them. In JSON, octets are Base64, and NaN and infinities are null. In
+CBOR, octets are bytes and other arrays of numbers are typed arrays (RFC 8746), little endian.
 """
 
 from __future__ import annotations
@@ -30,16 +30,13 @@ _NOT_ASCII = re.compile(r"[^\x00-\x7f]+")
 
 
 def read_frame(frame: Frame) -> Request:
-    """Read what a client sends.
-
-    Args:
-        frame: JSON, or CBOR in a binary frame.
+    """Read a frame of a client, which is JSON, or CBOR in a binary frame.
 
     Raises:
         ConfigError: If it is neither, or no operation.
     """
     try:
-        # What JSON can begin with is no map in CBOR.
+        # No map of CBOR begins with a byte that an object of JSON can begin with.
         if isinstance(frame, str) or frame[:1].isspace() or frame[:1] == b"{":
             fields = orjson.loads(frame)
         else:
@@ -52,41 +49,41 @@ def read_frame(frame: Frame) -> Request:
 
 
 def _read_array(tag: cbor2.CBORTag, _immutable: bool) -> Any:
-    """An array for a tag of one; other tags stay what they are."""
+    """Turn the tag of a typed array into the array; other tags stay as they are."""
     kind = _TAGS.get(tag.tag)
     if kind is None or not isinstance(tag.value, bytes) or len(tag.value) % np.dtype(kind).itemsize:
         return tag
     return np.frombuffer(tag.value, kind)
 
 
-def json_values(message: Any) -> Any:
-    """A message as JSON has it; arrays of numbers are still NumPy's, which `json_text` writes."""
-    return plain(message, _json_numbers)
+def plain_values(message: Any, compression: str = "none") -> Any:
+    """Turn a message into values that `encode` writes.
+
+    Args:
+        message: The message.
+        compression: ``none`` for values of JSON, in which arrays of numbers are still NumPy's; otherwise those of CBOR.
+    """
+    return plain(message, _json_numbers if compression == "none" else _cbor_numbers)
 
 
-def cbor_values(message: Any) -> Any:
-    """A message as CBOR has it."""
-    return plain(message, _cbor_numbers)
+def encode(fields: object, compression: str = "none") -> Frame:
+    """Write a frame: JSON if ``compression`` is ``none``, otherwise CBOR."""
+    return json_text(fields) if compression == "none" else bytes(cbor2.dumps(fields))
 
 
 def json_text(fields: object) -> str:
-    """JSON in one line, in ASCII: ROS# takes every byte of a frame for a character."""
+    """Write JSON in one line, in ASCII, because ROS# takes every byte of a frame for a character."""
     text = orjson.dumps(fields, option=orjson.OPT_SERIALIZE_NUMPY).decode()
     return text if text.isascii() else _NOT_ASCII.sub(lambda found: json.dumps(found[0])[1:-1], text)
 
 
-def cbor_bytes(fields: object) -> bytes:
-    """CBOR."""
-    return bytes(cbor2.dumps(fields))
-
-
 def fragments(text: str, size: int, number: str) -> Iterator[str]:
-    """Parts of a text frame that is longer than a client wants.
+    """Split a text frame that is longer than a client wants into fragments.
 
     Args:
         text: The frame.
-        size: Characters in each part, at most.
-        number: What tells the parts of different frames apart.
+        size: Characters in each fragment, at most.
+        number: Tells the fragments of different frames apart.
     """
     total = -(-len(text) // size)
     for index in range(total):

@@ -1,4 +1,4 @@
-"""A subscription in ROS, and the samples that it gives to all clients that want them, each encoded once."""
+"""A subscription in ROS whose messages go to all clients that listen; each message is encoded once."""
 
 from __future__ import annotations
 
@@ -9,9 +9,8 @@ import orjson
 
 from throwcollect import ros
 from throwcollect.ros.offered_qos import find_offered_qos
-from throwcollect.serve.rosbridge.codec import Frame, cbor_bytes, cbor_values, json_text, json_values
-
-NS_PER_S = 10**9
+from throwcollect.serve.rosbridge.codec import Frame, encode, json_text, plain_values
+from throwcollect.units import NS_PER_S
 
 
 class Sample:
@@ -34,7 +33,7 @@ class Sample:
         """The message as a client gets it.
 
         Args:
-            topic: The topic, by the name that the client has for it.
+            topic: The client's name for the topic.
             compression: ``none``, ``cbor`` or ``cbor-raw``.
 
         Raises:
@@ -43,7 +42,7 @@ class Sample:
         key = topic, compression
         if key not in self._frames:
             fields = {"op": "publish", "topic": topic, "msg": self._content(compression)}
-            self._frames[key] = json_text(fields) if compression == "none" else cbor_bytes(fields)
+            self._frames[key] = encode(fields, compression)
         return self._frames[key]
 
     def _content(self, compression: str) -> Any:
@@ -51,10 +50,9 @@ class Sample:
             secs, nsecs = divmod(self._received_ns, NS_PER_S)
             return {"secs": secs, "nsecs": nsecs, "bytes": self._data}
         if compression not in self._encoded:
-            message = ros.deserialize_message(self._data, self._type)
-            self._encoded[compression] = (
-                orjson.Fragment(json_text(json_values(message))) if compression == "none" else cbor_values(message)
-            )
+            values = plain_values(ros.deserialize_message(self._data, self._type), compression)
+            # Clients may have other names for the topic, and the values are the largest part of a frame.
+            self._encoded[compression] = orjson.Fragment(json_text(values)) if compression == "none" else values
         return self._encoded[compression]
 
 
@@ -62,10 +60,10 @@ Listener = Callable[[Sample], None]
 
 
 class Feed:
-    """Hears a topic for all clients that listen to it.
+    """Subscribes to a topic for all clients that listen to it.
 
     Args:
-        node: The node that hears it.
+        node: The node of the bridge.
         topic: Absolute name of the topic.
         type_name: Full name of its type.
         on_end: Called when nobody listens any more.
@@ -82,24 +80,24 @@ class Feed:
 
     @property
     def is_latched(self) -> bool:
-        """Whether who joins late gets what was said before."""
+        """Whether a subscription that joins late gets earlier messages."""
         return self._offered.durability == ros.DurabilityPolicy.TRANSIENT_LOCAL
 
     def add(self, listener: Listener) -> None:
-        """Give the samples to somebody, too."""
+        """Give the samples to one more listener."""
         self._listeners.append(listener)
         if self._subscription is None:
             self._subscribe()
 
     def remove(self, listener: Listener) -> None:
-        """Give the samples to somebody no longer."""
+        """Give the samples to a listener no longer."""
         self._listeners.remove(listener)
         if not self._listeners:
             self._node.destroy_subscription(self._subscription)
             self._on_end()
 
     def renew(self) -> None:
-        """Hear the topic as its publishers offer it by now."""
+        """Subscribe again if publishers offer another quality of service by now."""
         offered = self._find_offered()
         if _terms(offered) != _terms(self._offered):
             self._node.destroy_subscription(self._subscription)
@@ -107,7 +105,7 @@ class Feed:
             self._subscribe()
 
     def _find_offered(self) -> ros.QoSProfile:
-        # Whoever listens before there is a publisher needs no other subscription for most, and so misses nothing.
+        # Most publishers are reliable: a subscription that waits for them like this is not renewed, and misses nothing.
         return find_offered_qos(self._node, self._topic, ros.ReliabilityPolicy.RELIABLE)
 
     def _subscribe(self) -> None:

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import base64
-from collections.abc import Callable
-from pathlib import Path
 
 from throwcollect.errors import ConfigError
+from throwcollect.serve.robot_files import find_mesh
 from throwcollect.serve.rosbridge.service_calls import Call
 
 GET_FILE = "file_server/get_file"
@@ -16,38 +15,21 @@ _PACKAGE = "package://"
 _LARGEST = 64 * 2**20
 
 
-class FileServer:
-    """Files of packages, for those who name them as ``package://NAME/PATH``.
+def give_file(call: Call) -> None:
+    """Answer a call with the bytes of a mesh that it names as ``package://NAME/PATH``.
 
-    Args:
-        find: Finds a file by the name of its package and its path there; raises `NotFoundError` if there is none.
+    Raises:
+        ConfigError: If no robot has such a mesh, or the file is too large or cannot be read.
     """
-
-    def __init__(self, find: Callable[[str, str], Path]) -> None:
-        self._find = find
-
-    def answer(self, call: Call) -> None:
-        """Answer with the bytes of a file.
-
-        Raises:
-            ConfigError: If there is no such file in a package of a robot.
-        """
-        data = self._read(call.fields.text("name"))
-        call.reply({"value": base64.b64encode(data).decode() if call.form.compression == "none" else data})
-
-    def _read(self, url: str) -> bytes:
-        """Bytes of a file.
-
-        Raises:
-            ConfigError: If it lies elsewhere, is not there, or too large.
-        """
-        name, _, rest = url.removeprefix(_PACKAGE).partition("/")
-        if not url.startswith(_PACKAGE):
-            raise ConfigError(f"{url}: not a file of a robot's description", expected=f"{_PACKAGE}NAME/PATH")
-        path = self._find(name, rest)
-        try:
-            if path.stat().st_size > _LARGEST:
-                raise ConfigError(f"{url}: is larger than {_LARGEST >> 20} MiB")
-            return path.read_bytes()
-        except OSError as error:
-            raise ConfigError(f"{url}: cannot be read: {error}") from error
+    url = call.fields.text("name")
+    name, _, rest = url.removeprefix(_PACKAGE).partition("/")
+    if not url.startswith(_PACKAGE):
+        raise ConfigError(f"{url}: not a file of a robot's description", expected=f"{_PACKAGE}NAME/PATH")
+    path = find_mesh(name, rest)
+    try:
+        if path.stat().st_size > _LARGEST:
+            raise ConfigError(f"{url}: is larger than {_LARGEST >> 20} MiB")
+        data = path.read_bytes()
+    except OSError as error:
+        raise ConfigError(f"{url}: cannot be read: {error}") from error
+    call.reply({"value": base64.b64encode(data).decode() if call.form.compression == "none" else data})

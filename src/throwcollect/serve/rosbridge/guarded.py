@@ -1,4 +1,4 @@
-"""What nobody may hear or say over a bridge, because it would change or reveal what a run is made of."""
+"""Topics and parameters that clients of a bridge may not have, as they would change or reveal what a run is made of."""
 
 from __future__ import annotations
 
@@ -10,61 +10,50 @@ from throwcollect.errors import ConfigError
 from throwcollect.ros.names import absolute_name
 from throwcollect.trial.lease import LEASES
 
-_PARAMETER_EVENTS = "parameter_events"
+_GUARDED = {
+    EPISODE_TOPIC: "nobody but the coordinator may have this topic, as whoever is slow would hold the simulation up",
+    "parameter_events": "nobody may have this topic, as it tells the signed leases of trials",
+}
+"""Last part of the name of each topic that clients may not have, and why."""
 _PARAMETER_SERVICES = ("get_parameters", "set_parameters", "set_parameters_atomically")
 
 
 def is_guarded(topic: str) -> bool:
-    """Whether a topic is the coordinator's alone.
-
-    Args:
-        topic: Its absolute name.
-    """
-    return topic.rpartition("/")[2] in (EPISODE_TOPIC, _PARAMETER_EVENTS)
+    """Whether clients may not have a topic, given by its absolute name."""
+    return topic.rpartition("/")[2] in _GUARDED
 
 
 def open_topic(given: str) -> str:
-    """Absolute name of a topic that a client may hear and publish.
-
-    Args:
-        given: Its name as the client has it.
+    """Absolute name of a topic, given by a client's name for it.
 
     Raises:
-        ConfigError: If it is no name, or a topic that a client may not have.
+        ConfigError: If ROS does not allow the name, or clients may not have the topic.
     """
     topic = absolute_name(given)
-    short = topic.rpartition("/")[2]
-    if short == EPISODE_TOPIC:
-        raise ConfigError(
-            f"{topic}: nobody but the coordinator may have this topic, as whoever is slow would hold the simulation up"
-        )
-    if short == _PARAMETER_EVENTS:
-        raise ConfigError(f"{topic}: nobody may have this topic, as it tells the signed leases of trials")
+    if is_guarded(topic):
+        raise ConfigError(f"{topic}: {_GUARDED[topic.rpartition('/')[2]]}")
     return topic
 
 
 def refuse_leases(parameter: str) -> None:
-    """Refuse to read or set the parameter by which trials are given.
-
-    Args:
-        parameter: Name of the parameter.
+    """Refuse to read or set the parameter by which the coordinator leases trials.
 
     Raises:
-        ConfigError: If it is that one.
+        ConfigError: If ``parameter`` is its name.
     """
     if parameter == LEASES:
         raise ConfigError(f"{LEASES}: nobody but the coordinator may have this parameter, as its leases are signed")
 
 
 def refuse_secrets(service: str, arguments: object) -> None:
-    """Refuse to call a service of a node that would read or set the parameter by which trials are given.
+    """Refuse to call a service of a node that would read or set the parameter by which trials are leased.
 
     Args:
         service: Absolute name of the service.
-        arguments: What it would be called with.
+        arguments: Arguments of the call.
 
     Raises:
-        ConfigError: If it would.
+        ConfigError: If the call would do so.
     """
     if service.rpartition("/")[2] not in _PARAMETER_SERVICES or not isinstance(arguments, Mapping):
         return

@@ -1,4 +1,4 @@
-"""Actions that one client offers to nodes."""
+"""An action that a client offers to nodes."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from throwcollect import ros
 from throwcollect.errors import ConfigError
 from throwcollect.ros.names import absolute_name, find_interface
 from throwcollect.ros.values import fill
-from throwcollect.serve.rosbridge.codec import json_values
+from throwcollect.serve.rosbridge.codec import plain_values
 from throwcollect.serve.rosbridge.peer import Peer
 from throwcollect.serve.rosbridge.request import Form, Request
 
@@ -21,15 +21,10 @@ _numbers = itertools.count(1)
 
 
 class OfferedAction:
-    """An action that a client offers.
-
-    Args:
-        client: The client.
-        given: Its name as the client has it.
-        type_name: Name of its type.
+    """An action that a client offers, made from the client's names for it and for its type.
 
     Raises:
-        ConfigError: If there is no such type, or its name is none.
+        ConfigError: If there is no such type, or ROS does not allow the name.
     """
 
     def __init__(self, client: Peer, given: str, type_name: str) -> None:
@@ -57,19 +52,19 @@ class OfferedAction:
             return
         for number in list(self._goals):
             self._finish(number, self._type.Result(), _ABORTED)
-        # Once those who wait for a result have got it.
+        # Nodes that wait for a result get it first.
         self._client.later(_FAREWELL_S, server.destroy)
 
     def lose(self) -> None:
-        """Know that the session is gone, and all that it had."""
+        """Forget the session, which is gone, and all goals that came by it."""
         self._server = None
         self._goals.clear()
 
-    def tell(self, request: Request) -> None:
-        """Publish how far a goal has come, as the client says it.
+    def publish_feedback(self, request: Request) -> None:
+        """Publish feedback of the client on a goal.
 
         Raises:
-            ConfigError: If there is no such goal, or it is no feedback of this type.
+            ConfigError: If there is no such goal, or the feedback is not of the type.
         """
         handle, _ = self._goals[self._find(request)]
         feedback = self._type.Feedback()
@@ -77,10 +72,10 @@ class OfferedAction:
         handle.publish_feedback(feedback)
 
     def end(self, request: Request) -> None:
-        """End a goal with the result that the client has.
+        """End a goal with the client's result.
 
         Raises:
-            ConfigError: If there is no such goal, or it is no result of this type.
+            ConfigError: If there is no such goal, or the result is not of the type.
         """
         number = self._find(request)
         has_succeeded = request.flag("result", default=True)
@@ -90,7 +85,7 @@ class OfferedAction:
         self._finish(number, result, request.natural_or("status", _SUCCEEDED) if has_succeeded else _ABORTED)
 
     def settle(self, request: Request) -> None:
-        """Take note of the state of a goal; one that has ended without a result gets an empty one.
+        """Take note of the state of a goal; one that has ended gets an empty result, as the client sends none.
 
         Raises:
             ConfigError: If there is no such goal.
@@ -123,7 +118,7 @@ class OfferedAction:
             "id": number,
             "action": self._given,
             "action_type": self._type_name,
-            "args": json_values(handle.request),
+            "args": plain_values(handle.request),
             "feedback": True,
         }
         self._client.answer(fields, Form())
@@ -134,86 +129,3 @@ class OfferedAction:
             if other.goal_id == handle.goal_id:
                 self._client.answer({"op": "cancel_action_goal", "id": number, "action": self._given}, Form())
         return ros.CancelResponse.ACCEPT
-
-
-class OfferedActions:
-    """All actions that a client offers.
-
-    Args:
-        client: The client.
-    """
-
-    def __init__(self, client: Peer) -> None:
-        self._client = client
-        self._by_name: dict[str, OfferedAction] = {}
-
-    def advertise(self, request: Request) -> None:
-        """Offer an action, in place of one of this name that the client has offered before.
-
-        Raises:
-            ConfigError: If there is no such type, its name is none, or a node offers it already.
-        """
-        given = request.text("action")
-        name = absolute_name(given)
-        offered = OfferedAction(self._client, given, request.text("type"))
-        if name in self._by_name:
-            self._by_name.pop(name).close()
-        elif self._client.session.is_offered_by_others(f"{name}/_action/send_goal"):
-            raise ConfigError(f"advertise_action: {name} is offered already", expected="another name")
-        offered.open()
-        self._by_name[name] = offered
-
-    def unadvertise(self, request: Request) -> None:
-        """Withdraw an action.
-
-        Raises:
-            ConfigError: If the client does not offer it.
-        """
-        self._find(request).close()
-        del self._by_name[absolute_name(request.text("action"))]
-
-    def tell(self, request: Request) -> None:
-        """Publish how far a goal has come.
-
-        Raises:
-            ConfigError: If there is no such goal, or it is no feedback of this type.
-        """
-        self._find(request).tell(request)
-
-    def end(self, request: Request) -> None:
-        """End a goal with its result.
-
-        Raises:
-            ConfigError: If there is no such goal, or it is no result of this type.
-        """
-        self._find(request).end(request)
-
-    def settle(self, request: Request) -> None:
-        """Take note of the state of a goal.
-
-        Raises:
-            ConfigError: If there is no such goal.
-        """
-        self._find(request).settle(request)
-
-    def lose(self) -> None:
-        """Know that the session is gone, and all that it had."""
-        for offered in self._by_name.values():
-            offered.lose()
-
-    def restore(self) -> None:
-        """Offer everything again, in a new session."""
-        for offered in self._by_name.values():
-            offered.open()
-
-    def close(self) -> None:
-        """Withdraw everything."""
-        for offered in self._by_name.values():
-            offered.close()
-        self._by_name.clear()
-
-    def _find(self, request: Request) -> OfferedAction:
-        name = absolute_name(request.text("action"))
-        if name not in self._by_name:
-            raise ConfigError(f"{request.op}: {name} is not advertised by this client")
-        return self._by_name[name]

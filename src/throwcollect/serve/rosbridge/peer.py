@@ -1,4 +1,4 @@
-"""A client as those parts of it see it that do its operations."""
+"""A client, as the parts of it see it that carry out its operations."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ Level = Literal["info", "warning", "error"]
 
 
 class Peer(Protocol):
-    """A client. All is done in the thread of the bridge."""
+    """A client. Everything here is called in the thread of the bridge."""
 
     @property
     def session(self) -> Session:
         """The place of the bridge in the ROS graph."""
 
     def later(self, seconds: float, action: Callable[[], None]) -> None:
-        """Have something done after a time [s]."""
+        """Call an action after a time [s]."""
 
     def send(self, frame: Frame, fragment_size: int = 0) -> None:
         """Send a frame, in parts if it is a text longer than ``fragment_size``, unless that is 0."""
@@ -30,17 +30,4 @@ class Peer(Protocol):
         """Send an operation; what is None is left out."""
 
     def say(self, level: Level, text: str, request: RequestId = None) -> None:
-        """Send a status message about a request, unless the client does not want those of its level."""
-
-
-class Part(Protocol):
-    """A part of a client that has something in the ROS graph."""
-
-    def lose(self) -> None:
-        """Know that the session is gone, and all that it had."""
-
-    def restore(self) -> None:
-        """Have everything again, in a new session."""
-
-    def close(self) -> None:
-        """Withdraw everything."""
+        """Send a status message about a request, if the client wants messages of this level."""

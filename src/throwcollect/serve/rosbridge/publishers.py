@@ -1,4 +1,4 @@
-"""What one client publishes."""
+"""Topics that one client publishes."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import Any
 from throwcollect import ros
 from throwcollect.errors import ConfigError
 from throwcollect.ros.values import fill
+from throwcollect.serve.rosbridge.belongings import Belongings
 from throwcollect.serve.rosbridge.guarded import open_topic
 from throwcollect.serve.rosbridge.peer import Peer
 from throwcollect.serve.rosbridge.request import Request
@@ -23,43 +24,47 @@ class Advertised:
     """A topic that a client publishes.
 
     Attributes:
-        topic: Its absolute name.
+        client: The client.
+        topic: Absolute name of the topic.
         type_name: Full name of its type.
-        latched: Whether who joins late gets the last message.
-        depth: Messages that are kept for who is slow.
+        latched: Whether subscribers that join late get the last message.
+        depth: Messages that are kept for slow subscribers.
         publisher: The publisher; None while there is no session.
     """
 
+    client: Peer
     topic: str
     type_name: str
     latched: bool
     depth: int
     publisher: ros.Publisher | None = None
 
-    def open(self, node: ros.Node) -> None:
+    def open(self) -> None:
         """Announce the topic."""
         qos = ros.QoSProfile(depth=1 if self.latched else self.depth)
         if self.latched:
             qos.durability = ros.DurabilityPolicy.TRANSIENT_LOCAL
-        self.publisher = node.create_publisher(ros.get_message(self.type_name), self.topic, qos)
+        message_type = ros.get_message(self.type_name)
+        self.publisher = self.client.session.node.create_publisher(message_type, self.topic, qos)
+
+    def lose(self) -> None:
+        """Forget the session, which is gone."""
+        self.publisher = None
+
+    def close(self) -> None:
+        """Withdraw the topic."""
+        if self.publisher is not None:
+            self.client.session.node.destroy_publisher(self.publisher)
 
 
-class Publishers:
-    """All topics that a client publishes.
-
-    Args:
-        client: The client.
-    """
-
-    def __init__(self, client: Peer) -> None:
-        self._client = client
-        self._by_topic: dict[str, Advertised] = {}
+class Publishers(Belongings[Advertised]):
+    """All topics that a client publishes."""
 
     def advertise(self, request: Request) -> None:
         """Announce a topic.
 
         Raises:
-            ConfigError: If it has another type, or nobody may publish it.
+            ConfigError: If the topic has another type, or clients may not publish it.
         """
         self._advertise(open_topic(request.text("topic")), request, request.text("type"))
 
@@ -67,23 +72,23 @@ class Publishers:
         """Withdraw a topic.
 
         Raises:
-            ConfigError: If its name is none.
+            ConfigError: If ROS does not allow the name.
         """
         topic = open_topic(request.text("topic"))
-        advertised = self._by_topic.pop(topic, None)
+        advertised = self._by_name.pop(topic, None)
         if advertised is None:
             self._client.say("warning", f"unadvertise: {topic} is not advertised", request.id)
-        elif advertised.publisher is not None:
-            self._client.session.node.destroy_publisher(advertised.publisher)
+        else:
+            advertised.close()
 
     def publish(self, request: Request) -> None:
-        """Publish a message; the topic is announced if it is there, and the client has not announced it.
+        """Publish a message; a topic that the client has not announced, but others have, is announced first.
 
         Raises:
-            ConfigError: If nobody has announced the topic, nobody may publish it, or the message is not of its type.
+            ConfigError: If nobody has announced the topic, clients may not publish it, or the message is malformed.
         """
         topic = open_topic(request.text("topic"))
-        advertised = self._by_topic.get(topic) or self._advertise(topic, request, request.text_or("type", ""))
+        advertised = self._by_name.get(topic) or self._advertise(topic, request, request.text_or("type", ""))
         message = ros.get_message(advertised.type_name)()
         values = request.any("msg")
         self._stamp(message, values)
@@ -94,37 +99,20 @@ class Publishers:
             except ValueError as error:
                 raise ConfigError(f"publish: {error}") from error
 
-    def lose(self) -> None:
-        """Know that the session is gone, and all that it had."""
-        for advertised in self._by_topic.values():
-            advertised.publisher = None
-
-    def restore(self) -> None:
-        """Announce everything again, in a new session."""
-        for advertised in self._by_topic.values():
-            advertised.open(self._client.session.node)
-
-    def close(self) -> None:
-        """Withdraw everything."""
-        for advertised in self._by_topic.values():
-            if advertised.publisher is not None:
-                self._client.session.node.destroy_publisher(advertised.publisher)
-        self._by_topic.clear()
-
     def _advertise(self, topic: str, request: Request, wanted: str) -> Advertised:
         type_name = self._client.session.type_of(topic, wanted)
-        known = self._by_topic.get(topic)
+        known = self._by_name.get(topic)
         if known is not None:
             if known.type_name != type_name:
                 raise ConfigError(f"{topic} is advertised as {known.type_name} already", expected="that type")
             return known
         depth = min(request.natural_or("queue_size", _DEPTH) or _DEPTH, _LONGEST_QUEUE)
-        advertised = Advertised(topic, type_name, request.flag("latch"), depth)
-        advertised.open(self._client.session.node)
-        self._by_topic[topic] = advertised
+        advertised = Advertised(self._client, topic, type_name, request.flag("latch"), depth)
+        advertised.open()
+        self._by_name[topic] = advertised
         return advertised
 
     def _stamp(self, message: Any, values: object) -> None:
-        """Give the header of a message the present time, should the client have left that out."""
+        """Set the stamp of the header to the present time; `fill` replaces it if the client has one."""
         if message.get_fields_and_field_types().get("header") == _HEADER and isinstance(values, Mapping):
             message.header.stamp = self._client.session.node.get_clock().now().to_msg()

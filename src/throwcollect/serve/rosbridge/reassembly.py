@@ -1,4 +1,4 @@
-"""Frames that a client sends in parts."""
+"""Frames that a client sends in fragments."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from throwcollect.errors import ConfigError
 from throwcollect.serve.rosbridge.request import Request, RequestId
 
 LONGEST_FRAME = 10 * 2**20
-"""Bytes of a frame that a client may send."""
+"""Bytes of a frame that a client may send, whole or in fragments."""
 _MOST_PARTS = 100_000
 _OF_A_PART = 64
-"""Characters that count for a part besides its own."""
+"""Characters by which each part counts more than its text, because it takes memory even if it is empty."""
 
 
 @dataclass
@@ -22,7 +22,7 @@ class _Unfinished:
 
 
 class Reassembly:
-    """Parts of frames of one client that are not whole yet."""
+    """Collects the parts of frames of one client."""
 
     def __init__(self) -> None:
         self._frames: dict[RequestId, _Unfinished] = {}
@@ -35,8 +35,8 @@ class Reassembly:
             The frame, if this was its last part.
 
         Raises:
-            ConfigError: If it is no part of a frame, or the parts that wait for others are too long together. What is
-                there of the frame is dropped then.
+            ConfigError: If it is no part of a frame, or all parts that wait are too long together; the frame is
+                dropped then.
         """
         number, total = request.natural_or("num", _MOST_PARTS), request.natural_or("total", 0)
         data = request.any("data")

@@ -1,4 +1,4 @@
-"""What a client asks: an operation with its fields, which are looked at as they are used."""
+"""Requests of clients: an operation with its fields, which are checked as they are used."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from typing import Any
 from throwcollect.errors import ConfigError, ThrowcollectError
 
 COMPRESSIONS = ("none", "cbor", "cbor-raw")
-"""How messages are encoded that leave."""
+"""Encodings of messages to clients; of two that one client asks for, the later one counts."""
 
 RequestId = str | int | None
-"""What a client calls a request by; None if it does not."""
+"""The id that a client has given a request; None if it has given none."""
 
 
 @dataclass(frozen=True)
@@ -29,7 +29,7 @@ class Form:
 
 
 _LONGEST = 200
-"""Characters of a name that cannot be right; it is told in messages."""
+"""Characters that a text may have: no name is longer, and messages repeat it."""
 
 
 class Fields:
@@ -37,7 +37,7 @@ class Fields:
 
     Args:
         fields: The fields.
-        what: What they belong to; messages begin with it.
+        what: What they belong to, for the beginning of messages.
     """
 
     def __init__(self, fields: Mapping[Any, Any], what: str) -> None:
@@ -45,10 +45,10 @@ class Fields:
         self._what = what
 
     def text(self, name: str) -> str:
-        """A field that has to be there.
+        """A text that has to be there.
 
         Raises:
-            ConfigError: If it is not, or is no text.
+            ConfigError: If it is missing, is no text, or is too long.
         """
         value = self._fields.get(name)
         if not isinstance(value, str) or len(value) > _LONGEST:
@@ -56,7 +56,7 @@ class Fields:
         return value
 
     def text_or(self, name: str, default: str) -> str:
-        """A field that may be left out.
+        """A text that may be left out.
 
         Raises:
             ConfigError: If it is no text.
@@ -118,11 +118,11 @@ class Request(Fields):
         fields: Its fields.
 
     Attributes:
-        op: Which operation.
-        id: What the client calls it by.
+        op: The operation.
+        id: The id that the client has given it; None if it has given none.
 
     Raises:
-        ConfigError: If it does not say which operation.
+        ConfigError: If the fields name no operation.
     """
 
     def __init__(self, fields: Mapping[Any, Any]) -> None:
@@ -133,7 +133,7 @@ class Request(Fields):
         self.id: RequestId = given if isinstance(given, str | int) else None
 
     def form(self) -> Form:
-        """How messages are sent that leave because of this.
+        """How the client wants answers and messages to be sent.
 
         Raises:
             ConfigError: If they cannot be sent like that.
@@ -145,5 +145,5 @@ class Request(Fields):
 
 
 def sentence(error: ThrowcollectError) -> str:
-    """What is wrong, and what would be right, in one line."""
+    """Put an error into one line: what is wrong, and what would be right."""
     return "; ".join(line.strip() for line in str(error).splitlines())

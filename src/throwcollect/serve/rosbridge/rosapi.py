@@ -1,8 +1,9 @@
-"""The services of rosapi, by which clients look around in the ROS graph; the bridge answers them itself."""
+"""The services of rosapi, by which clients look around in the ROS graph; the bridge itself answers them."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
+from typing import Literal
 
 from rclzenoh.interfaces import message_definition
 from throwcollect import ros
@@ -10,28 +11,24 @@ from throwcollect.ros.names import absolute_name, full_name, is_hidden
 from throwcollect.serve.rosbridge.guarded import is_guarded
 from throwcollect.serve.rosbridge.peer import Peer
 from throwcollect.serve.rosbridge.questions import Questions
-from throwcollect.serve.rosbridge.rosapi_details import describe_message, describe_request, describe_response
+from throwcollect.serve.rosbridge.rosapi_details import describe_message, describe_service
 from throwcollect.serve.rosbridge.rosapi_parameters import Parameters
 from throwcollect.serve.rosbridge.service_calls import Call
+from throwcollect.units import NS_PER_S
 
 Answer = Callable[[Call], None]
 Values = Mapping[str, object]
 NamesAndTypes = Iterable[tuple[str, list[str]]]
 
 SET_PARAMETER = "rosapi/set_param"
-"""The service that changes something."""
-NS_PER_S = 10**9
+"""The only one of them that changes something."""
 
 
 class Rosapi:
-    """The services of rosapi for one client. What ROS hides, they leave out, and what nobody may hear.
-
-    Args:
-        client: The client.
-        questions: What of the client waits for answers of nodes.
+    """The services of rosapi for one client. They leave out what ROS hides, and topics that clients may not have.
 
     Attributes:
-        answers: What answers each service, by its name without a slash at its beginning.
+        answers: Function that answers each service, by its name without a slash at its beginning.
     """
 
     def __init__(self, client: Peer, questions: Questions) -> None:
@@ -52,8 +49,8 @@ class Rosapi:
             "nodes": self._list_nodes,
             "node_details": self._describe_node,
             "message_details": lambda call: {"typedefs": describe_message(call.fields.text("type"))},
-            "service_request_details": lambda call: {"typedefs": describe_request(call.fields.text("type"))},
-            "service_response_details": lambda call: {"typedefs": describe_response(call.fields.text("type"))},
+            "service_request_details": lambda call: _describe_service(call, "Request"),
+            "service_response_details": lambda call: _describe_service(call, "Response"),
             "get_time": self._tell_time,
             "get_ros_version": lambda _: {"version": 2, "distro": "jazzy"},
         }
@@ -75,7 +72,7 @@ class Rosapi:
         return self._client.session.node
 
     def _topics(self) -> dict[str, str]:
-        """Types of the topics that a client may hear."""
+        """Topics that clients may have, with their types."""
         topics = _visible(self._node.get_topic_names_and_types())
         return {name: types[0] for name, types in topics if not is_guarded(name)}
 
@@ -136,7 +133,7 @@ class Rosapi:
 
     def _list_actions(self, _call: Call) -> Values:
         actions = [name for name, _ in _visible(ros.get_action_names_and_types(self._node))]
-        # On DDS, services that somebody would call, and nobody offers, have names, too.
+        # On DDS, the graph also names services that nodes want to call and that no node offers.
         offered = {
             service
             for node in self._node.get_node_names_and_namespaces()
@@ -151,7 +148,7 @@ class Rosapi:
         namespace, _, name = absolute_name(call.fields.text("node")).rpartition("/")
         owner = (name, namespace or "/")
         if owner not in self._nodes():
-            # As rosapi does: whoever asks for all nodes, one after the other, should not stumble over one that ended.
+            # As rosapi does: a client that asks for all nodes in turn must not fail at one that has just ended.
             return {"subscribing": [], "publishing": [], "services": []}
         return {
             "subscribing": [each for each, _ in _visible(self._node.get_subscriber_names_and_types_by_node(*owner))],
@@ -168,6 +165,10 @@ def _reply_with(answer: Callable[[Call], Values]) -> Answer:
     return lambda call: call.reply(answer(call))
 
 
+def _describe_service(call: Call, part: Literal["Request", "Response"]) -> Values:
+    return {"typedefs": describe_service(call.fields.text("type"), part)}
+
+
 def _visible(found: NamesAndTypes) -> list[tuple[str, list[str]]]:
     return sorted((name, types) for name, types in found if not is_hidden(name))
 
@@ -182,7 +183,7 @@ def _names(infos: Iterable[object]) -> list[str]:
 
 
 def _definition(type_name: str) -> str:
-    """Definition of a message as rosbag2 stores it; empty for one that is installed with ROS alone."""
+    """Definition of a message as rosbag2 stores it; empty for one that only an installed ROS knows."""
     try:
         return message_definition(type_name)
     except ValueError:

@@ -1,9 +1,9 @@
-"""Definitions of messages and services as rosapi tells them: one entry for each message that they consist of."""
+"""Definitions of messages and services as rosapi tells them: one entry for each message inside."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, Literal
 
 from rclzenoh.interfaces.catalog import structure
 from throwcollect import ros
@@ -15,42 +15,22 @@ Definition = Mapping[str, object]
 
 
 def describe_message(name: str) -> list[Definition]:
-    """Tell the definition of a message.
-
-    Args:
-        name: Its name, in full or as ``pkg/Type``.
+    """Describe a message, named in full or as ``pkg/Type``.
 
     Raises:
         ConfigError: If there is no such message.
     """
-    full = full_name("msg", name)
-    return _describe(full, find_interface("msg", ros.get_message, full), [])
+    return _describe(full_name("msg", name), find_interface("msg", ros.get_message, name), [])
 
 
-def describe_request(name: str) -> list[Definition]:
-    """Tell the definition of the request of a service.
-
-    Args:
-        name: Name of the service, in full or as ``pkg/Type``.
+def describe_service(name: str, part: Literal["Request", "Response"]) -> list[Definition]:
+    """Describe the request or the response of a service, named in full or as ``pkg/Type``.
 
     Raises:
         ConfigError: If there is no such service.
     """
-    full = full_name("srv", name)
-    return _describe(f"{full}_Request", find_interface("srv", ros.get_service, full).Request, [])
-
-
-def describe_response(name: str) -> list[Definition]:
-    """Tell the definition of the response of a service.
-
-    Args:
-        name: Name of the service, in full or as ``pkg/Type``.
-
-    Raises:
-        ConfigError: If there is no such service.
-    """
-    full = full_name("srv", name)
-    return _describe(f"{full}_Response", find_interface("srv", ros.get_service, full).Response, [])
+    service = find_interface("srv", ros.get_service, name)
+    return _describe(f"{full_name('srv', name)}_{part}", getattr(service, part), [])
 
 
 def _describe(name: str, message_class: Any, seen: list[str]) -> list[Definition]:

@@ -21,15 +21,13 @@ from throwcollect.serve.rosbridge.service_calls import Call
 _TIMEOUT_S = 5.0
 _NOT_SET = 0
 """Of rcl_interfaces/msg/ParameterType."""
+_GET = "rcl_interfaces/srv/GetParameters"
+_SET = "rcl_interfaces/srv/SetParameters"
+_LIST = "rcl_interfaces/srv/ListParameters"
 
 
 class Parameters:
-    """The services of rosapi for parameters, for one client.
-
-    Args:
-        client: The client.
-        questions: What of the client waits for answers of nodes.
-    """
+    """The services of rosapi for parameters, for one client."""
 
     def __init__(self, client: Peer, questions: Questions) -> None:
         self._client = client
@@ -39,7 +37,7 @@ class Parameters:
         """Answer with the value of a parameter, or the default that the client gives, in JSON or as a text.
 
         Raises:
-            ConfigError: If it is no name of a parameter, or one that nobody may read.
+            ConfigError: If it is no name of a parameter, or clients may not read it.
         """
         default = call.fields.text_or("default_value", "")
 
@@ -57,7 +55,7 @@ class Parameters:
         """Answer whether there is a parameter.
 
         Raises:
-            ConfigError: If it is no name of a parameter, or one that nobody may read.
+            ConfigError: If it is no name of a parameter, or clients may not read it.
         """
         self._get(call, lambda value: call.reply({"exists": value.type != _NOT_SET}))
 
@@ -65,7 +63,7 @@ class Parameters:
         """Set a parameter.
 
         Raises:
-            ConfigError: If it is no name of a parameter, one that nobody may set, or its value is no JSON.
+            ConfigError: If it is no name of a parameter, clients may not set it, or the value is no JSON.
         """
         node, name = _read_name(call)
         try:
@@ -81,76 +79,71 @@ class Parameters:
             else:
                 call.fail(f"{node}:{name}: {result.reason}")
 
-        def set_as(current: Any) -> None:
+        def set_like(current: Any) -> None:
+            if not self._is_offered(f"{node}/set_parameters"):
+                call.fail(f"{node}: there is no such node, or it tells nobody of its parameters")
+                return
             # JavaScript writes 1.0 as 1.
             value = _as_floats(wanted) if isinstance(_first(ros.parameter_value_to_python(current)), float) else wanted
-            request = ros.get_service("rcl_interfaces/srv/SetParameters").Request()
+            request = ros.get_service(_SET).Request()
             request.parameters = [ros.Parameter(name, value=value).to_parameter_msg()]
             try:
-                self._ask(call, node, "set_parameters", "SetParameters", request, answer)
+                self._questions.ask(f"{node}/set_parameters", _SET, request, answer, call.fail, _TIMEOUT_S)
             except ConfigError as error:
+                # A callback answers the call itself; nothing catches its errors.
                 call.fail(sentence(error))
 
-        self._get(call, set_as)
+        self._get(call, set_like)
 
     def delete(self, call: Call) -> None:
         """Answer that parameters of nodes cannot be deleted."""
         call.fail(f"{call.given}: parameters of nodes cannot be deleted")
 
     def list_all(self, call: Call) -> None:
-        """Answer with the names of the parameters of all nodes that tell them."""
+        """Answer with the names of the parameters of all nodes that answer in time."""
         session = self._client.session
         offered = dict(session.node.get_service_names_and_types())
         nodes = [
             service.rpartition("/")[0]
             for service, types in sorted(offered.items())
-            if "rcl_interfaces/srv/ListParameters" in types and not is_hidden(service)
+            if _LIST in types and not is_hidden(service)
         ]
-        found: list[str] = []
-        left = len(nodes)
+        names: list[str] = []
+        waits_for = len(nodes)
 
         def finish(node: str, response: Any) -> None:
-            nonlocal left
-            left -= 1
+            nonlocal waits_for
+            waits_for -= 1
             if response is not None:
-                found.extend(f"{node}:{name}" for name in response.result.names)
-            if left == 0:
-                call.reply({"names": sorted(found)})
+                names.extend(f"{node}:{name}" for name in response.result.names)
+            if waits_for == 0:
+                call.reply({"names": sorted(names)})
 
         if not nodes:
             call.reply({"names": []})
         for node in nodes:
             self._questions.ask(
                 f"{node}/list_parameters",
-                "rcl_interfaces/srv/ListParameters",
-                ros.get_service("rcl_interfaces/srv/ListParameters").Request(),
+                _LIST,
+                ros.get_service(_LIST).Request(),
                 partial(finish, node),
                 lambda _, node=node: finish(node, None),  # type: ignore[misc]
                 _TIMEOUT_S,
             )
 
     def _get(self, call: Call, answer: Callable[[Any], None]) -> None:
-        """Have the value of a parameter, which is not set if there is no such node."""
+        """Get the value of a parameter; without such a node, the value is not set."""
         node, name = _read_name(call)
-        request = ros.get_service("rcl_interfaces/srv/GetParameters").Request(names=[name])
         unset = ros.get_message("rcl_interfaces/msg/ParameterValue")()
-        if not self._is_offered(f"{node}/get_parameters"):
-            answer(unset)
-            return
-        self._ask(
-            call,
-            node,
-            "get_parameters",
-            "GetParameters",
-            request,
-            lambda response: answer(response.values[0] if response.values else unset),
-        )
 
-    def _ask(self, call: Call, node: str, service: str, kind: str, request: Any, answer: Callable[[Any], None]) -> None:
-        path = f"{node}/{service}"
-        if not self._is_offered(path):
-            raise ConfigError(f"{node}: there is no such node, or it tells nobody of its parameters")
-        self._questions.ask(path, f"rcl_interfaces/srv/{kind}", request, answer, call.fail, _TIMEOUT_S)
+        def take(response: Any) -> None:
+            answer(response.values[0] if response.values else unset)
+
+        if self._is_offered(f"{node}/get_parameters"):
+            request = ros.get_service(_GET).Request(names=[name])
+            self._questions.ask(f"{node}/get_parameters", _GET, request, take, call.fail, _TIMEOUT_S)
+        else:
+            answer(unset)
 
     def _is_offered(self, service: str) -> bool:
         return service in dict(self._client.session.node.get_service_names_and_types())
@@ -160,7 +153,7 @@ def _read_name(call: Call) -> tuple[str, str]:
     """Node and name of a parameter.
 
     Raises:
-        ConfigError: If it is no name of a parameter, or one that nobody may have.
+        ConfigError: If it is no name of a parameter, or clients may not have it.
     """
     given = call.fields.text("name")
     node, separator, name = given.partition(":")
@@ -173,7 +166,7 @@ def _read_name(call: Call) -> tuple[str, str]:
 
 
 def _as_json(default: str) -> str:
-    """What a client gives as a default: ROS# gives it as a text, all others in JSON."""
+    """Turn the default of a client into JSON: ROS# sends a plain text, all others send JSON."""
     try:
         orjson.loads(default)
     except ValueError:

@@ -1,4 +1,4 @@
-"""Calls of services by a client: how they are answered, and those of services that nodes have."""
+"""Calls of services by a client: how they are answered, and how those of nodes are called."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from throwcollect import ros
 from throwcollect.errors import ConfigError
 from throwcollect.ros.names import absolute_name, find_interface, full_name
 from throwcollect.ros.values import fill
-from throwcollect.serve.rosbridge.codec import cbor_values, json_values
+from throwcollect.serve.rosbridge.codec import plain_values
 from throwcollect.serve.rosbridge.guarded import refuse_secrets
 from throwcollect.serve.rosbridge.peer import Peer
 from throwcollect.serve.rosbridge.questions import Questions
@@ -17,19 +17,15 @@ from throwcollect.serve.rosbridge.request import Fields, Form, Request
 
 
 class Call:
-    """One call, which is answered once.
-
-    Args:
-        client: Who calls.
-        request: What it asks.
+    """One call of a client, which is answered once.
 
     Attributes:
-        given: Name of the service as the client has it.
+        given: The client's name for the service.
         arguments: Fields of the service's request, by name or in their order.
         form: How the answer is sent.
 
     Raises:
-        ConfigError: If the request does not say which service.
+        ConfigError: If the request names no service.
     """
 
     def __init__(self, client: Peer, request: Request) -> None:
@@ -58,29 +54,23 @@ class Call:
 
 
 def call_node(client: Peer, questions: Questions, call: Call, request: Request) -> None:
-    """Call a service that a node has.
-
-    Args:
-        client: Who calls.
-        questions: What of the client waits for answers of nodes.
-        call: What is to be answered.
-        request: What the client asks.
+    """Call a service of a node, and answer the client when the node has answered.
 
     Raises:
         ConfigError: If there is no such service, or it cannot be called like this.
     """
     service = absolute_name(call.given)
     refuse_secrets(service, call.arguments)
-    there = dict(client.session.node.get_service_names_and_types()).get(service, [])
-    if not there:
+    types = dict(client.session.node.get_service_names_and_types()).get(service, [])
+    if not types:
         raise ConfigError(f"nobody offers a service {service}")
-    wanted = full_name("srv", request.text_or("type", ""))
-    type_name = wanted if wanted in there else there[0]
+    named = full_name("srv", request.text_or("type", ""))
+    type_name = named if named in types else types[0]
     message = find_interface("srv", ros.get_service, type_name).Request()
     _fill_arguments(message, call.arguments)
 
     def reply(response: Any) -> None:
-        call.reply(json_values(response) if call.form.compression == "none" else cbor_values(response))
+        call.reply(plain_values(response, call.form.compression))
 
     questions.ask(service, type_name, message, reply, call.fail, request.seconds_or("timeout", float("inf")))
 

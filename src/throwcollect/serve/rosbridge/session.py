@@ -1,4 +1,4 @@
-"""The place of a bridge in the ROS graph while there is a router: a node, and what all clients share of it."""
+"""The place of a bridge in the ROS graph while there is a router: a node, and what all clients share."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 class Session:
-    """A context, a node in it, and its executor; of one thread.
+    """A context, a node in it, and its executor; all are used by one thread.
 
     Args:
         connection: The way into the graph.
@@ -58,32 +58,26 @@ class Session:
 
         Args:
             topic: Absolute name of the topic.
-            wanted: Type that a client names, in full or as ``pkg/Type``; empty if it does not.
+            wanted: Type that a client names, in full or as ``pkg/Type``; empty if it names none.
 
         Raises:
             ConfigError: If the topic has another type, or none is named and it has none or several.
         """
-        there = dict(self.node.get_topic_names_and_types()).get(topic, [])
+        types = dict(self.node.get_topic_names_and_types()).get(topic, [])
         if not wanted:
-            if len(there) != 1:
-                what = f"has {len(there)} types" if there else "is published by nobody, and no type is named"
-                raise ConfigError(f"{topic} {what}", expected=f"one of {', '.join(there)}" if there else "a type")
-            return there[0]
+            if len(types) != 1:
+                what = f"has {len(types)} types" if types else "is published by nobody, and no type is named"
+                raise ConfigError(f"{topic} {what}", expected=f"one of {', '.join(types)}" if types else "a type")
+            return types[0]
         name = full_name("msg", wanted)
         find_interface("msg", ros.get_message, name)
-        if there and name not in there:
-            raise ConfigError(f"{topic} is no {name}", expected=", ".join(there))
+        if types and name not in types:
+            raise ConfigError(f"{topic} is no {name}", expected=", ".join(types))
         return name
 
     def listen(self, topic: str, type_name: str, listener: Listener) -> Feed:
-        """Have the messages of a topic from now on; a latched topic begins with what was said before.
-
-        Args:
-            topic: Absolute name of the topic.
-            type_name: Full name of its type.
-            listener: Called with each sample.
-        """
-        # Of a latched topic, whoever comes later gets what was said before from ROS alone.
+        """Give the messages of a topic to a listener; a latched topic begins with its earlier messages."""
+        # Only ROS has the earlier messages of a latched topic, so a later listener needs a subscription of its own.
         alone = (topic, type_name, listener)
         shared = (topic, type_name, None)
         feed = self._feeds.get(shared)
@@ -94,11 +88,7 @@ class Session:
         return feed
 
     def service_client(self, service: str, type_name: str) -> Any:
-        """A client of a service, which all share.
-
-        Args:
-            service: Absolute name of the service.
-            type_name: Full name of its type.
+        """A client of a service, given by its absolute name; all clients of the bridge share it.
 
         Raises:
             ConfigError: If there is no such type.
@@ -117,7 +107,7 @@ class Session:
         )
 
     def look_around(self) -> None:
-        """Hear topics as their publishers offer them by now."""
+        """Subscribe again where publishers offer another quality of service by now."""
         changes = ros.graph_changes(self.node)
         if changes != self._changes:
             self._changes = changes

@@ -1,4 +1,4 @@
-"""What one client hears: its subscriptions to topics, at the rate and in the form that it wants."""
+"""Subscriptions of one client to topics, at the rate and in the form that it asks for."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from throwcollect.errors import ConfigError
+from throwcollect.serve.rosbridge.belongings import Belongings
 from throwcollect.serve.rosbridge.feed import Feed, Sample
 from throwcollect.serve.rosbridge.guarded import open_topic
 from throwcollect.serve.rosbridge.peer import Peer
@@ -16,11 +17,11 @@ from throwcollect.serve.rosbridge.request import COMPRESSIONS, Form, Request
 
 @dataclass(frozen=True)
 class Wish:
-    """How one subscription of a client wants a topic.
+    """What one subscription of a client asks for.
 
     Attributes:
         throttle_s: Least time between two messages [s].
-        queue_length: Messages that wait for their time; those that find no place are left out.
+        queue_length: Messages that may wait for their time; beyond that, the oldest are left out.
         form: How messages are sent.
     """
 
@@ -30,12 +31,7 @@ class Wish:
 
 
 class Pace:
-    """Lets samples through at the rate that a client wants.
-
-    Args:
-        send: Takes a sample that is let through.
-        later: Has something done after a time.
-    """
+    """Lets samples through to `send` at the rate that a client asks for; `later` calls an action after a time [s]."""
 
     def __init__(self, send: Callable[[Sample], None], later: Callable[[float, Callable[[], None]], None]) -> None:
         self._send = send
@@ -46,13 +42,13 @@ class Pace:
         self._waits = False
 
     def change(self, wish: Wish) -> None:
-        """Go by another wish from now on."""
+        """Use another wish from now on."""
         self._wish = wish
         self._queue = deque(self._queue, maxlen=wish.queue_length)
         self._due = min(self._due, time.monotonic() + wish.throttle_s)
 
     def offer(self, sample: Sample) -> None:
-        """Send a sample, keep it until its time has come, or leave it out."""
+        """Send a sample, keep it until it is due, or leave it out."""
         now = time.monotonic()
         if now >= self._due and not self._queue:
             self._let_through(sample, now)
@@ -61,7 +57,7 @@ class Pace:
             self._wait(now)
 
     def _let_through(self, sample: Sample, now: float) -> None:
-        # Of what waits, the times are evenly spread, however late each of them is.
+        # Samples that wait are sent at even intervals, even if the timer is late each time.
         is_late = now - self._due < self._wish.throttle_s and self._wish.queue_length
         self._due = (self._due if is_late else now) + self._wish.throttle_s
         self._send(sample)
@@ -81,13 +77,7 @@ class Pace:
 
 
 class Subscription:
-    """A topic that a client hears, by whatever number of subscriptions of its own.
-
-    Args:
-        client: The client.
-        given: Its name for the topic.
-        type_name: Full name of the type.
-    """
+    """A topic of a client, which may have several subscriptions to it under different ids."""
 
     def __init__(self, client: Peer, given: str, type_name: str) -> None:
         self._client = client
@@ -100,26 +90,26 @@ class Subscription:
         self._pace = Pace(self._send, client.later)
 
     def want(self, name: object, wish: Wish) -> None:
-        """Take account of one subscription of the client."""
+        """Add one subscription of the client, or change it."""
         self.wishes[name] = wish
         self._merge()
 
     def leave(self, name: object) -> None:
-        """Take no account of one subscription any more."""
+        """Remove one subscription of the client."""
         del self.wishes[name]
         if self.wishes:
             self._merge()
 
     def open(self) -> None:
-        """Begin to hear."""
+        """Begin to listen, in the session of the bridge."""
         self._feed = self._client.session.listen(self._topic, self.type_name, self._pace.offer)
 
-    def forget(self) -> None:
-        """Know that the session is gone."""
+    def lose(self) -> None:
+        """Forget the session, which is gone."""
         self._feed = None
 
     def close(self) -> None:
-        """Hear no more."""
+        """Listen no more."""
         if self._feed is not None:
             self._feed.remove(self._pace.offer)
             self._feed = None
@@ -145,22 +135,14 @@ class Subscription:
         self._client.send(frame, self._merged.form.fragment_size)
 
 
-class Subscriptions:
-    """All topics that a client hears.
-
-    Args:
-        client: The client.
-    """
-
-    def __init__(self, client: Peer) -> None:
-        self._client = client
-        self._by_name: dict[str, Subscription] = {}
+class Subscriptions(Belongings[Subscription]):
+    """All topics that a client subscribes to."""
 
     def subscribe(self, request: Request) -> None:
-        """Hear a topic.
+        """Subscribe to a topic.
 
         Raises:
-            ConfigError: If there is no such topic, it has another type, or nobody may hear it.
+            ConfigError: If there is no such topic, it has another type, or clients may not subscribe to it.
         """
         given, wanted = request.text("topic"), request.text_or("type", "")
         topic = open_topic(given)
@@ -197,19 +179,3 @@ class Subscriptions:
         if not subscription.wishes:
             subscription.close()
             del self._by_name[given]
-
-    def lose(self) -> None:
-        """Know that the session is gone, and all that it had."""
-        for subscription in self._by_name.values():
-            subscription.forget()
-
-    def restore(self) -> None:
-        """Hear everything again, in a new session."""
-        for subscription in self._by_name.values():
-            subscription.open()
-
-    def close(self) -> None:
-        """Hear nothing more."""
-        for subscription in self._by_name.values():
-            subscription.close()
-        self._by_name.clear()

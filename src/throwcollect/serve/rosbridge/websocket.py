@@ -7,7 +7,7 @@ import threading
 from collections import deque
 from contextlib import suppress
 
-from starlette.websockets import WebSocket, WebSocketDisconnect, WebSocketState
+from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from throwcollect.serve.rosbridge.bridge import Bridge
 from throwcollect.serve.rosbridge.client import Client
@@ -16,7 +16,7 @@ from throwcollect.serve.rosbridge.reassembly import LONGEST_FRAME
 
 MOST_FRAMES = 1000
 MOST_BYTES = 32 * 2**20
-"""What waits for a client that reads slowly; more than either, and the oldest is dropped."""
+"""What may wait for a client that reads slowly; beyond either limit, the oldest frames are dropped."""
 
 _MOST_WAITING = 100
 _POLL_S = 0.01
@@ -31,11 +31,7 @@ _DROPPED = json_text(
 
 
 class Outbox:
-    """Frames that wait to be sent; filled in any thread, emptied in that of an event loop.
-
-    Args:
-        loop: The event loop.
-    """
+    """Frames that wait to be sent; filled in any thread, emptied in that of an event loop."""
 
     def __init__(self, loop: asyncio.AbstractEventLoop) -> None:
         self._loop = loop
@@ -46,7 +42,7 @@ class Outbox:
         self._filled = asyncio.Event()
 
     def put(self, frame: Frame) -> None:
-        """Have a frame sent; what has waited longest is dropped if too much waits."""
+        """Add a frame; the oldest frames are dropped if too much waits."""
         with self._lock:
             was_empty = not self._frames
             self._append(frame)
@@ -56,12 +52,12 @@ class Outbox:
                     self._is_told = True
                     self._append(_DROPPED)
         if was_empty:
-            # The loop may have ended, and with it the client.
+            # The loop may have ended, and with it the connection.
             with suppress(RuntimeError):
                 self._loop.call_soon_threadsafe(self._filled.set)
 
     async def take(self) -> Frame:
-        """The frame that has waited longest, as soon as there is one."""
+        """Take the oldest frame, as soon as there is one."""
         while True:
             with self._lock:
                 if self._frames:
@@ -77,15 +73,14 @@ class Outbox:
 
 
 async def attend(websocket: WebSocket, bridge: Bridge, *, read_only: bool = False) -> None:
-    """Have somebody at the other end of a WebSocket be a client of a bridge, until he leaves.
+    """Connect a client to a bridge until it leaves.
 
     Args:
-        websocket: The WebSocket; it is accepted if it is not yet.
+        websocket: The WebSocket of the client, not accepted yet.
         bridge: The bridge.
-        read_only: Whether he may only look.
+        read_only: Whether the client may only look.
     """
-    if websocket.application_state == WebSocketState.CONNECTING:
-        await websocket.accept()
+    await websocket.accept()
     outbox = Outbox(asyncio.get_running_loop())
     client = bridge.attach(outbox.put, read_only=read_only)
     sending = asyncio.create_task(_send_all(websocket, outbox))
@@ -114,7 +109,7 @@ async def _receive_all(websocket: WebSocket, client: Client) -> None:
 
 
 async def _send_all(websocket: WebSocket, outbox: Outbox) -> None:
-    # Whoever leaves is noticed where frames are received.
+    # `_receive_all` notices a client that leaves.
     with suppress(WebSocketDisconnect, RuntimeError):
         while True:
             frame = await outbox.take()

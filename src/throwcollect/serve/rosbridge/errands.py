@@ -1,0 +1,115 @@
+"""Requests of one client to services and actions of nodes, each until it is answered or cannot be answered any more."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from functools import partial
+from typing import Generic, TypeVar
+
+from throwcollect.serve.rosbridge.peer import Peer
+
+READY_S = 5.0
+"""Time in which nodes find each other."""
+_POLL_S = 0.02
+_WATCH_S = 1.0
+
+
+class Errand:
+    """One thing that a client has asked of a node; it ends once.
+
+    Attributes:
+        name: Absolute name of the service or action.
+        is_open: Whether it has not ended.
+    """
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+        self.is_open = True
+
+    def fail(self, why: str) -> None:
+        """Tell the client why there is no answer."""
+        raise NotImplementedError
+
+
+AnErrand = TypeVar("AnErrand", bound=Errand)
+
+
+class Errands(Generic[AnErrand]):
+    """All errands of one kind that a client waits for.
+
+    Args:
+        client: The client.
+        unoffered: Sentence, with a place for the name, that says that no node offers the service or action.
+        gone: Sentence, with a place for the name, that says that the node has gone before it answered.
+    """
+
+    def __init__(self, client: Peer, unoffered: str, gone: str) -> None:
+        self._client = client
+        self._unoffered = unoffered
+        self._gone = gone
+        self._open: list[AnErrand] = []
+
+    def begin(
+        self, errand: AnErrand, is_ready: Callable[[], bool], send: Callable[[], object], patience_s: float = READY_S
+    ) -> None:
+        """Send a request as soon as the node is found, and watch from then on whether the node is still there.
+
+        Args:
+            errand: What is asked.
+            is_ready: Tells whether a node offers the service or action.
+            send: Sends the request; may raise `TypeError` or `ValueError` if the request is malformed.
+            patience_s: Time within which the node has to be found [s].
+        """
+        self._open.append(errand)
+        self._send_when_ready(errand, is_ready, send, time.monotonic() + patience_s)
+
+    def end(self, errand: AnErrand) -> bool:
+        """Take an errand off the list; returns whether it was still open."""
+        was_open, errand.is_open = errand.is_open, False
+        if was_open:
+            self._open.remove(errand)
+        return was_open
+
+    def fail(self, errand: AnErrand, why: str) -> None:
+        """End an errand without an answer, unless it has ended already."""
+        if self.end(errand):
+            errand.fail(why)
+
+    def lose(self) -> None:
+        """Fail everything, because the session is gone."""
+        for errand in list(self._open):
+            self.fail(errand, f"{errand.name}: the router of the run has gone")
+
+    def restore(self) -> None:
+        """Ask nothing again in a new session: the client was told that it failed."""
+
+    def close(self) -> None:
+        """Wait for no answer any more; what nodes have begun goes on."""
+        for errand in list(self._open):
+            self.end(errand)
+
+    def _send_when_ready(
+        self, errand: AnErrand, is_ready: Callable[[], bool], send: Callable[[], object], deadline: float
+    ) -> None:
+        if not errand.is_open:
+            return
+        if is_ready():
+            try:
+                send()
+            except (TypeError, ValueError) as error:
+                self.fail(errand, f"{errand.name}: {error}")
+            self._watch(errand, is_ready)
+        elif time.monotonic() < deadline:
+            self._client.later(_POLL_S, partial(self._send_when_ready, errand, is_ready, send, deadline))
+        else:
+            self.fail(errand, self._unoffered.format(errand.name))
+
+    def _watch(self, errand: AnErrand, is_ready: Callable[[], bool]) -> None:
+        """Fail an errand whose service or action has gone."""
+        if not errand.is_open:
+            return
+        if is_ready():
+            self._client.later(_WATCH_S, partial(self._watch, errand, is_ready))
+        else:
+            self.fail(errand, self._gone.format(errand.name))

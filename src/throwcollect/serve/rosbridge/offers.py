@@ -1,0 +1,70 @@
+"""Services or actions that one client offers to nodes, by their names."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Literal
+
+from throwcollect.errors import ConfigError
+from throwcollect.ros.names import absolute_name
+from throwcollect.serve.rosbridge.belongings import ABelonging, Belongings
+from throwcollect.serve.rosbridge.peer import Peer
+from throwcollect.serve.rosbridge.request import Request
+
+
+class Offers(Belongings[ABelonging]):
+    """All services, or all actions, that a client offers.
+
+    Args:
+        client: The client.
+        kind: The field of requests that has the name.
+        make: Makes an offer from the client's name for it and the name of its type.
+        probe: A service that each node with such an offer has, behind the offer's name.
+    """
+
+    def __init__(
+        self,
+        client: Peer,
+        kind: Literal["service", "action"],
+        make: Callable[[Peer, str, str], ABelonging],
+        probe: str = "",
+    ) -> None:
+        super().__init__(client)
+        self._kind = kind
+        self._make = make
+        self._probe = probe
+
+    def advertise(self, request: Request) -> None:
+        """Offer something, in place of what the client has offered by the same name before.
+
+        Raises:
+            ConfigError: If there is no such type, ROS does not allow the name, or a node offers it already.
+        """
+        given = request.text(self._kind)
+        name = absolute_name(given)
+        offered = self._make(self._client, given, request.text("type"))
+        if name in self._by_name:
+            self._by_name.pop(name).close()
+        elif self._client.session.is_offered_by_others(name + self._probe):
+            raise ConfigError(f"{request.op}: {name} is offered already", expected="another name")
+        offered.open()
+        self._by_name[name] = offered
+
+    def unadvertise(self, request: Request) -> None:
+        """Withdraw something.
+
+        Raises:
+            ConfigError: If the client does not offer it.
+        """
+        self._find(request).close()
+        del self._by_name[absolute_name(request.text(self._kind))]
+
+    def pass_on(self, operation: Callable[[ABelonging, Request], None]) -> Callable[[Request], None]:
+        """Make what hands a request of the client to the offer that it names."""
+        return lambda request: operation(self._find(request), request)
+
+    def _find(self, request: Request) -> ABelonging:
+        name = absolute_name(request.text(self._kind))
+        if name not in self._by_name:
+            raise ConfigError(f"{request.op}: {name} is not advertised by this client")
+        return self._by_name[name]
