@@ -39,7 +39,7 @@ class Context:
         """Open the session.
 
         Args:
-            args: Accepted for the sake of rclpy's signature; remapping by arguments is not supported.
+            args: Not used: rclpy has it, and names cannot be remapped here.
             domain_id: Domain identifier; None takes ``ROS_DOMAIN_ID``, or 0.
             config: Configuration of the session; None for the one that the environment asks for.
 
@@ -139,27 +139,20 @@ def get_default_context() -> Context:
     return _default[0]
 
 
-def init(
-    args: list[str] | None = None,
-    *,
-    context: Context | None = None,
-    domain_id: int | None = None,
-    config: zenoh.Config | None = None,
-) -> None:
+def init(*, context: Context | None = None, domain_id: int | None = None, config: zenoh.Config | None = None) -> None:
     """Initialise a context; for the default one, a SIGTERM ends all spinning from now on.
 
     Args:
-        args: See `Context.init`.
         context: The context; None for the default one.
-        domain_id: Domain identifier; None takes ``ROS_DOMAIN_ID``, or 0.
-        config: Configuration of the session; None for the one that the environment asks for.
+        domain_id: As in `Context.init`.
+        config: As in `Context.init`.
 
     Raises:
         RuntimeError: If the context is in use already.
         ConfigurationError: If the environment does not hold what it should.
         NoRouterError: If there is no router.
     """
-    (context or get_default_context()).init(args, domain_id=domain_id, config=config)
+    (context or get_default_context()).init(domain_id=domain_id, config=config)
     in_main_thread = threading.current_thread() is threading.main_thread()
     if context is None and in_main_thread and signal.getsignal(signal.SIGTERM) is signal.SIG_DFL:
         signal.signal(signal.SIGTERM, _on_sigterm)

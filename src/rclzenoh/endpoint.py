@@ -7,7 +7,6 @@ from typing import Any
 import zenoh
 
 from rclzenoh.exceptions import InvalidHandle
-from rclzenoh.gid import gid_of
 from rclzenoh.interfaces import type_hash
 from rclzenoh.keys import EntityKind, Token, data_key, dds_type
 from rclzenoh.node_base import NodeBase
@@ -51,7 +50,7 @@ class Endpoint:
             type_hash=hashed,
             qos=encode(qos),
         )
-        self.gid = gid_of(self.token.key())
+        self.gid = self.token.gid
         self._declared: list[Any] = []
         self._has_complained = False
 

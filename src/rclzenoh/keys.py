@@ -9,6 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum
 
+from xxhash import xxh3_128_intdigest
+
 PREFIX = "@ros2_lv"
 """First chunk of all tokens."""
 
@@ -66,6 +68,11 @@ class Token:
         if self.kind is not EntityKind.NODE:
             chunks += [self.name.replace("/", "%"), self.type, self.type_hash, self.qos]
         return "/".join(chunks)
+
+    @property
+    def gid(self) -> bytes:
+        """Global identifier of the endpoint, as rmw_zenoh_cpp has it: XXH3-128 of the key, in little-endian order."""
+        return xxh3_128_intdigest(self.key().encode()).to_bytes(16, "little")
 
     @property
     def ros_type(self) -> str:

@@ -7,10 +7,11 @@ import sys
 import threading
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
 from enum import IntEnum
 
 from rclzenoh.duration import S_TO_NS
+from rclzenoh.interfaces.msg import Log
+from rclzenoh.time import Time
 
 
 class LoggingSeverity(IntEnum):
@@ -24,32 +25,6 @@ class LoggingSeverity(IntEnum):
     FATAL = 50
 
 
-@dataclass(frozen=True)
-class LogRecord:
-    """One message of a logger.
-
-    Attributes:
-        severity: How severe it is.
-        name: Name of the logger.
-        text: The message.
-        stamp_ns: System time [ns].
-        file: Absolute path of the source that logged it.
-        function: Function that logged it.
-        line: Line in the source.
-    """
-
-    severity: LoggingSeverity
-    name: str
-    text: str
-    stamp_ns: int
-    file: str
-    function: str
-    line: int
-
-
-Sink = Callable[[LogRecord], None]
-"""Takes what is logged."""
-
 _writing = threading.Lock()
 
 
@@ -58,12 +33,12 @@ class Logger:
 
     Attributes:
         name: Name of the logger.
-        sink: Gets what is logged besides standard error; None for nothing.
+        sink: Gets each message after standard error has it; None if nobody else shall.
     """
 
-    def __init__(self, name: str, sink: Sink | None = None) -> None:
+    def __init__(self, name: str) -> None:
         self.name = name
-        self.sink = sink
+        self.sink: Callable[[Log], None] | None = None
         self._seen: dict[str, float] = {}
 
     def log(
@@ -112,7 +87,18 @@ class Logger:
             sys.stderr.write(line)
             sys.stderr.flush()
         if self.sink is not None:
-            self.sink(LogRecord(severity, self.name, text, stamp, *place))
+            file, function, number = place
+            self.sink(
+                Log(
+                    stamp=Time(nanoseconds=stamp).to_msg(),
+                    level=int(severity),
+                    name=self.name,
+                    msg=text,
+                    file=file,
+                    function=function,
+                    line=number,
+                )
+            )
         return True
 
     def info(self, message: object, *, throttle_duration_sec: float | None = None) -> bool:

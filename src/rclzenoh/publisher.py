@@ -39,11 +39,6 @@ class Publisher:
         """Absolute name of the topic."""
         return self._endpoint.name
 
-    @property
-    def gid(self) -> bytes:
-        """Identifier of the publisher, 16 bytes."""
-        return self._endpoint.gid
-
     def publish(self, msg: Message | bytes) -> None:
         """Publish a message.
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import IntEnum
 
-from rclzenoh.gid import gid_of
 from rclzenoh.keys import EntityKind, Token
 from rclzenoh.qos import HistoryPolicy, QoSProfile, decode
 
@@ -75,6 +74,6 @@ def endpoint_info(token: Token) -> TopicEndpointInfo | None:
         topic_type=token.ros_type,
         topic_type_hash=token.type_hash,
         endpoint_type=TopicEndpointTypeEnum.PUBLISHER if is_publisher else TopicEndpointTypeEnum.SUBSCRIPTION,
-        endpoint_gid=list(gid_of(token.key())),
+        endpoint_gid=list(token.gid),
         qos_profile=qos,
     )

@@ -22,9 +22,7 @@ class ActionProtocol:
 
     SendGoalService: ClassVar[type[Service]]
     GetResultService: ClassVar[type[Service]]
-    CancelGoalService: ClassVar[type[Service]]
     FeedbackMessage: ClassVar[type[AnyMessage]]
-    GoalStatusMessage: ClassVar[type[AnyMessage]]
 
 
 class Action:
@@ -90,9 +88,7 @@ def get_action(name: str) -> type[Action]:
     protocol = {
         "SendGoalService": _service(f"{name}_SendGoal"),
         "GetResultService": _service(f"{name}_GetResult"),
-        "CancelGoalService": get_service("action_msgs/srv/CancelGoal"),
         "FeedbackMessage": message_class(f"{name}_FeedbackMessage"),
-        "GoalStatusMessage": get_message("action_msgs/msg/GoalStatusArray"),
     }
     short = name.rpartition("/")[2]
     return type(short, (Action,), {"TYPE": name, **parts, "Impl": type("Impl", (ActionProtocol,), protocol)})

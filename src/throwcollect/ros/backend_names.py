@@ -17,6 +17,11 @@ def __getattr__(name: str) -> Any:
     return value
 
 
+def find_class(get: str, full_name: str) -> object:
+    """Class of an interface of the backend; ``get`` names the function that finds it by its full name."""
+    return backend_name(get)(full_name)
+
+
 def backend_name(name: str) -> Any:
     """A name of the backend.
 

@@ -1,4 +1,6 @@
-"""The genuine rclpy, whatever RMW it uses, where it is installed."""
+"""The genuine rclpy, whatever RMW it uses, where it is installed: the names of `rclzenoh.api`, and `embedded`'s own."""
+
+# ruff: noqa: F401 - `backend_names` looks up what is imported here.
 
 from __future__ import annotations
 
@@ -258,46 +260,3 @@ def provide_time(node: Node) -> None:
     """Make a node the source of its own time: its clock shows what ``set_ros_time_override`` was last given."""
     # As rclpy's own time source does it; there is no public way.
     node.get_clock()._set_ros_time_is_active(True)
-
-
-__all__ = [
-    "ActionClient",
-    "ActionServer",
-    "CancelResponse",
-    "Context",
-    "DurabilityPolicy",
-    "Executor",
-    "ExternalShutdownException",
-    "FloatingPointRange",
-    "Future",
-    "GoalResponse",
-    "HistoryPolicy",
-    "IntegerRange",
-    "NameValidationException",
-    "Node",
-    "Parameter",
-    "ParameterDescriptor",
-    "Publisher",
-    "QoSProfile",
-    "ReliabilityPolicy",
-    "SetParametersResult",
-    "SingleThreadedExecutor",
-    "Time",
-    "deserialize_message",
-    "get_action",
-    "get_action_client_names_and_types_by_node",
-    "get_action_names_and_types",
-    "get_action_server_names_and_types_by_node",
-    "get_message",
-    "get_service",
-    "graph_changes",
-    "init",
-    "joins_protected",
-    "let_callbacks_wait",
-    "parameter_value_to_python",
-    "pass_on_log",
-    "provide_time",
-    "shutdown",
-    "spin_some",
-    "stop_waiting",
-]

@@ -1,13 +1,16 @@
-"""Names in the ROS graph as people and programs outside of ROS give them."""
+"""Names in the ROS graph: as people and programs outside of ROS give them, and of our own nodes that only look on."""
 
 from __future__ import annotations
 
+import itertools
+import os
 import re
 from collections.abc import Callable
 from typing import Any
 
 from throwcollect.errors import ConfigError
 
+_numbers = itertools.count()
 _ABSOLUTE = re.compile(r"(/[A-Za-z_][A-Za-z0-9_]*)+")
 
 
@@ -28,6 +31,11 @@ def absolute_name(name: str) -> str:
 def is_hidden(name: str) -> bool:
     """Whether ROS hides a name, because a part of it begins with an underscore."""
     return any(part.startswith("_") for part in name.split("/"))
+
+
+def make_own_name() -> str:
+    """Hidden name of a node by which a process of ours asks or looks on; no other node of this machine has it."""
+    return f"_throwcollect_{os.getpid()}_{next(_numbers)}"
 
 
 def full_name(kind: str, name: str) -> str:

@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from throwcollect import ros
 from throwcollect.errors import ConfigError, Interrupted, ThrowcollectError, WorkerError
-from throwcollect.ros.names import is_hidden
-from throwcollect.ros.own_name import make_own_name
+from throwcollect.ros.names import is_hidden, make_own_name
 
 if TYPE_CHECKING:
     from throwcollect.ros.connection import Connection
