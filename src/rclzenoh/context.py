@@ -1,4 +1,4 @@
-"""Contexts: the life of a session and everything that hangs on it."""
+"""Contexts: the life of a Zenoh session, and the shutdown of all that uses it."""
 
 from __future__ import annotations
 
@@ -8,8 +8,10 @@ import signal
 import threading
 import weakref
 from collections.abc import Callable
+from functools import cache
 from itertools import count
 from types import FrameType
+from typing import TypeVar
 
 import zenoh
 
@@ -18,6 +20,8 @@ from rclzenoh.exceptions import NotInitializedException
 from rclzenoh.graph import Graph
 from rclzenoh.session import open_session
 from rclzenoh.session_config import environment_config
+
+_T = TypeVar("_T")
 
 _open: weakref.WeakSet[Context] = weakref.WeakSet()
 
@@ -63,7 +67,7 @@ class Context:
         return self._ok
 
     def is_open(self) -> bool:
-        """Whether there is a session, if only to withdraw what was declared."""
+        """Whether there is a session: also after a requested shutdown, when nodes can still withdraw their tokens."""
         return self._session is not None
 
     @property
@@ -73,9 +77,7 @@ class Context:
         Raises:
             NotInitializedException: If there is none.
         """
-        if self._session is None:
-            raise NotInitializedException("init() has not been called, or shutdown() has")
-        return self._session
+        return _require_initialized(self._session)
 
     @property
     def graph(self) -> Graph:
@@ -84,9 +86,7 @@ class Context:
         Raises:
             NotInitializedException: If there is no session.
         """
-        if self._graph is None:
-            raise NotInitializedException("init() has not been called, or shutdown() has")
-        return self._graph
+        return _require_initialized(self._graph)
 
     def get_domain_id(self) -> int:
         """Domain identifier."""
@@ -129,14 +129,16 @@ class Context:
             session.close()  # type: ignore[no-untyped-call]
 
 
-_default: list[Context] = []
+def _require_initialized(value: _T | None) -> _T:
+    if value is None:
+        raise NotInitializedException("init() has not been called, or shutdown() has")
+    return value
 
 
+@cache
 def get_default_context() -> Context:
     """The context that is used when none is given."""
-    if not _default:
-        _default.append(Context())
-    return _default[0]
+    return Context()
 
 
 def init(*, context: Context | None = None, domain_id: int | None = None, config: zenoh.Config | None = None) -> None:
@@ -159,19 +161,12 @@ def init(*, context: Context | None = None, domain_id: int | None = None, config
 
 
 def shutdown(*, context: Context | None = None) -> None:
-    """Shut a context down.
-
-    Args:
-        context: The context; None for the default one.
+    """Shut a context down, the default one if none is given, and handle SIGTERM no longer.
 
     Raises:
         RuntimeError: If it was never initialised.
     """
     (context or get_default_context()).shutdown()
-    _restore_sigterm()
-
-
-def _restore_sigterm() -> None:
     if threading.current_thread() is threading.main_thread() and signal.getsignal(signal.SIGTERM) is _on_sigterm:
         signal.signal(signal.SIGTERM, signal.SIG_DFL)
 

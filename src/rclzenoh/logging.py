@@ -1,4 +1,4 @@
-"""Logging: one line a message to standard error and, for nodes, to ``/rosout``."""
+"""Logging: each message is a line on standard error and, if a node logs, a message on ``/rosout``."""
 
 from __future__ import annotations
 
@@ -48,16 +48,7 @@ class Logger:
         *,
         throttle_duration_sec: float | None = None,
     ) -> bool:
-        """Log a message.
-
-        Args:
-            message: What to log.
-            severity: How severe it is.
-            throttle_duration_sec: Log this text at most once in so many seconds.
-
-        Returns:
-            Whether it was logged.
-        """
+        """Log a message, the same text at most once in ``throttle_duration_sec``; returns whether it was logged."""
         text = str(message)
         if throttle_duration_sec is not None:
             now, last = time.monotonic(), self._seen.get(text)
@@ -71,16 +62,7 @@ class Logger:
         return self.log_from((os.path.abspath(code.co_filename), code.co_name, caller.f_lineno), text, severity)
 
     def log_from(self, place: tuple[str, str, int], text: str, severity: LoggingSeverity) -> bool:
-        """Log a message that comes from another place than the caller.
-
-        Args:
-            place: Absolute path of the source, function and line.
-            text: What to log.
-            severity: How severe it is.
-
-        Returns:
-            Whether it was logged.
-        """
+        """Log a message that comes from another place than the caller: absolute path of the source, function, line."""
         stamp = time.time_ns()
         line = f"[{severity.name}] [{stamp // S_TO_NS}.{stamp % S_TO_NS:09d}] [{self.name}]: {text}\n"
         with _writing:

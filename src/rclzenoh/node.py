@@ -76,4 +76,4 @@ class Node(NodeEndpoints, NodeGraph, NodeParameters):
         try:
             self._rosout.publish(message)
         except InvalidHandle:
-            self._logger.sink = None  # The node or its session ended; standard error has the message.
+            self._logger.sink = None  # The node or its session has ended; standard error has the message anyway.
