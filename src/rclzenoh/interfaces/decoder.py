@@ -24,13 +24,9 @@ _STRINGS_OF_NOTHING = (b"\x00\x00\x00\x00", ())
 def decoder(name: str) -> Callable[[bytes, bytearray], tuple[Any, int]]:
     """Function that makes messages of one type from their bytes.
 
-    Args:
-        name: Full name of the structure.
-
-    Returns:
-        The function. It takes the data with its header and a copy of the body that is padded to a multiple of eight
-        bytes, and returns the message and the length of the body that was used; that is more than there is when the
-        data is too short. It raises IndexError, ValueError or ``struct.error`` when the data is malformed.
+    It takes the data with its header and a copy of the body that is padded to a multiple of eight bytes. It returns the
+    message and the length of the body that it used, which exceeds the body if data is missing, and raises IndexError,
+    ValueError or ``struct.error`` if the data is malformed.
     """
     reader = _Reader()
     reader.structure(name, "message", 1)
@@ -52,7 +48,7 @@ def _strings(data: bytes, at: int, count: int, memory: list[tuple[bytes, tuple[s
         values.append(data[at + 8 : at + 7 + length].decode())
         at += 4 + length
     known = data[start + 4 : at + 4]
-    # Not of data that is cut off, which whole data may begin with.
+    # Bytes of data that is cut off are not remembered, as whole data may begin with them.
     if len(known) == at - start:
         memory[0] = (known, tuple(values))
     return values, at
@@ -95,7 +91,7 @@ class _Reader(FunctionWriter):
             length = self.name("length")
             self.scalar("uint32", length, depth)
             self.flush(depth)
-            # Without the terminating zero; a length of 0, which some writers use for an empty string, works too.
+            # The terminating zero is left out; a length of 0, which some writers use for an empty string, works too.
             self.line(depth, f"{operand} = data[at + 4 : at + 3 + {length}].decode()")
             self.line(depth, f"at += {length}")
             self.at = Alignment(1, 0)

@@ -29,12 +29,8 @@ _PADDING = tuple(bytes(count) for count in range(8))
 def encoder(name: str) -> Callable[[Message], bytearray]:
     """Function that serialises messages of one type.
 
-    Args:
-        name: Full name of the structure.
-
-    Returns:
-        The function. It raises AttributeError, TypeError, ValueError, OverflowError or ``struct.error`` when a field
-        holds something that is not of its type.
+    It raises AttributeError, TypeError, ValueError, OverflowError or ``struct.error`` if a value is not of its field's
+    type.
     """
     writer = _Writer(HEADER=HEADER, PADDING=_PADDING, strings=_strings, check_length=_check_length)
     writer.structure(name, "message", 1)

@@ -1,6 +1,6 @@
 """Interfaces whose fields type checkers know, by their short names, which differ from each other within a kind.
 
-Of the others `get_message`, `get_service` and `get_action` give classes, too, without types. After a change here,
+`get_message`, `get_service` and `get_action` give classes of all other interfaces, without types. After a change here,
 ``python packaging/interface_stubs.py`` writes the stubs again.
 """
 
