@@ -7,7 +7,7 @@ from rclzenoh import api
 from rclzenoh.api import *  # noqa: F403
 from rclzenoh.context import Context
 from rclzenoh.session_config import client_config, is_protected
-from throwcollect.ros.connection import Connection
+from throwcollect.ros.connection import Connection, session_key
 from throwcollect.ros.middleware import EMBEDDED_RMW
 from throwcollect.ros.zenoh_errors import zenoh_errors
 
@@ -29,7 +29,7 @@ def init(*, context: Context | None = None, connection: Connection | None = None
         if connection is not None:
             connection.check(EMBEDDED_RMW)
             domain_id = connection.domain_id
-            config = client_config(connection.endpoint, connection.session_key)
+            config = client_config(connection.endpoint, session_key(connection.endpoint, connection.key))
         rclzenoh.context.init(context=context, domain_id=domain_id, config=config)
 
 
