@@ -164,7 +164,11 @@ def _tls_settings(key: Key, side: Literal["connect", "listen"]) -> Mapping[str, 
 
 
 def _check_key(config: zenoh.Config) -> None:
-    """Refuse files of a key that cannot be read: Zenoh would only say that it cannot connect."""
+    """Refuse a key that cannot be read: Zenoh would only say that it cannot connect.
+
+    Raises:
+        UnreadableKeyError: If one of its files cannot be read.
+    """
     sided = [f"{side}_{name}" for name in ("private_key", "certificate") for side in ("connect", "listen")]
     for name in (*sided, "root_ca_certificate"):
         if path := json.loads(config.get_json(f"{_TLS}/{name}")):

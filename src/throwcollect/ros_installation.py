@@ -1,6 +1,6 @@
-"""What of genuine ROS 2 this Python finds, without importing any of it.
+"""Looks for the parts of genuine ROS 2 that this Python can import, without importing them.
 
-Apart from `ros`, whose import already needs the answer.
+It is not a part of `ros`, as importing that already needs the answer.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from pathlib import Path
 
 import rclzenoh
 
-# Not from `rclzenoh.interfaces`, whose import health checks cannot afford.
+# `rclzenoh.interfaces` has this path, too, but importing it takes too long for health checks.
 DEFINITIONS = Path(rclzenoh.__file__).parent / "interfaces" / "definitions"
 """Definitions of interfaces, by package and kind."""
 PACKAGES = (
@@ -44,7 +44,7 @@ _INTERFACES = "packaging/ros_interfaces"
 
 
 def missing() -> list[str]:
-    """What nodes need of genuine ROS 2 and Python does not find: rclpy itself, else packages, or single interfaces."""
+    """Names that nodes need and Python does not find: rclpy, or else packages of interfaces, or single interfaces."""
     if _directory("rclpy") is None:
         return ["rclpy"]
     lacking = []
@@ -69,7 +69,7 @@ def rmws() -> list[str]:
 
 
 def rclpy_version() -> str | None:
-    """Version of rclpy, as its wheel or else its package says it; None where neither is there."""
+    """Version of rclpy, from its wheel or from the package of an installation; None if there is neither."""
     for distribution in ("ros-rclpy", "rclpy"):
         try:
             return version(distribution)
@@ -79,7 +79,7 @@ def rclpy_version() -> str | None:
 
 
 def how_to_install() -> str:
-    """What makes rclpy and all interfaces available to this Python: a command where wheels are for it."""
+    """Advice by which this Python gets rclpy and all interfaces: a command of pip, if there are wheels for it."""
     if not _has_wheels():
         this = f"{platform.python_implementation()} {platform.python_version()} on {platform.system()}"
         return f"{_SETUP}: by pip it is for {_BY_PIP} alone, and this is {this}, {platform.machine()}"
@@ -90,7 +90,7 @@ def how_to_install() -> str:
 
 
 def module_name(interface: str) -> str:
-    """Name of the module that an interface is in, without its underscore: ``SpawnEntity`` is in ``spawn_entity``."""
+    """Name of the module of an interface, without its first underscore: ``SpawnEntity`` is in ``_spawn_entity``."""
     words = re.sub(r"(.)([A-Z][a-z]+)", r"\1_\2", interface)
     return re.sub(r"([a-z0-9])([A-Z])", r"\1_\2", words).lower()
 
@@ -106,5 +106,5 @@ def _has_wheels() -> bool:
 
 def _directory(package: str) -> Path | None:
     spec = find_spec(package)
-    # A directory of that name without a module in it, as may lie in the working directory, is no package of ROS.
+    # A directory without a module, such as one of that name in the working directory, is no package of ROS.
     return Path(spec.origin).parent if spec is not None and spec.origin else None

@@ -1,4 +1,4 @@
-"""The names of the backend that nodes run on, found when the first of them is asked for."""
+"""Finds names in the backend that nodes run on, which is imported when the first of them is asked for."""
 
 from __future__ import annotations
 

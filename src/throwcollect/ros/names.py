@@ -44,12 +44,7 @@ def full_name(kind: str, name: str) -> str:
 
 
 def find_interface(kind: str, get: Callable[[str], Any], name: str) -> Any:
-    """Class of a message, service or action that a user names.
-
-    Args:
-        kind: ``msg``, ``srv`` or ``action``.
-        get: Finds the class by its full name.
-        name: Full name, or without the kind: ``std_msgs/String``.
+    """Class of a message, service or action that a user names in full, or without its ``kind``.
 
     Raises:
         ConfigError: If there is no such type.
