@@ -17,7 +17,6 @@ from rclzenoh.time import Time
 class LoggingSeverity(IntEnum):
     """How severe a message is; the values are those of rcl_interfaces/msg/Log."""
 
-    UNSET = 0
     DEBUG = 10
     INFO = 20
     WARN = 30

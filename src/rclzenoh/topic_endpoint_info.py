@@ -12,7 +12,6 @@ from rclzenoh.qos import HistoryPolicy, QoSProfile, decode
 class TopicEndpointTypeEnum(IntEnum):
     """Kind of an endpoint."""
 
-    INVALID = 0
     PUBLISHER = 1
     SUBSCRIPTION = 2
 

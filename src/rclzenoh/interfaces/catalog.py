@@ -59,12 +59,10 @@ class Structure:
     """A message, or a part of a service or action.
 
     Attributes:
-        name: Full name, such as ``sensor_msgs/msg/JointState``.
         constants: Values by name.
         fields: Fields in order; empty when the wire has only the placeholder.
     """
 
-    name: str
     constants: dict[str, Default]
     fields: tuple[Field, ...]
 
@@ -88,7 +86,6 @@ def structure(name: str) -> Structure:
     constants, fields = _FIELDDEFS[name]
     defaults = _DEFAULTS.get(name, {})
     return Structure(
-        name,
         {constant: value for constant, _, value in constants},
         tuple(_field(field, description, defaults.get(field)) for field, description in fields if field != PLACEHOLDER),
     )
