@@ -20,7 +20,7 @@ _MOST_DIGITS = 20
 
 
 class EntityKind(str, Enum):
-    """What a token announces."""
+    """Kind of the node or endpoint that a token announces."""
 
     NODE = "NN"
     PUBLISHER = "MP"

@@ -1,4 +1,4 @@
-"""What the CDR encoder and decoder share: positions in the body, and the writing of functions for one structure."""
+"""Code that the CDR encoder and decoder share: positions in the body, and the writing of functions for one structure."""
 
 from __future__ import annotations
 

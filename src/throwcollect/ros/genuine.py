@@ -1,4 +1,4 @@
-"""The genuine rclpy, whatever RMW it uses, where it is installed: the names of `rclzenoh.api`, and `embedded`'s own."""
+"""The backend on genuine rclpy, with any RMW: it has the names of `rclzenoh.api`, and those that `embedded` adds."""
 
 # ruff: noqa: F401 - `backend_names` looks up what is imported here.
 
