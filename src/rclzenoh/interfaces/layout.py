@@ -1,4 +1,4 @@
-"""Code that the CDR encoder and decoder share: positions in the body, and the writing of functions for one structure."""
+"""The part of the CDR encoder and decoder that both have: positions in the body, and the writing of functions."""
 
 from __future__ import annotations
 
