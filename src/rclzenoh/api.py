@@ -1,19 +1,13 @@
-"""What nodes use of rclpy's API, and the little beyond it.
+"""The names of rclpy's API that nodes use, and a few of our own; `context.init` begins a session."""
 
-`init` is no part of what a star import takes: whoever offers these names to nodes says itself how a session is found.
-"""
-
-from rclzenoh.action import (
-    ActionClient,
-    ActionServer,
-    CancelResponse,
-    GoalResponse,
+from rclzenoh.action.client import ActionClient
+from rclzenoh.action.graph import (
     get_action_client_names_and_types_by_node,
     get_action_names_and_types,
     get_action_server_names_and_types_by_node,
 )
+from rclzenoh.action.server import ActionServer, CancelResponse, GoalResponse
 from rclzenoh.context import Context, shutdown
-from rclzenoh.context import init as init
 from rclzenoh.exceptions import ExternalShutdownException, NameValidationException
 from rclzenoh.executors import Executor, SingleThreadedExecutor
 from rclzenoh.extensions import graph_changes, let_callbacks_wait, pass_on_log, provide_time, spin_some, stop_waiting

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 _LAYOUT = struct.Struct("<qqB16s")
 GID_LENGTH = 16
-"""Of the identifier of an endpoint [bytes]."""
+"""Length of the identifier of an endpoint [bytes]."""
 
 
 class Attachment(NamedTuple):
@@ -30,12 +30,6 @@ class Attachment(NamedTuple):
 
 def unpack(data: bytes) -> Attachment:
     """Attachment from its bytes.
-
-    Args:
-        data: What was received.
-
-    Returns:
-        The attachment.
 
     Raises:
         ValueError: If the data is not laid out like one.

@@ -56,25 +56,16 @@ class Client(Receiver):
         return endpoint.node.context.graph.count(EntityKind.SERVICE, endpoint.name, endpoint.type) > 0
 
     def wait_for_service(self, timeout_sec: float | None = None) -> bool:
-        """Wait until somebody offers the service.
+        """Wait until somebody offers the service, and tell whether somebody does.
 
         Args:
             timeout_sec: Longest time [s]; None or negative for no limit.
-
-        Returns:
-            Whether somebody does.
         """
         context = self._endpoint.node.context
         return context.graph.wait_for(self.service_is_ready, timeout_sec, context.ok)
 
     def call_async(self, request: Message) -> Future:
-        """Send a request.
-
-        Args:
-            request: The request.
-
-        Returns:
-            A future of the response. It stays pending if nobody answers.
+        """Send a request; the future of the response stays pending if nobody answers.
 
         Raises:
             TypeError: If the request is not of the service's type.
@@ -84,14 +75,7 @@ class Client(Receiver):
         return self.send(request, None)
 
     def send(self, request: Message, convert: Callable[[Any], Any] | None) -> Future:
-        """Send a request.
-
-        Args:
-            request: The request.
-            convert: Makes the future's result from the response; None leaves it as it is.
-
-        Returns:
-            A future of the result.
+        """Send a request like `call_async`; the future has what ``convert`` makes of the response.
 
         Raises:
             TypeError: If the request is not of the service's type.

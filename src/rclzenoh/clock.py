@@ -1,4 +1,4 @@
-"""ROS time, which is the system's until a simulation provides it."""
+"""ROS time: the simulation's while it provides one, otherwise the system's."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from rclzenoh.time import Time
 
 
 class ROSClock:
-    """ROS time: that of the simulation while it is active, otherwise the system's."""
+    """A clock of ROS time; real time is counted from the epoch [ns], as is that of a simulation."""
 
     def __init__(self) -> None:
         self._override_ns = 0
@@ -16,7 +16,7 @@ class ROSClock:
 
     @property
     def is_driven(self) -> bool:
-        """Whether the clock advances by messages alone, so that waiting for it is waiting for a message."""
+        """Whether only messages advance the clock, so that an executor need not wait for a time."""
         return self._active
 
     def activate(self, active: bool) -> None:
@@ -33,5 +33,5 @@ class ROSClock:
         return Time(nanoseconds=nanoseconds)
 
     def timer_now_ns(self) -> int:
-        """Time by which timers run [ns]: a steady one in real time, so that a corrected system clock delays none."""
+        """Time by which timers run [ns]; a steady clock in real time, as the system's may be corrected."""
         return self._override_ns if self._active else system.monotonic_ns()

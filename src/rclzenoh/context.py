@@ -1,4 +1,4 @@
-"""Contexts: the life of a session and everything that hangs on it."""
+"""Contexts: the life of a Zenoh session, and the shutdown of all that uses it."""
 
 from __future__ import annotations
 
@@ -8,8 +8,10 @@ import signal
 import threading
 import weakref
 from collections.abc import Callable
+from functools import cache
 from itertools import count
 from types import FrameType
+from typing import TypeVar
 
 import zenoh
 
@@ -18,6 +20,8 @@ from rclzenoh.exceptions import NotInitializedException
 from rclzenoh.graph import Graph
 from rclzenoh.session import open_session
 from rclzenoh.session_config import environment_config
+
+_T = TypeVar("_T")
 
 _open: weakref.WeakSet[Context] = weakref.WeakSet()
 
@@ -39,7 +43,7 @@ class Context:
         """Open the session.
 
         Args:
-            args: Accepted for the sake of rclpy's signature; remapping by arguments is not supported.
+            args: Not used: rclpy has it, and names cannot be remapped here.
             domain_id: Domain identifier; None takes ``ROS_DOMAIN_ID``, or 0.
             config: Configuration of the session; None for the one that the environment asks for.
 
@@ -63,7 +67,7 @@ class Context:
         return self._ok
 
     def is_open(self) -> bool:
-        """Whether there is a session, if only to withdraw what was declared."""
+        """Whether there is a session: also after a requested shutdown, when nodes can still withdraw their tokens."""
         return self._session is not None
 
     @property
@@ -73,9 +77,7 @@ class Context:
         Raises:
             NotInitializedException: If there is none.
         """
-        if self._session is None:
-            raise NotInitializedException("init() has not been called, or shutdown() has")
-        return self._session
+        return _require_initialized(self._session)
 
     @property
     def graph(self) -> Graph:
@@ -84,9 +86,7 @@ class Context:
         Raises:
             NotInitializedException: If there is no session.
         """
-        if self._graph is None:
-            raise NotInitializedException("init() has not been called, or shutdown() has")
-        return self._graph
+        return _require_initialized(self._graph)
 
     def get_domain_id(self) -> int:
         """Domain identifier."""
@@ -129,56 +129,44 @@ class Context:
             session.close()  # type: ignore[no-untyped-call]
 
 
-_default: list[Context] = []
+def _require_initialized(value: _T | None) -> _T:
+    if value is None:
+        raise NotInitializedException("init() has not been called, or shutdown() has")
+    return value
 
 
+@cache
 def get_default_context() -> Context:
     """The context that is used when none is given."""
-    if not _default:
-        _default.append(Context())
-    return _default[0]
+    return Context()
 
 
-def init(
-    args: list[str] | None = None,
-    *,
-    context: Context | None = None,
-    domain_id: int | None = None,
-    config: zenoh.Config | None = None,
-) -> None:
+def init(*, context: Context | None = None, domain_id: int | None = None, config: zenoh.Config | None = None) -> None:
     """Initialise a context; for the default one, a SIGTERM ends all spinning from now on.
 
     Args:
-        args: See `Context.init`.
         context: The context; None for the default one.
-        domain_id: Domain identifier; None takes ``ROS_DOMAIN_ID``, or 0.
-        config: Configuration of the session; None for the one that the environment asks for.
+        domain_id: As in `Context.init`.
+        config: As in `Context.init`.
 
     Raises:
         RuntimeError: If the context is in use already.
         ConfigurationError: If the environment does not hold what it should.
         NoRouterError: If there is no router.
     """
-    (context or get_default_context()).init(args, domain_id=domain_id, config=config)
+    (context or get_default_context()).init(domain_id=domain_id, config=config)
     in_main_thread = threading.current_thread() is threading.main_thread()
     if context is None and in_main_thread and signal.getsignal(signal.SIGTERM) is signal.SIG_DFL:
         signal.signal(signal.SIGTERM, _on_sigterm)
 
 
 def shutdown(*, context: Context | None = None) -> None:
-    """Shut a context down.
-
-    Args:
-        context: The context; None for the default one.
+    """Shut a context down, the default one if none is given, and handle SIGTERM no longer.
 
     Raises:
         RuntimeError: If it was never initialised.
     """
     (context or get_default_context()).shutdown()
-    _restore_sigterm()
-
-
-def _restore_sigterm() -> None:
     if threading.current_thread() is threading.main_thread() and signal.getsignal(signal.SIGTERM) is _on_sigterm:
         signal.signal(signal.SIGTERM, signal.SIG_DFL)
 

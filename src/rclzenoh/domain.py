@@ -1,4 +1,4 @@
-"""The domain of a process: nodes of different domains do not know of each other."""
+"""The ROS domain of a process; nodes of different domains do not see each other."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ def domain_of_environment() -> int:
     """Domain identifier that the environment names; 0 if none.
 
     Raises:
-        ConfigurationError: If it names none that there is.
+        ConfigurationError: If it is no number of a domain.
     """
     text = os.environ.get(DOMAIN_VARIABLE) or "0"
     if not text.isdecimal() or int(text) > _LARGEST_DOMAIN:

@@ -1,4 +1,4 @@
-"""What publishers, subscriptions, services and clients have in common: identity, token, and how they end."""
+"""The identity, the token and the end of publishers, subscriptions, services and clients."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ from typing import Any
 import zenoh
 
 from rclzenoh.exceptions import InvalidHandle
-from rclzenoh.gid import gid_of
 from rclzenoh.interfaces import type_hash
 from rclzenoh.keys import EntityKind, Token, data_key, dds_type
 from rclzenoh.node_base import NodeBase
@@ -18,8 +17,8 @@ class Endpoint:
     """Identity of one publisher, subscription, service or client.
 
     Args:
-        node: The node it belongs to.
-        kind: What it is.
+        node: The node that it belongs to.
+        kind: Kind of the endpoint.
         name: Absolute, relative or private name of the topic or service.
         type_name: ROS name of the message or service type.
         qos: Quality of service.
@@ -51,7 +50,7 @@ class Endpoint:
             type_hash=hashed,
             qos=encode(qos),
         )
-        self.gid = gid_of(self.token.key())
+        self.gid = self.token.gid
         self._declared: list[Any] = []
         self._has_complained = False
 
@@ -67,15 +66,15 @@ class Endpoint:
         """Withdraw the token, then the endpoint; does nothing the second time."""
         declared, self._declared = self._declared, []
         if not self.session.is_closed():
-            for thing in declared:
-                thing.undeclare()
+            for declaration in declared:
+                declaration.undeclare()
 
     def invalid(self, error: zenoh.ZError) -> InvalidHandle:
-        """What to raise when Zenoh refuses to send."""
+        """The error to raise when Zenoh refuses to send."""
         return InvalidHandle(f"{self.name}: cannot send, the session is closed or lost: {error}")
 
     def complain(self, problem: object) -> None:
-        """Log what is wrong with something that was received, the first time only."""
+        """Log a problem with something that was received; only the first one, as anybody may send garbage."""
         if not self._has_complained:
             self._has_complained = True
             self.node.get_logger().warning(f"{self.name}: ignored (this is logged once): {problem}")

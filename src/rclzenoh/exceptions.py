@@ -1,4 +1,4 @@
-"""Every error that rclzenoh raises on purpose; those that rclpy has, too, by the names that they have there."""
+"""Every error that rclzenoh raises on purpose; errors that rclpy has as well have the same names."""
 
 from __future__ import annotations
 
@@ -6,12 +6,7 @@ from pathlib import Path
 
 
 class RclzenohError(Exception):
-    """Root of all errors raised on purpose.
-
-    Args:
-        message: What is wrong, in one line.
-        expected: What would have been right.
-    """
+    """Root of all errors raised on purpose: one line that says what is wrong, and maybe what would have been right."""
 
     def __init__(self, message: str, *, expected: str | None = None) -> None:
         self.message = message
@@ -23,16 +18,11 @@ class RclzenohError(Exception):
 
 
 class ConfigurationError(RclzenohError):
-    """A session cannot be opened as it is asked for, whatever there is at the other end."""
+    """A session cannot be opened because its configuration is wrong."""
 
 
 class UnreadableKeyError(ConfigurationError):
-    """A file of the key that a session shows to its router cannot be read.
-
-    Args:
-        path: The file.
-        reason: Why, in words.
-    """
+    """A file of the key that a session shows to its router cannot be read."""
 
     def __init__(self, path: Path, reason: str) -> None:
         self.path = path

@@ -18,7 +18,7 @@ from rclzenoh.timer import Timer
 
 _FOREVER = float("inf")
 _LONGEST_WAIT_S = 0.5
-"""A signal that comes just before the wait begins has its Python handler run only when the wait ends."""
+"""Python runs the handler of a signal that comes just before the wait begins only when the wait ends."""
 
 
 class Executor:
@@ -57,20 +57,11 @@ class Executor:
             node.mailbox.detach()
 
     def wake(self) -> None:
-        """Let a waiting executor look around."""
+        """Let a waiting executor look for work and at its context again."""
         self._queue.put(None)
 
     def create_task(self, callback: Callable[..., Any] | Coroutine[Any, Any, Any], *args: Any, **kwargs: Any) -> Task:
-        """Have a function called, or a coroutine carried out, by the thread that spins.
-
-        Args:
-            callback: Function, coroutine function or coroutine.
-            args: Arguments of the function.
-            kwargs: Keyword arguments of the function.
-
-        Returns:
-            A future of the outcome.
-        """
+        """Have a function called, or a coroutine carried out, by the thread that spins; returns its future."""
         work = callback if isinstance(callback, Coroutine) else partial(callback, *args, **kwargs)
         return submit(self._mailbox, work)
 
@@ -94,7 +85,7 @@ class Executor:
         """Call callbacks until a future is done or cancelled.
 
         Args:
-            future: What to wait for.
+            future: The future.
             timeout_sec: Longest time [s]; None or negative for no limit.
 
         Raises:
@@ -162,4 +153,4 @@ class Executor:
 
 
 class SingleThreadedExecutor(Executor):
-    """The executor: one thread, one callback at a time."""
+    """The only kind of executor here; rclpy has others."""

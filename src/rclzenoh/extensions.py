@@ -1,4 +1,4 @@
-"""What nodes need beyond rclpy's public API; every backend offers it by the same names."""
+"""Functions that nodes need and rclpy's public API lacks; every backend offers them by the same names."""
 
 from __future__ import annotations
 
@@ -10,32 +10,27 @@ from rclzenoh.node import Node
 
 
 def graph_changes(node: Node) -> int:
-    """A number that differs from what it was before whenever the ROS graph has changed in between."""
+    """A number that is another one whenever the ROS graph has changed since it was last asked for."""
     return node.context.graph.changes
 
 
 def let_callbacks_wait(_node: Node) -> None:
-    """Have a node go on with other callbacks while one, a coroutine, waits: here all nodes do."""
+    """Have a node go on with other callbacks while one of its coroutines waits; here all nodes do so anyway."""
 
 
 def pass_on_log(node: Node, record: logging.LogRecord) -> None:
-    """Log what was logged by Python's own logging, under a node's name and with the place that it came from."""
+    """Log a record of Python's own logging under a node's name and with the place that the record comes from."""
     place = (record.pathname, record.funcName or "", record.lineno)
     node.get_logger().log_from(place, record.getMessage(), LoggingSeverity(record.levelno))
 
 
 def provide_time(node: Node) -> None:
-    """Make a node the source of its own time: its clock shows what ``set_ros_time_override`` was last given."""
+    """Make a node the source of its own time: its clock shows the last ``set_ros_time_override``."""
     node.get_clock().activate(True)
 
 
 def spin_some(executor: Executor, timeout_sec: float) -> None:
-    """Wait for an input, then call back with it and all others that have come by then, but none that come meanwhile.
-
-    Args:
-        executor: The executor.
-        timeout_sec: Longest time to wait [s].
-    """
+    """Wait for an input, then call back with it and all others that have come by then, but none that come meanwhile."""
     executor.spin_once(timeout_sec)
     last = executor.create_task(_nothing)
     while not last.done():
@@ -43,7 +38,7 @@ def spin_some(executor: Executor, timeout_sec: float) -> None:
 
 
 def stop_waiting(executor: Executor) -> None:
-    """Have `spin_some` come back at once if it waits just now; for handlers of signals, in the thread that spins."""
+    """End the wait of `spin_some`, if there is one; for handlers of signals, which run in the thread that spins."""
     executor.create_task(_nothing)
 
 

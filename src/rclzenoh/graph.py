@@ -1,4 +1,4 @@
-"""The ROS graph: who publishes, subscribes, serves and calls what, as liveliness tokens tell it.
+"""The ROS graph: all nodes and endpoints of a domain, which announce themselves by liveliness tokens.
 
 Tokens are parsed when somebody asks about the graph, in the asking thread. Asking again while nothing changed costs a
 dictionary lookup.
@@ -16,18 +16,13 @@ import zenoh
 from rclzenoh.keys import PREFIX, EntityKind, Token, parse_token
 
 _MOST_UNREAD = 10_000
-"""Changes after which they are read even though nobody asks."""
+"""So many unread changes are read even though nobody asks about the graph."""
 _POLL_S = 0.1
 _HISTORY_TIMEOUT_S = 10.0
 
 
 class Graph:
-    """Nodes and endpoints that are known in one domain.
-
-    Args:
-        session: Open session.
-        domain: Domain identifier.
-    """
+    """Nodes and endpoints that are known in one domain."""
 
     def __init__(self, session: zenoh.Session, domain: int) -> None:
         self._changed = threading.Condition()
@@ -39,8 +34,9 @@ class Graph:
         key = f"{PREFIX}/{domain}/**"
         handler = zenoh.handlers.Callback(self._on_change, indirect=False)
         self._subscriber = session.liveliness().declare_subscriber(key, handler, history=True)
-        # Nobody has an answer, but the router says so after the history that the subscriber asked for: now the graph
-        # is complete. Not a liveliness query, which never ends while there is a subscriber to its tokens (Zenoh 1.10).
+        # Nobody answers this query, but the router ends it only after it has sent the history that the subscriber asked
+        # for, so the graph is complete now. A liveliness query would not end while there is a subscriber to its tokens
+        # (Zenoh 1.10).
         list(session.get(f"{PREFIX}/{domain}/{session.zid()}", timeout=_HISTORY_TIMEOUT_S))
 
     def _on_change(self, sample: zenoh.Sample) -> None:

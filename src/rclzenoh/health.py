@@ -1,8 +1,8 @@
-"""Whether a node answers, asked so that it costs next to nothing: for health checks, which run often.
+"""Asks a node for a sign of life at next to no cost, as health checks run often.
 
 A request goes to a service that every node offers. Its answer comes from the loop that does the node's work, so a node
-that is stuck does not answer, however alive its process looks. The request is put together here, from the names that
-keys have: a client node would have to load all interfaces, and everybody in the ROS graph would hear of it.
+that is stuck does not answer, however alive its process looks. The request is put together here, without a client node,
+which would have to load all interfaces, and which everybody in the ROS graph would hear of.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from rclzenoh.attachment import GID_LENGTH, Attachment
 from rclzenoh.keys import data_key
 
 _ANY_HASH = "*"
-"""There is but one, which is worked out from all interfaces."""
+"""Any type hash: to compute the only one that there is, all interfaces would have to be loaded."""
 
 REQUEST = b"\0\1\0\0" + struct.pack("<I", 0)
 """CDR of ``rcl_interfaces/srv/GetParameters_Request`` that asks for no parameter."""
@@ -31,9 +31,6 @@ def node_answers(session: zenoh.Session, node: str, *, domain_id: int, timeout_s
         node: Full name of the node without its first slash; ``**/`` in front of a name stands for any namespace.
         domain_id: ROS domain.
         timeout_s: Time for the answer [s].
-
-    Returns:
-        Whether it has answered.
     """
     replies = session.get(
         data_key(domain_id, f"{node}/get_parameters", "rcl_interfaces/srv/GetParameters", _ANY_HASH),
@@ -47,5 +44,5 @@ def node_answers(session: zenoh.Session, node: str, *, domain_id: int, timeout_s
 
 
 def attachment() -> bytes:
-    """What a client puts on its first request."""
+    """Attachment that a client puts on its first request."""
     return Attachment(1, time.time_ns(), os.urandom(GID_LENGTH)).pack()

@@ -9,16 +9,18 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum
 
+from xxhash import xxh3_128_intdigest
+
 PREFIX = "@ros2_lv"
 """First chunk of all tokens."""
 
 _NODE_CHUNKS, _ENDPOINT_CHUNKS = 9, 13
 _MOST_DIGITS = 20
-"""Of a number of 64 bits."""
+"""Digits of the largest number of 64 bits."""
 
 
 class EntityKind(str, Enum):
-    """What a token announces."""
+    """Kind of the node or endpoint that a token announces."""
 
     NODE = "NN"
     PUBLISHER = "MP"
@@ -68,19 +70,20 @@ class Token:
         return "/".join(chunks)
 
     @property
+    def gid(self) -> bytes:
+        """Global identifier of the endpoint, as rmw_zenoh_cpp has it: XXH3-128 of the key, in little-endian order."""
+        return xxh3_128_intdigest(self.key().encode()).to_bytes(16, "little")
+
+    @property
     def ros_type(self) -> str:
         """ROS name of the type, such as ``sensor_msgs/msg/JointState``."""
         return ros_type(self.type)
 
 
 def parse_token(key: str) -> Token | None:
-    """Token from its key expression.
+    """Token from its key expression; None if that is malformed, as anybody may declare one.
 
-    Args:
-        key: Key expression.
-
-    Returns:
-        The token; None if it is malformed, as anybody may declare one. Chunks that later versions append are ignored.
+    Chunks that later versions of rmw_zenoh_cpp append are ignored.
     """
     chunks = key.split("/")
     if len(chunks) < _NODE_CHUNKS or chunks[0] != PREFIX or not all(chunks):
@@ -115,21 +118,11 @@ def dds_type(name: str) -> str:
 
 
 def ros_type(name: str) -> str:
-    """ROS name of a DDS type; the inverse of `dds_type`. What is no DDS name of a ROS type is returned as it is."""
+    """ROS name of a DDS type, the inverse of `dds_type`; another name is returned as it is."""
     package, _, short = name.partition("::dds_::")
     return f"{package.replace('::', '/')}/{short.removesuffix('_')}" if short else name
 
 
 def data_key(domain: int, name: str, type_name: str, type_hash: str) -> str:
-    """Key on which a topic's samples or a service's requests travel.
-
-    Args:
-        domain: Domain identifier.
-        name: Absolute name of the topic or service.
-        type_name: ROS name of the message or service type.
-        type_hash: Its type hash; that of the service type for a service.
-
-    Returns:
-        The key expression.
-    """
+    """Key expression of a topic's samples or a service's requests; the name is absolute, the type has its ROS name."""
     return f"{domain}/{name.strip('/')}/{dds_type(type_name)}/{type_hash}"

@@ -1,4 +1,4 @@
-"""Logging: one line a message to standard error and, for nodes, to ``/rosout``."""
+"""Logging: each message is a line on standard error and, if a node logs, a message on ``/rosout``."""
 
 from __future__ import annotations
 
@@ -7,48 +7,22 @@ import sys
 import threading
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
 from enum import IntEnum
 
 from rclzenoh.duration import S_TO_NS
+from rclzenoh.interfaces.msg import Log
+from rclzenoh.time import Time
 
 
 class LoggingSeverity(IntEnum):
     """How severe a message is; the values are those of rcl_interfaces/msg/Log."""
 
-    UNSET = 0
     DEBUG = 10
     INFO = 20
     WARN = 30
     ERROR = 40
     FATAL = 50
 
-
-@dataclass(frozen=True)
-class LogRecord:
-    """One message of a logger.
-
-    Attributes:
-        severity: How severe it is.
-        name: Name of the logger.
-        text: The message.
-        stamp_ns: System time [ns].
-        file: Absolute path of the source that logged it.
-        function: Function that logged it.
-        line: Line in the source.
-    """
-
-    severity: LoggingSeverity
-    name: str
-    text: str
-    stamp_ns: int
-    file: str
-    function: str
-    line: int
-
-
-Sink = Callable[[LogRecord], None]
-"""Takes what is logged."""
 
 _writing = threading.Lock()
 
@@ -58,12 +32,12 @@ class Logger:
 
     Attributes:
         name: Name of the logger.
-        sink: Gets what is logged besides standard error; None for nothing.
+        sink: Gets each message after standard error has it; None if nobody else shall.
     """
 
-    def __init__(self, name: str, sink: Sink | None = None) -> None:
+    def __init__(self, name: str) -> None:
         self.name = name
-        self.sink = sink
+        self.sink: Callable[[Log], None] | None = None
         self._seen: dict[str, float] = {}
 
     def log(
@@ -73,16 +47,7 @@ class Logger:
         *,
         throttle_duration_sec: float | None = None,
     ) -> bool:
-        """Log a message.
-
-        Args:
-            message: What to log.
-            severity: How severe it is.
-            throttle_duration_sec: Log this text at most once in so many seconds.
-
-        Returns:
-            Whether it was logged.
-        """
+        """Log a message, the same text at most once in ``throttle_duration_sec``; returns whether it was logged."""
         text = str(message)
         if throttle_duration_sec is not None:
             now, last = time.monotonic(), self._seen.get(text)
@@ -96,23 +61,25 @@ class Logger:
         return self.log_from((os.path.abspath(code.co_filename), code.co_name, caller.f_lineno), text, severity)
 
     def log_from(self, place: tuple[str, str, int], text: str, severity: LoggingSeverity) -> bool:
-        """Log a message that comes from another place than the caller.
-
-        Args:
-            place: Absolute path of the source, function and line.
-            text: What to log.
-            severity: How severe it is.
-
-        Returns:
-            Whether it was logged.
-        """
+        """Log a message that comes from another place than the caller: absolute path of the source, function, line."""
         stamp = time.time_ns()
         line = f"[{severity.name}] [{stamp // S_TO_NS}.{stamp % S_TO_NS:09d}] [{self.name}]: {text}\n"
         with _writing:
             sys.stderr.write(line)
             sys.stderr.flush()
         if self.sink is not None:
-            self.sink(LogRecord(severity, self.name, text, stamp, *place))
+            file, function, number = place
+            self.sink(
+                Log(
+                    stamp=Time(nanoseconds=stamp).to_msg(),
+                    level=int(severity),
+                    name=self.name,
+                    msg=text,
+                    file=file,
+                    function=function,
+                    line=number,
+                )
+            )
         return True
 
     def info(self, message: object, *, throttle_duration_sec: float | None = None) -> bool:

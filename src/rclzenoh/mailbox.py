@@ -1,4 +1,4 @@
-"""How what arrives from Zenoh gets to the thread that spins.
+"""Queues that carry what arrives from Zenoh to the thread that spins.
 
 Zenoh's threads only put the raw item into the receiver's queue and the receiver into the mailbox of its node, which is
 one queue for all receivers of all nodes of an executor. So an executor that waits wakes at once, items are handled in
@@ -25,7 +25,7 @@ WorkQueue = SimpleQueue[Work | None]
 
 
 class Mailbox:
-    """Queue of a node's work; that of its executor while it has one."""
+    """Queue of a node's work; while the node is in an executor, that of the executor."""
 
     def __init__(self) -> None:
         # Reentrant: the garbage collector may close a query, and with it deliver, while the lock is held.
@@ -33,19 +33,19 @@ class Mailbox:
         self.queue: WorkQueue = SimpleQueue()
 
     def submit(self, work: Work | None) -> None:
-        """Have something done by the thread that spins; None only wakes it."""
+        """Give work to the thread that spins; None only wakes it."""
         with self.lock:
             self.queue.put(work)
 
     def attach(self, queue: WorkQueue) -> None:
-        """Deliver to another queue from now on, beginning with what is waiting in the present one."""
+        """Deliver to another queue from now on, and move the work that waits in the present one there."""
         with self.lock:
             while not self.queue.empty():
                 queue.put(self.queue.get())
             self.queue = queue
 
     def detach(self) -> None:
-        """Deliver to a queue of its own again, and take back what the executor has not done yet."""
+        """Deliver to a queue of its own again, and take back the items that the executor has not handled yet."""
         with self.lock:
             shared, own, others = self.queue, SimpleQueue[Work | None](), []
             while not shared.empty():
@@ -60,7 +60,7 @@ class Mailbox:
 
 
 class Receiver:
-    """What gets items from Zenoh and handles them when its executor spins.
+    """Gets items from Zenoh and handles them when its executor spins.
 
     Args:
         mailbox: Mailbox of the node.
@@ -77,12 +77,11 @@ class Receiver:
         surplus = None
         with self.mailbox.lock:
             if len(self._items) == self._queue_length:
-                # The queue is full: the oldest item makes room, and the number of pending wake-ups stays right.
+                # The oldest item makes room; it has put this receiver into the mailbox, which serves for the new one.
                 surplus = self._items.popleft()
-                self._items.append(item)
             else:
-                self._items.append(item)
                 self.mailbox.queue.put(self)
+            self._items.append(item)
         if surplus is not None:
             self.refuse(surplus)
 
@@ -100,10 +99,10 @@ class Receiver:
         raise NotImplementedError
 
     def refuse(self, item: Any) -> None:
-        """Get rid of an item for which there is no room, in Zenoh's thread."""
+        """Turn away an item for which there is no room, in Zenoh's thread."""
 
     def discard_all(self) -> None:
-        """Get rid of everything that waits."""
+        """Turn away all items that wait."""
         with self.mailbox.lock:
             items, self._items = self._items, deque()
         for item in items:

@@ -1,4 +1,4 @@
-"""Names of nodes, topics and services: what ROS allows, and how relative names are resolved."""
+"""Names of nodes, topics and services: checks that ROS allows them, and makes them absolute."""
 
 from __future__ import annotations
 
@@ -12,10 +12,7 @@ _ABSOLUTE = re.compile(rf"(/{_PART})+")
 
 
 def check_node_name(name: str) -> None:
-    """Refuse what is no node name.
-
-    Args:
-        name: Name without namespace.
+    """Refuse a name without namespace that no node can have.
 
     Raises:
         NameValidationException: If it has other characters than letters, digits and underscores, or begins with
@@ -28,13 +25,7 @@ def check_node_name(name: str) -> None:
 
 
 def absolute_namespace(namespace: str) -> str:
-    """Namespace with its leading slash.
-
-    Args:
-        namespace: Absolute, relative or empty.
-
-    Returns:
-        ``/`` or an absolute name.
+    """Namespace with its leading slash, whether it was given absolute, relative or empty.
 
     Raises:
         NameValidationException: If it is not made of valid names.
@@ -57,9 +48,6 @@ def resolve(name: str, namespace: str, node: str) -> str:
         name: Absolute (``/x``), relative (``x``) or private (``~/x``) name.
         namespace: Absolute namespace of the node.
         node: Name of the node.
-
-    Returns:
-        The absolute name.
 
     Raises:
         NameValidationException: If the result is no valid name.

@@ -7,13 +7,11 @@ from typing import Any
 from rclzenoh.context import Context
 from rclzenoh.exceptions import InvalidHandle
 from rclzenoh.interfaces.msg import Log, ParameterEvent
-from rclzenoh.logging import LogRecord
 from rclzenoh.node_endpoints import NodeEndpoints
 from rclzenoh.node_graph import NodeGraph
 from rclzenoh.node_parameters import NodeParameters
 from rclzenoh.parameter_service import offer_parameters
 from rclzenoh.qos import qos_profile_parameter_events, qos_profile_rosout
-from rclzenoh.time import Time
 from rclzenoh.time_source import TimeSource
 
 
@@ -74,17 +72,8 @@ class Node(NodeEndpoints, NodeGraph, NodeParameters):
         event.stamp = self._clock.now().to_msg()
         self._parameter_events.publish(event)
 
-    def _publish_log(self, record: LogRecord) -> None:
-        message = Log(
-            stamp=Time(nanoseconds=record.stamp_ns).to_msg(),
-            level=int(record.severity),
-            name=record.name,
-            msg=record.text,
-            file=record.file,
-            function=record.function,
-            line=record.line,
-        )
+    def _publish_log(self, message: Log) -> None:
         try:
             self._rosout.publish(message)
         except InvalidHandle:
-            self._logger.sink = None  # The node or its session ended; standard error has the message.
+            self._logger.sink = None  # The node or its session has ended; standard error has the message anyway.

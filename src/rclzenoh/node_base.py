@@ -1,4 +1,4 @@
-"""What endpoints and executors know of their node: names, session, clock, log, and where its work waits."""
+"""The part of a node that its endpoints and its executor use: names, session, clock, log and mailbox."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from rclzenoh.timer import Timer
 
 
 class NodeKeeper(Protocol):
-    """What a node knows of the executor that it is in."""
+    """The executor that a node is in; that of `executors` imports this module."""
 
     def remove_node(self, node: NodeBase) -> None:
         """Stop taking care of a node's callbacks."""
@@ -24,16 +24,8 @@ class NodeKeeper(Protocol):
 class NodeBase:
     """A node as its endpoints and its executor see it.
 
-    Args:
-        node_name: Name of the node.
-        namespace: Namespace of the node and its relative names.
-        context: Context; None for the default one.
-
     Attributes:
-        context: Context of the node.
-        executor: Executor that takes care of the node's callbacks.
         mailbox: Where work of the node waits for its executor.
-        timers: Timers of the node.
         token: Token that announces the node.
 
     Raises:
@@ -84,13 +76,7 @@ class NodeBase:
         return self._logger
 
     def resolve_topic_name(self, topic: str) -> str:
-        """Absolute name of a topic.
-
-        Args:
-            topic: Absolute (``/x``), relative (``x``) or private (``~/x``) name.
-
-        Returns:
-            The absolute name.
+        """Absolute name of a topic or service that is given as ``/x``, ``x`` or ``~/x``.
 
         Raises:
             NameValidationException: If it is no valid name.

@@ -1,4 +1,4 @@
-"""The publishers, subscriptions, services, clients and timers of a node."""
+"""How a node makes its publishers, subscriptions, services, clients and timers, and withdraws them."""
 
 from __future__ import annotations
 
@@ -28,15 +28,7 @@ class NodeEndpoints(NodeBase):
         self._entities: list[Publisher | Subscription | Service | Client] = []
 
     def create_publisher(self, msg_type: type[Message], topic: str, qos_profile: QoSProfile | int) -> Publisher:
-        """Publisher of a topic.
-
-        Args:
-            msg_type: Class of the messages.
-            topic: Name of the topic.
-            qos_profile: Quality of service, or its depth.
-
-        Returns:
-            The publisher.
+        """Make a publisher; instead of a profile, a depth will do.
 
         Raises:
             NameValidationException: If the name is invalid.
@@ -52,18 +44,10 @@ class NodeEndpoints(NodeBase):
         *,
         raw: bool = False,
     ) -> Subscription:
-        """Subscription to a topic.
+        """Make a subscription; instead of a profile, a depth will do.
 
-        Args:
-            msg_type: Class of the messages.
-            topic: Name of the topic.
-            callback: Called with the message or, if it takes two arguments, with the message and a dictionary that says
-                when it was sent; may be a coroutine function.
-            qos_profile: Quality of service, or its depth.
-            raw: Whether the callback gets the CDR bytes instead of a message.
-
-        Returns:
-            The subscription.
+        The callback may be a coroutine function. It gets the message (with ``raw`` its CDR bytes) and, if it takes two
+        arguments, a dictionary that says when the message was sent.
 
         Raises:
             NameValidationException: If the name is invalid.
@@ -79,16 +63,9 @@ class NodeEndpoints(NodeBase):
         *,
         qos_profile: QoSProfile = qos_profile_services_default,
     ) -> Service:
-        """Service.
+        """Make a service.
 
-        Args:
-            srv_type: Class of the service.
-            srv_name: Name of the service.
-            callback: Called with the request and an empty response, returns the response; may be a coroutine function.
-            qos_profile: Quality of service.
-
-        Returns:
-            The service.
+        The callback gets the request and an empty response, and returns the response; it may be a coroutine function.
 
         Raises:
             NameValidationException: If the name is invalid.
@@ -102,38 +79,18 @@ class NodeEndpoints(NodeBase):
         *,
         qos_profile: QoSProfile = qos_profile_services_default,
     ) -> Client:
-        """Client of a service.
-
-        Args:
-            srv_type: Class of the service.
-            srv_name: Name of the service.
-            qos_profile: Quality of service.
-
-        Returns:
-            The client.
+        """Make a client of a service.
 
         Raises:
             NameValidationException: If the name is invalid.
         """
         return self._keep(Client(self, srv_type, srv_name, qos_profile))
 
-    def create_timer(
-        self,
-        timer_period_sec: float,
-        callback: Callable[[], Any],
-    ) -> Timer:
-        """Timer.
-
-        Args:
-            timer_period_sec: Period [s] of the node's clock, so that simulated time counts.
-            callback: Called without arguments; may be a coroutine function.
-
-        Returns:
-            The timer.
-        """
-        period_ns = int(timer_period_sec * S_TO_NS)
-        timer = Timer(callback, period_ns, self._clock)
+    def create_timer(self, timer_period_sec: float, callback: Callable[[], Any]) -> Timer:
+        """Make a timer on the node's clock, so that simulated time counts; the callback may be a coroutine function."""
+        timer = Timer(callback, int(timer_period_sec * S_TO_NS), self._clock)
         self.timers.append(timer)
+        # An executor that waits has chosen how long to wait without this timer.
         self.mailbox.submit(None)
         return timer
 

@@ -1,4 +1,4 @@
-"""What a node can ask about the ROS graph."""
+"""The methods by which a node asks about the ROS graph."""
 
 from __future__ import annotations
 
@@ -50,14 +50,14 @@ class NodeGraph(NodeBase):
         return self.context.graph.count(EntityKind.SUBSCRIPTION, self.resolve_topic_name(topic_name))
 
     def get_publishers_info_by_topic(self, topic_name: str) -> list[TopicEndpointInfo]:
-        """What the graph tells about each publisher of a topic, given by its absolute, relative or private name."""
+        """All publishers of a topic, given by its absolute, relative or private name."""
         return self._endpoints_info(EntityKind.PUBLISHER, topic_name)
 
     def get_subscriptions_info_by_topic(self, topic_name: str) -> list[TopicEndpointInfo]:
-        """What the graph tells about each subscription to a topic, given by its absolute, relative or private name."""
+        """All subscriptions to a topic, given by its absolute, relative or private name."""
         return self._endpoints_info(EntityKind.SUBSCRIPTION, topic_name)
 
     def _endpoints_info(self, kind: EntityKind, topic_name: str) -> list[TopicEndpointInfo]:
         name = self.resolve_topic_name(topic_name)
-        found = (endpoint_info(token) for token in self.context.graph.tokens(kind) if token.name == name)
-        return [info for info in found if info is not None]
+        infos = (endpoint_info(token) for token in self.context.graph.tokens(kind) if token.name == name)
+        return [info for info in infos if info is not None]

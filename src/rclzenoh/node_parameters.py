@@ -23,16 +23,16 @@ from rclzenoh.parameter import Parameter, ParameterKind
 from rclzenoh.parameter_rules import check
 
 OnSet = Callable[[list[Parameter]], SetParametersResult]
-"""Is asked before parameters are set."""
+"""Callback that agrees or objects before parameters are set."""
 PostSet = Callable[[list[Parameter]], None]
-"""Is told after parameters were set."""
+"""Callback that runs after parameters were set."""
 
 
 class NodeParameters:
     """Parameters that were declared, and the rules for setting them.
 
     Args:
-        announce: Gets the event of each change, without node and stamp.
+        announce: Publishes the event of a change, after it has added node and stamp.
     """
 
     def __init__(self, announce: Callable[[ParameterEvent], None]) -> None:
@@ -45,15 +45,9 @@ class NodeParameters:
     def declare_parameter(
         self, name: str, value: Any = None, descriptor: ParameterDescriptor | None = None
     ) -> Parameter:
-        """Declare a parameter.
+        """Declare a parameter; instead of its value, its type will do.
 
-        Args:
-            name: Name of the parameter.
-            value: Default value, or the type of a parameter without default.
-            descriptor: What is known of it; None for one that fixes the type only.
-
-        Returns:
-            The parameter with its value.
+        Without a descriptor, the parameter keeps the type that it is declared with.
 
         Raises:
             ParameterAlreadyDeclaredException: If it is declared already.
@@ -82,12 +76,6 @@ class NodeParameters:
     def get_parameter(self, name: str) -> Parameter:
         """A parameter with its value.
 
-        Args:
-            name: Name of the parameter.
-
-        Returns:
-            The parameter.
-
         Raises:
             ParameterNotDeclaredException: If it is not declared.
             ParameterUninitializedException: If it has a type but no value yet.
@@ -108,12 +96,6 @@ class NodeParameters:
     def describe_parameter(self, name: str) -> ParameterDescriptor:
         """Descriptor of a parameter.
 
-        Args:
-            name: Name of the parameter.
-
-        Returns:
-            The descriptor.
-
         Raises:
             ParameterNotDeclaredException: If it is not declared.
         """
@@ -123,13 +105,7 @@ class NodeParameters:
         return self._descriptors[name]
 
     def set_parameters(self, parameter_list: Sequence[Parameter]) -> list[SetParametersResult]:
-        """Set parameters one after the other.
-
-        Args:
-            parameter_list: Parameters with their new values.
-
-        Returns:
-            One result each.
+        """Set parameters one after the other; returns a result for each.
 
         Raises:
             ParameterNotDeclaredException: If one is not declared; those before it are set.
@@ -137,13 +113,7 @@ class NodeParameters:
         return [self.set_parameters_atomically([parameter]) for parameter in parameter_list]
 
     def set_parameters_atomically(self, parameter_list: Sequence[Parameter]) -> SetParametersResult:
-        """Set parameters all at once, or none of them.
-
-        Args:
-            parameter_list: Parameters with their new values.
-
-        Returns:
-            Whether they were set, and if not, why.
+        """Set parameters all at once, or none of them; the result says why not.
 
         Raises:
             ParameterNotDeclaredException: If one is not declared.
@@ -166,13 +136,10 @@ class NodeParameters:
         Args:
             prefixes: Names and prefixes to list; empty for all.
             depth: Number of name parts below a prefix; 0 for any number.
-
-        Returns:
-            The names and prefixes.
         """
         everything = depth == ListParameters.Request.DEPTH_RECURSIVE
 
-        def is_wanted(name: str) -> bool:
+        def is_listed(name: str) -> bool:
             if not prefixes:
                 return everything or name.count(".") < depth
             return any(
@@ -181,7 +148,7 @@ class NodeParameters:
                 for prefix in prefixes
             )
 
-        names = [name for name in self._parameters if is_wanted(name)]
+        names = [name for name in self._parameters if is_listed(name)]
         nested = dict.fromkeys(name.rpartition(".")[0] for name in names if "." in name)
         return ListParametersResult(names=names, prefixes=list(nested))
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import array
-from collections.abc import Sequence
 from enum import Enum
 from typing import Any
 
@@ -31,12 +30,6 @@ class ParameterKind(Enum):
     def from_parameter_value(cls, value: object) -> ParameterKind:
         """Type that a Python value has as a parameter.
 
-        Args:
-            value: The value.
-
-        Returns:
-            The type.
-
         Raises:
             TypeError: If parameters cannot have such values.
         """
@@ -59,8 +52,9 @@ class ParameterKind(Enum):
             return isinstance(value, _SCALARS[self.value]) and (
                 self is ParameterKind.BOOL or not isinstance(value, bool)
             )
-        is_sequence = isinstance(value, (list, tuple, array.array))
-        return is_sequence and all(isinstance(element, _ELEMENTS[self.value]) for element in _sequence(value))
+        return isinstance(value, (list, tuple, array.array)) and all(
+            isinstance(element, _ELEMENTS[self.value]) for element in value
+        )
 
 
 # In this order: True is an int, too.
@@ -77,11 +71,6 @@ _FIELDS = {
     ParameterKind.DOUBLE_ARRAY: "double_array_value",
     ParameterKind.STRING_ARRAY: "string_array_value",
 }
-
-
-def _sequence(value: Any) -> Sequence[Any]:
-    sequence: Sequence[Any] = value
-    return sequence
 
 
 class Parameter:
@@ -129,12 +118,6 @@ class Parameter:
     def from_parameter_msg(cls, param_msg: ParameterMessage) -> Parameter:
         """Parameter that a message holds.
 
-        Args:
-            param_msg: The message.
-
-        Returns:
-            The parameter.
-
         Raises:
             ValueError: If the message's type is none of `Type`.
         """
@@ -143,13 +126,7 @@ class Parameter:
 
 
 def parameter_value_to_python(message: ParameterValue) -> Any:
-    """Python value that a message holds.
-
-    Args:
-        message: The message.
-
-    Returns:
-        The value; None if it is not set.
+    """Python value that a message holds; None if it is not set.
 
     Raises:
         ValueError: If the message's type is none of `Type`.

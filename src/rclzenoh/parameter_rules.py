@@ -1,4 +1,4 @@
-"""What a parameter's descriptor allows."""
+"""The values that the descriptor of a parameter allows."""
 
 from __future__ import annotations
 
@@ -8,22 +8,11 @@ from rclzenoh.interfaces.msg import FloatingPointRange, IntegerRange, ParameterD
 from rclzenoh.parameter import Parameter, ParameterKind
 
 _RELATIVE_TOLERANCE = 1e-6
-"""Within which a floating point value counts as a bound or a step of its range; that of rclpy."""
-
-WRONG_TYPE = "Wrong parameter type"
+"""A floating point value this close to a bound or a step of its range counts as that; the number is rclpy's."""
 
 
 def check(parameter: Parameter, descriptor: ParameterDescriptor, *, is_declared: bool) -> SetParametersResult:
-    """Whether a parameter may take a value.
-
-    Args:
-        parameter: The parameter with its new value.
-        descriptor: What is known of the parameter.
-        is_declared: Whether the parameter exists, so that this is a change.
-
-    Returns:
-        Whether it may, and if not, why.
-    """
+    """Whether a parameter may take its new value, and if not, why; one that is not declared yet may take its first."""
     if is_declared and descriptor.read_only:
         return _refuse(f"Trying to set a read-only parameter: {parameter.name}.")
     if not descriptor.dynamic_typing:
@@ -31,7 +20,7 @@ def check(parameter: Parameter, descriptor: ParameterDescriptor, *, is_declared:
             return _refuse("Static parameter cannot be undeclared")
         if parameter.type_ is not ParameterKind.NOT_SET and parameter.type_.value != descriptor.type:
             expected = ParameterKind(descriptor.type).name
-            return _refuse(f"{WRONG_TYPE} of {parameter.name}, expected {expected}, got {parameter.type_.name}")
+            return _refuse(f"Wrong parameter type of {parameter.name}, expected {expected}, got {parameter.type_.name}")
     if parameter.type_ is ParameterKind.INTEGER and len(descriptor.integer_range):
         return _check_integer(parameter, descriptor.integer_range[0])
     if parameter.type_ is ParameterKind.DOUBLE and len(descriptor.floating_point_range):

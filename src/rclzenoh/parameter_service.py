@@ -29,27 +29,17 @@ def offer_parameters(node: NodeEndpoints, parameters: NodeParameters) -> None:
     """Let other nodes read and change a node's parameters.
 
     A request that names an unknown parameter is answered with an empty list, as rclpy's nodes do.
-
-    Args:
-        node: The node.
-        parameters: Its parameters.
     """
     answers = _Answers(parameters, node.get_logger())
-    node.create_service(
-        DescribeParameters, "~/describe_parameters", answers.describe, qos_profile=qos_profile_parameters
-    )
-    node.create_service(GetParameters, "~/get_parameters", answers.get, qos_profile=qos_profile_parameters)
-    node.create_service(
-        GetParameterTypes, "~/get_parameter_types", answers.get_types, qos_profile=qos_profile_parameters
-    )
-    node.create_service(ListParameters, "~/list_parameters", answers.list_names, qos_profile=qos_profile_parameters)
-    node.create_service(SetParameters, "~/set_parameters", answers.set, qos_profile=qos_profile_parameters)
-    node.create_service(
-        SetParametersAtomically,
-        "~/set_parameters_atomically",
-        answers.set_atomically,
-        qos_profile=qos_profile_parameters,
-    )
+    for service, name, answer in (
+        (DescribeParameters, "describe_parameters", answers.describe),
+        (GetParameters, "get_parameters", answers.get),
+        (GetParameterTypes, "get_parameter_types", answers.get_types),
+        (ListParameters, "list_parameters", answers.list_names),
+        (SetParameters, "set_parameters", answers.set),
+        (SetParametersAtomically, "set_parameters_atomically", answers.set_atomically),
+    ):
+        node.create_service(service, f"~/{name}", answer, qos_profile=qos_profile_parameters)
 
 
 class _Answers:
@@ -60,11 +50,11 @@ class _Answers:
     def describe(
         self, request: DescribeParameters.Request, response: DescribeParameters.Response
     ) -> DescribeParameters.Response:
-        response.descriptors = self._each(request.names, self._parameters.describe_parameter)
+        response.descriptors = self._read_each(request.names, self._parameters.describe_parameter)
         return response
 
     def get(self, request: GetParameters.Request, response: GetParameters.Response) -> GetParameters.Response:
-        response.values = self._each(
+        response.values = self._read_each(
             request.names, lambda name: self._parameters.get_parameter(name).get_parameter_value()
         )
         return response
@@ -72,15 +62,15 @@ class _Answers:
     def get_types(
         self, request: GetParameterTypes.Request, response: GetParameterTypes.Response
     ) -> GetParameterTypes.Response:
-        response.types = self._each(request.names, self._type_of)
+        response.types = self._read_each(request.names, self._type_of)
         return response
 
     def _type_of(self, name: str) -> int:
-        # Of a parameter without a value, too, but of none that is not declared.
+        # A parameter without a value has a type, too; one that is not declared is an error.
         self._parameters.describe_parameter(name)
         return int(self._parameters.get_parameter_or(name).type_.value)
 
-    def _each(self, names: list[str], read: Callable[[str], _T]) -> list[_T]:
+    def _read_each(self, names: list[str], read: Callable[[str], _T]) -> list[_T]:
         try:
             return [read(name) for name in names]
         except ParameterException as error:

@@ -18,7 +18,7 @@ from rclzenoh.node_base import NodeBase
 from rclzenoh.qos import HistoryPolicy, QoSProfile
 
 HEARTBEAT_S = 0.5
-"""Period in which rmw_zenoh_cpp tells of the last sample of a reliable, transient local topic."""
+"""Period [s] in which rmw_zenoh_cpp announces the last sample of a reliable, transient local topic."""
 
 
 class Publisher:
@@ -38,11 +38,6 @@ class Publisher:
     def topic_name(self) -> str:
         """Absolute name of the topic."""
         return self._endpoint.name
-
-    @property
-    def gid(self) -> bytes:
-        """Identifier of the publisher, 16 bytes."""
-        return self._endpoint.gid
 
     def publish(self, msg: Message | bytes) -> None:
         """Publish a message.
@@ -72,7 +67,7 @@ class Publisher:
                 raise self._endpoint.invalid(error) from error
 
     def get_subscription_count(self) -> int:
-        """Subscriptions to the topic in the whole graph; costs a fraction of a microsecond."""
+        """Number of subscriptions to the topic in the whole graph; asking costs a fraction of a microsecond."""
         endpoint = self._endpoint
         return endpoint.node.context.graph.count(EntityKind.SUBSCRIPTION, endpoint.name, endpoint.type)
 

@@ -101,13 +101,9 @@ _RCL_DEPTH, _MIDDLEWARE_DEPTH = 10, 42
 
 
 def encode(profile: QoSProfile) -> str:
-    """Profile as the last chunk of a liveliness token; what equals the middleware's defaults is left empty.
+    """Profile as the last chunk of a liveliness token; values that are the middleware's defaults are left empty.
 
-    Args:
-        profile: The profile.
-
-    Returns:
-        ``reliability:durability:history,depth:deadline:lifespan:liveliness,lease``.
+    It reads ``reliability:durability:history,depth:deadline:lifespan:liveliness,lease``.
     """
     reliability = _number(profile.reliability, ReliabilityPolicy.RELIABLE)
     durability = _number(profile.durability, DurabilityPolicy.VOLATILE)
@@ -119,14 +115,7 @@ def encode(profile: QoSProfile) -> str:
 
 
 def decode(text: str) -> QoSProfile | None:
-    """Profile from the last chunk of a liveliness token; the inverse of `encode`.
-
-    Args:
-        text: The chunk.
-
-    Returns:
-        The profile with the middleware's defaults filled in; None if the text is malformed.
-    """
+    """Profile from the last chunk of a liveliness token, with the middleware's defaults; None if it is malformed."""
     groups = [group.split(",") for group in text.split(":")]
     if len(groups) < len(_SIZES) or any(len(group) < size for group, size in zip(groups, _SIZES, strict=False)):
         return None
@@ -151,14 +140,14 @@ _SIZES = (1, 1, 2, 2, 2, 3)
 
 
 def _natural(text: str) -> int:
-    # Not `int` alone, which takes signs, blanks and underscores, too.
+    # `int` alone takes signs, blanks and underscores, too.
     if not (text.isascii() and text.isdecimal() and len(text) <= _MOST_DIGITS):
         raise ValueError(f"{text!r:.40} is no number")
     return int(text)
 
 
 _MOST_DIGITS = 20
-"""Of a number of 64 bits."""
+"""Digits of the largest number of 64 bits."""
 
 
 def _duration(chunk: list[str]) -> Duration:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 import time
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import zenoh
@@ -25,8 +26,7 @@ Callback = Callable[[Any, Any], Any]
 class Service(Receiver):
     """Answers requests. Made by `Node.create_service`.
 
-    The callback gets the request and an empty response and returns the response; it may be a coroutine function, and
-    other callbacks are called while it waits.
+    While a callback that is a coroutine function waits, other callbacks are called.
     """
 
     def __init__(
@@ -99,14 +99,12 @@ class Service(Receiver):
         self._open.clear()
 
 
+@dataclass(frozen=True, eq=False)
 class _OpenRequest:
     """A request that has no answer yet."""
 
-    __slots__ = ("attachment", "query")
-
-    def __init__(self, query: zenoh.Query, attachment: Attachment) -> None:
-        self.query = query
-        self.attachment = attachment
+    query: zenoh.Query
+    attachment: Attachment
 
 
 def _refuse(query: zenoh.Query, reason: str) -> None:

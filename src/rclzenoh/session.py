@@ -1,4 +1,4 @@
-"""The Zenoh session of a context: how it is opened."""
+"""Opens the Zenoh session of a context."""
 
 from __future__ import annotations
 
@@ -13,15 +13,9 @@ _PATIENCE_S, _RETRY_S = 5.0, 0.1
 
 
 def open_session(config: zenoh.Config) -> zenoh.Session:
-    """Open a session with a router.
+    """Open a session with a router, which may just be starting; the caller has to close it.
 
-    Zenoh itself waits for as long as ``connect/timeout_ms`` of the configuration says, which says nothing by default.
-
-    Args:
-        config: Configuration of the session.
-
-    Returns:
-        The session, which the caller has to close.
+    Zenoh itself waits only if the configuration has ``connect/timeout_ms``, which it does not have by default.
 
     Raises:
         NoRouterError: If there is no router within some seconds.

@@ -1,4 +1,4 @@
-"""Configuration of Zenoh sessions: of one that a program describes, or of the one that the environment asks for.
+"""Configurations of Zenoh sessions: for values that a program has, or as the environment asks for.
 
 The environment variables are those of rmw_zenoh_cpp: ``ZENOH_SESSION_CONFIG_URI`` names a whole configuration file and
 ``ZENOH_CONFIG_OVERRIDE`` (``key=json5;key=json5``) is applied after it.
@@ -24,11 +24,11 @@ DEFAULT_ENDPOINT = "tcp/localhost:7447"
 CONFIG_FILE_VARIABLE = "ZENOH_SESSION_CONFIG_URI"
 OVERRIDE_VARIABLE = "ZENOH_CONFIG_OVERRIDE"
 OPEN = "tcp/"
-"""What endpoints begin with whose router lets anybody in."""
+"""Beginning of the endpoints whose router lets anybody in."""
 PROTECTED = "tls/"
-"""What endpoints begin with whose router lets nobody in without a key."""
+"""Beginning of the endpoints whose router lets nobody in without a key."""
 NOT_IN_PATHS = ";?"
-"""Zenoh puts paths into endpoints, in which these have a meaning: it finds no key in a directory with one of them."""
+"""Characters that a path to a key must not have: Zenoh puts paths into endpoints, in which they have a meaning."""
 
 _TLS = "transport/link/tls"
 _SETTINGS = {
@@ -41,7 +41,7 @@ _SETTINGS = {
 
 @dataclass(frozen=True)
 class Key:
-    """By which a router and its clients know each other: all show the same certificate and trust no other (mutual TLS).
+    """The key of a router and its clients, which all show the same certificate and trust no other (mutual TLS).
 
     Attributes:
         private_key: File of the private key, in PEM.
@@ -97,7 +97,7 @@ def environment_config() -> zenoh.Config:
 
 
 def connect_endpoint() -> str | None:
-    """Where the environment says that the router is; None if it says nothing of it.
+    """Endpoint of the router that the environment names; None if it names none.
 
     Raises:
         ConfigurationError: As `environment_config`.
@@ -109,7 +109,7 @@ def connect_endpoint() -> str | None:
 
 
 def is_protected() -> bool:
-    """Whether the session that the environment asks for is one with a router that lets nobody in without a key.
+    """Whether the environment leads to a router that lets nobody in without a key.
 
     Raises:
         ConfigurationError: As `environment_config`.
@@ -118,7 +118,7 @@ def is_protected() -> bool:
 
 
 def client_override(endpoint: str, key: Key | None = None) -> str:
-    """Value of ``ZENOH_CONFIG_OVERRIDE`` by which a session is that of `client_config`; it holds no secrets."""
+    """Value of ``ZENOH_CONFIG_OVERRIDE`` that has the effect of `client_config`; it names files and holds no secret."""
     return ";".join(f"{name}={json.dumps(value)}" for name, value in _client_settings(endpoint, key).items())
 
 
@@ -141,7 +141,7 @@ def router_config(endpoint: str, key: Key | None = None) -> zenoh.Config:
 
 
 def in_words(error: zenoh.ZError) -> str:
-    """What Zenoh says is wrong, without the names and places of its sources."""
+    """Message of an error of Zenoh, without the names and lines of its source files."""
     return re.sub(r'^\w+\([^"]*"', "", re.split(r' at /| \(os error|", location: |"\)', str(error))[0])
 
 
@@ -164,20 +164,18 @@ def _tls_settings(key: Key, side: Literal["connect", "listen"]) -> Mapping[str, 
 
 
 def _check_key(config: zenoh.Config) -> None:
-    """Find out whether the files of a key can be read: without them Zenoh would only say that it cannot connect."""
-    for name in ("private_key", "certificate"):
-        for side in ("connect", "listen"):
-            if path := json.loads(config.get_json(f"{_TLS}/{side}_{name}")):
-                _check_readable(Path(path))
-    if path := json.loads(config.get_json(f"{_TLS}/root_ca_certificate")):
-        _check_readable(Path(path))
+    """Refuse a key that cannot be read: Zenoh would only say that it cannot connect.
 
-
-def _check_readable(path: Path) -> None:
-    try:
-        path.read_bytes()
-    except OSError as error:
-        raise UnreadableKeyError(path, error.strerror or str(error)) from error
+    Raises:
+        UnreadableKeyError: If one of its files cannot be read.
+    """
+    sided = [f"{side}_{name}" for name in ("private_key", "certificate") for side in ("connect", "listen")]
+    for name in (*sided, "root_ca_certificate"):
+        if path := json.loads(config.get_json(f"{_TLS}/{name}")):
+            try:
+                Path(path).read_bytes()
+            except OSError as error:
+                raise UnreadableKeyError(Path(path), error.strerror or str(error)) from error
 
 
 def _endpoints(config: zenoh.Config) -> list[str]:

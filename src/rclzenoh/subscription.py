@@ -42,7 +42,7 @@ class Subscription(Receiver):
         if not self._wants_info and not _takes(callback, 1):
             raise RuntimeError(f"{topic}: the callback must take a message, or a message and its info")
         self._endpoint = Endpoint(node, EntityKind.SUBSCRIPTION, topic, msg_type.TYPE, qos_profile)
-        # History may arrive before the declaring call returns: nothing below may matter to `handle`.
+        # `handle` may be called for history before `_declare` returns, so it must not need anything that comes below.
         self._endpoint.announce(self._declare())
 
     def _declare(self) -> Any:

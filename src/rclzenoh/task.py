@@ -70,7 +70,7 @@ class Future:
             self._finish(_State.CANCELLED)
 
     def add_done_callback(self, callback: Callable[[Any], Any]) -> None:
-        """Call something with this future once the outcome is known, or now if it is."""
+        """Call back with this future once the outcome is known, or now if it is."""
         with self._lock:
             if self._state is _State.PENDING:
                 self._callbacks.append(callback)
@@ -107,7 +107,7 @@ class Future:
 
 
 class Task(Future):
-    """A function or coroutine that the thread that spins carries out; its outcome is theirs.
+    """A function or coroutine that the thread that spins carries out; the task has the outcome of it.
 
     Args:
         work: The coroutine, or a function without arguments, which may return one.
@@ -122,14 +122,14 @@ class Task(Future):
         self._coroutine = work if isinstance(work, Coroutine) else None
 
     def schedule(self) -> None:
-        """Have this task carried on by the thread that spins."""
+        """Have the thread that spins carry on with this task."""
         self._waits_in.submit(self)
 
     def run(self) -> bool:
         """Carry on until the task ends or awaits something; returns whether there was anything to do.
 
         Raises:
-            BaseException: What the function or coroutine raised; it is the task's outcome, too.
+            BaseException: If the function or coroutine does; the exception is the task's outcome, too.
         """
         if self.done() or self.cancelled():
             return False

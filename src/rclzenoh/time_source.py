@@ -1,4 +1,4 @@
-"""Where a node's ROS time comes from: its parameter ``use_sim_time`` and the topic ``/clock``."""
+"""The source of a node's ROS time: the topic ``/clock`` while the parameter ``use_sim_time`` is true."""
 
 from __future__ import annotations
 
@@ -15,12 +15,7 @@ USE_SIM_TIME = "use_sim_time"
 
 
 class TimeSource:
-    """Sets a node's clock.
-
-    Args:
-        node: The node.
-        parameters: Its parameters.
-    """
+    """Sets the clock of a node, which has these parameters."""
 
     def __init__(self, node: NodeEndpoints, parameters: NodeParameters) -> None:
         self._node = node

@@ -9,13 +9,7 @@ from rclzenoh.clock import ROSClock
 
 
 class Timer:
-    """Calls back once a period of its clock; periods that were missed are skipped.
-
-    Args:
-        callback: Called without arguments; may be a coroutine function.
-        timer_period_ns: Period [ns].
-        clock: ROSClock that the period is measured with.
-    """
+    """Calls back once a period of its clock; periods that were missed are skipped."""
 
     def __init__(self, callback: Callable[[], Any], timer_period_ns: int, clock: ROSClock) -> None:
         if timer_period_ns < 0:

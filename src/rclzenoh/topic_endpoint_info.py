@@ -1,36 +1,24 @@
-"""What the graph tells about one publisher or subscription."""
+"""Description of one publisher or subscription in the ROS graph."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import IntEnum
 
-from rclzenoh.gid import gid_of
 from rclzenoh.keys import EntityKind, Token
 from rclzenoh.qos import HistoryPolicy, QoSProfile, decode
 
 
 class TopicEndpointTypeEnum(IntEnum):
-    """What an endpoint is."""
+    """Kind of an endpoint."""
 
-    INVALID = 0
     PUBLISHER = 1
     SUBSCRIPTION = 2
 
 
 @dataclass(frozen=True)
 class TopicEndpointInfo:
-    """One publisher or subscription.
-
-    Attributes:
-        node_name: Name of its node.
-        node_namespace: Namespace of its node.
-        topic_type: ROS name of the type.
-        topic_type_hash: Type hash.
-        endpoint_type: What it is.
-        endpoint_gid: Identifier, 16 numbers.
-        qos_profile: Quality of service.
-    """
+    """One publisher or subscription; its type has the ROS name, and its identifier is 16 octets."""
 
     node_name: str
     node_namespace: str
@@ -64,7 +52,7 @@ class TopicEndpointInfo:
 
 
 def endpoint_info(token: Token) -> TopicEndpointInfo | None:
-    """What a token tells; None if its quality of service is malformed, as genuine nodes ignore it then."""
+    """Description of the endpoint of a token; None if its QoS is malformed, as genuine nodes ignore such a token."""
     qos = decode(token.qos)
     if qos is None:
         return None
@@ -75,6 +63,6 @@ def endpoint_info(token: Token) -> TopicEndpointInfo | None:
         topic_type=token.ros_type,
         topic_type_hash=token.type_hash,
         endpoint_type=TopicEndpointTypeEnum.PUBLISHER if is_publisher else TopicEndpointTypeEnum.SUBSCRIPTION,
-        endpoint_gid=list(gid_of(token.key())),
+        endpoint_gid=list(token.gid),
         qos_profile=qos,
     )

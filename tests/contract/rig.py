@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 import time
 from collections.abc import Callable
 from typing import Any
@@ -13,6 +15,28 @@ ON_RCLPY = uses_rclpy()
 ON_DDS = Middleware.of_process().is_fast_dds
 PATIENCE_S = 30.0
 """Genuine nodes find each other, and all that they have, within a second; the machine may be very busy."""
+
+SERVER = """
+from throwcollect import ros
+
+ros.init()
+node = ros.Node("server")
+
+def answer(request, response):
+    response.success = True
+    return response
+
+node.create_service(ros.get_service("std_srvs/srv/Trigger"), "trigger", answer)
+executor = ros.SingleThreadedExecutor()
+executor.add_node(node)
+print("ready", flush=True)
+try:
+    executor.spin()
+except ros.ExternalShutdownException:
+    pass
+print("asked to end", flush=True)
+"""
+"""A node with the service ``trigger``, which ends at SIGTERM and leaves its context to the end of the process."""
 
 if ON_RCLPY:
     from rclpy import exceptions as exceptions
@@ -38,6 +62,11 @@ def said(*, embedded: str, rclpy: str) -> str:
 def names_of(node: Node) -> list[str]:
     """Names of the nodes that a node sees, sorted."""
     return sorted(name for name, _ in node.get_node_names_and_namespaces())
+
+
+def start_python(*arguments: str, **options: Any) -> subprocess.Popen[str]:
+    """Start a process of Python whose output is text."""
+    return subprocess.Popen([sys.executable, *arguments], stdout=subprocess.PIPE, text=True, **options)
 
 
 class Rig:

@@ -2,8 +2,7 @@ import signal
 
 import pytest
 
-from rclzenoh import api as ros
-from rclzenoh.context import get_default_context
+from rclzenoh.context import Context, get_default_context, init, shutdown
 from rclzenoh.exceptions import ConfigurationError, NotInitializedException
 
 
@@ -11,21 +10,21 @@ from rclzenoh.exceptions import ConfigurationError, NotInitializedException
 def test_the_domain_must_be_a_number(environment, monkeypatch, text):
     monkeypatch.setenv("ROS_DOMAIN_ID", text)
     with pytest.raises(ConfigurationError, match="ROS_DOMAIN_ID must be a number"):
-        ros.Context().init()
+        Context().init()
 
 
 def test_sigterm_is_handled_as_long_as_the_default_context_lives(environment):
     assert signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
-    ros.init()
+    init()
     assert signal.getsignal(signal.SIGTERM) is not signal.SIG_DFL
     signal.raise_signal(signal.SIGTERM)
     assert not get_default_context().ok()
-    ros.shutdown()
+    shutdown()
     assert signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
 
 
 def test_a_session_is_there_from_init_to_shutdown(environment):
-    context = ros.Context()
+    context = Context()
     with pytest.raises(NotInitializedException, match=r"init\(\) has not been called"):
         _ = context.session
     context.init()
@@ -35,7 +34,7 @@ def test_a_session_is_there_from_init_to_shutdown(environment):
 
 
 def test_a_shutdown_that_was_requested_ends_what_spins_before_it_is_carried_out(environment):
-    context, calls = ros.Context(), []
+    context, calls = Context(), []
     context.init()
     context.on_shutdown(lambda: calls.append(1))
     context.request_shutdown()

@@ -32,6 +32,14 @@ def test_an_endpoint_token_is_written_as_rmw_zenoh_does():
     )
 
 
+def test_a_gid_is_the_hash_of_the_token_in_little_endian_order():
+    token = parse_token(
+        "@ros2_lv/2/1a2b3c4d/0/11/MP/%/%/talker/%chatter/std_msgs::msg::dds_::String_/"
+        "RIHS01_df668c740482bbd48fb39d76a70dfd4bd59db1288021743503259e948f6b1a18/::,10:,:,:,,"
+    )
+    assert token.gid.hex() == "d5750f4532486ffa5daaffa683021e1c"
+
+
 @pytest.mark.parametrize("token", [NODE, PUBLISHER])
 def test_tokens_survive_writing_and_parsing(token):
     assert parse_token(token.key()) == token

@@ -3,47 +3,18 @@
 import os
 import signal
 import subprocess
-import sys
 import time
-
-import pytest
 
 from rclzenoh.interfaces import get_message, get_service
 from rclzenoh.session_config import OVERRIDE_VARIABLE
+from tests.contract.rig import SERVER, names_of, start_python
 
 String = get_message("std_msgs/msg/String")
 Trigger = get_service("std_srvs/srv/Trigger")
-SERVER = """
-from rclzenoh import api as ros
-from rclzenoh.interfaces import get_service
-
-ros.init()
-node = ros.Node("server")
-
-def answer(request, response):
-    response.success = True
-    return response
-
-node.create_service(get_service("std_srvs/srv/Trigger"), "trigger", answer)
-executor = ros.SingleThreadedExecutor()
-executor.add_node(node)
-print("ready", flush=True)
-try:
-    executor.spin()
-except ros.ExternalShutdownException:
-    pass
-print("asked to end", flush=True)
-{end}
-"""
 
 
-def start(*arguments, **options):
-    return subprocess.Popen([sys.executable, *arguments], stdout=subprocess.PIPE, text=True, **options)
-
-
-@pytest.mark.parametrize("end", ["ros.shutdown()", ""])
-def test_a_node_in_another_process_answers_and_ends_at_sigterm(rig, end):
-    process = start("-c", SERVER.format(end=end))
+def test_a_node_in_another_process_answers_and_ends_at_sigterm(rig):
+    process = start_python("-c", SERVER)
     assert process.stdout.readline() == "ready\n"
     node = rig.node("client")
     client = node.create_client(Trigger, "trigger")
@@ -52,11 +23,11 @@ def test_a_node_in_another_process_answers_and_ends_at_sigterm(rig, end):
     process.send_signal(signal.SIGTERM)
     assert process.communicate(timeout=10)[0] == "asked to end\n"
     assert process.returncode == 0
-    assert rig.spin(lambda: [name for name, _ in node.get_node_names_and_namespaces()] == ["client"])
+    assert rig.spin(lambda: names_of(node) == ["client"])
 
 
 def test_nodes_survive_a_router_that_dies_and_comes_back(rig, monkeypatch):
-    router = start("-m", "throwcollect.ros.router", "--listen", "tcp/127.0.0.1:0")
+    router = start_python("-m", "throwcollect.ros.router", "--listen", "tcp/127.0.0.1:0")
     endpoint = router.stdout.readline().split()[-1]
     monkeypatch.setenv(OVERRIDE_VARIABLE, f'connect/endpoints=["{endpoint}"]')
     talker, listener = rig.node("talker"), rig.node("listener")
@@ -68,20 +39,20 @@ def test_nodes_survive_a_router_that_dies_and_comes_back(rig, monkeypatch):
     router.communicate()
     assert rig.spin(lambda: publisher.get_subscription_count() == 0)
     publisher.publish(String(data="lost"))
-    router = start("-m", "throwcollect.ros.router", "--listen", endpoint)
+    router = start_python("-m", "throwcollect.ros.router", "--listen", endpoint)
     try:
         assert rig.spin(lambda: publisher.get_subscription_count() == 1, timeout=20)
         publisher.publish(String(data="back"))
         assert rig.spin(lambda: heard)
         assert heard[-1].data == "back"
-        assert rig.spin(lambda: [name for name, _ in talker.get_node_names_and_namespaces()] == ["listener", "talker"])
+        assert rig.spin(lambda: names_of(talker) == ["listener", "talker"])
     finally:
         os.kill(router.pid, signal.SIGTERM)
         router.communicate(timeout=10)
 
 
 def test_a_call_that_waits_is_interrupted_by_sigint(environment):
-    process = start("-c", SERVER.format(end=""), stderr=subprocess.PIPE)
+    process = start_python("-c", SERVER, stderr=subprocess.PIPE)
     process.stdout.readline()
     time.sleep(0.1)
     process.send_signal(signal.SIGINT)

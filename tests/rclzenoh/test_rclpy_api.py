@@ -7,12 +7,13 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from rclzenoh import action, client, clock, service, subscription, timer
 from rclzenoh import api as embedded
+from rclzenoh import client, clock, service, subscription, timer
 from rclzenoh.action.client import ClientGoalHandle
 from rclzenoh.action.server import ServerGoalHandle
 from rclzenoh.logging import Logger
 from rclzenoh.topic_endpoint_info import TopicEndpointInfo
+from throwcollect.ros import embedded as ros
 
 API = Path(__file__).with_name("rclpy_api.txt")
 PAGE = Path(__file__).parents[2] / "docs" / "ros.md"
@@ -37,7 +38,7 @@ CLASSES: dict[str, Any] = {
     "TopicEndpointInfo": TopicEndpointInfo,
 }
 """Classes that our nodes meet, by the names that they have in rclpy."""
-MODULES = {"rclpy": embedded, "rclpy.action": action, "rclpy.executors": embedded, "rclpy.qos": embedded}
+MODULES = {"rclpy": ros, "rclpy.action": embedded, "rclpy.executors": embedded, "rclpy.qos": embedded}
 
 
 @cache

@@ -25,7 +25,7 @@ def test_a_session_waits_for_its_router_as_long_as_its_configuration_says(enviro
         unused = f"tcp/127.0.0.1:{probe.getsockname()[1]}"
     monkeypatch.setenv("ZENOH_CONFIG_OVERRIDE", f'connect/endpoints=["{unused}"];connect/timeout_ms=20000')
     routers: list[zenoh.Session] = []
-    late = threading.Timer(0.5, lambda: routers.append(zenoh.open(router_config(unused))))
+    late = threading.Timer(0.2, lambda: routers.append(zenoh.open(router_config(unused))))
     late.start()
     try:
         opened = open_session(environment_config())

@@ -30,7 +30,8 @@ def test_the_wire_is_that_of_rmw_zenoh(rig):
     assert rig.spin(lambda: publisher.publish(String(data="x")) or len(samples) > 2)
     first, second = (unpack(sample.attachment.to_bytes()) for sample in samples[:2])
     assert second.sequence == first.sequence + 1
-    assert first.gid == second.gid == publisher.gid
+    (info,) = node.get_publishers_info_by_topic("chatter")
+    assert first.gid == second.gid == bytes(info.endpoint_gid)
     assert before <= first.source_timestamp <= time.time_ns()
     assert samples[0].payload.to_bytes() == serialize(String(data="x"))
     # Advanced subscribers drop samples without a time stamp of the session.

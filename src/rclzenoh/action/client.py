@@ -31,28 +31,20 @@ class ClientGoalHandle:
 
     @property
     def status(self) -> int:
-        """State of the goal, as far as the server has told; asking for it is what makes the client listen."""
+        """Last state of the goal that the server has published; the client listens from the first time it is asked."""
         self._client.listen_to_status()
         return self._status
 
     def update(self, status: int) -> None:
-        """Take over the state that the server tells."""
+        """Take over a state that the server has published."""
         self._status = status
 
     def get_result_async(self) -> Future:
-        """Ask for the result.
-
-        Returns:
-            A future of the response, which has ``status`` and ``result``.
-        """
+        """Ask for the result; the response has ``status`` and ``result``."""
         return self._client.request_result(self)
 
     def cancel_goal_async(self) -> Future:
-        """Ask for the goal to be cancelled.
-
-        Returns:
-            A future of the response of action_msgs/srv/CancelGoal.
-        """
+        """Ask for the goal to be cancelled; the response is that of action_msgs/srv/CancelGoal."""
         return self._client.request_cancel(self)
 
 
@@ -60,12 +52,7 @@ class ActionClient:
     """Sends goals.
 
     A client subscribes to feedback when it is first given a callback for it, and to the status when a goal's status is
-    first asked for: servers then spare messages that nobody looks at.
-
-    Args:
-        node: Node that the client belongs to.
-        action_type: Class of the action.
-        action_name: Name of the action.
+    first asked for, so that servers spare messages that nobody looks at.
     """
 
     def __init__(self, node: NodeEndpoints, action_type: type[Action], action_name: str) -> None:
@@ -94,13 +81,10 @@ class ActionClient:
         )
 
     def wait_for_server(self, timeout_sec: float | None = None) -> bool:
-        """Wait until somebody offers the action.
+        """Wait until somebody offers the action, and tell whether somebody does.
 
         Args:
             timeout_sec: Longest time [s]; None or negative for no limit.
-
-        Returns:
-            Whether somebody does.
         """
         context = self._node.context
         return context.graph.wait_for(self.server_is_ready, timeout_sec, context.ok)
@@ -108,16 +92,13 @@ class ActionClient:
     def send_goal_async(
         self, goal: Message, feedback_callback: FeedbackCallback | None = None, goal_uuid: UUID | None = None
     ) -> Future:
-        """Send a goal.
+        """Send a goal; the future has a `ClientGoalHandle` once the goal is accepted or rejected.
 
         Args:
             goal: Goal of the action's type.
             feedback_callback: Called with each feedback message, which has ``goal_id`` and ``feedback``, until the
                 result has been received.
             goal_uuid: Identifier of the goal; None for a random one.
-
-        Returns:
-            A future of a `ClientGoalHandle`, once the goal is accepted or rejected.
 
         Raises:
             TypeError: If the goal is of another type.

@@ -1,4 +1,4 @@
-"""The goals of an action server: their states, and which of them are meant by a wish to cancel."""
+"""The goals of an action server: their states, and the ones that a request to cancel is about."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _CANCELED, _ABORTED = GoalStatus.STATUS_CANCELED, GoalStatus.STATUS_ABORTED
 
 
 class GoalEvent(Enum):
-    """What can happen to a goal."""
+    """An event that may change the state of a goal."""
 
     EXECUTE = "executed"
     CANCEL = "cancelled by request"
@@ -76,19 +76,14 @@ class GoalTable(dict[bytes, TrackedGoal]):
         return self[key]
 
     def can(self, key: bytes, event: GoalEvent) -> bool:
-        """Whether something can happen to a goal in its present state."""
+        """Whether an event is possible in the present state of a goal."""
         return key in self and (self[key].status, event) in _MOVES
 
     def change(self, key: bytes, event: GoalEvent, now_ns: int) -> None:
         """Change a goal's state.
 
-        Args:
-            key: Its identifier.
-            event: What happens to it.
-            now_ns: Present time [ns].
-
         Raises:
-            RuntimeError: If that cannot happen in its present state.
+            RuntimeError: If the event is not possible in its present state.
         """
         if not self.can(key, event):
             status = self[key].status if key in self else GoalStatus.STATUS_UNKNOWN
@@ -99,14 +94,14 @@ class GoalTable(dict[bytes, TrackedGoal]):
             goal.ended_ns = now_ns
 
     def select(self, key: bytes, stamp_ns: int) -> tuple[int, list[bytes]]:
-        """Goals that a wish to cancel means.
+        """Goals that a request to cancel is about.
 
         Args:
             key: Identifier in the request; all zeros for none.
             stamp_ns: Stamp in the request [ns]; 0 for none.
 
         Returns:
-            Return code of action_msgs/srv/CancelGoal and the identifiers.
+            Return code of action_msgs/srv/CancelGoal, and the identifiers of the goals.
         """
         has_key = any(key)
         if has_key and not stamp_ns:
@@ -116,27 +111,20 @@ class GoalTable(dict[bytes, TrackedGoal]):
                 return CancelGoal.Response.ERROR_GOAL_TERMINATED, []
             return CancelGoal.Response.ERROR_NONE, [key]
         everything = not has_key and not stamp_ns
-        meant = [
+        selected = [
             other
             for other, goal in self.items()
             if self.can(other, GoalEvent.CANCEL) and (everything or other == key or _stamp_ns(goal) <= stamp_ns)
         ]
-        return CancelGoal.Response.ERROR_NONE, meant
+        return CancelGoal.Response.ERROR_NONE, selected
 
     def expire(self, now_ns: int) -> list[bytes]:
-        """Forget goals that ended long enough ago.
-
-        Args:
-            now_ns: Present time [ns].
-
-        Returns:
-            Their identifiers.
-        """
+        """Forget the goals that ended long enough ago, and return their identifiers."""
         old = []
         for key, goal in self.items():
             if goal.ended_ns is None:
                 continue
-            # A simulation that was reset has turned the clock back: the time of the end means nothing any more.
+            # After a reset of the simulation the clock is behind the time of the end, so the wait begins anew.
             goal.ended_ns = min(goal.ended_ns, now_ns)
             if now_ns - goal.ended_ns > self._result_timeout_ns:
                 old.append(key)

@@ -1,4 +1,4 @@
-"""Actions in the ROS graph: an action is where its feedback topic is."""
+"""Actions in the ROS graph, which shows them by their feedback topics."""
 
 from __future__ import annotations
 

@@ -27,7 +27,7 @@ class GoalResponse(Enum):
 
 
 class CancelResponse(Enum):
-    """Answers to the wish to cancel a goal."""
+    """Answers to a request to cancel a goal."""
 
     REJECT = 1
     ACCEPT = 2
@@ -67,17 +67,14 @@ class ServerGoalHandle:
 
         Args:
             execute_callback: Called with this handle, returns the result; may be a coroutine function. None for that of
-                the server; if that has none either, the goal is merely said to be executing.
+                the server; if the server has none either, only the state of the goal changes.
         """
         if not self.is_cancel_requested:
             self._server.change(self, GoalEvent.EXECUTE)
         self._server.schedule(self, execute_callback)
 
     def publish_feedback(self, feedback: Message) -> None:
-        """Publish how far the goal has come.
-
-        Args:
-            feedback: Feedback of the action's type.
+        """Publish feedback.
 
         Raises:
             TypeError: If it is of another type.
@@ -97,11 +94,7 @@ class ServerGoalHandle:
         self.finish(GoalEvent.CANCELED, response)
 
     def finish(self, event: GoalEvent, response: Message | None) -> None:
-        """End the goal.
-
-        Args:
-            event: How.
-            response: Result of the action's type; None leaves it to the execute callback.
+        """End the goal; without a response, the execute callback returns the result.
 
         Raises:
             RuntimeError: If the goal cannot end like this in its present state.
@@ -183,24 +176,16 @@ class ActionServer:
         self._handles.clear()
 
     def change(self, handle: ServerGoalHandle, event: GoalEvent) -> None:
-        """Change a goal's state, and tell everybody.
-
-        Args:
-            handle: The goal.
-            event: What happens to it.
+        """Change a goal's state, and publish it.
 
         Raises:
-            RuntimeError: If that cannot happen in its present state.
+            RuntimeError: If the event is not possible in its present state.
         """
         self._goals.change(_key(handle.goal_id), event, self._now_ns())
         self._publish_status()
 
     def publish_feedback(self, handle: ServerGoalHandle, feedback: Message) -> None:
-        """Publish how far a goal has come.
-
-        Args:
-            handle: The goal.
-            feedback: Feedback of the action's type.
+        """Publish feedback of a goal.
 
         Raises:
             TypeError: If it is of another type.
@@ -210,22 +195,13 @@ class ActionServer:
         self._feedback.publish(self.action_type.Impl.FeedbackMessage(goal_id=handle.goal_id, feedback=feedback))
 
     def schedule(self, handle: ServerGoalHandle, execute_callback: Callable[[ServerGoalHandle], Any] | None) -> None:
-        """Have the executor carry a goal out.
-
-        Args:
-            handle: The goal.
-            execute_callback: Callback that does; None for the server's.
-        """
+        """Have the executor carry a goal out, by the server's callback if no other is given."""
         callback = execute_callback or self._execute_callback
         if callback is not None:
             submit(self._node.mailbox, partial(self._execute, handle, callback))
 
     def set_result(self, handle: ServerGoalHandle, result: Message) -> None:
-        """Set a goal's result and answer those who wait for it; the first result counts.
-
-        Args:
-            handle: The goal, which has ended.
-            result: Result of the action's type.
+        """Set the result of a goal that has ended, and answer those who wait for it; only the first result counts.
 
         Raises:
             TypeError: If it is of another type.
@@ -240,9 +216,9 @@ class ActionServer:
         try:
             result = await _outcome(callback(handle))
         except GeneratorExit:
-            raise  # The executor is gone, and with it those who could be told.
+            raise  # The executor is gone, so no result can be sent any more.
         except BaseException:
-            # Whatever happened, those who wait for a result must get one.
+            # Clients that wait for a result must get one, whatever happened.
             self._abort_if_active(handle, "failed")
             self.set_result(handle, self.action_type.Result())
             raise
@@ -272,11 +248,12 @@ class ActionServer:
             response.stamp = now.to_msg()
             goal = self._goals.add(key, GoalInfo(goal_id=request.goal_id, stamp=response.stamp))
             handle = self._handles[key] = ServerGoalHandle(self, goal, request.goal)
-            # Once the response is on its way, as its receiver must know the goal before it hears of its fate.
             self._begin_after_response(handle)
         return response
 
     def _begin_after_response(self, handle: ServerGoalHandle) -> None:
+        """Begin in another task: the client must have the response before it hears of the goal's state."""
+
         async def begin() -> None:
             self._publish_status()
             await _outcome(self._handle_accepted_callback(handle))
@@ -325,7 +302,7 @@ class ActionServer:
 
 
 async def _outcome(value: Any) -> Any:
-    """What a callback returned, after waiting for it if it is a coroutine function."""
+    """Return value of a callback, which is waited for if the callback is a coroutine function."""
     return await value if hasattr(value, "__await__") else value
 
 

@@ -1,10 +1,6 @@
 """Classes of actions by name: ``from rclzenoh.interfaces.action import SimulateSteps``."""
 
 from rclzenoh.interfaces.lookup import get_action
-from rclzenoh.interfaces.typed_names import ACTIONS
+from rclzenoh.interfaces.typed_names import ACTIONS, look_up_in
 
-
-def __getattr__(name: str) -> object:
-    if name not in ACTIONS:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return get_action(ACTIONS[name])
+__getattr__ = look_up_in(ACTIONS, get_action, __name__)

@@ -1,11 +1,11 @@
-"""Every interface that is known: the messages of Jazzy in ``jazzy.json``, completed by the files in ``definitions``.
+"""All known interfaces: the messages of Jazzy in ``jazzy.json``, completed by the files in ``definitions``.
 
 ``packaging/jazzy_messages.py`` takes those messages from rosbags. Services and actions, messages that it lacks, and
 messages whose default values it does not keep are read from ``definitions/<package>/{msg,srv,action}/`` when they are
 first asked for; a file wins.
 
-What the generators of ROS 2 derive from a service or an action (requests, events, the services and the feedback message
-behind an action) is derived here too, because the type hash of a service covers all of it (rosidl 4.6, Jazzy).
+The generators of ROS 2 derive further structures from a service or an action: requests, events, the services and the
+feedback message behind an action. They are derived here, too, because type hashes cover them (rosidl 4.6, Jazzy).
 """
 
 from __future__ import annotations
@@ -59,12 +59,10 @@ class Structure:
     """A message, or a part of a service or action.
 
     Attributes:
-        name: Full name, such as ``sensor_msgs/msg/JointState``.
         constants: Values by name.
         fields: Fields in order; empty when the wire has only the placeholder.
     """
 
-    name: str
     constants: dict[str, Default]
     fields: tuple[Field, ...]
 
@@ -79,13 +77,7 @@ _COMPLETE: set[str] = set()
 
 
 def structure(name: str) -> Structure:
-    """Constants and fields of a structure.
-
-    Args:
-        name: Full name, such as ``sensor_msgs/msg/JointState`` or ``std_srvs/srv/Trigger_Response``.
-
-    Returns:
-        The structure.
+    """Constants and fields of a structure, such as ``sensor_msgs/msg/JointState`` or ``std_srvs/srv/Trigger_Response``.
 
     Raises:
         ValueError: If no such structure is known.
@@ -94,7 +86,6 @@ def structure(name: str) -> Structure:
     constants, fields = _FIELDDEFS[name]
     defaults = _DEFAULTS.get(name, {})
     return Structure(
-        name,
         {constant: value for constant, _, value in constants},
         tuple(_field(field, description, defaults.get(field)) for field, description in fields if field != PLACEHOLDER),
     )
@@ -102,13 +93,7 @@ def structure(name: str) -> Structure:
 
 @cache
 def type_hash(name: str) -> str:
-    """Type hash (REP 2016) of a message, service, action or a part of one.
-
-    Args:
-        name: Full name, such as ``std_srvs/srv/Trigger``.
-
-    Returns:
-        ``RIHS01_`` and 64 hexadecimal digits.
+    """Type hash (REP 2016) of a message, service, action or a part of one: ``RIHS01_`` and 64 hexadecimal digits.
 
     Raises:
         ValueError: If no such interface is known.
@@ -121,12 +106,8 @@ def type_hash(name: str) -> str:
 def message_definition(name: str) -> str:
     """Definition text of a message and all messages it consists of, as rosbag2 stores it (``ros2msg``).
 
-    Args:
-        name: Full name, such as ``sensor_msgs/msg/JointState``, or that of a part of a service or action.
-
-    Returns:
-        The message's definition, then those of its dependencies, each after a line of 80 ``=`` and ``MSG: <name>``.
-        Parts of services and actions that stand in it have their full names.
+    The definition of the message comes first, then those of its dependencies, each after a line of 80 ``=`` and
+    ``MSG: <name>``. Parts of services and actions, for which there is such a text as well, have their full names in it.
 
     Raises:
         ValueError: If no such message is known.
@@ -144,12 +125,12 @@ _RULE = "=" * 80 + "\n"
 
 
 def _has_parts(name: str) -> bool:
-    """Whether parts of a service or action are among the fields of a structure; rosbags knows no text for those."""
+    """Whether a field of a structure is a part of a service or action, for which rosbags writes no definition."""
     return any(field.nested and "/msg/" not in field.type for field in structure(name).fields)
 
 
 def _add_texts(name: str, texts: dict[str, str]) -> None:
-    """Add the definitions of a structure, and of what it consists of, that are not there yet."""
+    """Add the definitions of a structure and of its parts, unless they are there already."""
     if _has_parts(name):
         texts[name] = "".join(f"{_write_type(field)} {field.name}\n" for field in structure(name).fields)
     else:
@@ -185,7 +166,7 @@ def _field(name: str, description: tuple[Nodetype, Any], default: Default | None
 
 
 def _require(name: str) -> None:
-    """Read the files that define ``name`` and everything it refers to, unless that was done before.
+    """Read the definitions of ``name`` and of everything it refers to, unless they have been read before.
 
     Raises:
         ValueError: If there is no such interface.
@@ -229,7 +210,7 @@ def _read_description(description: list[Any]) -> tuple[Nodetype, Any]:
 
 
 def _char_to_uint8(description: Any) -> Any:
-    """Do to a field what rosidl does before it hashes it, and rosbags does not."""
+    """Replace ``char``, as rosidl does before it computes a type hash and rosbags does not."""
     if isinstance(description, tuple):
         return tuple(_char_to_uint8(part) for part in description)
     return "uint8" if description == "char" else description

@@ -13,13 +13,7 @@ _M = TypeVar("_M", bound=Message)
 
 
 def serialize(message: Message) -> bytes:
-    """Bytes of a message, with the encapsulation header.
-
-    Args:
-        message: The message.
-
-    Returns:
-        Little-endian CDR.
+    """Little-endian CDR of a message, with the encapsulation header.
 
     Raises:
         TypeError: If a field holds something that is not of its type.
@@ -34,15 +28,10 @@ def serialize(message: Message) -> bytes:
 
 
 def deserialize(data: bytes, message_class: type[_M]) -> _M:
-    """Message from its bytes.
+    """Message from its bytes: little-endian CDR with its encapsulation header.
 
-    Args:
-        data: Little-endian CDR with its encapsulation header. What follows the message is left alone: rmw_serialize
-            gives as many bytes as the message might have taken, and whoever publishes those sends them all.
-        message_class: Class of the message.
-
-    Returns:
-        A message that shares no memory with ``data``; its number sequences may be changed.
+    The message shares no memory with ``data``, and its number sequences may be changed. Bytes after the message are
+    ignored: rmw_serialize gives as many bytes as the message might take, and programs publish all of them.
 
     Raises:
         ValueError: If the data is malformed or too short.

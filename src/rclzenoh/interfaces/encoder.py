@@ -3,9 +3,9 @@
 The wire format is plain CDR, little endian, as Fast-CDR writes it for ROS 2: four bytes ``00 01 00 00``, then the body,
 in which each primitive is aligned to its size, counted from the body's first byte.
 
-What makes the functions fast: nested structures are written inline; neighbouring primitives go through one `struct`
-call with the padding in its format; arrays are copied as they lie in memory; the bytes of a list of strings, which are
-joint names as a rule, are remembered.
+The functions are fast because nested structures are written inline, neighbouring primitives go through one `struct`
+call with the padding in its format, arrays are copied as they lie in memory, and the bytes of a list of strings (joint
+names as a rule) are remembered.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ from functools import cache, lru_cache
 from typing import Any
 
 from rclzenoh.interfaces.catalog import Field, structure
-from rclzenoh.interfaces.layout import CODES, Alignment
-from rclzenoh.interfaces.message import DTYPES, Message, is_numbers
+from rclzenoh.interfaces.layout import Alignment, FunctionWriter
+from rclzenoh.interfaces.message import DTYPES, Message
 
 HEADER = b"\x00\x01\x00\x00"
 """Encapsulation header of little-endian plain CDR."""
@@ -29,14 +29,10 @@ _PADDING = tuple(bytes(count) for count in range(8))
 def encoder(name: str) -> Callable[[Message], bytearray]:
     """Function that serialises messages of one type.
 
-    Args:
-        name: Full name of the structure.
-
-    Returns:
-        The function. It raises AttributeError, TypeError, ValueError, OverflowError or ``struct.error`` when a field
-        holds something that is not of its type.
+    It raises AttributeError, TypeError, ValueError, OverflowError or ``struct.error`` if a value is not of its field's
+    type.
     """
-    writer = _Writer()
+    writer = _Writer(HEADER=HEADER, PADDING=_PADDING, strings=_strings, check_length=_check_length)
     writer.structure(name, "message", 1)
     writer.flush(1)
     source = "\n".join(["def encode(message):", " out = bytearray(HEADER)", *writer.lines, " return out"])
@@ -62,95 +58,50 @@ def _check_length(values: Sequence[Any], field: Field) -> None:
         raise ValueError(f"{field.name}: expected at most {field.bound}, got {len(values)}")
 
 
-class _Writer:
-    """Source lines under construction, and what is known of the position at the end of them."""
+class _Writer(FunctionWriter):
+    """Writes a function that appends to ``out``; operands are expressions of values."""
 
-    def __init__(self) -> None:
-        self.lines: list[str] = []
-        self.namespace: dict[str, Any] = {"HEADER": HEADER, "PADDING": _PADDING, "strings": _strings}
-        self.namespace["check_length"] = _check_length
-        self.at = Alignment(8, 0)
-        self.run_format = ""
-        self.run_values: list[str] = []
-        self.names = 0
+    def run(self, depth: int) -> None:
+        pack = self.name("pack")
+        self.namespace[pack] = struct.Struct("<" + self.run_format).pack
+        self.line(depth, f"out += {pack}({', '.join(self.run_operands)})")
 
-    def fresh(self, prefix: str) -> str:
-        self.names += 1
-        return f"{prefix}{self.names}"
+    def pad(self, size: int, padding: int | None) -> str:
+        # The header in front of the body is a multiple of four, but not of eight.
+        at_run_time = f"{'-len(out)' if size < 8 else '4 - len(out)'} & {size - 1}"
+        return f"out += PADDING[{at_run_time if padding is None else padding}]"
 
-    def line(self, depth: int, text: str) -> None:
-        self.lines.append(" " * depth + text)
-
-    def scalar(self, primitive: str, value: str, depth: int) -> None:
-        size = struct.calcsize(CODES[primitive])
-        padding = self.at.padding(size)
-        if padding is None:
-            self.align(size, depth)
-            padding = 0
-        self.run_format += "x" * padding + CODES[primitive]
-        self.run_values.append(value)
-        self.at = self.at.after(padding + size)
-
-    def flush(self, depth: int) -> None:
-        """Emit the primitives collected so far."""
-        if self.run_values:
-            pack = self.fresh("pack")
-            self.namespace[pack] = struct.Struct("<" + self.run_format).pack
-            self.line(depth, f"out += {pack}({', '.join(self.run_values)})")
-        self.run_format, self.run_values = "", []
-
-    def align(self, size: int, depth: int) -> None:
-        """Pad to a multiple of ``size``, at run time if the position is not known well enough."""
-        padding = self.at.padding(size)
-        self.flush(depth)
-        if padding is None:
-            # The header in front of the body is a multiple of four, but not of eight.
-            position = "len(out)" if size < 8 else "4 - len(out)"
-            self.line(depth, f"out += PADDING[{'-' if size < 8 else ''}{position} & {size - 1}]")
-            self.at = Alignment(size, 0)
-        elif padding:
-            self.line(depth, f"out += PADDING[{padding}]")
-            self.at = self.at.after(padding)
-
-    def structure(self, name: str, message: str, depth: int) -> None:
+    def structure(self, name: str, operand: str, depth: int) -> None:
         fields = structure(name).fields
         if not fields:
             self.scalar("uint8", "0", depth)
         for field in fields:
-            self.field(field, f"{message}.{'_' if is_numbers(field) else ''}{field.name}", depth)
+            self.field(field, operand, depth)
 
-    def field(self, field: Field, value: str, depth: int) -> None:
-        if is_numbers(field):
-            self.numbers(field, value, depth)
-        elif field.length is None and not field.sequence:
-            self.element(field, value, depth, bounded=field.bound is not None)
-        else:
-            self.elements(field, value, depth)
-
-    def element(self, field: Field, value: str, depth: int, *, bounded: bool = False) -> None:
+    def element(self, field: Field, operand: str, depth: int) -> None:
         if field.nested:
-            self.structure(field.type, value, depth)
+            self.structure(field.type, operand, depth)
         elif field.type == "string":
-            if bounded:
-                self.check(field, value, depth)
-            text = self.fresh("text")
-            self.line(depth, f'{text} = {value}.encode() + b"\\0"')
+            if field.bound is not None:
+                self.check(field, operand, depth)
+            text = self.name("text")
+            self.line(depth, f'{text} = {operand}.encode() + b"\\0"')
             self.scalar("uint32", f"len({text})", depth)
             self.flush(depth)
             self.line(depth, f"out += {text}")
             self.at = Alignment(1, 0)
         else:
-            self.scalar(field.type, value, depth)
+            self.scalar(field.type, operand, depth)
 
-    def check(self, field: Field, value: str, depth: int) -> None:
-        name = self.fresh("field")
+    def check(self, field: Field, operand: str, depth: int) -> None:
+        name = self.name("field")
         self.namespace[name] = field
-        self.line(depth, f"check_length({value}, {name})")
+        self.line(depth, f"check_length({operand}, {name})")
 
-    def numbers(self, field: Field, value: str, depth: int) -> None:
+    def numbers(self, field: Field, operand: str, depth: int) -> None:
         size = DTYPES[field.type].itemsize
-        array = self.fresh("array")
-        self.line(depth, f"{array} = {value}")
+        array = self.name("array")
+        self.line(depth, f"{array} = {operand}")
         if field.length is not None:
             self.align(size, depth)
             self.line(depth, f"out += {array}.data")
@@ -164,32 +115,19 @@ class _Writer:
         self.line(depth + 1, f"out += {array}.data")
         self.at = empty.either(Alignment(size, 0))
 
-    def elements(self, field: Field, value: str, depth: int) -> None:
-        """A sequence or array of strings or structures."""
-        values = self.fresh("values")
-        self.line(depth, f"{values} = {value}")
+    def elements(self, field: Field, operand: str, depth: int) -> None:
+        values = self.name("values")
+        self.line(depth, f"{values} = {operand}")
         if field.bound is not None or field.length is not None:
             self.check(field, values, depth)
         if field.length is None:
             self.scalar("uint32", f"len({values})", depth)
         if field.type == "string":
             self.align(4, depth)
-            self.flush(depth)
             self.line(depth, f"out += strings(tuple({values}))")
             self.at = Alignment(1, 0)
             return
         self.flush(depth)
-        item = self.fresh("item")
+        item = self.name("item")
         self.line(depth, f"for {item} in {values}:")
-        before, lines = self.at, len(self.lines)
-        while True:
-            # The body must hold for the first element and for those after it, so it is written until that is so.
-            self.at = before
-            self.element(field, item, depth + 1)
-            self.flush(depth + 1)
-            entry = before.either(self.at)
-            if entry == before:
-                break
-            before = entry
-            del self.lines[lines:]
-        self.at = before
+        self.loop_body(field, item, depth + 1)

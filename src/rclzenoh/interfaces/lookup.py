@@ -22,9 +22,7 @@ class ActionProtocol:
 
     SendGoalService: ClassVar[type[Service]]
     GetResultService: ClassVar[type[Service]]
-    CancelGoalService: ClassVar[type[Service]]
     FeedbackMessage: ClassVar[type[AnyMessage]]
-    GoalStatusMessage: ClassVar[type[AnyMessage]]
 
 
 class Action:
@@ -38,13 +36,7 @@ class Action:
 
 
 def get_message(name: str) -> type[AnyMessage]:
-    """Class of a message.
-
-    Args:
-        name: Full name, such as ``sensor_msgs/msg/JointState``.
-
-    Returns:
-        The class.
+    """Class of a message, such as ``sensor_msgs/msg/JointState``.
 
     Raises:
         ValueError: If no such message is known, or the name is not one of a message.
@@ -55,13 +47,7 @@ def get_message(name: str) -> type[AnyMessage]:
 
 @cache
 def get_service(name: str) -> type[Service]:
-    """Class of a service, which holds the classes of its request and response.
-
-    Args:
-        name: Full name, such as ``std_srvs/srv/Trigger``.
-
-    Returns:
-        The class.
+    """Class of a service, such as ``std_srvs/srv/Trigger``; it has the classes of the request and the response.
 
     Raises:
         ValueError: If no such service is known, or the name is not one of a service.
@@ -73,13 +59,7 @@ def get_service(name: str) -> type[Service]:
 
 @cache
 def get_action(name: str) -> type[Action]:
-    """Class of an action, which holds the classes of its goal, result and feedback.
-
-    Args:
-        name: Full name, such as ``control_msgs/action/FollowJointTrajectory``.
-
-    Returns:
-        The class.
+    """Class of an action, such as ``simulation_interfaces/action/SimulateSteps``; it has the classes of all its parts.
 
     Raises:
         ValueError: If no such action is known, or the name is not one of an action.
@@ -90,9 +70,7 @@ def get_action(name: str) -> type[Action]:
     protocol = {
         "SendGoalService": _service(f"{name}_SendGoal"),
         "GetResultService": _service(f"{name}_GetResult"),
-        "CancelGoalService": get_service("action_msgs/srv/CancelGoal"),
         "FeedbackMessage": message_class(f"{name}_FeedbackMessage"),
-        "GoalStatusMessage": get_message("action_msgs/msg/GoalStatusArray"),
     }
     short = name.rpartition("/")[2]
     return type(short, (Action,), {"TYPE": name, **parts, "Impl": type("Impl", (ActionProtocol,), protocol)})

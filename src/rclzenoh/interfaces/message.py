@@ -1,8 +1,8 @@
 """Message classes, made from their structures.
 
 They behave like the classes that rosidl generates for Python: keyword arguments, nested defaults, mutable fields,
-constants as class attributes. Number sequences are always numpy arrays of the field's type, whatever they were set
-from.
+constants as class attributes. Number sequences are always numpy arrays of the field's type, even if they were set to
+lists.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ if TYPE_CHECKING:
         def __getattr__(cls, name: str) -> Any: ...
 
     class AnyMessage(Message, metaclass=_Constants):
-        """A message of which type checkers know nothing, because its type is known by name alone."""
+        """A message whose type is only known at run time, so that type checkers know nothing of its fields."""
 
         def __init__(self, **fields: Any) -> None: ...
         def __getattr__(self, name: str) -> Any: ...
@@ -78,13 +78,7 @@ def is_numbers(field: Field) -> bool:
 
 @cache
 def message_class(name: str) -> type[AnyMessage]:
-    """Class of a message, or of a part of a service or action.
-
-    Args:
-        name: Full name, such as ``sensor_msgs/msg/JointState`` or ``std_srvs/srv/Trigger_Response``.
-
-    Returns:
-        The class; always the same one for a name.
+    """Class of a message, or of a part of a service or action such as ``std_srvs/srv/Trigger_Response``.
 
     Raises:
         ValueError: If no such structure is known.
@@ -116,7 +110,7 @@ def as_numbers(value: Any, field: Field, where: str) -> NDArray[Any]:
         where: Name of the structure, for errors.
 
     Returns:
-        One-dimensional contiguous array of the field's type; ``value`` itself when it already is one.
+        One-dimensional contiguous array of the field's type; ``value`` itself if it is one already.
 
     Raises:
         TypeError: If the value is no sequence of such numbers.
@@ -128,8 +122,8 @@ def as_numbers(value: Any, field: Field, where: str) -> NDArray[Any]:
         return value
     is_octets = isinstance(value, (bytes, bytearray))
     array = np.frombuffer(value, np.uint8).copy() if is_octets else np.asarray(value)
-    if dtype.kind in "iu" and array.size and array.dtype.kind in "fO" and all(isinstance(each, int) for each in value):
-        # NumPy knows no whole numbers among which are both 0 and 2 to the power of 63, and takes fractions.
+    if dtype.kind in "iu" and array.size and array.dtype.kind in "fO" and all(isinstance(item, int) for item in value):
+        # NumPy has no type of integers for a list with both 0 and 2**63, and makes floats or objects of it.
         info = np.iinfo(dtype.name)
         if min(value) < info.min or max(value) > info.max:
             raise ValueError(f"{where}.{field.name}: {value!r:.80} does not fit {field.type}")

@@ -1,10 +1,6 @@
 """Classes of messages by name: ``from rclzenoh.interfaces.msg import JointState``."""
 
 from rclzenoh.interfaces.lookup import get_message
-from rclzenoh.interfaces.typed_names import MESSAGES
+from rclzenoh.interfaces.typed_names import MESSAGES, look_up_in
 
-
-def __getattr__(name: str) -> object:
-    if name not in MESSAGES:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return get_message(MESSAGES[name])
+__getattr__ = look_up_in(MESSAGES, get_message, __name__)

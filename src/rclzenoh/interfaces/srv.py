@@ -1,10 +1,6 @@
 """Classes of services by name: ``from rclzenoh.interfaces.srv import SetParameters``."""
 
 from rclzenoh.interfaces.lookup import get_service
-from rclzenoh.interfaces.typed_names import SERVICES
+from rclzenoh.interfaces.typed_names import SERVICES, look_up_in
 
-
-def __getattr__(name: str) -> object:
-    if name not in SERVICES:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return get_service(SERVICES[name])
+__getattr__ = look_up_in(SERVICES, get_service, __name__)

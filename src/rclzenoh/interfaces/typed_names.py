@@ -1,12 +1,23 @@
 """Interfaces whose fields type checkers know, by their short names, which differ from each other within a kind.
 
-Of the others `get_message`, `get_service` and `get_action` give classes, too, without types. After a change here,
+`get_message`, `get_service` and `get_action` give classes of all other interfaces, without types. After a change here,
 ``python packaging/interface_stubs.py`` writes the stubs again.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+
+
+def look_up_in(names: Mapping[str, str], find_class: Callable[[str], object], module: str) -> Callable[[str], object]:
+    """Make ``__getattr__`` of a module that has the classes of all these names and finds each when it is asked for."""
+
+    def find(name: str) -> object:
+        if name not in names:
+            raise AttributeError(f"module {module!r} has no attribute {name!r}")
+        return find_class(names[name])
+
+    return find
 
 
 def _full_names(kind: str, by_package: Mapping[str, str]) -> Mapping[str, str]:

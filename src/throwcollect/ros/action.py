@@ -1,10 +1,8 @@
 """Classes of actions of this process's backend: ``from throwcollect.ros.action import SimulateSteps``."""
 
-from rclzenoh.interfaces.typed_names import ACTIONS
-from throwcollect.ros.backend_names import backend_name
+from functools import partial
 
+from rclzenoh.interfaces.typed_names import ACTIONS, look_up_in
+from throwcollect.ros.backend_names import find_class
 
-def __getattr__(name: str) -> object:
-    if name not in ACTIONS:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return backend_name("get_action")(ACTIONS[name])
+__getattr__ = look_up_in(ACTIONS, partial(find_class, "get_action"), __name__)

@@ -1,4 +1,4 @@
-"""The names of the backend that nodes run on, found when the first of them is asked for."""
+"""Finds names in the backend that nodes run on, which is imported when the first of them is asked for."""
 
 from __future__ import annotations
 
@@ -15,6 +15,11 @@ def __getattr__(name: str) -> Any:
     value = backend_name(name)
     setattr(sys.modules[_EDGE], name, value)
     return value
+
+
+def find_class(get: str, full_name: str) -> object:
+    """Class of an interface of the backend; ``get`` names the function that finds it by its full name."""
+    return backend_name(get)(full_name)
 
 
 def backend_name(name: str) -> Any:

@@ -1,4 +1,4 @@
-"""The way into the ROS graph of one run, as a value: a program may have several at once."""
+"""The way into the ROS graph of one run, as a value, so that a program may have several at once."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class Connection:
 
     A context that is initialised with one takes nothing from the environment. On the embedded backend, and on genuine
     rclpy with rmw_zenoh_cpp, contexts of one process may be in different runs. On Fast DDS a process is in one run, as
-    that reads only once where its discovery server is.
+    Fast DDS reads only once which discovery server it uses.
 
     Attributes:
         endpoint: Endpoint of the router, such as ``tls/127.0.0.1:7447``.
@@ -42,28 +42,16 @@ class Connection:
         """
         return {
             **self.middleware.environment(),
-            OVERRIDE_VARIABLE: client_override(self.endpoint, self.session_key),
+            OVERRIDE_VARIABLE: client_override(self.endpoint, session_key(self.endpoint, self.key)),
             DOMAIN_VARIABLE: str(self.domain_id),
             KEY_VARIABLE: str(self.key.directory),
         }
 
-    @property
-    def session_key(self) -> Key | None:
-        """The key of the run as a Zenoh session takes it; None if its router lets anybody in.
-
-        Raises:
-            ConfigError: If the key lies where Zenoh cannot find it.
-        """
-        return session_key(self.endpoint, self.key)
-
     def check(self, rmw: str) -> None:
-        """Refuse to join a run by middleware that its nodes do not understand.
-
-        Args:
-            rmw: Middleware of this process.
+        """Refuse to join the run by an RMW that its nodes do not understand.
 
         Raises:
-            ConfigError: If it is another one than that of the run.
+            ConfigError: If this process has another one than the run.
         """
         if self.middleware.rmw != rmw:
             raise ConfigError(
@@ -73,20 +61,16 @@ class Connection:
 
 
 def session_key(endpoint: str, key: RunKey) -> Key | None:
-    """The key of a run as a Zenoh session takes it; None if its router lets anybody in.
-
-    Args:
-        endpoint: Endpoint of the router.
-        key: The key of the run.
+    """The key of a run as a Zenoh session takes it; None if the router at the endpoint lets anybody in.
 
     Raises:
         ConfigError: If it lies where Zenoh cannot find it.
     """
     if not endpoint.startswith(PROTECTED):
         return None
-    if wrong := sorted(set(NOT_IN_PATHS) & set(str(key.directory))):
+    if forbidden := sorted(set(NOT_IN_PATHS) & set(str(key.directory))):
         raise ConfigError(
-            f"{key.directory}: Zenoh finds no key in a directory with {' or '.join(wrong)} in its name",
+            f"{key.directory}: Zenoh finds no key in a directory with {' or '.join(forbidden)} in its name",
             expected=f"a path without {' and '.join(NOT_IN_PATHS)}, as of the directory that THROWCOLLECT_STATE names",
         )
     return Key(key.private_key, key.certificate)

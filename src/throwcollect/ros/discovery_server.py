@@ -16,6 +16,7 @@ from pathlib import Path
 
 from throwcollect.errors import ConfigError, WorkerError
 from throwcollect.interruption import die_with_parent
+from throwcollect.ros.endpoint import split_address
 from throwcollect.ros.fast_dds import server_profile, write_temporarily
 
 _PROGRAM = "fast-discovery-server"
@@ -25,14 +26,9 @@ _STOP_S = 3.0
 
 @contextmanager
 def discovery_server(endpoint: str) -> Iterator[None]:
-    """Run a discovery server as a child process.
+    """Run a discovery server as a child process, from when it listens at an endpoint like ``udp/127.0.0.1:7447``.
 
-    Args:
-        endpoint: Where it listens, such as ``udp/127.0.0.1:7447``; at the same port of TCP, whoever asks learns that it
-            is there.
-
-    Yields:
-        Nothing; by then it runs.
+    The same port of TCP takes connections meanwhile, by which others find out that the server is there.
 
     Raises:
         ConfigError: If there is no such program, or it cannot listen there.
@@ -40,7 +36,7 @@ def discovery_server(endpoint: str) -> Iterator[None]:
     """
     command = [_program(), "-i", "0", "-x", str(write_temporarily(server_profile(endpoint)))]
     with (
-        _showing_that_it_is_there(endpoint),
+        _accept_connections(endpoint),
         subprocess.Popen(
             command,
             stdin=subprocess.DEVNULL,
@@ -61,15 +57,14 @@ def discovery_server(endpoint: str) -> Iterator[None]:
 
 
 @contextmanager
-def _showing_that_it_is_there(endpoint: str) -> Iterator[None]:
+def _accept_connections(endpoint: str) -> Iterator[None]:
     """Accept connections and close them: a port of UDP alone does not tell whether somebody listens.
 
     Raises:
         ConfigError: If the port is taken, or the address is not this machine's.
     """
-    host, _, port = endpoint.partition("/")[2].rpartition(":")
     try:
-        server = socket.create_server((host, int(port)))
+        server = socket.create_server(split_address(endpoint))
     except OSError as error:
         raise ConfigError(
             f"the discovery server cannot listen on {endpoint}: {error.strerror}",
@@ -90,20 +85,20 @@ def _showing_that_it_is_there(endpoint: str) -> Iterator[None]:
 
 
 def _wait_until_it_runs(process: subprocess.Popen[bytes], endpoint: str) -> None:
-    said = []
+    output = []
     for line in process.stdout or ():
         if _RUNNING in line:
             return
-        said.append(line.decode(errors="replace"))
-    raise WorkerError(f"the discovery server at {endpoint} has ended", evidence="".join(said).strip() or None)
+        output.append(line.decode(errors="replace"))
+    raise WorkerError(f"the discovery server at {endpoint} has ended", evidence="".join(output).strip() or None)
 
 
 def _program() -> str:
     beside_python = Path(sys.prefix, "bin", _PROGRAM)
-    found = str(beside_python) if beside_python.is_file() else shutil.which(_PROGRAM)
-    if found is None:
+    program = str(beside_python) if beside_python.is_file() else shutil.which(_PROGRAM)
+    if program is None:
         raise ConfigError(
             f"there is no program {_PROGRAM}, by which nodes on Fast DDS find each other",
             hint="it comes with Fast DDS: pip install 'throwcollect[ros]'; or set run.ros to embedded",
         )
-    return found
+    return program

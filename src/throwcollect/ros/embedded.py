@@ -7,7 +7,7 @@ from rclzenoh import api
 from rclzenoh.api import *  # noqa: F403
 from rclzenoh.context import Context
 from rclzenoh.session_config import client_config, is_protected
-from throwcollect.ros.connection import Connection
+from throwcollect.ros.connection import Connection, session_key
 from throwcollect.ros.middleware import EMBEDDED_RMW
 from throwcollect.ros.zenoh_errors import zenoh_errors
 
@@ -24,13 +24,13 @@ def init(*, context: Context | None = None, connection: Connection | None = None
         ConfigError: If the environment or the connection cannot be used, or the connection is one by other middleware.
         ThrowcollectError: If there is no router.
     """
+    domain_id = config = None
     with zenoh_errors():
-        if connection is None:
-            rclzenoh.context.init(context=context)
-            return
-        connection.check(EMBEDDED_RMW)
-        config = client_config(connection.endpoint, connection.session_key)
-        rclzenoh.context.init(context=context, domain_id=connection.domain_id, config=config)
+        if connection is not None:
+            connection.check(EMBEDDED_RMW)
+            domain_id = connection.domain_id
+            config = client_config(connection.endpoint, session_key(connection.endpoint, connection.key))
+        rclzenoh.context.init(context=context, domain_id=domain_id, config=config)
 
 
 def joins_protected() -> bool:

@@ -9,18 +9,26 @@ _CONNECT_S = 0.5
 _POLL_S = 0.05
 
 
+def split_address(endpoint: str) -> tuple[str, int]:
+    """Host and port of an endpoint, such as ``tcp/0.0.0.0:7447``.
+
+    Raises:
+        ValueError: If the port is no number.
+    """
+    host, _, port = endpoint.partition("/")[2].rpartition(":")
+    return host.strip("[]"), int(port)
+
+
 def answers(endpoint: str, *, patience_s: float = 0.0) -> bool:
     """Whether something listens at an endpoint of TCP or TLS.
 
-    Args:
-        endpoint: Such as ``tls/127.0.0.1:7447``.
-        patience_s: How long to go on trying, as what listens there may just be starting again; 0 tries once.
+    With ``patience_s``, ask again for that long, as the router may just be starting again.
     """
-    host, _, port = endpoint.partition("/")[2].rpartition(":")
+    address = split_address(endpoint)
     deadline = time.monotonic() + patience_s
     while True:
         try:
-            socket.create_connection((host, int(port)), _CONNECT_S).close()
+            socket.create_connection(address, _CONNECT_S).close()
         except OSError:
             if time.monotonic() >= deadline:
                 return False

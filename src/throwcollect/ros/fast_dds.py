@@ -1,12 +1,12 @@
-"""How nodes of genuine rclpy on Fast DDS find each other: XML profiles of a discovery server.
+"""XML profiles by which nodes of genuine rclpy on Fast DDS find each other through a discovery server.
 
 By itself DDS has all nodes of a network find each other by multicast, which is what nodes of an open run do. Other runs
 have a discovery server, in the place of Zenoh's router and at an endpoint of the same form: nodes know its address and
 nothing else, so runs do not see each other. Everything goes over UDP, without multicast and without shared memory,
 which containers do not share.
 
-It keeps nobody out who knows the address: DDS Security is not compiled into the wheels of Fast DDS, and over TLS, which
-was tried, one connection in ten was never made on a busy machine.
+The server keeps nobody out who knows the address: DDS Security is not compiled into the wheels of Fast DDS, and over
+TLS, which was tried, one connection in ten was never made on a busy machine.
 
 Source: documentation of Fast DDS 2.14, "XML profiles" and "Discovery Server".
 """
@@ -19,30 +19,25 @@ import tempfile
 from pathlib import Path
 
 from throwcollect.errors import ConfigError
+from throwcollect.ros.endpoint import split_address
 
 PROFILE_VARIABLE = "FASTRTPS_DEFAULT_PROFILES_FILE"
-"""Names the file with the profile of a process."""
+"""Environment variable that names the file with the profile of a process."""
 PLAIN_DISCOVERY = {"ROS_AUTOMATIC_DISCOVERY_RANGE": "SYSTEM_DEFAULT"}
-"""Keeps rmw_fastrtps from adding ways of discovery of its own to those of the profile."""
+"""Environment variable that keeps rmw_fastrtps from adding ways of discovery of its own to those of the profile."""
 
 _SERVER = "44.53.00.5f.45.50.52.4f.53.49.4d.41"
-"""Identifier of a discovery server, by which its clients know it; that which Fast DDS's own tools take."""
+"""Identifier of a discovery server, by which its clients know it; Fast DDS's own tools take the same one."""
 _LEASE_S, _ANNOUNCED_S = 10, 1
-"""A node or server that is not heard of for so long is gone. On a busy machine they are silent for a while; whoever is
-taken for gone by mistake is often not found again."""
+"""Times [s] after which a silent node or server counts as gone, and in which each announces itself. On a busy machine
+they are silent for a while, and one that counts as gone by mistake is often not found again."""
 SERVER_REST_S = 11.0
-"""A server that ended is started again after this time. Nodes take one that comes back sooner, before they have missed
-the last one, for that one: they do not tell it of themselves, and are never told of any node that comes later."""
+"""Time [s] after which a server that ended is started again. Nodes take one that comes back sooner for the old one,
+which they have not missed yet: they do not announce themselves to it, and never hear of nodes that come later."""
 
 
 def client_profile(endpoint: str) -> str:
-    """The profile of a node.
-
-    Args:
-        endpoint: Endpoint of the discovery server, such as ``udp/127.0.0.1:7447``.
-
-    Returns:
-        XML.
+    """The profile of a node that uses the discovery server at an endpoint like ``udp/127.0.0.1:7447``.
 
     Raises:
         ConfigError: If the endpoint has no address.
@@ -56,14 +51,14 @@ def client_profile(endpoint: str) -> str:
 
 
 def server_profile(endpoint: str) -> str:
-    """The profile of a discovery server that listens there; argument, result and errors as `client_profile`."""
+    """The profile of the discovery server itself; errors are those of `client_profile`."""
     address, port = _place(endpoint)
     locators = f"<metatrafficUnicastLocatorList>{_locator(address, port)}</metatrafficUnicastLocatorList>"
     return _profile(address, "<discoveryProtocol>SERVER</discoveryProtocol>", locators, f"<prefix>{_SERVER}</prefix>")
 
 
 def write_temporarily(profile: str) -> Path:
-    """Write a profile into a file that is there until this process ends."""
+    """Write a profile into a file that is deleted when this process ends."""
     descriptor, name = tempfile.mkstemp(prefix="throwcollect-", suffix=".xml")
     with open(descriptor, "w", encoding="utf-8") as file:
         file.write(profile)
@@ -73,14 +68,14 @@ def write_temporarily(profile: str) -> Path:
 
 
 def _place(endpoint: str) -> tuple[str, int]:
-    """IPv4 address and port; names are looked up here, as DDS tells others the address of a server.
+    """IPv4 address and port of an endpoint; its name is resolved here, as nodes pass the address on to others.
 
     Raises:
         ConfigError: If it is no address, or a name that nobody knows.
     """
-    host, _, port = endpoint.partition("/")[2].rpartition(":")
     try:
-        return socket.gethostbyname(host), int(port)
+        host, port = split_address(endpoint)
+        return socket.gethostbyname(host), port
     except (OSError, UnicodeError, ValueError) as error:
         raise ConfigError(f"{endpoint}: no address of a discovery server: {error}") from error
 
@@ -90,7 +85,7 @@ def _locator(address: str, port: int) -> str:
 
 
 def _profile(address: str, discovery: str, locators: str = "", prefix: str = "") -> str:
-    # Nodes of one machine are not to be reached from others.
+    # Nodes of a run on one machine must not be reachable from others.
     loopback = f"<interfaceWhiteList><address>{address}</address></interfaceWhiteList>"
     return f"""<?xml version="1.0" encoding="UTF-8" ?>
 <dds xmlns="http://www.eprosima.com/XMLSchemas/fastRTPS_Profiles">

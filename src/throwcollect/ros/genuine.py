@@ -1,4 +1,6 @@
-"""The genuine rclpy, whatever RMW it uses, where it is installed."""
+"""The backend on genuine rclpy, with any RMW: it has the names of `rclzenoh.api`, and those that `embedded` adds."""
+
+# ruff: noqa: F401 - `backend_names` looks up what is imported here.
 
 from __future__ import annotations
 
@@ -41,7 +43,7 @@ from rclpy.time import Time
 
 from rclzenoh.session_config import OPEN, OVERRIDE_VARIABLE, client_override, connect_endpoint, is_protected
 from throwcollect.errors import ThrowcollectError, WorkerError
-from throwcollect.ros.connection import Connection
+from throwcollect.ros.connection import Connection, session_key
 from throwcollect.ros.fast_dds import PLAIN_DISCOVERY, PROFILE_VARIABLE, client_profile, write_temporarily
 from throwcollect.ros.middleware import RMW_VARIABLE, Middleware
 from throwcollect.ros.zenoh_errors import zenoh_errors
@@ -65,7 +67,7 @@ def init(*, context: Context | None = None, connection: Connection | None = None
         ThrowcollectError: If the RMW does not start, as rmw_zenoh_cpp does not without a router, or this process is in
             another run on Fast DDS.
     """
-    # rclpy loads its RMW at the first look at it, and finds its name in the environment alone.
+    # rclpy loads its RMW when it is first used, and takes its name from the environment alone.
     os.environ[RMW_VARIABLE] = Middleware.of_process().rmw
     middleware = Middleware("rclpy", rclpy.get_rmw_implementation_identifier())
     variables: Mapping[str, str] = {}
@@ -77,7 +79,7 @@ def init(*, context: Context | None = None, connection: Connection | None = None
         connection.check(middleware.rmw)
         endpoint = connection.endpoint
         domain_id = connection.domain_id
-        variables = {OVERRIDE_VARIABLE: client_override(endpoint, connection.session_key)}
+        variables = {OVERRIDE_VARIABLE: client_override(endpoint, session_key(connection.endpoint, connection.key))}
     if middleware.is_fast_dds and endpoint is not None and not endpoint.startswith(OPEN):
         _use_discovery_server(endpoint)
     try:
@@ -88,14 +90,14 @@ def init(*, context: Context | None = None, connection: Connection | None = None
 
 
 _discovery_server: list[str] = []
-"""Endpoint of the discovery server that nodes of this process look for."""
+"""Endpoint of the discovery server that nodes of this process use; empty if they use none."""
 
 
 def _use_discovery_server(endpoint: str) -> None:
     """Have the nodes of this process find others by a discovery server of Fast DDS.
 
-    Fast DDS reads its profile when the first node is made, and never again. So the variable stays, and a process can
-    have one discovery server only.
+    Fast DDS reads its profile when the first node is made, and never again. So the variable stays set, and a process
+    can use one discovery server only.
 
     Raises:
         ConfigError: If the endpoint has no address.
@@ -116,7 +118,7 @@ _environment_lock = threading.Lock()
 
 @contextmanager
 def _environment(variables: Mapping[str, str]) -> Iterator[None]:
-    """Set environment variables for a moment: while a context is initialised, its RMW reads them, and nothing else."""
+    """Set environment variables while a context is initialised, which is when its RMW reads them."""
     with _environment_lock:
         before = {name: os.environ.get(name) for name in variables}
         os.environ.update(variables)
@@ -131,10 +133,7 @@ def _environment(variables: Mapping[str, str]) -> Iterator[None]:
 
 
 def get_message(name: str) -> Any:
-    """Class of a message.
-
-    Args:
-        name: Full name, such as ``sensor_msgs/msg/JointState``.
+    """Class of a message, such as ``sensor_msgs/msg/JointState``.
 
     Raises:
         ValueError: If no such message is installed, or the name is not one of a message.
@@ -143,10 +142,7 @@ def get_message(name: str) -> Any:
 
 
 def get_service(name: str) -> Any:
-    """Class of a service, which holds the classes of its request and response.
-
-    Args:
-        name: Full name, such as ``std_srvs/srv/Trigger``.
+    """Class of a service, such as ``std_srvs/srv/Trigger``.
 
     Raises:
         ValueError: If no such service is installed, or the name is not one of a service.
@@ -155,10 +151,7 @@ def get_service(name: str) -> Any:
 
 
 def get_action(name: str) -> Any:
-    """Class of an action, which holds the classes of its goal, result and feedback.
-
-    Args:
-        name: Full name, such as ``control_msgs/action/FollowJointTrajectory``.
+    """Class of an action, such as ``control_msgs/action/FollowJointTrajectory``.
 
     Raises:
         ValueError: If no such action is installed, or the name is not one of an action.
@@ -177,16 +170,13 @@ def _interface(name: str, kind: str) -> Any:
 
 
 def graph_changes(_node: Node) -> int:
-    """A number that differs from what it was before whenever the ROS graph has changed in between.
-
-    rclpy does not tell of changes, so there may always have been one.
-    """
+    """Another number at each call, as rclpy does not tell whether the ROS graph has changed."""
     return next(_looks)
 
 
 def let_callbacks_wait(node: Node) -> None:
-    """Have a node go on with other callbacks while one, a coroutine, waits."""
-    # What is made without naming a group of callbacks is put into this one; there is no public way to choose it.
+    """Have a node go on with other callbacks while one of its coroutines waits."""
+    # Callbacks without a group of their own are put into this one; there is no public way to choose it.
     node._default_callback_group = ReentrantCallbackGroup()
 
 
@@ -206,10 +196,6 @@ def spin_some(executor: Executor, timeout_sec: float) -> None:
     """Wait for an input, then call back with it and all others that have come by then, but none that come meanwhile.
 
     Up to rclpy 7.1.8, the executor of a node that carries out a goal does not wait.
-
-    Args:
-        executor: The executor.
-        timeout_sec: Longest time to wait [s].
     """
     wait = timeout_sec
     with suppress(TimeoutException):
@@ -223,27 +209,28 @@ def spin_some(executor: Executor, timeout_sec: float) -> None:
                 get_logger("rclpy").warning(
                     f"a request that cannot be read is left without an answer: {error}", throttle_duration_sec=1.0
                 )
-            # From now on the executor looks once at all that is ready, and says so at the end of that.
+            # From now on the executor goes once through the ready callbacks, and raises a TimeoutException at their
+            # end.
             wait = 0.0
 
 
 def stop_waiting(executor: Executor) -> None:
-    """Let an executor look around; `spin_some` waits on for as long as it was told to, a tenth of a second at most."""
+    """Let an executor look for work; `spin_some` waits on for its whole time, a tenth of a second at most."""
     executor.wake()
 
 
 def _is_of_request(error: BaseException) -> bool:
-    """Whether rclpy itself stumbled over what a request says, such as a parameter of a type that there is not.
+    """Whether rclpy itself failed because of the content of a request, such as a parameter of an unknown type.
 
-    Nobody who may send requests to a node shall be able to end it.
+    A client must not be able to end a node by such a request.
     """
     modules = [frame.f_globals.get("__name__", "") for frame, _ in traceback.walk_tb(error.__traceback__)]
     return isinstance(error, ValueError) and not any(name.startswith("throwcollect.") for name in modules)
 
 
 def pass_on_log(node: Node, record: logging.LogRecord) -> None:
-    """Log what was logged by Python's own logging, under a node's name and with the place that it came from."""
-    # A logger itself would name this place.
+    """Log a record of Python's own logging under a node's name and with the place that the record comes from."""
+    # The node's logger would name the line here as the place.
     rclpy_implementation.rclpy_logging_rcutils_log(
         record.levelno,
         node.get_logger().name,
@@ -255,49 +242,6 @@ def pass_on_log(node: Node, record: logging.LogRecord) -> None:
 
 
 def provide_time(node: Node) -> None:
-    """Make a node the source of its own time: its clock shows what ``set_ros_time_override`` was last given."""
-    # As rclpy's own time source does it; there is no public way.
+    """Make a node the source of its own time: its clock shows the last ``set_ros_time_override``."""
+    # rclpy's own time source does it like this; there is no public way.
     node.get_clock()._set_ros_time_is_active(True)
-
-
-__all__ = [
-    "ActionClient",
-    "ActionServer",
-    "CancelResponse",
-    "Context",
-    "DurabilityPolicy",
-    "Executor",
-    "ExternalShutdownException",
-    "FloatingPointRange",
-    "Future",
-    "GoalResponse",
-    "HistoryPolicy",
-    "IntegerRange",
-    "NameValidationException",
-    "Node",
-    "Parameter",
-    "ParameterDescriptor",
-    "Publisher",
-    "QoSProfile",
-    "ReliabilityPolicy",
-    "SetParametersResult",
-    "SingleThreadedExecutor",
-    "Time",
-    "deserialize_message",
-    "get_action",
-    "get_action_client_names_and_types_by_node",
-    "get_action_names_and_types",
-    "get_action_server_names_and_types_by_node",
-    "get_message",
-    "get_service",
-    "graph_changes",
-    "init",
-    "joins_protected",
-    "let_callbacks_wait",
-    "parameter_value_to_python",
-    "pass_on_log",
-    "provide_time",
-    "shutdown",
-    "spin_some",
-    "stop_waiting",
-]

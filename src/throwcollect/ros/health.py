@@ -1,7 +1,7 @@
-"""Whether a node answers, for health checks: they run often and in every container, so they must cost next to nothing.
+"""Health checks of nodes, which run often and in every container, so they must cost next to nothing.
 
-``python -m throwcollect.ros.health`` is ``throwcollect health`` without the command line's own cost, five times that of
-the check.
+``python -m throwcollect.ros.health`` does the same as ``throwcollect health``, whose command line costs five times as
+much as the check.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from rclzenoh.health import node_answers
 from rclzenoh.session_config import OPEN, connect_endpoint, environment_config
 from throwcollect.errors import ConfigError, ThrowcollectError
 from throwcollect.heartbeat import is_beating
+from throwcollect.ros.endpoint import split_address
 from throwcollect.ros.middleware import Middleware
 from throwcollect.ros.zenoh_errors import zenoh_errors
 
@@ -50,7 +51,9 @@ def check(node: str | None = None) -> None:
         )
     is_fast_dds = Middleware.of_process().is_fast_dds
     if is_fast_dds and name != _ROUTER:
-        _check_heartbeat(name)
+        # Nothing can be asked over DDS at so little cost; the loop of the node in this container keeps a heartbeat.
+        if not is_beating():
+            raise ThrowcollectError(f"{name}: does not answer")
         return
     with zenoh_errors():
         endpoint, config, domain_id = connect_endpoint(), environment_config(), domain_of_environment()
@@ -73,37 +76,22 @@ def check(node: str | None = None) -> None:
         session.close()  # type: ignore[no-untyped-call]
 
 
-def _check_heartbeat(name: str) -> None:
-    """Whether the loop of the node in this container goes on.
-
-    Raises:
-        ThrowcollectError: If it does not.
-    """
-    if not is_beating():
-        raise ThrowcollectError(f"{name}: does not answer")
-
-
 def _check_discovery_server(endpoint: str) -> None:
-    """Whether the router of a private run on Fast DDS takes a connection.
+    """Check that the router of a private run on Fast DDS takes a connection.
 
     Raises:
         ThrowcollectError: If it does not.
     """
-    host, _, port = endpoint.partition("/")[2].rpartition(":")
     try:
-        with socket.create_connection((host, int(port)), TIMEOUT_S) as connection:
-            # It hangs up at once; one that is stuck does not.
+        with socket.create_connection(split_address(endpoint), TIMEOUT_S) as connection:
+            # The router hangs up at once; one that is stuck does not.
             connection.recv(1)
     except OSError as error:
         raise ThrowcollectError(f"{_ROUTER}: no session with the router at {endpoint}: {error}") from error
 
 
 def main() -> int:
-    """Ask the node that the environment names.
-
-    Returns:
-        Exit code.
-    """
+    """Check the node that the environment names, and return the exit code."""
     try:
         check()
     except ThrowcollectError as error:

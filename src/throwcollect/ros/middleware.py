@@ -1,7 +1,7 @@
-"""What carries the messages of a run: all its nodes have to agree on it, and so has everybody who joins.
+"""The middleware that carries the messages of a run; all its nodes and everybody who joins need the same one.
 
-What a process has is settled by its environment: ``THROWCOLLECT_ROS`` is ``auto``, ``rclpy`` or ``embedded``, and
-genuine rclpy has its own variable for the RMW. A program that joins a run settles it by `Middleware.settle` instead.
+The environment of a process chooses it: ``THROWCOLLECT_ROS`` is ``auto``, ``rclpy`` or ``embedded``, and genuine rclpy
+has its own variable for the RMW. A program that joins a run chooses it by `Middleware.settle` instead.
 """
 
 from __future__ import annotations
@@ -19,23 +19,23 @@ from throwcollect.wording import join_names
 VARIABLE = "THROWCOLLECT_ROS"
 """Name of the environment variable that chooses the backend."""
 RMW_VARIABLE = "RMW_IMPLEMENTATION"
-"""Name of the environment variable by which rclpy chooses what it talks through."""
+"""Name of the environment variable by which rclpy chooses its RMW."""
 EMBEDDED_RMW = "rmw_zenoh_cpp"
 """The RMW whose wire protocol the embedded backend speaks."""
 
 Backend = Literal["embedded", "rclpy"]
 
 _DEFAULT_RMW = "rmw_fastrtps_cpp"
-"""That of Jazzy, and the one that the wheels of rclpy bring."""
+"""The default of Jazzy, and the only RMW in the wheels of rclpy."""
 
 
 @dataclass(frozen=True)
 class Middleware:
-    """What carries the messages of a run.
+    """The middleware that carries the messages of a run.
 
     Attributes:
-        backend: What its nodes run on.
-        rmw: Middleware of genuine rclpy; that which the embedded backend is understood by, if nodes run on that.
+        backend: The library with which its nodes speak ROS 2.
+        rmw: RMW of genuine rclpy; on the embedded backend, the RMW whose protocol that speaks.
     """
 
     backend: Backend = "embedded"
@@ -43,7 +43,7 @@ class Middleware:
 
     @classmethod
     def of_process(cls) -> Middleware:
-        """That of this process: the one it has settled on, or else the one that its environment asks for.
+        """The middleware of this process: the one it has settled on, or else the one that its environment asks for.
 
         Raises:
             ConfigError: If the environment asks for a backend that is not there.
@@ -59,12 +59,12 @@ class Middleware:
 
     @property
     def keeps_others_out(self) -> bool:
-        """Whether its router asks for the key of a run; other middleware has none, or lets in whoever finds it."""
+        """Whether its router asks for the key of a run; other middleware has no router, or one that lets anybody in."""
         return self.rmw == EMBEDDED_RMW
 
     @property
     def joining(self) -> Middleware:
-        """What our own processes join with that are no nodes: the embedded backend, wherever that is understood."""
+        """The middleware of our processes that are no nodes: the embedded backend, if the nodes understand it."""
         return Middleware() if self.rmw == EMBEDDED_RMW else self
 
     def environment(self) -> Mapping[str, str]:
@@ -74,9 +74,9 @@ class Middleware:
         return {VARIABLE: self.backend, RMW_VARIABLE: self.rmw}
 
     def settle(self) -> None:
-        """Make it that of this process, whatever its environment says.
+        """Make this the middleware of the process, whatever its environment says.
 
-        It has to be done before the first name is taken from `throwcollect.ros`, as a process has one backend.
+        Call it before the first name is taken from `throwcollect.ros`, as a process has one backend.
 
         Raises:
             ConfigError: If the backend or its RMW is not there.
@@ -85,14 +85,16 @@ class Middleware:
 
 
 _settled: list[Middleware] = []
-"""What this process has settled on; empty while its environment decides."""
+"""The middleware that this process has settled on; empty while its environment decides."""
 
 
 def choose_middleware(backend: Literal["auto", "embedded", "rclpy"]) -> Middleware:
-    """What a run is to have, and its launcher, too.
+    """Choose the middleware of a run and of its launcher.
 
     Args:
-        backend: What its configuration asks for; ``auto`` leaves it to the environment, and to what is installed.
+        backend: The one that the configuration asks for; ``auto`` leaves it to the environment, and to the packages
+        that
+            are installed.
 
     Raises:
         ConfigError: If the backend is not there.
@@ -111,13 +113,13 @@ def uses_rclpy() -> bool:
     return Middleware.of_process().backend == "rclpy"
 
 
-# To look for all interfaces takes milliseconds, and every name of `throwcollect.ros` asks.
+# Cached because the search for all interfaces takes milliseconds, and each name taken from `throwcollect.ros` needs it.
 @cache
 def _choose_installed(backend: str, rmw: str | None) -> Middleware:
-    """The middleware that is asked for: genuine rclpy by default, if Python finds it and all interfaces.
+    """Choose the middleware that is asked for: by default genuine rclpy, if Python finds it and all interfaces.
 
-    By default it is not taken where rmw_zenoh_cpp is asked for and ROS does not have it: the embedded backend speaks as
-    that does.
+    By default the embedded backend is taken instead where rmw_zenoh_cpp is asked for and ROS does not have it, as it
+    speaks the same protocol.
 
     Raises:
         ConfigError: If there is no such backend, or rclpy is asked for and is not there or lacks interfaces, or there
@@ -137,7 +139,6 @@ def _choose_installed(backend: str, rmw: str | None) -> Middleware:
     installed = rmws()
     if rmw is None or rmw in installed:
         return Middleware("rclpy", rmw or _DEFAULT_RMW)
-    # The embedded backend speaks the protocol of that RMW, so nodes of both meet.
     if backend == "auto" and rmw == EMBEDDED_RMW:
         return Middleware()
     raise ConfigError(

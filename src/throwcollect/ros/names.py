@@ -1,13 +1,16 @@
-"""Names in the ROS graph as people and programs outside of ROS give them."""
+"""Names in the ROS graph: as people and programs outside of ROS give them, and of our own nodes that only look on."""
 
 from __future__ import annotations
 
+import itertools
+import os
 import re
 from collections.abc import Callable
 from typing import Any
 
 from throwcollect.errors import ConfigError
 
+_numbers = itertools.count()
 _ABSOLUTE = re.compile(r"(/[A-Za-z_][A-Za-z0-9_]*)+")
 
 
@@ -30,18 +33,18 @@ def is_hidden(name: str) -> bool:
     return any(part.startswith("_") for part in name.split("/"))
 
 
+def make_own_name() -> str:
+    """Hidden name of a node by which a process of ours asks or looks on; no other node of this machine has it."""
+    return f"_throwcollect_{os.getpid()}_{next(_numbers)}"
+
+
 def full_name(kind: str, name: str) -> str:
     """Full name of a type that may be named without its kind, as ``std_msgs/String`` for ``std_msgs/msg/String``."""
     return name.replace("/", f"/{kind}/") if name.count("/") == 1 else name
 
 
 def find_interface(kind: str, get: Callable[[str], Any], name: str) -> Any:
-    """Class of a message, service or action that a user names.
-
-    Args:
-        kind: ``msg``, ``srv`` or ``action``.
-        get: Finds the class by its full name.
-        name: Full name, or without the kind: ``std_msgs/String``.
+    """Class of a message, service or action that a user names in full, or without its ``kind``.
 
     Raises:
         ConfigError: If there is no such type.

@@ -1,4 +1,4 @@
-"""The quality of service by which a topic is heard, whatever its publishers offer."""
+"""The quality of service by which a subscription hears all publishers of a topic."""
 
 from __future__ import annotations
 
@@ -8,12 +8,9 @@ _DEPTH = 100
 
 
 def find_offered_qos(node: ros.Node, topic: str, unknown: ros.ReliabilityPolicy) -> ros.QoSProfile:
-    """What all publishers of a topic offer.
+    """The strictest profile that all publishers of a topic, given by its absolute name, offer.
 
-    Args:
-        node: A node that sees them.
-        topic: Absolute name of the topic.
-        unknown: Reliability while there are none: best effort hears all that may come, reliable is what most offer.
+    While there is no publisher, reliability is ``unknown``: best effort hears all that may come, reliable suits most.
     """
     offered = [info.qos_profile for info in node.get_publishers_info_by_topic(topic)]
     profile = ros.QoSProfile(depth=_DEPTH, reliability=unknown)

@@ -35,14 +35,11 @@ _PORT_ATTEMPTS = 5
 
 @contextmanager
 def router(listen: str = DEFAULT_LISTEN, key: RunKey | None = None) -> Iterator[str]:
-    """Run a router in this process.
+    """Run a router in this process; yields the endpoint that nodes connect to.
 
     Args:
         listen: Endpoint to listen on; port 0 takes a free one.
         key: Key that an endpoint ``tls/...`` lets nobody in without.
-
-    Yields:
-        The endpoint that nodes connect to.
 
     Raises:
         ConfigError: If the endpoint is malformed, the router cannot listen on it, or its key cannot be read.
@@ -56,13 +53,7 @@ def router(listen: str = DEFAULT_LISTEN, key: RunKey | None = None) -> Iterator[
 
 @contextmanager
 def _discovery_server(listen: str) -> Iterator[str]:
-    """Run a discovery server of Fast DDS.
-
-    Args:
-        listen: Endpoint to listen on; port 0 takes a free one.
-
-    Yields:
-        The endpoint that nodes look for.
+    """Run a discovery server of Fast DDS; yields the endpoint that nodes use. Port 0 takes a free one.
 
     Raises:
         ConfigError: If it cannot listen there, or there is no such program.
@@ -76,9 +67,9 @@ def _discovery_server(listen: str) -> Iterator[str]:
 
 def _open(listen: str, key: RunKey | None) -> tuple[zenoh.Session, str]:
     address, _, port = listen.rpartition(":")
-    wants_any = port == "0"
+    takes_any = port == "0"
     for attempt in range(_PORT_ATTEMPTS):
-        endpoint = f"{address}:{_free_port(address)}" if wants_any else listen
+        endpoint = f"{address}:{_free_port(address)}" if takes_any else listen
         with zenoh_errors():
             config = router_config(endpoint, session_key(endpoint, key) if key is not None else None)
         if endpoint.startswith(PROTECTED) and key is None:
@@ -89,8 +80,8 @@ def _open(listen: str, key: RunKey | None) -> tuple[zenoh.Session, str]:
         try:
             return zenoh.open(config), endpoint
         except zenoh.ZError as error:
-            # Somebody may have taken the free port in between.
-            if not wants_any or attempt == _PORT_ATTEMPTS - 1:
+            # Another process may have taken the free port in between.
+            if not takes_any or attempt == _PORT_ATTEMPTS - 1:
                 raise ConfigError(
                     f"the router cannot listen on {endpoint}: {in_words(error).rpartition(': ')[2]}",
                     expected="an address of this machine with a free port, such as tcp/127.0.0.1:0, which takes any",
@@ -107,7 +98,7 @@ def _free_port(address: str) -> int:
             probe.bind((host, 0))
             return int(probe.getsockname()[1])
     except (OSError, UnicodeError) as error:
-        # A name of a host that has too long a part is none in Unicode.
+        # A host name with a part that is too long is a UnicodeError.
         raise ConfigError(f"cannot listen on {address!r}: {error}", expected="such as tcp/127.0.0.1:0") from error
 
 
@@ -131,15 +122,15 @@ def serve(listen: str = DEFAULT_LISTEN, key_directory: Path | None = None) -> No
         key = RunKey(key_directory.absolute())
         if not key.exists:
             key.create()
-    # Not `sigwait`: libraries start threads when they are imported, and one of those would take the signal and die.
+    # `sigwait` does not work: libraries start threads when they are imported, and one of those may get the signal.
     stop: SimpleQueue[int] = SimpleQueue()
     for number in stop_signals():
         signal.signal(number, lambda received, _frame: stop.put(received))
-    # In an open run, nodes on Fast DDS find each other as DDS does it, and the router only shows that the run lives.
+    # Nodes of an open run on Fast DDS find each other by multicast; the router of Zenoh only shows that the run lives.
     by_server = Middleware.of_process().is_fast_dds and not listen.startswith(OPEN)
     with _discovery_server(listen) if by_server else router(listen, key) as endpoint:
         print(f"router listening on {endpoint}", flush=True)
-        # In slices: a signal just before the wait would have its handler run only when the wait ends.
+        # Python runs the handler of a signal that comes just before a wait only after it, so the waits are short.
         while True:
             with suppress(Empty):
                 stop.get(timeout=_SLICE_S)
@@ -147,14 +138,7 @@ def serve(listen: str = DEFAULT_LISTEN, key_directory: Path | None = None) -> No
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run a router until SIGTERM or SIGINT.
-
-    Args:
-        arguments: Command line; None for that of the process.
-
-    Returns:
-        Exit code.
-    """
+    """Run a router until SIGTERM or SIGINT, and return the exit code."""
     parser = argparse.ArgumentParser(prog="python -m throwcollect.ros.router", description="Zenoh router")
     parser.add_argument("--listen", default=DEFAULT_LISTEN, help="endpoint; port 0 takes a free one [%(default)s]")
     parser.add_argument("--key", type=Path, help="directory of the key for tls/...; made if there is none")

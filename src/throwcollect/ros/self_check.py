@@ -1,4 +1,4 @@
-"""Whether a node that is about to say that it is ready can be reached at all."""
+"""Checks that a node which is about to announce that it is ready can be reached at all."""
 
 from __future__ import annotations
 
@@ -15,13 +15,9 @@ _SLICE_S = 0.05
 
 
 def check_answers(node: ros.Node, executor: ros.Executor) -> None:
-    """Ask a node of this process for something, on the way by which others ask it.
+    """Have a node call one of its own services, while its executor spins as it will in this process.
 
-    A backend that does not answer would otherwise show as a collection that does not begin.
-
-    Args:
-        node: The node, in the executor.
-        executor: The executor, which is spun as the process will spin it.
+    Without this check, a backend that does not answer would show only as a collection that does not begin.
 
     Raises:
         WorkerError: If no answer comes within ten seconds.

@@ -1,10 +1,8 @@
 """Classes of services of this process's backend: ``from throwcollect.ros.srv import SetParameters``."""
 
-from rclzenoh.interfaces.typed_names import SERVICES
-from throwcollect.ros.backend_names import backend_name
+from functools import partial
 
+from rclzenoh.interfaces.typed_names import SERVICES, look_up_in
+from throwcollect.ros.backend_names import find_class
 
-def __getattr__(name: str) -> object:
-    if name not in SERVICES:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return backend_name("get_service")(SERVICES[name])
+__getattr__ = look_up_in(SERVICES, partial(find_class, "get_service"), __name__)

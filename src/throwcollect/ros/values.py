@@ -1,4 +1,4 @@
-"""Messages to plain values and back: mappings by field, lists and scalars, as YAML, JSON and CBOR have them."""
+"""Turns messages into plain values and back: mappings by field, lists and scalars, as in YAML, JSON and CBOR."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from throwcollect.errors import ConfigError
 from throwcollect.ros import get_message
 
 Numbers = Callable[[NDArray[Any], str], Any]
-"""Makes a plain value of an array of numbers, which it is given with the type of its elements in IDL."""
+"""Makes a plain value of an array of numbers and the IDL type of its elements."""
 
 _ARRAY = re.compile(r"(?:sequence<(?P<element>.+?)(?:, (?P<most>\d+))?>|(?P<item>.+)\[(?P<length>\d+)\])")
 _DTYPES = {
@@ -38,8 +38,8 @@ def fill(message: Any, values: object, where: str = "") -> None:
 
     Args:
         message: The message.
-        values: Mapping of field names to values; nested messages are mappings, too. Numbers that no JSON has are null,
-            octets may be bytes or Base64, arrays may be NumPy's, and times may have the names that they have in ROS 1.
+        values: Mapping of field names to values; nested messages are mappings, too. Null is the number NaN, octets may
+            be bytes or Base64, arrays may be NumPy's, and fields of times may have the names that they have in ROS 1.
         where: Path of the message in the whole one, with a dot at its end.
 
     Raises:
@@ -93,7 +93,7 @@ def _plain(value: Any, kind: str, numbers: Numbers) -> Any:
             return numbers(np.frombuffer(b"".join(value), np.uint8), "octet")
         if element and "/" not in element:
             return list(value)
-        return [plain(each, numbers) for each in value]
+        return [plain(item, numbers) for item in value]
     return plain(value, numbers) if "/" in kind else value
 
 
@@ -105,12 +105,12 @@ def _field_types(message_class: Any) -> Mapping[str, str]:
 
 @cache
 def array_parts(kind: str) -> tuple[str, int | None, int | None] | None:
-    """Type of the elements of an array, their largest number, and their number; None if it is no array."""
-    found = _ARRAY.fullmatch(kind)
-    if found is None:
+    """Type of the elements of an array, its bound and its fixed length, of which one may be there; None if no array."""
+    match = _ARRAY.fullmatch(kind)
+    if match is None:
         return None
-    most, length = (int(found[name]) if found[name] else None for name in ("most", "length"))
-    return found["element"] or found["item"], most, length
+    most, length = (int(match[name]) if match[name] else None for name in ("most", "length"))
+    return match["element"] or match["item"], most, length
 
 
 def _element(kind: str) -> str:
@@ -122,14 +122,14 @@ def _convert(kind: str, value: object, path: str, current: Any = None) -> Any:
     if parts := array_parts(kind):
         element, most, length = parts
         if element in _DTYPES:
-            found: Any = _numbers(element, value, current)
+            array: Any = _numbers(element, value, current)
         elif isinstance(value, list):
-            found = [_convert(element, each, f"{path}[{index}]") for index, each in enumerate(value)]
+            array = [_convert(element, item, f"{path}[{index}]") for index, item in enumerate(value)]
         else:
             raise TypeError
-        if (most is not None and len(found) > most) or (length is not None and len(found) != length):
+        if (most is not None and len(array) > most) or (length is not None and len(array) != length):
             raise ValueError
-        return found
+        return array
     if _is_message(kind):
         package, _, short = kind.partition("/")
         message = get_message(f"{package}/msg/{short}")()
@@ -152,18 +152,18 @@ def _numbers(element: str, value: object, current: Any) -> Any:
         except binascii.Error as error:
             raise ValueError from error
     if element in _OCTETS and isinstance(value, bytes | bytearray):
-        found = np.frombuffer(value, dtype)
+        numbers = np.frombuffer(value, dtype)
     elif isinstance(value, np.ndarray) and value.dtype == dtype:
-        found = value
+        numbers = value
     elif isinstance(value, list | np.ndarray):
-        found = np.array(_check_numbers(element, value if isinstance(value, list) else value.tolist()), dtype)
+        numbers = np.array(_check_numbers(element, value if isinstance(value, list) else value.tolist()), dtype)
     else:
         raise TypeError
     if isinstance(current, array.array):
-        return array.array(current.typecode, found.tobytes())
+        return array.array(current.typecode, numbers.tobytes())
     if isinstance(current, list):
-        return [bytes([each]) for each in found] if element == "octet" else found.tolist()
-    return found
+        return [bytes([octet]) for octet in numbers] if element == "octet" else numbers.tolist()
+    return numbers
 
 
 def _check_numbers(kind: str, values: list[Any]) -> list[Any]:

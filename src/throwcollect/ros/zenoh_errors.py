@@ -1,4 +1,4 @@
-"""Errors of `rclzenoh` in the words of throwcollect."""
+"""Turns errors of `rclzenoh` into errors of throwcollect."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from throwcollect.run_key import unreadable_key
 
 @contextmanager
 def zenoh_errors() -> Iterator[None]:
-    """Raise what is wrong with a session as an error of throwcollect.
+    """Raise errors about a session as errors of throwcollect.
 
     Raises:
         ConfigError: If the session cannot be opened as it is asked for.

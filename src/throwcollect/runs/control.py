@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from throwcollect.errors import ConfigError, ThrowcollectError, WorkerError
 from throwcollect.ros.endpoint import answers
-from throwcollect.ros.own_name import make_own_name
+from throwcollect.ros.names import make_own_name
 from throwcollect.runs.record import Record
 from throwcollect.runs.records import Records, Run
 from throwcollect.runs.selection import find_held_runs, id_of, require_living, to_change

@@ -15,7 +15,7 @@ from throwcollect.files import write_file
 from throwcollect.ros.connection import Connection
 from throwcollect.ros.endpoint import answers
 from throwcollect.ros.middleware import Middleware
-from throwcollect.ros.own_name import make_own_name
+from throwcollect.ros.names import make_own_name
 from throwcollect.run_key import RunKey
 from throwcollect.runs.onlooker import SILENT, Onlooker
 from throwcollect.runs.own_directory import make_own_directory

@@ -10,11 +10,12 @@ from typing import cast
 
 from throwcollect.config.schema import Config
 from throwcollect.errors import ConfigError
+from throwcollect.ros.endpoint import split_address
 from throwcollect.runs.onlooker import Onlooker
 from throwcollect.runs.record import Record, Summary
 from throwcollect.runs.records import OpenRun, Records, Run
 from throwcollect.runs.token import JoinToken
-from throwcollect.runtimes.ports import format_endpoint, reach_from_elsewhere, split_address
+from throwcollect.runtimes.ports import format_endpoint, reach_from_elsewhere
 from throwcollect.runtimes.runtime import Place, Runtime
 
 

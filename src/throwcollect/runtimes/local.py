@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 from throwcollect.errors import WorkerError
 from throwcollect.files import open_log
 from throwcollect.own_process import may_be_forked
+from throwcollect.ros.endpoint import split_address
 from throwcollect.ros.middleware import Middleware
 from throwcollect.runtimes.node_logs import NodeLogs
 from throwcollect.runtimes.node_server import ForkedNode, NodeServer
@@ -25,7 +26,7 @@ from throwcollect.runtimes.nodes import (
     node_environment,
     protocol_of,
 )
-from throwcollect.runtimes.ports import format_endpoint, reach_from_here, reserve_port, split_address
+from throwcollect.runtimes.ports import format_endpoint, reach_from_here, reserve_port
 from throwcollect.runtimes.runtime import Place, Runtime, Session
 
 if TYPE_CHECKING:

@@ -7,6 +7,7 @@ from ipaddress import ip_address
 
 from throwcollect.config.run import RunConfig
 from throwcollect.errors import ConfigError, Problem
+from throwcollect.ros.endpoint import split_address
 
 LOOPBACK = "127.0.0.1"
 _ELSEWHERE = ("192.0.2.1", 9)
@@ -27,12 +28,6 @@ def reserve_port(run: RunConfig) -> socket.socket:
         return _bind(LOOPBACK, run.router_port, "run.router_port", hint="--set run.router_port=0 takes a free one")
     host, port = split_address(run.listen)
     return _bind(host, port, "run.listen", hint="tcp/0.0.0.0:PORT listens at all addresses of this machine")
-
-
-def split_address(endpoint: str) -> tuple[str, int]:
-    """Host and port of an endpoint, such as ``tcp/0.0.0.0:7447``."""
-    host, _, port = endpoint.partition("/")[2].rpartition(":")
-    return host.strip("[]"), int(port)
 
 
 def format_endpoint(protocol: str, host: str, port: int) -> str:

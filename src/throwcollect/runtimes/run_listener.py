@@ -13,7 +13,7 @@ from throwcollect.errors import ConfigError, ThrowcollectError
 from throwcollect.ros.connection import Connection
 from throwcollect.ros.endpoint import answers
 from throwcollect.ros.msg import String
-from throwcollect.ros.own_name import make_own_name
+from throwcollect.ros.names import make_own_name
 
 _SILENT_S = 8.0
 """Reports come several times a second; after a silence like this the connection is made anew, should it be broken."""

@@ -2,9 +2,9 @@
 
 import pytest
 
-from rclzenoh.action import ActionClient, ActionServer, GoalStatus
 from rclzenoh.interfaces import get_action
-from throwcollect.ros import Future
+from rclzenoh.interfaces.msg import GoalStatus
+from throwcollect.ros import ActionClient, ActionServer, Future
 
 FJT = get_action("control_msgs/action/FollowJointTrajectory")
 

@@ -10,8 +10,7 @@ from typing import Any
 
 from throwcollect import ros
 from throwcollect.errors import ConfigError, Interrupted, ThrowcollectError, WorkerError
-from throwcollect.ros.names import is_hidden
-from throwcollect.ros.own_name import make_own_name
+from throwcollect.ros.names import is_hidden, make_own_name
 
 _SLICE_S = 0.2
 """Longest single wait: rclpy handles signals only between two waits."""

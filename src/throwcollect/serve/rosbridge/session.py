@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from throwcollect import ros
 from throwcollect.errors import ConfigError
-from throwcollect.ros.names import find_interface, full_name
-from throwcollect.ros.own_name import make_own_name
+from throwcollect.ros.names import find_interface, full_name, make_own_name
 from throwcollect.serve.rosbridge.feed import Feed, Listener
 
 if TYPE_CHECKING:

@@ -416,10 +416,10 @@ def test_a_reader_that_leaves_early_is_no_error(endpoint: str) -> None:
 
 def test_a_service_that_goes_away_before_it_answers_is_told() -> None:
     server = (
-        "from rclzenoh import api as ros; from rclzenoh.interfaces import get_service\n"
+        "from throwcollect import ros\n"
         "ros.init(); node = ros.Node('n')\n"
         "async def wait(request, response): await ros.Future()\n"
-        "node.create_service(get_service('std_srvs/srv/SetBool'), 'slow', wait)\n"
+        "node.create_service(ros.get_service('std_srvs/srv/SetBool'), 'slow', wait)\n"
         "executor = ros.SingleThreadedExecutor(); executor.add_node(node)\n"
         "print('ready', flush=True); executor.spin()\n"
     )
