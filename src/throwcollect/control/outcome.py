@@ -53,14 +53,12 @@ class GoalResult:
         status: How it ended.
         error_code: Why.
         error_string: Why, in words; empty for a cancelled goal.
-        stamp_ns: Time of the decision [ns].
     """
 
     goal_id: Hashable
     status: GoalStatus
     error_code: ErrorCode
     error_string: str
-    stamp_ns: int
 
 
 @dataclass(frozen=True)

@@ -102,7 +102,7 @@ class ControllerAction:
         return GoalResponse.ACCEPT
 
     def _abort(self, key: int, refusal: Refusal) -> GoalResult:
-        return GoalResult(key, GoalStatus.ABORTED, refusal.error_code, refusal.text, self._simulation.now_ns)
+        return GoalResult(key, GoalStatus.ABORTED, refusal.error_code, refusal.text)
 
     def _accept(self, handle: Any) -> None:
         key = next(iter(self._considered))

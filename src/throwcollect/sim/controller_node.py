@@ -6,8 +6,7 @@ import logging
 import math
 import time
 
-from throwcollect.control import ControllerState, GoalResult
-from throwcollect.control.log import REPEATED
+from throwcollect.control import REPEATED, ControllerState, GoalResult
 from throwcollect.ros import (
     DurabilityPolicy,
     Node,

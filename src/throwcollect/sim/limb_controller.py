@@ -12,7 +12,6 @@ from throwcollect.control import (
     Constraints,
     ControllerParameters,
     ControllerState,
-    Deviations,
     ErrorCode,
     GoalResult,
     JointConstraints,
@@ -51,9 +50,8 @@ class LimbController:
             self.name,
             self._configured,
             period_ns=period_ns,
-            deviations=Deviations(
-                hold="command" if config.hold == "command" else "measured", topic_aborts_goal=config.topic_aborts_goal
-            ),
+            holds_command=config.hold == "command",
+            topic_aborts_goal=config.topic_aborts_goal,
         )
         self.watched = False
         """Whether the state of every update is kept for `pop_states`."""
@@ -96,11 +94,9 @@ class LimbController:
             self._wake()
 
     def restore(self) -> None:
-        """Undo whatever clients have changed of the controller: its parameters and the speed of its clock."""
+        """Undo what clients have changed of the controller's parameters; its speed is set anew by `reset`."""
         if self._controller.parameters != self._configured:
             self._controller.parameters = self._configured
-        if self._controller.speed_scaling_factor != self._speed:
-            self._controller.scale_speed(self._speed)
 
     def pop_results(self) -> tuple[GoalResult, ...]:
         """Results of the goals that have ended since the last call, oldest first."""
@@ -143,16 +139,15 @@ class LimbController:
         speeds[self._own] = [velocities[index] for index in self._worlds]
         return JointState(state, speeds)
 
-    def update(self, time_ns: int, period_ns: int, measured: JointState, command: NDArray[np.float64]) -> None:
-        """One control period with a look at the measured state.
+    def update(self, time_ns: int, measured: JointState, command: NDArray[np.float64]) -> None:
+        """Make one update, in which the controller sees the measured state.
 
         Args:
             time_ns: Time of this update [ns].
-            period_ns: Time since the update before [ns].
             measured: State of this limb's joints.
             command: Command of each of the world's moving joints, written in place [rad].
         """
-        row = self.controller.update(time_ns, period_ns, measured)
+        row = self.controller.update(time_ns, measured)
         command[self._worlds] = row[self._own]
         if self.watched:
             self._states.append(self._controller.state())
@@ -184,12 +179,8 @@ class LimbController:
         if start_ns is None:
             return
         still = np.zeros(len(self._joints)) if self._configured.measures_velocity else None
-        measured = JointState(self._posture.copy(), still)
-        self._controller.reset(start_ns, measured)
-        if self._speed != 1.0:
-            self._controller.scale_speed(self._speed)
-        # This update begins the hold: from then on an idle limb has the same command and need not be driven.
-        self._controller.update(start_ns, 0, measured)
+        self._controller.reset(start_ns, JointState(self._posture, still))
+        self._controller.scale_speed(self._speed)
 
 
 def _configure(robot: Robot, joints: tuple[str, ...], config: ControllersConfig) -> ControllerParameters:

@@ -385,7 +385,7 @@ class Simulation:
         positions, velocities = self.world.joints()
         keeps = self._keeps_states and self.world.steps % self._stride == 0
         for limb in limbs:
-            limb.update(self.now_ns, self._period_ns, limb.measure(positions, velocities), self._command)
+            limb.update(self.now_ns, limb.measure(positions, velocities), self._command)
             if keeps:
                 limb.keep_state()
 
