@@ -35,7 +35,7 @@ _FAR_AHEAD_NS = 3600 * 10**9
 """A trajectory that starts so much later was most likely stamped by another clock."""
 
 _MOST_SPEED = 1000.0
-"""Upstream has no limit. Far above this one, the time that the trajectory's clock advances in a period fits no number."""
+"""Upstream has no limit. Far above this one, the time that the clock advances in a period fits no number."""
 
 
 class JointTrajectoryController:
@@ -111,7 +111,7 @@ class JointTrajectoryController:
         return self._motion.past_end and self.next_decision() == sys.maxsize
 
     def scale_speed(self, factor: float) -> None:
-        """Let the trajectory's clock go at another speed [-]: slower below 1; 0 stops it. Others are logged, and ignored."""
+        """Let the trajectory's clock go at another speed [-]: slower below 1; 0 stops it. Log wrong ones."""
         if not 0 <= factor <= _MOST_SPEED:
             rule = "Scaling factor has to be greater or equal to 0.0 - Ignoring input!"
             problem = f"{rule} (got {factor:g}; expected 0 to {_MOST_SPEED:g})"

@@ -68,7 +68,7 @@ class Motion:
         self._index += 1
 
     def skip(self, n_updates: int) -> NDArray[np.float64]:
-        """Go on by many control periods, and return their commands [rad], shape ``(n_updates, n_joints)``, read-only."""
+        """Go on by many control periods. Return their commands [rad], shape ``(n_updates, n_joints)``, read-only."""
         first = self._index + 1 + self._ahead
         self._index += n_updates
         return self._commands.positions(first, n_updates)

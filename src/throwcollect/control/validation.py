@@ -20,16 +20,7 @@ END_VELOCITY_LIMIT = float(np.finfo(np.float32).eps)
 
 
 def refusal(trajectory: Trajectory, parameters: ControllerParameters, now_ns: int) -> Refusal | None:
-    """Reason for which a trajectory cannot be executed.
-
-    Args:
-        trajectory: What has been asked for.
-        parameters: Those of the controller.
-        now_ns: Current time [ns].
-
-    Returns:
-        One sentence for the first rule that is broken, or None if the trajectory can be executed.
-    """
+    """The first rule that a trajectory breaks at the present time [ns]; None if it can be executed."""
     for rule, code in _RULES:
         if (text := rule(trajectory, parameters, now_ns)) is not None:
             return Refusal(code, text)

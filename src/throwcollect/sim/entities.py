@@ -6,8 +6,11 @@ import math
 from dataclasses import dataclass
 from enum import IntEnum
 
-from throwcollect.engines.engine import BodyModel, BodyState, Box, Quaternion, Vector
+import numpy as np
+
+from throwcollect.engines.engine import BodyModel, BodyState, Box, Vector
 from throwcollect.errors import RequestError
+from throwcollect.pinocchio_library import pinocchio
 from throwcollect.sim.world import World
 
 BALL = "ball"
@@ -159,12 +162,12 @@ class Entities:
                 known = ", ".join((WORLD_FRAME, *self.names))
                 raise RequestError("INVALID_POSE", f"no frame {frame!r:.80}", expected=known)
             base = self.state(frame)
-            turn = base.orientation_xyzw
+            turn = pinocchio.Quaternion(np.array(base.orientation_xyzw))
             state = BodyState(
-                _add(base.position, _rotate(turn, state.position)),
-                _multiply(turn, state.orientation_xyzw),
-                _rotate(turn, state.linear_velocity),
-                _rotate(turn, state.angular_velocity),
+                tuple((base.position + turn * np.array(state.position)).tolist()),
+                tuple((turn * pinocchio.Quaternion(np.array(state.orientation_xyzw))).coeffs().tolist()),
+                tuple((turn * np.array(state.linear_velocity)).tolist()),
+                tuple((turn * np.array(state.angular_velocity)).tolist()),
             )
         if not all(abs(value) <= _LARGEST_COORDINATE_M for value in state.position):
             expected = f"within {_LARGEST_COORDINATE_M:g} m of the world's origin"
@@ -193,9 +196,8 @@ class Entities:
         if name in self._world.spawned:
             return _unite(self._world.spawned.engine_bodies(name).bounds(name))
         # The robot's axes are those of the world, and the ball looks the same from everywhere.
-        box = _unite(self.boxes(name))
         origin = self.state(name).position
-        return box and (_subtract(box[0], origin), _subtract(box[1], origin))
+        return _unite([tuple(np.subtract(box, origin).tolist()) for box in self.boxes(name)])
 
     def add(self, name: str, model: BodyModel, start: BodyState, description: str) -> None:
         """Put a new entity into the world.
@@ -242,29 +244,3 @@ def _unite(boxes: list[Box]) -> Box | None:
     lowest: Vector = tuple(map(min, zip(*lows, strict=True)))
     highest: Vector = tuple(map(max, zip(*highs, strict=True)))
     return lowest, highest
-
-
-def _add(point: Vector, other: Vector) -> Vector:
-    return (point[0] + other[0], point[1] + other[1], point[2] + other[2])
-
-
-def _subtract(point: Vector, origin: Vector) -> Vector:
-    return (point[0] - origin[0], point[1] - origin[1], point[2] - origin[2])
-
-
-def _multiply(turn: Quaternion, other: Quaternion) -> Quaternion:
-    """The quaternion (xyzw) that turns first by `other`, then by `turn`."""
-    x, y, z, w = turn
-    a, b, c, d = other
-    return (
-        w * a + x * d + y * c - z * b,
-        w * b - x * c + y * d + z * a,
-        w * c + x * b - y * a + z * d,
-        w * d - x * a - y * b - z * c,
-    )
-
-
-def _rotate(turn: Quaternion, vector: Vector) -> Vector:
-    x, y, z, w = turn
-    rotated = _multiply(_multiply(turn, (*vector, 0.0)), (-x, -y, -z, w))
-    return rotated[:3]

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from throwcollect.errors import RequestError
 from throwcollect.ros import Node
-from throwcollect.ros.msg import Bounds, EntityFilters, EntityState, TagsFilter, Vector3
+from throwcollect.ros.msg import Bounds, EntityState, Vector3
 from throwcollect.ros.srv import (
     DeleteEntity,
     GetEntities,
@@ -17,13 +16,9 @@ from throwcollect.ros.srv import (
 )
 from throwcollect.sim.body_messages import body_state, entity_state
 from throwcollect.sim.entities import EntityInfo
-from throwcollect.sim.entity_filter import BoxRegion, EntityFilter, SphereRegion
+from throwcollect.sim.entity_filter import select
 from throwcollect.sim.service_results import answering
 from throwcollect.sim.simulation import Simulation
-
-_CORNERS = 2
-_MOST_WANTED = 1000
-"""Largest number of categories, and of tags, in one filter."""
 
 
 class EntityServices:
@@ -50,10 +45,10 @@ class EntityServices:
             node.create_service(service, name, answering(service, fill))
 
     def _list(self, request: GetEntities.Request, response: GetEntities.Response) -> None:
-        response.entities = _filter(request.filters).select(self._entities)
+        response.entities = select(self._entities, request.filters)
 
     def _list_states(self, request: GetEntitiesStates.Request, response: GetEntitiesStates.Response) -> None:
-        response.entities = _filter(request.filters).select(self._entities)
+        response.entities = select(self._entities, request.filters)
         response.states = [self._state(name) for name in response.entities]
 
     def _get_state(self, request: GetEntityState.Request, response: GetEntityState.Response) -> None:
@@ -97,47 +92,3 @@ class EntityServices:
         del response
         self._simulation.trial.require_free()
         self._entities.remove(request.entity)
-
-
-def _filter(filters: EntityFilters) -> EntityFilter:
-    """What simulation_interfaces/msg/EntityFilters means.
-
-    Raises:
-        RequestError: ``RESULT_FEATURE_UNSUPPORTED`` for a kind of bounds that is not known here,
-            ``RESULT_OPERATION_FAILED`` for what makes no sense.
-    """
-    tags = filters.tags
-    if len(tags.tags) > _MOST_WANTED or len(filters.categories) > _MOST_WANTED:
-        raise _senseless(f"more than {_MOST_WANTED} tags or categories")
-    if tags.filter_mode not in (TagsFilter.FILTER_MODE_ANY, TagsFilter.FILTER_MODE_ALL):
-        raise _senseless(f"no tags filter mode {tags.filter_mode}")
-    return EntityFilter(
-        name=filters.filter,
-        categories={int(category.category) for category in filters.categories},
-        tags=tuple(tags.tags),
-        needs_all_tags=tags.filter_mode == TagsFilter.FILTER_MODE_ALL,
-        region=_region(filters.bounds),
-    )
-
-
-def _region(bounds: Bounds) -> BoxRegion | SphereRegion | None:
-    if bounds.type == Bounds.TYPE_EMPTY:
-        return None
-    if bounds.type not in (Bounds.TYPE_BOX, Bounds.TYPE_SPHERE):
-        message = f"bounds of type {bounds.type}; boxes and spheres are supported"
-        raise RequestError("RESULT_FEATURE_UNSUPPORTED", message)
-    if len(bounds.points) != _CORNERS:
-        raise _senseless(f"bounds with {len(bounds.points)} points; a box and a sphere have {_CORNERS}")
-    first, second = ((float(point.x), float(point.y), float(point.z)) for point in bounds.points)
-    if bounds.type == Bounds.TYPE_SPHERE:
-        radius = second[0]
-        if not radius >= 0:
-            raise _senseless(f"a sphere of radius {radius:g} m")
-        return SphereRegion(first, radius)
-    if not all(low <= high for high, low in zip(first, second, strict=True)):
-        raise _senseless(f"a box whose upper corner {first} is not above its lower one {second}")
-    return BoxRegion(second, first)
-
-
-def _senseless(message: str) -> RequestError:
-    return RequestError("RESULT_OPERATION_FAILED", message)

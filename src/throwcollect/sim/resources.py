@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from pathlib import Path
 from urllib.parse import quote, unquote, urlsplit
@@ -19,19 +18,6 @@ from throwcollect.sim.urdf import read_model
 
 _LARGEST_FILE = 4 * 2**20
 _MOST_ENTRIES = 20_000
-
-
-@dataclass(frozen=True)
-class Resource:
-    """A description that lies ready to be spawned.
-
-    Attributes:
-        uri: What to ask for.
-        name: The name that it gives itself.
-    """
-
-    uri: str
-    name: str
 
 
 def load_model(uri: str, text: str, robot: Robot) -> BodyModel:
@@ -64,7 +50,7 @@ def load_model(uri: str, text: str, robot: Robot) -> BodyModel:
     return read_model(content, lambda filename: read_mesh(_locate(filename, path.parent, robot)))
 
 
-def find_resources(sources: Sequence[str], robot: Robot) -> tuple[list[Resource], list[str]]:
+def find_resources(sources: Sequence[str], robot: Robot) -> tuple[dict[str, str], list[str]]:
     """Look for descriptions that can be spawned.
 
     Args:
@@ -72,31 +58,32 @@ def find_resources(sources: Sequence[str], robot: Robot) -> tuple[list[Resource]
         robot: The robot.
 
     Returns:
-        What was found, in order of the URIs, and what is wrong with each source that cannot be searched.
+        The name that each description gives itself, by its URI, and what is wrong with each source that cannot be
+        searched.
     """
-    found = list(_find_installed(robot))
+    names = dict(_find_installed(robot))
     useless = []
     for source in sources:
         try:
             directory = _path(source, robot, missing="RESULT_NOT_FOUND")
             if not directory.is_dir():
                 raise RequestError("RESULT_NOT_FOUND", f"{source!r:.255}: no such directory")
-            found += _search(directory, Path.as_uri, robot)
+            names |= _search(directory, Path.as_uri, robot)
         except (OSError, ValueError) as error:
             useless.append(f"{source!r:.255}: cannot be searched: {error}")
         except RequestError as error:
             useless.append(str(error))
-    return sorted(set(found), key=lambda resource: resource.uri), useless
+    return names, useless
 
 
 @cache
-def _find_installed(robot: Robot) -> tuple[Resource, ...]:
+def _find_installed(robot: Robot) -> Mapping[str, str]:
     share = robot.share()
 
     def uri_of(path: Path) -> str:
         return f"package://{quote(path.relative_to(share).as_posix())}"
 
-    return tuple(_search(share / _package_of(robot), uri_of, robot))
+    return _search(share / _package_of(robot), uri_of, robot)
 
 
 def _package_of(robot: Robot) -> str:
@@ -104,13 +91,13 @@ def _package_of(robot: Robot) -> str:
     return robot.urdf.split("/", 1)[0]
 
 
-def _search(directory: Path, uri_of: Callable[[Path], str], robot: Robot) -> list[Resource]:
-    """Descriptions below a directory whose collision shapes are all there.
+def _search(directory: Path, uri_of: Callable[[Path], str], robot: Robot) -> dict[str, str]:
+    """Names of the descriptions below a directory whose collision shapes are all there, by their URIs.
 
     Raises:
         RequestError: ``RESULT_NOT_FOUND`` if there are too many files to search.
     """
-    found = []
+    names = {}
     seen = 0
     for parent, directories, files in os.walk(directory):
         directories.sort()
@@ -120,10 +107,10 @@ def _search(directory: Path, uri_of: Callable[[Path], str], robot: Robot) -> lis
         for path in (Path(parent, name) for name in sorted(files) if name.endswith(".urdf")):
             try:
                 if path.is_file() and path.stat().st_size <= _LARGEST_FILE:
-                    found.append(Resource(uri_of(path), _spawnable_name(path, robot)))
+                    names[uri_of(path)] = _spawnable_name(path, robot)
             except (RequestError, OSError):
                 continue
-    return found
+    return names
 
 
 def _spawnable_name(path: Path, robot: Robot) -> str:

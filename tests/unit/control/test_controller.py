@@ -14,15 +14,13 @@ from throwcollect.control import (
     Constraints,
     ControllerParameters,
     JointConstraints,
-    JointState,
     JointTolerance,
-    JointTrajectoryController,
     Trajectory,
     TrajectoryGoal,
     TrajectoryPoint,
 )
 
-from .bench import JOINTS, PERIOD_NS, SHIPPED, TALOS, Bench, Plant, constrained, goal, seconds, to
+from .bench import JOINTS, PERIOD_NS, TALOS, Bench, Plant, constrained, goal, seconds, to
 
 UPDATES = 120
 positions = st.tuples(*[st.floats(-3, 3)] * 3)
