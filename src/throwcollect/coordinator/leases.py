@@ -22,6 +22,10 @@ class Leases:
     Args:
         trials: Numbers of the trials to do.
         retries: How often a trial may come back before it is given up.
+
+    Attributes:
+        total: Number of trials in all.
+        ended: Number of trials that were completed or given up.
     """
 
     def __init__(self, trials: Iterable[int], *, retries: int) -> None:
@@ -38,20 +42,10 @@ class Leases:
         """Trials that a simulation has refused since it could do one, with the reasons."""
         self._wrong_refusals: dict[str, int] = {}
         """Number of trials that each simulation has refused and another one could do."""
-        self._total = 0
-        self._ended = 0
+        self.total = 0
+        self.ended = 0
         self._completed = 0
         self.add(trials)
-
-    @property
-    def total(self) -> int:
-        """Number of trials in all."""
-        return self._total
-
-    @property
-    def ended(self) -> int:
-        """Number of trials that were completed or given up."""
-        return self._ended
 
     @property
     def leased(self) -> int:
@@ -66,7 +60,7 @@ class Leases:
     @property
     def finished(self) -> bool:
         """Whether every trial was completed or given up."""
-        return self._ended == self._total
+        return self.ended == self.total
 
     def why_set_aside(self, simulation: str) -> str | None:
         """Why a simulation gets no more trials: it has refused too many that others could do. None if it gets them."""
@@ -85,7 +79,7 @@ class Leases:
         for trial in trials:
             self._fresh.extend(bytes(max(0, trial + 1 - len(self._fresh))))
             self._waiting_fresh += not self._fresh[trial]
-            self._total += not self._fresh[trial]
+            self.total += not self._fresh[trial]
             self._fresh[trial] = True
 
     def find_held(self, simulation: str) -> tuple[int, ...]:
@@ -93,14 +87,11 @@ class Leases:
         return tuple(self._held.get(simulation, ()))
 
     def lease(self, simulation: str, *, others: Collection[str] = ()) -> int | None:
-        """Give the next trial to a simulation.
+        """Give the next trial to a simulation; None when none is waiting for it.
 
         Args:
             simulation: Name of a simulation.
             others: Names of the other simulations that there are.
-
-        Returns:
-            Number of the trial, or None when none is waiting for it.
         """
         rivals = [other for other in others if other != simulation and not self._is_doubted(other)]
         if self.why_set_aside(simulation) is not None or (rivals and self._is_doubted(simulation)):
@@ -117,7 +108,7 @@ class Leases:
         return trial
 
     def recall(self, trial: int) -> None:
-        """Count a trial as completed that was so before any was handed out.
+        """Count a trial as completed that an earlier collection has completed.
 
         Raises:
             ValueError: If it does not wait to be handed out.
@@ -125,7 +116,7 @@ class Leases:
         if not self._fresh[trial]:
             raise ValueError(trial)
         self._take_fresh(trial)
-        self._ended += 1
+        self.ended += 1
 
     def complete(self, simulation: str, trial: int) -> None:
         """A simulation has done a trial that it held.
@@ -139,7 +130,7 @@ class Leases:
         for other, refused in self._refusals.items():
             wrong = sum(each == trial for each, _ in refused)
             self._wrong_refusals[other] = self._wrong_refusals.get(other, 0) + wrong
-        self._ended += 1
+        self.ended += 1
         self._completed += 1
 
     def fail(self, simulation: str, trial: int, reason: str, *, refused: bool = False) -> list[str] | None:
@@ -165,7 +156,7 @@ class Leases:
         if len(failures) <= self._retries:
             self._returned.append(trial)
             return None
-        self._ended += 1
+        self.ended += 1
         if self._completed:
             # Nobody could do it, so that is the trial's fault.
             for name, refusals in self._refusals.items():

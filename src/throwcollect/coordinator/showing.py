@@ -1,6 +1,6 @@
-"""Shows the newest episodes to whoever looks on: once a second, and only while somebody does.
+"""Publishes the newest episodes for onlookers, once a second, and only while a topic has subscribers.
 
-Nobody but the coordinator may subscribe to the episodes themselves: a simulation waits until all who do have got each.
+Onlookers must not subscribe to the episodes themselves, because a simulation waits until all subscribers have got each.
 """
 
 from __future__ import annotations

@@ -5,18 +5,18 @@ from __future__ import annotations
 from collections.abc import Hashable
 from typing import Any
 
-from throwcollect.control import ControllerState, GoalResult, GoalStatus, Refusal
+from throwcollect.control import ControllerState, GoalResult, GoalStatus
 from throwcollect.ros import ActionServer, CancelResponse, Future, GoalResponse, Node
 from throwcollect.ros.action import FollowJointTrajectory
 from throwcollect.sim.controller_messages import feedback_message, read_goal
 from throwcollect.sim.simulation import Simulation
 
 _RESULT_TIMEOUT_S = 10
-"""How long a result can be asked for, on the simulation's clock; rcl's default."""
+"""Simulated time for which a result can be asked for; rcl's default."""
 
 
 class ControllerAction:
-    """Takes goals for a controller, and tells what becomes of them.
+    """Takes goals for a controller, and sends feedback and results.
 
     Args:
         node: Node of the controller.
@@ -52,30 +52,30 @@ class ControllerAction:
         )
 
     def finish(self, result: GoalResult) -> None:
-        """Answer whoever waits for the result of a goal."""
+        """Send the result of a goal to the client that waits for it."""
         if (future := self._results.get(result.goal_id)) is not None:
             future.set_result(result)
-            # A goal that has ended gets no more feedback, also if it ended in the middle of the last slice.
+            # A goal that has ended gets no more feedback, even if it ended in the middle of the last slice.
             self._handles.pop(result.goal_id, None)
 
     @property
     def heard(self) -> bool:
-        """Whether somebody listens to feedback."""
+        """Whether feedback has subscribers."""
         return self._node.count_subscribers(self._feedback_topic) > 0
 
     @property
     def watched(self) -> bool:
-        """Whether a goal has been taken and somebody listens to its feedback."""
+        """Whether a goal has been taken and feedback has subscribers."""
         return bool(self._results) and self.heard
 
     @property
     def owes_feedback(self) -> bool:
-        """Whether somebody listens to feedback, and some time has passed since the last one."""
+        """Whether feedback has subscribers, and enough simulated time has passed since the last message."""
         passed_ns = self._simulation.now_ns - self._told_ns
         return passed_ns != 0 and not 0 < passed_ns < self._simulation.feedback_ns and self.watched
 
     def publish_feedback(self, state: ControllerState) -> None:
-        """Tell how far the goals have come."""
+        """Send feedback on all goals."""
         passed_ns = self._simulation.now_ns - self._told_ns
         # Feedback is due by a clock of its own, as slices of time need not end just then.
         self._told_ns += passed_ns - passed_ns % (self._simulation.feedback_ns or 1)
@@ -87,8 +87,8 @@ class ControllerAction:
                 waiting.append(feedback)
 
     def _consider(self, request: FollowJointTrajectory.Goal) -> GoalResponse:
-        # The controller takes the goal here, as it alone can tell whether it is acceptable. Its handle follows in the
-        # same order, but perhaps after the next goal, after time has passed, or after its own end.
+        # The controller takes the goal here, because it alone can tell whether the goal is acceptable. Handles come in
+        # the same order, but perhaps after the next goal, after time has passed, or after the goal's own end.
         refusal = self._simulation.submit(self._controller, self._count + 1, read_goal(request))
         if refusal is not None and not self._aborts_refused:
             return GoalResponse.REJECT
@@ -98,11 +98,8 @@ class ControllerAction:
         self._considered[self._count] = []
         self._results[self._count] = Future()
         if refusal is not None:
-            self.finish(self._abort(self._count, refusal))
+            self.finish(GoalResult(self._count, GoalStatus.ABORTED, refusal.error_code, refusal.text))
         return GoalResponse.ACCEPT
-
-    def _abort(self, key: int, refusal: Refusal) -> GoalResult:
-        return GoalResult(key, GoalStatus.ABORTED, refusal.error_code, refusal.text)
 
     def _accept(self, handle: Any) -> None:
         key = next(iter(self._considered))

@@ -1,4 +1,4 @@
-"""One limb: its joint trajectory controller, and which of its joints the physics moves."""
+"""One limb: binds its joint trajectory controller to those of its joints that the physics moves."""
 
 from __future__ import annotations
 
@@ -68,8 +68,7 @@ class LimbController:
     @property
     def controller(self) -> JointTrajectoryController:
         """The controller, in the state of the last reset or later."""
-        if self._start_ns is not None:
-            self._wake()
+        self._wake()
         return self._controller
 
     @property
@@ -108,29 +107,20 @@ class LimbController:
         return states
 
     def refuse_locked(self, trajectory: Trajectory) -> Refusal | None:
-        """Refuse a trajectory that would move joints which are locked.
-
-        Returns:
-            None if it moves no such joint, else the reason of the refusal.
-        """
+        """Refuse a trajectory that would move joints which are locked."""
         for column, joint in enumerate(trajectory.joint_names):
             if joint not in self._joints or self._joints.index(joint) in self._own:
                 continue
             held = self._posture[self._joints.index(joint)]
             for point in trajectory.points:
-                wanted = point.positions[column] if column < len(point.positions) else held
-                if not abs(wanted - held) <= _LOCKED_TOLERANCE_RAD:
-                    text = f"{joint} is locked at {held:.6g} rad (robot.locked) and cannot go to {wanted:.6g} rad"
+                target = point.positions[column] if column < len(point.positions) else held
+                if not abs(target - held) <= _LOCKED_TOLERANCE_RAD:
+                    text = f"{joint} is locked at {held:.6g} rad (robot.locked) and cannot go to {target:.6g} rad"
                     return self._controller.refuse(Refusal(ErrorCode.INVALID_GOAL, text))
         return None
 
     def measure(self, positions: Sequence[float], velocities: Sequence[float]) -> JointState:
-        """State of this limb's joints.
-
-        Args:
-            positions: Position of each of the world's moving joints [rad].
-            velocities: Their velocities [rad/s].
-        """
+        """State of this limb's joints, given positions [rad] and velocities [rad/s] of the world's moving joints."""
         state = self._posture.copy()
         state[self._own] = [positions[index] for index in self._worlds]
         if not self._configured.measures_velocity:
@@ -153,7 +143,7 @@ class LimbController:
             self._states.append(self._controller.state())
 
     def take(self, commands: NDArray[np.float64]) -> None:
-        """Many control periods that need no look at the measured state.
+        """Make as many updates as there are rows, without a look at the measured state.
 
         Args:
             commands: Commands of the world's moving joints, shape ``(n_updates, n_moving)``, written in place [rad].
@@ -184,7 +174,7 @@ class LimbController:
 
 
 def _configure(robot: Robot, joints: tuple[str, ...], config: ControllersConfig) -> ControllerParameters:
-    """Parameters of a controller of some joints: what the robot has, and the one thing that configurations may change.
+    """Parameters of a controller of some joints: the robot's, and how configurations have them stopped.
 
     The real Talos has no measured velocities, by which joints brake with ``hold: decelerate``.
     """

@@ -10,8 +10,7 @@ from throwcollect.ros.action import SimulateSteps
 from throwcollect.ros.msg import Result
 from throwcollect.ros.srv import StepSimulation
 from throwcollect.sim.service_results import refusal
-from throwcollect.sim.simulation import Simulation
-from throwcollect.sim.step_request import StepRequest
+from throwcollect.sim.simulation import Simulation, StepRequest
 
 _ACTION = "simulate_steps"
 _MOST_STEPS = 100_000
