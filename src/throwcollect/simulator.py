@@ -30,7 +30,7 @@ from throwcollect.sweep.plan import make_trials, refusal
 from throwcollect.sweep.points import Points, Targets
 from throwcollect.sweep.trials import Trial
 
-# Whoever takes the name hears what is missing, and not who simulates with it later.
+# The import of `Simulator` fails with the hint on the missing extra, and not the first throw.
 require("pinocchio")
 
 Point = Mapping[str, float]

@@ -1,4 +1,4 @@
-"""What is in the world, by name: ball, robot, and what clients have spawned."""
+"""The entities of a world, by name: ball, robot, and the bodies that clients have spawned."""
 
 from __future__ import annotations
 
@@ -36,13 +36,7 @@ class Category(IntEnum):
 
 @dataclass(frozen=True)
 class EntityInfo:
-    """What is said about an entity.
-
-    Attributes:
-        category: Constant of `Category`.
-        description: For people.
-        tags: For filters.
-    """
+    """Description of an entity for people, and category and tags for filters."""
 
     category: int
     description: str = ""
@@ -72,12 +66,12 @@ class Entities:
         return (BALL, self._robot, *self._world.spawned.names)
 
     def forget_infos(self) -> None:
-        """Go back to what is said about ball and robot at the start; forget what was said about what is gone."""
+        """Restore the descriptions of ball and robot, and forget those of entities that are gone."""
         for name in [name for name in self._infos if name not in self._world.spawned]:
             del self._infos[name]
 
     def info(self, name: str) -> EntityInfo:
-        """What is said about an entity.
+        """The description of an entity.
 
         Raises:
             RequestError: ``RESULT_NOT_FOUND`` if there is none of that name.
@@ -86,7 +80,7 @@ class Entities:
         return self._infos.get(name) or self._first_infos[name]
 
     def set_info(self, name: str, info: EntityInfo) -> None:
-        """Say something else about an entity.
+        """Replace the description of an entity.
 
         Raises:
             RequestError: ``RESULT_NOT_FOUND`` if there is none of that name, ``RESULT_OPERATION_FAILED`` if there is no
@@ -195,18 +189,12 @@ class Entities:
         """
         if name in self._world.spawned:
             return _unite(self._world.spawned.engine_bodies(name).bounds(name))
-        # The robot's axes are those of the world, and the ball looks the same from everywhere.
+        # The robot's axes are those of the world, and a ball has the same box along any axes.
         origin = self.state(name).position
         return _unite([tuple(np.subtract(box, origin).tolist()) for box in self.boxes(name)])
 
     def add(self, name: str, model: BodyModel, start: BodyState, description: str) -> None:
-        """Put a new entity into the world.
-
-        Args:
-            name: Its name, which is free.
-            model: What it is.
-            start: Its state in the world.
-            description: For people.
+        """Put a new entity into the world, under a name that is free.
 
         Raises:
             RequestError: ``RESULT_OPERATION_FAILED`` if the world is full, ``RESOURCE_PARSE_ERROR`` if the engine does

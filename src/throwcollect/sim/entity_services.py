@@ -1,4 +1,4 @@
-"""Services about the entities that are there: which, where, how large, what is said about them."""
+"""Services about the entities in the world: their names, states, bounds and descriptions."""
 
 from __future__ import annotations
 
@@ -22,12 +22,7 @@ from throwcollect.sim.simulation import Simulation
 
 
 class EntityServices:
-    """Offers the services under relative names, so that they stand in the simulation's namespace.
-
-    Args:
-        node: The simulation's node.
-        simulation: Whose entities they are.
-    """
+    """Offers the services under relative names, so that they stand in the simulation's namespace."""
 
     def __init__(self, node: Node, simulation: Simulation) -> None:
         self._simulation = simulation

@@ -1,4 +1,4 @@
-"""What can be spawned: descriptions found by URI, and the files that they refer to."""
+"""Finds what can be spawned: descriptions by their URIs, and the files that they refer to."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ _MOST_ENTRIES = 20_000
 
 
 def load_model(uri: str, text: str, robot: Robot) -> BodyModel:
-    """Read the description that a client means.
+    """Read the description that a client names or sends.
 
     Args:
         uri: ``file://`` or ``package://`` URI of a URDF file.
-        text: URDF text; what counts if there is no URI.
+        text: URDF text, which is used if there is no URI.
         robot: The robot, beside whose description those of ``package://`` are.
 
     Raises:
@@ -136,12 +136,7 @@ def _locate(filename: str, directory: Path | None, robot: Robot) -> Path:
 
 
 def _path(uri: str, robot: Robot, *, missing: str) -> Path:
-    """File that a URI means.
-
-    Args:
-        uri: The URI.
-        robot: The robot, whose share the packages are in.
-        missing: Reason to give if there is no such package.
+    """File that a URI means; packages are looked for in the share of the robot.
 
     Raises:
         RequestError: ``UNSUPPORTED_FORMAT`` if it has another scheme, `missing` if its package is not known.

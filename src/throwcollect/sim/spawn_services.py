@@ -1,4 +1,4 @@
-"""Services that put new entities into the world, and that tell what there is to put."""
+"""Services that put new entities into the world, and that list descriptions for that."""
 
 from __future__ import annotations
 
@@ -27,12 +27,7 @@ _LONGEST_NAMESPACE = 245
 
 
 class SpawnServices:
-    """Offers the services under relative names, so that they stand in the simulation's namespace.
-
-    Args:
-        node: The simulation's node.
-        simulation: Where to put entities.
-    """
+    """Offers the services under relative names, so that they stand in the simulation's namespace."""
 
     def __init__(self, node: Node, simulation: Simulation) -> None:
         self._trial = simulation.trial

@@ -1,7 +1,7 @@
-"""Robots and objects in URDF, from untrusted files: checked, and written anew for the physics engine.
+"""Reads URDF of robots and objects from untrusted files, checks it, and writes it anew for the physics engine.
 
-Bullet ends its process on some descriptions and guesses on others, so it gets to see only what was understood here:
-links with mass and inertia, collision shapes, joints that form a tree.
+Bullet ends its process on some descriptions and guesses on others. So it sees only what was understood here: links with
+mass and inertia, collision shapes, joints that form a tree.
 """
 
 from __future__ import annotations
@@ -183,17 +183,17 @@ def _joint(joint: ElementTree.Element) -> _Joint:
     if kind not in ("fixed", "revolute", "continuous", "prismatic"):
         raise _malformed(f"joint {name}: joints of type {kind!r:.40} are not simulated")
     clean = ElementTree.Element("joint", name=name, type=kind)
-    ends = []
+    ends = {}
     for end in ("parent", "child"):
         element = joint.find(end)
         if element is None or not (link := element.get("link")):
             raise _malformed(f"joint {name}: it has no {end}")
         ElementTree.SubElement(clean, end, link=link)
-        ends.append(link)
+        ends[end] = link
     clean.append(_origin(joint, of=joint))
     if kind != "fixed":
         _add_motion(clean, joint)
-    return _Joint(name, kind, *ends, clean)
+    return _Joint(name, kind, ends["parent"], ends["child"], clean)
 
 
 def _find_rigid_links(links: Collection[str], joints: Sequence[_Joint]) -> list[str]:
