@@ -50,7 +50,11 @@ def select(entities: Entities, filters: EntityFilters) -> list[str]:
 
 
 def _region(bounds: Bounds) -> Callable[[Box], bool] | None:
-    """Test for boxes along the axes of the world that reach into a region; None if there are no bounds."""
+    """Test for boxes along the axes of the world that reach into a region; None if there are no bounds.
+
+    Raises:
+        RequestError: As `select` does.
+    """
     if bounds.type == Bounds.TYPE_EMPTY:
         return None
     if bounds.type not in (Bounds.TYPE_BOX, Bounds.TYPE_SPHERE):

@@ -149,7 +149,11 @@ class _Reader:
         return ElementTree.Element(shape.tag, {key: _text(values) for key, values in sizes.items()})
 
     def _mesh(self, filename: str) -> int:
-        """Number of a mesh, which is read when the description first names it."""
+        """Number of a mesh, which is read when the description first names it.
+
+        Raises:
+            RequestError: ``UNSUPPORTED_ASSETS`` if all meshes together are too large.
+        """
         if filename not in self._meshes:
             self._meshes[filename] = self._read_mesh(filename)
             if (count := sum(map(len, self._meshes.values()))) > _MOST_TRIANGLES:
