@@ -99,7 +99,7 @@ class Simulator:
         point = dict(values or {})
         wrong = self.config.task.find_wrong_targets(target or {})
         wrong |= {
-            name: f"should be a number, got {each}" for name, each in (target or {}).items() if not isfinite(each)
+            name: f"should be a number, got {value}" for name, value in (target or {}).items() if not isfinite(value)
         }
         if wrong:
             raise ConfigError([Problem(reason, key=name) for name, reason in wrong.items()])

@@ -28,8 +28,8 @@ from throwcollect.control.validation import refusal
 from throwcollect.control.waypoints import Waypoints, arrange
 
 REPEATED = "repeated"
-"""Attribute of log records that clients can cause as often as they like; it holds the subject of the record. Whoever
-shows such records may leave some out. All other records are one line for each goal, stop or decision."""
+"""Attribute of log records that clients can cause as often as they like; it holds the subject of the record. A log may
+leave some of them out. All other records are one line for each goal, stop or decision."""
 
 _FAR_AHEAD_NS = 3600 * 10**9
 """A trajectory that starts so much later was most likely stamped by another clock."""
@@ -48,7 +48,7 @@ class JointTrajectoryController:
 
     Args:
         name: Name of the controller, for texts.
-        parameters: What it is set to; later changes must keep the joints and what is measured.
+        parameters: Its parameters; later changes must keep the joints and the interfaces that are measured.
         period_ns: Control period [ns], above 0; a command is what is due one period after its update.
         holds_command: Whether joints that are stopped are held at the last command, so that joints which lag under load
             do not sag. Otherwise they are held where they are measured, as upstream does.
@@ -86,12 +86,12 @@ class JointTrajectoryController:
         self._results: list[GoalResult] = []
         self._scaling = 1.0
         self._incoming: Trajectory | Waypoints | None = None
-        """What to follow from the next update on, if that is something new."""
+        """The trajectory, or the hold, that begins with the next update; None if the present one goes on."""
         self._holding = True
 
     @property
     def parameters(self) -> ControllerParameters:
-        """What the controller is set to; tolerances that are changed are those of the next goal."""
+        """The parameters of the controller; changed tolerances hold from the next goal on."""
         return self._parameters
 
     @parameters.setter
@@ -105,7 +105,7 @@ class JointTrajectoryController:
 
     @property
     def at_rest(self) -> bool:
-        """Whether, unless it is told something new, every further command equals the last and nothing is decided."""
+        """Whether every further command equals the last and nothing is decided, until a goal or trajectory comes."""
         if self.goal_id is not None or self._incoming is not None:
             return False
         return self._motion.past_end and self.next_decision() == sys.maxsize
@@ -156,7 +156,7 @@ class JointTrajectoryController:
         """Follow a trajectory from the topic instead of the present one, or refuse it.
 
         Args:
-            trajectory: What to follow.
+            trajectory: The trajectory.
             now_ns: Current time [ns].
 
         Returns:
@@ -260,7 +260,7 @@ class JointTrajectoryController:
         return results
 
     def state(self, time_ns: int | None = None) -> ControllerState:
-        """What the last update has seen and done; while a goal is being executed, that is the content of its feedback.
+        """State of the last update, which is the content of feedback while a goal is being executed.
 
         Args:
             time_ns: Time of what was observed last, if that was after the update [ns].

@@ -1,4 +1,4 @@
-"""What an update decides about the trajectory that is being followed."""
+"""Decides in every update whether the trajectory that is being followed is over."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ class Judge:
         """Judge one update; None while the trajectory goes on, or its end waits for the joints.
 
         Args:
-            motion: What is being followed.
+            motion: The motion along the trajectory.
             measured: Measured state.
             first: Whether it is the motion's first update, in which the path is checked even if the end has come.
         """
@@ -82,7 +82,7 @@ class Judge:
         """Number of updates that can pass without anything to decide; None if there will never be anything.
 
         Args:
-            motion: What is being followed.
+            motion: The motion along the trajectory.
             goal: Whether a goal waits for the end of it.
         """
         tolerances = self.tolerances

@@ -18,7 +18,7 @@ class Motion:
     period later. An instance stands at its first update when it is made.
 
     Args:
-        curve: What is followed.
+        curve: The curve that is followed.
         start_ns: Absolute time of the trajectory's start [ns].
         first_ns: Absolute time of the first update [ns].
         period_ns: Control period [ns].

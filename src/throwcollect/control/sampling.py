@@ -17,7 +17,7 @@ class Grid:
     """A curve at times that are one step apart; from the curve's end on its last position is held.
 
     Args:
-        curve: What is sampled.
+        curve: The curve that is sampled.
         origin_ns: Time of point 0, since the trajectory's start [ns].
         step_ns: Time from one point to the next [ns]; 0 stays at the origin.
     """

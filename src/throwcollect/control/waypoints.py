@@ -12,7 +12,7 @@ from throwcollect.control.goal import Trajectory, TrajectoryPoint, Values
 from throwcollect.control.outcome import JointState
 
 LINE, CUBIC, QUINTIC = 0, 1, 2
-"""What a point has besides positions: nothing, velocities, accelerations too."""
+"""Content of a point: positions alone, velocities too, accelerations too."""
 
 
 @dataclass(frozen=True)
@@ -24,7 +24,7 @@ class Waypoints:
         positions: [rad], shape ``(n_points, n_joints)``.
         velocities: [rad/s], shape ``(n_points, n_joints)``; 0 where a point has none.
         accelerations: [rad/s²], shape ``(n_points, n_joints)``; 0 where a point has none.
-        content: What a point has, shape ``(n_points,)``: `LINE`, `CUBIC` or `QUINTIC`.
+        content: Content of each point, shape ``(n_points,)``: `LINE`, `CUBIC` or `QUINTIC`.
     """
 
     times_ns: NDArray[np.int64]
@@ -53,7 +53,7 @@ def arrange(
     """Points of a valid trajectory for all joints of the controller, in the controller's order.
 
     Args:
-        trajectory: What has been asked for.
+        trajectory: The trajectory that was asked for.
         joints: Joints of the controller, in order.
         command: Last commanded positions [rad], shape ``(n_joints,)``: joints that are left out stay there.
         start: Where the trajectory begins: points without positions are integrated from there.

@@ -25,17 +25,17 @@ class Acceptance:
         self._build = build_digest(config.sim.engine)
         self._settings = Settings(config)
 
-    def find_difference(self, said: str, plan: Plan, trial: Trial, *, token: str) -> str | None:
+    def find_difference(self, text: str, plan: Plan, trial: Trial, *, token: str) -> str | None:
         """Why an episode is not the one that was asked for; None if it is.
 
         Args:
-            said: The conditions that the simulation names, in JSON.
+            text: The conditions that the simulation names, in JSON.
             plan: The plan.
             trial: Its trial.
             token: Token of the lease.
         """
         try:
-            conditions = conditions_from_json(said)
+            conditions = conditions_from_json(text)
         except DatasetError as error:
             return error.message
         config = plan.config_of(trial)

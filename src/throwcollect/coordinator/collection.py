@@ -1,4 +1,4 @@
-"""The trials of a plan on their way into the dataset, whoever simulates them and however that is reached.
+"""The trials of a plan on their way into the dataset, for any kind of simulation.
 
 It decides which trial a simulation gets next, whether an episode is the one that was asked for, and what is written. It
 knows no network and no processes: the coordinator's node drives it with simulations that it finds in the ROS graph, a
@@ -93,20 +93,20 @@ class TrialCollection:
             ConfigError: If its ``config.yaml`` is wrong.
         """
         collection = cls(DatasetWriter.open(directory), directory)
-        found = 0
+        count = 0
         told = time.monotonic()
 
         def tell(trial: int, result: Result) -> None:
-            nonlocal found, told
+            nonlocal count, told
             # Episodes come file by file, so these are all of some files.
-            if found and time.monotonic() >= told + _TELL_EVERY_S:
+            if count and time.monotonic() >= told + _TELL_EVERY_S:
                 told = time.monotonic()
-                say(f"has found {format_count(found, 'episode')} of an earlier collection so far")
-            found += 1
+                say(f"has found {format_count(count, 'episode')} of an earlier collection so far")
+            count += 1
             collection.recall(trial, result)
 
         if collection.writer.recover(tell, processes=processes):
-            say(f"keeps {format_count(found, 'episode')} of an earlier collection")
+            say(f"keeps {format_count(count, 'episode')} of an earlier collection")
         return collection
 
     def __enter__(self) -> TrialCollection:
@@ -278,7 +278,7 @@ class TrialCollection:
         self._ends.append((now, ended))
         while self._ends[0][0] < now - _RATE_WINDOW_S:
             self._ends.popleft()
-        # Of a plan that ends when enough trials have succeeded, nobody knows how many trials it will have.
+        # The number of trials of a plan that ends when enough have succeeded is not known.
         expected = self._growth.most if self._growth is not None and self._config.until is None else 0
         return Progress(
             total=self._leases.total + expected,
@@ -312,8 +312,8 @@ class TrialCollection:
                 f"interrupted; what is finished is in {known or 'the volume'}",
                 hint=command("resume", known) if known else None,
             )
-        if (said := self._replay.compare(self.writer.digests(), meanwhile=meanwhile)) is not None:
-            say(said)
+        if (sentence := self._replay.compare(self.writer.digests(), meanwhile=meanwhile)) is not None:
+            say(sentence)
         outcomes = self.writer.finish(simulations=len(self._took_part) or None)
         lost = explain_loss(outcomes, hint=f"{command('resume', known)} runs them again" if known else None)
         if lost is not None:
@@ -335,7 +335,7 @@ class TrialCollection:
             self._growth.tell(trial, result)
 
     def _tell_set_aside(self) -> None:
-        aside = {each: reason for each in self._names if (reason := self._leases.why_set_aside(each)) is not None}
+        aside = {name: reason for name in self._names if (reason := self._leases.why_set_aside(name)) is not None}
         for simulation in aside.keys() - self._set_aside.keys():
             self.warn(f"{simulation}: gets no more trials, as others could do what it refused: {aside[simulation]}")
         self._set_aside = aside

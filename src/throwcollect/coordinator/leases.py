@@ -1,4 +1,4 @@
-"""Which trial goes to which simulation next: a state machine without clocks, network or files."""
+"""Decides which trial goes to which simulation next: a state machine without clocks, network or files."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class Leases:
 
     def __init__(self, trials: Iterable[int], *, retries: int) -> None:
         self._fresh = bytearray()
-        """Of each number, whether it is that of a trial that nobody has held yet; there may be millions."""
+        """For each number, whether that trial has not been handed out yet; bytes, as there may be millions."""
         self._next = 0
         """No trial below this one is fresh."""
         self._waiting_fresh = 0
@@ -63,7 +63,7 @@ class Leases:
         return self.ended == self.total
 
     def why_set_aside(self, simulation: str) -> str | None:
-        """Why a simulation gets no more trials: it has refused too many that others could do. None if it gets them."""
+        """Why a simulation gets no more trials, as it refused too many that others could do; None if it gets them."""
         if self._wrong_refusals.get(simulation, 0) < _MOST_IN_A_ROW:
             return None
         return self._refusals[simulation][-1][1]
@@ -128,7 +128,7 @@ class Leases:
         self._refusals.pop(simulation, None)
         self._wrong_refusals.pop(simulation, None)
         for other, refused in self._refusals.items():
-            wrong = sum(each == trial for each, _ in refused)
+            wrong = sum(number == trial for number, _ in refused)
             self._wrong_refusals[other] = self._wrong_refusals.get(other, 0) + wrong
         self.ended += 1
         self._completed += 1
@@ -158,13 +158,13 @@ class Leases:
             return None
         self.ended += 1
         if self._completed:
-            # Nobody could do it, so that is the trial's fault.
+            # No simulation could do the trial, so its refusals are not held against them.
             for name, refusals in self._refusals.items():
-                self._refusals[name] = [each for each in refusals if each[0] != trial]
+                self._refusals[name] = [(number, why) for number, why in refusals if number != trial]
         return [f"{name}: {why}" for name, why in failures]
 
     def release(self, simulation: str) -> None:
-        """Take from a simulation all trials but the first, which runs; they were not begun, so nobody failed."""
+        """Take from a simulation all trials but the first, which runs; the others have not begun, so none failed."""
         held = self._held.get(simulation, [])
         self._returned += held[1:]
         del held[1:]

@@ -25,7 +25,7 @@ class Progress:
         wanted: Number of trials that are to succeed; None if the collection ends with its plan.
         set_aside: Why simulations get no more trials, by their names.
         success: Outcome of trials that succeeded.
-        noun: What a trial is called.
+        noun: Word for a trial.
     """
 
     total: int

@@ -101,7 +101,7 @@ class _Process:
     Attributes:
         trials: The trials.
         digests: Those that it has printed, by trial; empty until `end`.
-        errors: What it has written to its standard error; empty until `end`.
+        errors: Text of its standard error; empty until `end`.
         exit_code: Its exit code; None until `end`.
     """
 
@@ -133,7 +133,8 @@ class _Process:
             with self._printed, self._said:
                 lines = _contents(self._printed).splitlines(keepends=True)
                 self.errors = _contents(self._said).strip()
-            self.digests = {each["trial"]: each["digest"] for each in (json.loads(x) for x in lines if x[-1] == "\n")}
+            whole = (json.loads(line) for line in lines if line[-1] == "\n")
+            self.digests = {printed["trial"]: printed["digest"] for printed in whole}
 
 
 def _simulate(directory: Path, trials: Sequence[int], meanwhile: Callable[[], None]) -> Mapping[int, str]:

@@ -41,8 +41,8 @@ class Showing:
             self._newest[simulation] = message
 
     def _show(self) -> None:
-        self._watched = {each for each, publisher in self._publishers.items() if publisher.get_subscription_count()}
-        self._newest = {each: message for each, message in self._newest.items() if each in self._watched}
+        self._watched = {name for name, publisher in self._publishers.items() if publisher.get_subscription_count()}
+        self._newest = {name: message for name, message in self._newest.items() if name in self._watched}
         if self._newest:
             simulation = next(iter(self._newest))
             self._publishers[simulation].publish(self._newest.pop(simulation))

@@ -14,7 +14,7 @@ from throwcollect.sim.limb_controller import LimbController
 from throwcollect.sim.present_trial import PresentTrial
 
 COMMAND_INTERFACES = ("position",)
-"""What is commanded to all joints."""
+"""Interfaces that are commanded, for every joint."""
 
 _CHANGEABLE = {
     "allow_partial_joints_goal": "Whether goals may leave joints out",
@@ -88,7 +88,7 @@ class ParameterFace:
 
 
 def state_interfaces(parameters: ControllerParameters) -> tuple[str, ...]:
-    """What is measured of all joints of a controller."""
+    """Interfaces that are measured, for every joint of a controller."""
     return ("position", "velocity") if parameters.measures_velocity else ("position",)
 
 

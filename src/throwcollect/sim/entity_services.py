@@ -52,8 +52,7 @@ class EntityServices:
     def _state(self, name: str) -> EntityState:
         return entity_state(self._entities.state(name), self._simulation.now_ns)
 
-    def _set_state(self, request: SetEntityState.Request, response: SetEntityState.Response) -> None:
-        del response
+    def _set_state(self, request: SetEntityState.Request, _response: SetEntityState.Response) -> None:
         self._simulation.trial.require_free()
         state, acceleration = request.state, request.state.acceleration
         accelerations = (acceleration.linear, acceleration.angular)
@@ -70,8 +69,7 @@ class EntityServices:
         response.info.description = info.description
         response.info.tags = list(info.tags)
 
-    def _set_info(self, request: SetEntityInfo.Request, response: SetEntityInfo.Response) -> None:
-        del response
+    def _set_info(self, request: SetEntityInfo.Request, _response: SetEntityInfo.Response) -> None:
         info = request.info
         self._entities.set_info(
             request.entity, EntityInfo(int(info.category.category), info.description, tuple(info.tags))
@@ -83,7 +81,6 @@ class EntityServices:
             response.bounds.type = Bounds.TYPE_BOX
             response.bounds.points = [Vector3(x=x, y=y, z=z) for x, y, z in reversed(box)]
 
-    def _delete(self, request: DeleteEntity.Request, response: DeleteEntity.Response) -> None:
-        del response
+    def _delete(self, request: DeleteEntity.Request, _response: DeleteEntity.Response) -> None:
         self._simulation.trial.require_free()
         self._entities.remove(request.entity)

@@ -86,7 +86,7 @@ class LimbController:
         """
         self._speed = speed
         self._posture = np.array([posture[joint] for joint in self._joints])
-        # The controller itself is reset when somebody asks for it, as most limbs are idle in most trials.
+        # The controller itself is reset only when it is used, because most limbs are idle in most trials.
         self._start_ns = time_ns
         self._elapsed_ns, self._points, self._states = [], [], []
         if self._controller.goal_id is not None:

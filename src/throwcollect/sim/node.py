@@ -77,7 +77,7 @@ class SimulationNode(Node):
 
     Args:
         name: Name of the node.
-        simulation: What it serves.
+        simulation: The simulation that it serves.
         namespace: Namespace of the node and of all names; None for ``/<name>``.
 
     Raises:
@@ -117,7 +117,7 @@ class SimulationNode(Node):
 
     @property
     def companions(self) -> tuple[Node, ...]:
-        """The other nodes of the simulation: one for each controller, and that which lists them."""
+        """The other nodes of the simulation: one for each controller, and the controller manager."""
         return (*self._controllers.values(), self._manager)
 
     @property
@@ -228,7 +228,7 @@ class SimulationNode(Node):
         """Declare the parameter by which viewers are given another description to draw."""
         about = "URDF that viewers draw; only what is seen may differ from that of the configuration."
         self.declare_parameter(DESCRIPTION, self._description, ParameterDescriptor(description=about))
-        (self._described,) = (each for each in self._latched if each.topic_name.endswith(DESCRIPTION))
+        (self._described,) = (topic for topic in self._latched if topic.topic_name.endswith(DESCRIPTION))
 
         def show(parameters: list[Parameter]) -> None:
             for parameter in parameters:

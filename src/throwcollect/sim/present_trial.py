@@ -17,7 +17,7 @@ _EXECUTING = 2
 
 @dataclass(frozen=True)
 class TrialSetup:
-    """What the next reset prepares.
+    """The trial that the next reset prepares.
 
     Attributes:
         number: Number of the trial; negative for none.
@@ -34,7 +34,7 @@ class PresentTrial:
     """The trial of a simulation, without the physics.
 
     Attributes:
-        setup: What the next reset prepares.
+        setup: The trial that the next reset prepares.
         leased: Whether the trial belongs to a coordinator, until its episode is handed over; meanwhile no other client
             may change anything.
 

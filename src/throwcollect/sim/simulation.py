@@ -41,7 +41,7 @@ class State(IntEnum):
 
 
 class Scope(IntFlag):
-    """What a reset resets, by the constants of simulation_interfaces/srv/ResetSimulation."""
+    """Parts that a reset resets, by the constants of simulation_interfaces/srv/ResetSimulation."""
 
     TIME = 1
     STATE = 2
@@ -112,7 +112,7 @@ class Simulation:
         return self._steps is not None or (self._running and self.state == State.PLAYING)
 
     def lease(self, number: int, config: Config, goals: Mapping[str, TrajectoryGoal]) -> None:
-        """Begin a trial for a coordinator, with controllers as they are configured, which nobody else may touch.
+        """Begin a trial for a coordinator, with controllers as they are configured, which no other client may touch.
 
         Args:
             number: Number of the trial.
@@ -134,7 +134,7 @@ class Simulation:
         self.trial.leased = True
 
     def end_lease(self) -> None:
-        """Forget a leased trial that nobody wants any more; all is as configured."""
+        """Forget a leased trial that the coordinator has taken back, and go back to the configuration."""
         self.trial.set_up_nothing()
         self.reset()
 
@@ -166,7 +166,7 @@ class Simulation:
         of_time, of_state, of_spawned = Scope.TIME in scope, Scope.STATE in scope, Scope.SPAWNED in scope
         if of_spawned:
             self.world.spawned.clear()
-            # What clients have said of entities belongs to the world that ends here.
+            # Descriptions that clients have given to entities belong to the world that ends here.
             if of_time and of_state:
                 self.entities.forget_infos()
         if not (of_time or of_state):
@@ -228,7 +228,7 @@ class Simulation:
         """Run for a slice of time, or until the run ends; it ends on time where a real-time factor asks for it.
 
         Args:
-            watched: Whether somebody wants to see it happen: slices are short then.
+            watched: Whether a client listens, so that slices have to be short.
         """
         began_s, since_ns, factor = time.monotonic(), self.now_ns, self.real_time_factor
         # A long slice costs the least. A short one lets messages be sent in between, which only watching clients need.
@@ -286,13 +286,13 @@ class Simulation:
         """Take physics steps, fewer if the trial ends, or a goal outside of a trial; return how many were taken."""
         if not self._in_trial:
             self.world.forget_samples()
-        left = steps
-        while left > 0 and not (self._in_trial and self.world.end_reason is not None):
-            left -= self._step_some(left)
+        remaining = steps
+        while remaining > 0 and not (self._in_trial and self.world.end_reason is not None):
+            remaining -= self._step_some(remaining)
             if self._results and not self._in_trial:
                 # A client that waits for the result gets it before time goes on.
                 break
-        return steps - left
+        return steps - remaining
 
     def pop_results(self) -> list[tuple[str, GoalResult]]:
         """Controllers and results of the goals that have ended since the last call, oldest first."""

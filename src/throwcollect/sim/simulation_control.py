@@ -82,8 +82,7 @@ class SimulationControl:
     def _get_state(self, _request: GetSimulationState.Request, response: GetSimulationState.Response) -> None:
         response.state.state = int(self._simulation.state)
 
-    def _set_state(self, request: SetSimulationState.Request, response: SetSimulationState.Response) -> None:
-        del response
+    def _set_state(self, request: SetSimulationState.Request, _response: SetSimulationState.Response) -> None:
         target = request.state.state
         if target not in list(State):
             raise RequestError("INCORRECT_TRANSITION", f"state {target} cannot be set")
@@ -94,8 +93,7 @@ class SimulationControl:
         except ConfigError as error:
             raise RequestError("STATE_TRANSITION_ERROR", str(error)) from error
 
-    def _reset(self, request: ResetSimulation.Request, response: ResetSimulation.Response) -> None:
-        del response
+    def _reset(self, request: ResetSimulation.Request, _response: ResetSimulation.Response) -> None:
         self._simulation.trial.require_free()
         if request.scope in _WHOLE_SCOPES:
             self._simulation.reset()

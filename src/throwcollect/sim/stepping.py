@@ -25,7 +25,7 @@ class Stepping:
 
     Args:
         node: The simulation's node.
-        simulation: What is stepped through.
+        simulation: The simulation that is stepped through.
     """
 
     def __init__(self, node: Node, simulation: Simulation) -> None:

@@ -53,9 +53,9 @@ class Conditions:
         if self.settings != expected.settings:
             yield "its configuration is another one"
         for key in sorted({*self.values, *expected.values}):
-            used, wanted = self.values.get(key), expected.values.get(key)
-            if used != wanted:
-                yield f"{key} was {_describe(used)}, not {_describe(wanted)}"
+            used, planned = self.values.get(key), expected.values.get(key)
+            if used != planned:
+                yield f"{key} was {_describe(used)}, not {_describe(planned)}"
         if self.trajectory != expected.trajectory:
             yield "its controllers were given another trajectory"
 
@@ -90,10 +90,10 @@ class Settings:
     """
 
     def __init__(self, config: Config) -> None:
-        found = list(leaves(config))
+        keys = list(leaves(config))
         physics = set(sweepable_keys(config, Effect.PHYSICS))
-        self._physics = [(leaf.name, leaf.name.split("."), leaf.value) for leaf in found if leaf.name in physics]
-        heeded = {leaf.name: leaf.value for leaf in found if leaf.key.effect in _HEEDED}
+        self._physics = [(leaf.name, leaf.name.split("."), leaf.value) for leaf in keys if leaf.name in physics]
+        heeded = {leaf.name: leaf.value for leaf in keys if leaf.key.effect in _HEEDED}
         # Which joints move decides which are simulated as rigid; where they go, the trajectory says.
         heeded["task.end"] = sorted(config.task.end)
         lines = [f"{key}={json.dumps(value)}" for key, value in sorted(heeded.items())]

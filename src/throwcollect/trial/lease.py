@@ -28,7 +28,7 @@ class Lease:
     Attributes:
         simulation: Namespace of the simulation, such as ``/sim_0``.
         trial: Number of the trial.
-        values: What the trial replaces of the configuration, by dotted key.
+        values: Values of the trial that replace those of the configuration, by dotted key.
         nonce: Random text by which two leases of the same trial differ.
         signature: The coordinator's, over all of these.
     """
