@@ -85,7 +85,7 @@ class LimbController:
             speed: Speed of the controller's clock [-].
         """
         self._speed = speed
-        self._posture = np.array([posture[joint] for joint in self._joints])
+        self._posture = np.array([posture[joint] for joint in self._joints], dtype=float)
         # The controller itself is reset only when it is used, because most limbs are idle in most trials.
         self._start_ns = time_ns
         self._elapsed_ns, self._points, self._states = [], [], []

@@ -100,11 +100,10 @@ def _search(directory: Path, uri_of: Callable[[Path], str], robot: Robot) -> dic
     names = {}
     seen = 0
     for parent, directories, files in os.walk(directory):
-        directories.sort()
         seen += len(files) + len(directories)
         if seen > _MOST_ENTRIES:
             raise RequestError("RESULT_NOT_FOUND", f"{directory}: more than {_MOST_ENTRIES} files; name a part of it")
-        for path in (Path(parent, name) for name in sorted(files) if name.endswith(".urdf")):
+        for path in (Path(parent, name) for name in files if name.endswith(".urdf")):
             try:
                 if path.is_file() and path.stat().st_size <= _LARGEST_FILE:
                     names[uri_of(path)] = _spawnable_name(path, robot)
