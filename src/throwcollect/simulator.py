@@ -30,7 +30,7 @@ from throwcollect.sweep.plan import make_trials, refusal
 from throwcollect.sweep.points import Points, Targets
 from throwcollect.sweep.trials import Trial
 
-# Whoever takes the name hears what is missing, and not who simulates with it later.
+# The import of `Simulator` fails with the hint on the missing extra, and not the first throw.
 require("pinocchio")
 
 Point = Mapping[str, float]
@@ -99,7 +99,7 @@ class Simulator:
         point = dict(values or {})
         wrong = self.config.task.find_wrong_targets(target or {})
         wrong |= {
-            name: f"should be a number, got {each}" for name, each in (target or {}).items() if not isfinite(each)
+            name: f"should be a number, got {value}" for name, value in (target or {}).items() if not isfinite(value)
         }
         if wrong:
             raise ConfigError([Problem(reason, key=name) for name, reason in wrong.items()])

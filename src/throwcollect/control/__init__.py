@@ -3,8 +3,7 @@
 A `JointTrajectoryController` is driven by a clock and measured states; it knows neither messages nor simulations.
 """
 
-from throwcollect.control.controller import JointTrajectoryController
-from throwcollect.control.deviations import Deviations
+from throwcollect.control.controller import REPEATED, JointTrajectoryController
 from throwcollect.control.goal import JointTolerance, Trajectory, TrajectoryGoal, TrajectoryPoint
 from throwcollect.control.outcome import (
     ControllerState,
@@ -18,10 +17,10 @@ from throwcollect.control.outcome import (
 from throwcollect.control.parameters import Constraints, ControllerParameters, JointConstraints
 
 __all__ = [
+    "REPEATED",
     "Constraints",
     "ControllerParameters",
     "ControllerState",
-    "Deviations",
     "ErrorCode",
     "GoalResult",
     "GoalStatus",

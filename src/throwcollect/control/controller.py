@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from throwcollect.control.decision import CANCELED, Decision, Judge
-from throwcollect.control.deviations import Deviations
-from throwcollect.control.goal import Trajectory, TrajectoryGoal
-from throwcollect.control.log import mark_repeated
+from throwcollect.control.goal import Trajectory, TrajectoryGoal, TrajectoryPoint
+from throwcollect.control.interpolation import interpolate
+from throwcollect.control.motion import Motion
 from throwcollect.control.outcome import (
     ControllerState,
     GoalResult,
@@ -24,105 +24,114 @@ from throwcollect.control.outcome import (
 from throwcollect.control.parameters import ControllerParameters
 from throwcollect.control.stopping import brake
 from throwcollect.control.tolerances import Tolerances, default_tolerances, goal_tolerances
-from throwcollect.control.tracker import Tracker
 from throwcollect.control.validation import refusal
-from throwcollect.control.waypoints import Waypoints
+from throwcollect.control.waypoints import Waypoints, arrange
+
+REPEATED = "repeated"
+"""Attribute of log records that clients can cause as often as they like; it holds the subject of the record. A log may
+leave some of them out. All other records are one line for each goal, stop or decision."""
 
 _FAR_AHEAD_NS = 3600 * 10**9
 """A trajectory that starts so much later was most likely stamped by another clock."""
 
-_MOST_SPEED = 1000.0  # Upstream has no limit; far above this one, a step of the trajectory's clock fits no number.
+_MOST_SPEED = 1000.0
+"""Upstream has no limit. Far above this one, the time that the clock advances in a period fits no number."""
 
 
 class JointTrajectoryController:
     """Follows joint trajectories by commanding positions, as ros2_controllers' (Jazzy, 4.42) does.
 
-    Whoever drives it calls `update` once a control period, or, where nothing has to be decided, `take` for many at
-    once: both leave the controller in the same state. Between updates it is given goals, and their results are
-    fetched after every call with `pop_results`: a goal is decided in the update that upstream decides it in.
+    The caller begins with `reset`. It then calls `update` once a control period, or, where nothing has to be decided,
+    `take` for many periods at once: both leave the controller in the same state. Between updates it hands in goals. It
+    fetches their results with `pop_results` after every call, because a goal is decided in the update in which upstream
+    decides it.
 
     Args:
         name: Name of the controller, for texts.
-        parameters: What it is set to.
-        period_ns: Control period [ns]; a command is what is due one period after its update.
-        deviations: Where it differs from upstream.
+        parameters: Its parameters; later changes must keep the joints and the interfaces that are measured.
+        period_ns: Control period [ns], above 0; a command is what is due one period after its update.
+        holds_command: Whether joints that are stopped are held at the last command, so that joints which lag under load
+            do not sag. Otherwise they are held where they are measured, as upstream does.
+        topic_aborts_goal: Whether a trajectory from the topic aborts the goal that is being executed. Otherwise the
+            goal is judged on that trajectory, as upstream does.
 
-    Raises:
-        ValueError: If the period is not above 0.
+    Attributes:
+        command: Last commanded positions [rad], shape ``(n_joints,)``, read-only.
+        goal_id: Identity of the goal that is being executed; None if there is none.
+        logger: Gets one line for each refusal and each stop.
     """
 
+    command: NDArray[np.float64]
+    _motion: Motion
+    _measured: JointState
+    _time_ns: int
+
     def __init__(
-        self, name: str, parameters: ControllerParameters, *, period_ns: int, deviations: Deviations | None = None
+        self,
+        name: str,
+        parameters: ControllerParameters,
+        *,
+        period_ns: int,
+        holds_command: bool = False,
+        topic_aborts_goal: bool = False,
     ) -> None:
         self.name = name
         self.logger = logging.getLogger(f"throwcollect.control.{name}")
-        """Gets one line for each refusal and each stop."""
-        self._tracker = Tracker(name, parameters, period_ns=period_ns)
-        self._deviations = deviations or Deviations()
-        self._adopt(parameters)
+        self._period_ns = period_ns
+        self._holds_command = holds_command
+        self._topic_aborts_goal = topic_aborts_goal
+        self.parameters = parameters
         self._judge = self._judge_with(self._defaults)
-        self._goal_id: Hashable | None = None
+        self.goal_id: Hashable | None = None
         self._results: list[GoalResult] = []
+        self._scaling = 1.0
+        self._incoming: Trajectory | Waypoints | None = None
+        """The trajectory, or the hold, that begins with the next update; None if the present one goes on."""
         self._holding = True
 
     @property
     def parameters(self) -> ControllerParameters:
-        """What the controller is set to; tolerances that are changed are those of the next goal."""
+        """The parameters of the controller; changed tolerances hold from the next goal on."""
         return self._parameters
 
     @parameters.setter
     def parameters(self, parameters: ControllerParameters) -> None:
-        self._adopt(parameters)
-
-    @property
-    def goal_id(self) -> Hashable | None:
-        """Identity of the goal that is being executed, if any."""
-        return self._goal_id
+        self._parameters = parameters
+        self._defaults = default_tolerances(parameters.constraints, parameters.joints)
+        if parameters.cmd_timeout and not parameters.timeout:
+            values = f"({parameters.cmd_timeout:g} vs. {parameters.constraints.goal_time:g})"
+            problem = f"Command timeout must be higher than goal_time tolerance {values}; it is off."
+            self.logger.warning("%s: %s", self.name, problem, extra={REPEATED: "timeout"})
 
     @property
     def at_rest(self) -> bool:
-        """Whether, unless it is told something new, every further command equals the last and nothing is decided."""
-        if self._goal_id is not None or self._tracker.incoming is not None:
+        """Whether every further command equals the last and nothing is decided, until a goal or trajectory comes."""
+        if self.goal_id is not None or self._incoming is not None:
             return False
-        return self._tracker.motion.past_end and self.next_decision() == sys.maxsize
+        return self._motion.past_end and self.next_decision() == sys.maxsize
 
-    @property
-    def command(self) -> NDArray[np.float64]:
-        """Last commanded positions [rad], shape ``(n_joints,)``, read-only."""
-        return self._tracker.command
-
-    @property
-    def speed_scaling_factor(self) -> float:
-        """Speed of the trajectory's clock [-]."""
-        return self._tracker.scaling
-
-    def scale_speed(self, factor: float) -> bool:
-        """Let the trajectory's clock go at another speed [-]: slower below 1; 0 stops it.
-
-        Returns:
-            Whether it is taken over; the log says why not.
-        """
-        if 0 <= factor <= _MOST_SPEED:
-            self._tracker.scaling = factor
-            return True
-        rule = "Scaling factor has to be greater or equal to 0.0 - Ignoring input!"
-        problem = f"{rule} (got {factor:g}; expected 0 to {_MOST_SPEED:g})"
-        self.logger.warning("%s: %s", self.name, problem, extra=mark_repeated("speed"))
-        return False
+    def scale_speed(self, factor: float) -> None:
+        """Let the trajectory's clock go at another speed [-]: slower below 1; 0 stops it. Log wrong ones."""
+        if not 0 <= factor <= _MOST_SPEED:
+            rule = "Scaling factor has to be greater or equal to 0.0 - Ignoring input!"
+            problem = f"{rule} (got {factor:g}; expected 0 to {_MOST_SPEED:g})"
+            self.logger.warning("%s: %s", self.name, problem, extra={REPEATED: "speed"})
+        elif factor != self._scaling:
+            self._scaling = factor
+            self._motion.scale(factor)
 
     def reset(self, time_ns: int, measured: JointState) -> None:
-        """Begin, or begin anew after a reset of the simulation: a goal is aborted, the measured positions are held.
+        """Begin, or begin anew after a reset of the simulation: abort the goal, and hold the measured positions.
 
         Args:
             time_ns: Time now [ns].
             measured: State now.
-
-        Raises:
-            ValueError: If the state lacks what is to be measured.
         """
         self._finish(Decision.invalid("simulation was reset"))
-        self._tracker.restart(time_ns, measured)
-        self._hold(Waypoints.single(self._tracker.command))
+        self._time_ns, self._measured, self._scaling = time_ns, measured, 1.0
+        self._begin(Waypoints.single(measured.positions), measured)
+        self.command = self._motion.command
+        self._holding = True
 
     def submit(self, goal_id: Hashable, goal: TrajectoryGoal, now_ns: int) -> Refusal | None:
         """Accept a goal, which aborts the one before, or refuse it.
@@ -138,7 +147,7 @@ class JointTrajectoryController:
         if reason := self._refusal(goal.trajectory, now_ns):
             return reason
         self._finish(Decision.invalid("Current goal preempted by new incoming action."))
-        self._goal_id = goal_id
+        self.goal_id = goal_id
         tolerances = goal_tolerances(goal, self._defaults, self._parameters.joints, logger=self.logger)
         self._follow(goal.trajectory, self._judge_with(tolerances))
         return None
@@ -146,10 +155,8 @@ class JointTrajectoryController:
     def replace(self, trajectory: Trajectory, now_ns: int) -> Refusal | None:
         """Follow a trajectory from the topic instead of the present one, or refuse it.
 
-        Unless `Deviations` say otherwise, a goal that is being executed stays open and is judged on it.
-
         Args:
-            trajectory: What to follow.
+            trajectory: The trajectory.
             now_ns: Current time [ns].
 
         Returns:
@@ -157,9 +164,9 @@ class JointTrajectoryController:
         """
         if reason := self._refusal(trajectory, now_ns):
             return reason
-        if self._deviations.topic_aborts_goal:
+        if self._topic_aborts_goal:
             self._finish(Decision.invalid("Current goal preempted by a trajectory on the topic."))
-        self._follow(trajectory, self._judge if self._goal_id is not None else self._judge_with(self._defaults))
+        self._follow(trajectory, self._judge if self.goal_id is not None else self._judge_with(self._defaults))
         return None
 
     def refuse(self, reason: Refusal) -> Refusal:
@@ -168,43 +175,37 @@ class JointTrajectoryController:
         return Refusal(reason.error_code, f"{self.name}: {reason.text}")
 
     def cancel(self, goal_id: Hashable) -> bool:
-        """Cancel a goal and stop, from the state that was measured in the last update.
-
-        Args:
-            goal_id: Identity of the goal.
+        """Cancel a goal and stop, from the state that was measured last (see `observe`).
 
         Returns:
             Whether the goal was being executed.
-
-        Raises:
-            ValueError: If the measured state is unknown, since `take` was not followed by `observe`.
         """
-        if self._goal_id is None or self._goal_id != goal_id:
+        if self.goal_id is None or self.goal_id != goal_id:
             return False
         self._stop()
         self._finish(CANCELED)
         return True
 
-    def update(self, time_ns: int, period_ns: int, measured: JointState) -> NDArray[np.float64]:
+    def update(self, time_ns: int, measured: JointState) -> NDArray[np.float64]:
         """Command the next control period.
 
         Args:
-            time_ns: Time of this update [ns].
-            period_ns: Time since the update before, by which the trajectory's clock advances [ns].
+            time_ns: Time of this update, one period after the one before [ns].
             measured: State at this time.
 
         Returns:
             Positions to command [rad], shape ``(n_joints,)``, read-only.
-
-        Raises:
-            ValueError: If the controller was not begun (`reset`), or the state lacks what is to be measured.
         """
-        tracker = self._tracker
-        first = tracker.advance(time_ns, period_ns, measured)
-        decision = None if self._holding else self._decide(first=first)
+        self._time_ns, self._measured = time_ns, measured
+        begins = self._incoming is not None
+        if self._incoming is not None:
+            self._begin(self._incoming, measured)
+        else:
+            self._motion.advance()
+        decision = None if self._holding else self._decide(first=begins)
         if decision is None or decision.status is not GoalStatus.ABORTED:
-            tracker.send()
-        return tracker.command
+            self.command = self._motion.command
+        return self.command
 
     def next_decision(self) -> int:
         """Number of updates that can pass without the controller seeing the measured state.
@@ -215,42 +216,43 @@ class JointTrajectoryController:
         """
         if self._holding:
             return sys.maxsize
-        if self._tracker.incoming is not None:
+        if self._incoming is not None:
             return 0
-        updates = self._judge.updates_to_skip(self._tracker.motion, goal=self._goal_id is not None)
+        updates = self._judge.updates_to_skip(self._motion, goal=self.goal_id is not None)
         return sys.maxsize if updates is None else updates
 
     def take(self, n_updates: int) -> NDArray[np.float64]:
         """Make many updates at once, one control period after another, that need no measured state.
 
         Args:
-            n_updates: Number of updates, at most `next_decision`.
+            n_updates: Number of updates, from 1 to `next_decision`.
 
         Returns:
             Their commands [rad], shape ``(n_updates, n_joints)``, read-only.
-
-        Raises:
-            ValueError: If one of these updates needs the measured state.
         """
-        allowed = self.next_decision()
-        if not 0 <= n_updates <= allowed:
-            raise ValueError(f"{self.name}: cannot take {n_updates} updates; expected 0 to {allowed}")
-        if n_updates == 0:
-            return np.empty((0, len(self._tracker.command)))
-        return self._tracker.take(n_updates)
+        commands: NDArray[np.float64]
+        before_ns = self._time_ns
+        if self._incoming is None:
+            commands = self._motion.skip(n_updates)
+        else:
+            # Only a stop can be waiting here, and that does not depend on the measured state.
+            self._time_ns = before_ns + self._period_ns
+            self._begin(self._incoming, JointState(self.command))
+            motion, first = self._motion, self._motion.command
+            rows = motion.skip(n_updates - 1)
+            resting = motion.past_end and not motion.curve.end_ns
+            commands = np.broadcast_to(first, (n_updates, len(first))) if resting else np.vstack((first, rows))
+            commands.setflags(write=False)
+        self._time_ns = before_ns + n_updates * self._period_ns
+        self.command = commands[-1]
+        return commands
 
     def observe(self, measured: JointState) -> None:
         """Tell what the last of the updates that were taken would have measured.
 
-        `cancel`, `state` and `query` need it; an idle controller does not.
-
-        Args:
-            measured: State at the time of that update.
-
-        Raises:
-            ValueError: If the state lacks what is to be measured.
+        Call it after `take` and before `cancel`, `state` or `query`, which use what was measured last.
         """
-        self._tracker.observe(measured)
+        self._measured = measured
 
     def pop_results(self) -> tuple[GoalResult, ...]:
         """Results of the goals that have ended since the last call, oldest first."""
@@ -258,74 +260,77 @@ class JointTrajectoryController:
         return results
 
     def state(self, time_ns: int | None = None) -> ControllerState:
-        """What the last update has seen and done.
+        """State of the last update, which is the content of feedback while a goal is being executed.
 
         Args:
             time_ns: Time of what was observed last, if that was after the update [ns].
-
-        Returns:
-            The state; while a goal is being executed it is also the content of its feedback.
-
-        Raises:
-            ValueError: If there was no update yet, or `take` was not followed by `observe`.
         """
-        return self._tracker.state(time_ns)
+        motion, measured = self._motion, self._measured
+        time_ns = self._time_ns if time_ns is None else time_ns
+        clock_ns = motion.clock_ns + round((time_ns - self._time_ns) * self._scaling)
+        position, velocity, acceleration = motion.curve.state(clock_ns)
+        moving = () if measured.velocities is None else measured.velocities
+        return ControllerState(
+            stamp_ns=time_ns,
+            joint_names=self._parameters.joints,
+            desired=TrajectoryPoint(clock_ns, position, velocity, acceleration, np.zeros(len(position))),
+            actual=TrajectoryPoint(time_ns - motion.start_ns, measured.positions, moving),
+            error=TrajectoryPoint(0, position - measured.positions, np.zeros(len(moving))),
+            output=TrajectoryPoint(0, self.command),
+            speed_scaling_factor=self._scaling,
+        )
 
     def query(self, time_ns: int) -> TrajectoryState:
-        """The trajectory that is being followed, at a given time.
+        """The trajectory that is being followed, at an absolute time [ns]."""
+        motion = self._motion
+        if time_ns < motion.first_ns:
+            return TrajectoryState(False, self._measured.positions, self._measured.velocities)
+        time_from_start_ns = time_ns - motion.start_ns
+        return TrajectoryState(time_from_start_ns < motion.curve.end_ns, *motion.curve.state(time_from_start_ns))
 
-        Args:
-            time_ns: Absolute time [ns].
-
-        Returns:
-            Its state; with success if the time is between first update and end.
-
-        Raises:
-            ValueError: If `take` was not followed by `observe`.
-        """
-        return self._tracker.query(time_ns)
+    def _begin(self, incoming: Trajectory | Waypoints, state: JointState) -> None:
+        """Follow something else from the present update on, in which the joints are in the given state."""
+        start_ns = self._time_ns
+        if isinstance(incoming, Trajectory):
+            start_ns = incoming.stamp_ns or start_ns
+            incoming = arrange(incoming, self._parameters.joints, self.command, state, self._time_ns - start_ns)
+        curve = interpolate(incoming, state, self._time_ns - start_ns)
+        self._incoming = None
+        self._motion = Motion(
+            curve, start_ns=start_ns, first_ns=self._time_ns, period_ns=self._period_ns, scaling=self._scaling
+        )
 
     def _decide(self, *, first: bool) -> Decision | None:
-        motion = self._tracker.motion
-        if (decision := self._judge.decide(motion, self._tracker.measured, first=first)) is None:
+        motion = self._motion
+        if (decision := self._judge.decide(motion, self._measured, first=first)) is None:
             return None
         if decision.status is GoalStatus.ABORTED:
-            holds = "" if self._goal_id is not None else " (no goal is open; the trajectory of the topic ends)"
+            holds = "" if self.goal_id is not None else " (no goal is open; the trajectory of the topic ends)"
             self.logger.warning("%s: %s%s", self.name, decision.text, holds)
             self._stop()
-        elif self._goal_id is not None or self._judge.settled(motion):
+        elif self.goal_id is not None or self._judge.settled(motion):
             self._hold(Waypoints.single(*motion.curve.state(motion.curve.end_ns)))
         self._finish(decision)
         return decision
 
     def _follow(self, trajectory: Trajectory, judge: Judge) -> None:
-        self._tracker.incoming, self._judge, self._holding = trajectory, judge, False
+        self._incoming, self._judge, self._holding = trajectory, judge, False
 
     def _hold(self, waypoints: Waypoints) -> None:
-        self._tracker.incoming, self._holding = waypoints, True
+        self._incoming, self._holding = waypoints, True
 
     def _stop(self) -> None:
-        tracker, measured = self._tracker, self._tracker.measured
+        measured, constraints = self._measured, self._parameters.constraints
         if measured.velocities is not None:
-            constraints = self._parameters.constraints
             hardest = np.array([constraints.of(joint).max_deceleration_on_cancel for joint in self._parameters.joints])
-            self._hold(brake(measured.positions, measured.velocities, hardest, tracker.period_ns))
+            self._hold(brake(measured.positions, measured.velocities, hardest, self._period_ns))
         else:
-            self._hold(Waypoints.single(tracker.command if self._deviations.hold == "command" else measured.positions))
+            self._hold(Waypoints.single(self.command if self._holds_command else measured.positions))
 
     def _finish(self, decision: Decision) -> None:
-        if self._goal_id is not None:
-            end = (decision.status, decision.error_code, decision.text, self._tracker.time_ns)
-            self._results.append(GoalResult(self._goal_id, *end))
-            self._goal_id = None
-
-    def _adopt(self, parameters: ControllerParameters) -> None:
-        self._parameters = parameters
-        self._defaults = default_tolerances(parameters.constraints, parameters.joints)
-        if parameters.cmd_timeout and not parameters.timeout:
-            values = f"({parameters.cmd_timeout:g} vs. {parameters.constraints.goal_time:g})"
-            problem = f"Command timeout must be higher than goal_time tolerance {values}; it is off."
-            self.logger.warning("%s: %s", self.name, problem, extra=mark_repeated("timeout"))
+        if self.goal_id is not None:
+            self._results.append(GoalResult(self.goal_id, decision.status, decision.error_code, decision.text))
+            self.goal_id = None
 
     def _judge_with(self, tolerances: Tolerances) -> Judge:
         return Judge(tolerances, round(self._parameters.timeout * 1e9), self._parameters.joints)

@@ -1,4 +1,4 @@
-"""What an update decides about the trajectory that is being followed."""
+"""Decides in every update whether the trajectory that is being followed is over."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from throwcollect.control.tolerances import Limits, Tolerances, violations
 
 @dataclass(frozen=True)
 class Decision:
-    """A trajectory is over.
+    """Why a trajectory is over.
 
     Attributes:
-        status: Whether its end was reached or a tolerance broken.
-        error_code: Which tolerance.
-        text: In words; upstream's text comes first, as clients know it.
+        status: Whether its end was reached or a tolerance was broken.
+        error_code: Which tolerance was broken.
+        text: The reason in words; it begins with upstream's text, which clients know.
     """
 
     status: GoalStatus
@@ -49,15 +49,12 @@ class Judge:
     joints: Sequence[str]
 
     def decide(self, motion: Motion, measured: JointState, *, first: bool) -> Decision | None:
-        """Judge one update.
+        """Judge one update; None while the trajectory goes on, or its end waits for the joints.
 
         Args:
-            motion: What is being followed.
+            motion: The motion along the trajectory.
             measured: Measured state.
             first: Whether it is the motion's first update, in which the path is checked even if the end has come.
-
-        Returns:
-            The decision; None while the trajectory goes on, or its end waits for the joints.
         """
         past_end = motion.past_end
         if self.tolerances.path.any() and (first or not past_end):
@@ -82,14 +79,11 @@ class Judge:
         return None
 
     def updates_to_skip(self, motion: Motion, *, goal: bool) -> int | None:
-        """Number of updates that can pass without anything to decide.
+        """Number of updates that can pass without anything to decide; None if there will never be anything.
 
         Args:
-            motion: What is being followed.
+            motion: The motion along the trajectory.
             goal: Whether a goal waits for the end of it.
-
-        Returns:
-            Number of updates; None if there will never be anything.
         """
         tolerances = self.tolerances
         if tolerances.path.any() and not motion.past_end:

@@ -1,4 +1,4 @@
-"""What a controller is asked to do: trajectories and goals, as they arrive, not yet checked."""
+"""Trajectories and goals for a controller, as they arrive, not yet checked."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ class TrajectoryGoal:
     """A goal of control_msgs/action/FollowJointTrajectory.
 
     Attributes:
-        trajectory: What to follow.
+        trajectory: The trajectory to follow.
         path_tolerance: Tolerances while moving.
         goal_tolerance: Tolerances at the end.
         goal_time_tolerance_ns: How late the end may be reached [ns]: 0 keeps the controller's default, -1 s waits for

@@ -11,7 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from throwcollect.control.waypoints import CUBIC, LINE, QUINTIC, StartState, Waypoints
+from throwcollect.control.outcome import JointState
+from throwcollect.control.waypoints import CUBIC, LINE, QUINTIC, Waypoints
 
 
 @dataclass(frozen=True)
@@ -42,13 +43,9 @@ class Curve:
         return int(self.knots_ns[-1])
 
     def positions(self, times_ns: NDArray[np.int64]) -> NDArray[np.float64]:
-        """Positions at many times.
+        """Positions [rad], shape ``(n, n_joints)``, at times since the trajectory's start [ns], shape ``(n,)``.
 
-        Args:
-            times_ns: Times since the trajectory's start, none before the first knot [ns], shape ``(n,)``.
-
-        Returns:
-            [rad], shape ``(n, n_joints)``.
+        No time may be before the first knot.
         """
         return self._evaluate(self.position, times_ns)
 
@@ -78,18 +75,16 @@ class Curve:
         return value
 
 
-def interpolate(waypoints: Waypoints, start: StartState) -> Curve:
-    """Curve from a start state through the points.
+def interpolate(waypoints: Waypoints, start: JointState, start_ns: int) -> Curve:
+    """Curve from a start state through the points; if the first point's time has come, it begins there instead.
 
     Args:
         waypoints: The points.
         start: Where to begin.
-
-    Returns:
-        The curve; if the first point's time has come, it begins there and the start state is not used.
+        start_ns: When, since the trajectory's start [ns].
     """
-    if start.time_ns < waypoints.times_ns[0]:
-        waypoints = _lead_in(waypoints, start)
+    if start_ns < waypoints.times_ns[0]:
+        waypoints = _lead_in(waypoints, start, start_ns)
     durations_ns = np.append(np.diff(waypoints.times_ns), 1)
     if len(durations_ns) > 1:
         return _splines(waypoints, durations_ns)
@@ -125,14 +120,13 @@ def quintic(
     )
 
 
-def _lead_in(waypoints: Waypoints, start: StartState) -> Waypoints:
+def _lead_in(waypoints: Waypoints, start: JointState, start_ns: int) -> Waypoints:
     still = np.zeros_like(start.positions)
-    velocity, acceleration = (still if value is None else value for value in (start.velocities, start.accelerations))
     return Waypoints(
-        np.concatenate(([start.time_ns], waypoints.times_ns)),
+        np.concatenate(([start_ns], waypoints.times_ns)),
         np.vstack((start.positions, waypoints.positions)),
-        np.vstack((velocity, waypoints.velocities)),
-        np.vstack((acceleration, waypoints.accelerations)),
+        np.vstack((still if start.velocities is None else start.velocities, waypoints.velocities)),
+        np.vstack((still, waypoints.accelerations)),
         np.concatenate((waypoints.content[:1], waypoints.content)),
     )
 

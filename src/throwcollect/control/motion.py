@@ -18,7 +18,7 @@ class Motion:
     period later. An instance stands at its first update when it is made.
 
     Args:
-        curve: What is followed.
+        curve: The curve that is followed.
         start_ns: Absolute time of the trajectory's start [ns].
         first_ns: Absolute time of the first update [ns].
         period_ns: Control period [ns].
@@ -63,26 +63,12 @@ class Motion:
         self._scaling = scaling
         self._rebase(self.clock_ns)
 
-    def advance(self, period_ns: int) -> None:
-        """Go to the next update.
-
-        Args:
-            period_ns: Time since the update before [ns].
-        """
-        if period_ns == self._period_ns:
-            self._index += 1
-        else:
-            self._rebase(self.clock_ns + round(period_ns * self._scaling))
+    def advance(self) -> None:
+        """Go to the next update, one control period later."""
+        self._index += 1
 
     def skip(self, n_updates: int) -> NDArray[np.float64]:
-        """Go on by many control periods.
-
-        Args:
-            n_updates: Number of updates.
-
-        Returns:
-            Their commands [rad], shape ``(n_updates, n_joints)``, read-only.
-        """
+        """Go on by many control periods. Return their commands [rad], shape ``(n_updates, n_joints)``, read-only."""
         first = self._index + 1 + self._ahead
         self._index += n_updates
         return self._commands.positions(first, n_updates)
@@ -94,14 +80,7 @@ class Motion:
         return first_index_at(self.curve.end_ns - self._period_ns - self.clock_ns, self._step_ns) - 1
 
     def updates_until_late(self, tolerance_ns: int) -> int:
-        """Updates that follow before the one in which `since_end_ns` is above a tolerance.
-
-        Args:
-            tolerance_ns: [ns].
-
-        Returns:
-            Number of updates; negative when this one is late.
-        """
+        """Updates that follow before the one in which `since_end_ns` exceeds the tolerance; negative when it does."""
         left_ns = tolerance_ns - self.since_end_ns
         if left_ns < 0:
             return -1

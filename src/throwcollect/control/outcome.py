@@ -1,4 +1,4 @@
-"""What a controller reports: results of goals, and its state after an update."""
+"""Reports of a controller: results of goals, and its state after an update."""
 
 from __future__ import annotations
 
@@ -53,14 +53,12 @@ class GoalResult:
         status: How it ended.
         error_code: Why.
         error_string: Why, in words; empty for a cancelled goal.
-        stamp_ns: Time of the decision [ns].
     """
 
     goal_id: Hashable
     status: GoalStatus
     error_code: ErrorCode
     error_string: str
-    stamp_ns: int
 
 
 @dataclass(frozen=True)
@@ -78,17 +76,17 @@ class JointState:
 
 @dataclass(frozen=True)
 class ControllerState:
-    """What an update has seen and done: content of action feedback and of the controller's state topic.
+    """State of a controller in an update: the content of action feedback and of the controller's state topic.
 
     Fields are in the controller's joint order and empty where there is no interface.
 
     Attributes:
         stamp_ns: Time of the update [ns].
         joint_names: Joints of the controller.
-        desired: What was due (``reference`` of the state topic), timed by the trajectory's clock.
-        actual: What was measured (``feedback`` of the state topic), timed by the time that has really passed.
+        desired: The point that was due (``reference`` of the state topic), timed by the trajectory's clock.
+        actual: The measured state (``feedback`` of the state topic), timed by the simulated time that has passed.
         error: Desired minus actual; velocities are 0, as positions alone are commanded.
-        output: What is commanded.
+        output: The command.
         speed_scaling_factor: Speed of the trajectory's clock [-].
     """
 

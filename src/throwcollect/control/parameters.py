@@ -49,7 +49,7 @@ class Constraints:
 
 @dataclass(frozen=True)
 class ControllerParameters:
-    """What a position-commanded joint trajectory controller can be set to; an instance is valid.
+    """Parameters of a joint trajectory controller that commands positions; an instance is valid.
 
     Attributes:
         joints: Names of the joints, in the order of every array of the controller.

@@ -17,7 +17,7 @@ class Grid:
     """A curve at times that are one step apart; from the curve's end on its last position is held.
 
     Args:
-        curve: What is sampled.
+        curve: The curve that is sampled.
         origin_ns: Time of point 0, since the trajectory's start [ns].
         step_ns: Time from one point to the next [ns]; 0 stays at the origin.
     """
@@ -41,15 +41,7 @@ class Grid:
         return position
 
     def positions(self, first: int, count: int) -> NDArray[np.float64]:
-        """Positions at successive points.
-
-        Args:
-            first: Index of the first of them.
-            count: Their number.
-
-        Returns:
-            [rad], shape ``(count, n_joints)``, read-only.
-        """
+        """Positions at successive points [rad], shape ``(count, n_joints)``, read-only; `first` is an index."""
         stop = first + count
         moving_stop = min(stop, self.end_index if self._step_ns else first)
         if first >= moving_stop:
@@ -72,12 +64,7 @@ class Grid:
 
 
 def first_index_at(distance_ns: int, step_ns: int) -> int:
-    """Index of the first point that is at least a distance from the origin; `sys.maxsize` if there is none.
-
-    Args:
-        distance_ns: [ns].
-        step_ns: Time from one point to the next [ns].
-    """
+    """Index of the first point that is at least this far from the origin; `sys.maxsize` if there is none."""
     if distance_ns <= 0:
         return 0
     return -(-distance_ns // step_ns) if step_ns else sys.maxsize

@@ -17,8 +17,8 @@ from throwcollect.control.goal import JointTolerance, TrajectoryGoal
 from throwcollect.control.parameters import Constraints
 
 _ERASE = -1.0
+"""A goal switches a tolerance off with this number (control_msgs); upstream compares with the width below."""
 _ERASE_WIDTH = float(np.finfo(np.float32).eps)
-
 
 Limits = NDArray[np.float64]
 """Largest position errors of the joints [rad], shape ``(n_joints,)``; 0 is not checked."""
@@ -40,15 +40,7 @@ class Tolerances:
 
 
 def default_tolerances(constraints: Constraints, joints: Sequence[str]) -> Tolerances:
-    """Tolerances of trajectories that bring none of their own.
-
-    Args:
-        constraints: Those of the controller.
-        joints: Joints of the controller, in order.
-
-    Returns:
-        The parameters as arrays.
-    """
+    """Tolerances of trajectories that bring none of their own: the controller's parameters as arrays."""
     limits = [constraints.of(joint) for joint in joints]
     return Tolerances(
         path=np.array([limit.trajectory for limit in limits]),
@@ -63,15 +55,6 @@ def goal_tolerances(
     """Tolerances of one goal: its own where it has any, the defaults elsewhere.
 
     One illegal number or unknown joint makes the whole goal fall back to the defaults; the log says so.
-
-    Args:
-        goal: The goal.
-        defaults: Tolerances of the controller.
-        joints: Joints of the controller, in order.
-        logger: Log of the controller.
-
-    Returns:
-        The tolerances to put in force.
     """
     try:
         path = _merge(goal.path_tolerance, defaults.path, joints, "path_tolerance")
@@ -84,16 +67,7 @@ def goal_tolerances(
 
 
 def violations(error: NDArray[np.float64], limits: Limits, joints: Sequence[str]) -> str:
-    """Joints whose error is above their tolerance.
-
-    Args:
-        error: Position errors [rad], shape ``(n_joints,)``.
-        limits: Largest errors.
-        joints: Names of the joints.
-
-    Returns:
-        One phrase for each error that is too large; empty if there is none.
-    """
+    """One phrase for each joint whose position error [rad], shape ``(n_joints,)``, is above its limit, or nothing."""
     broken = np.flatnonzero((limits > 0) & (np.abs(error) > limits))
     return "; ".join(
         f"joint {joints[index]} has position {_describe(error[index], limits[index])}" for index in broken.tolist()
@@ -101,7 +75,7 @@ def violations(error: NDArray[np.float64], limits: Limits, joints: Sequence[str]
 
 
 def _describe(error: float, tolerance: float) -> str:
-    """An error that is above its tolerance, both with as many digits as it takes to see that."""
+    """Write an error and the tolerance below it with as many digits as it takes to see which is larger."""
     digits = next((n for n in range(6, 17) if f"{abs(error):.{n}g}" != f"{tolerance:.{n}g}"), 17)
     return f"error {error:.{digits}g} rad, tolerance {tolerance:.{digits}g} rad"
 

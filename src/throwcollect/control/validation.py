@@ -7,11 +7,11 @@ not finite and a negative first time are refused, as upstream would command nons
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
-from throwcollect.control.goal import Trajectory, Values
+from throwcollect.control.goal import Trajectory, TrajectoryPoint, Values
 from throwcollect.control.outcome import ErrorCode, Refusal
 from throwcollect.control.parameters import ControllerParameters
 
@@ -19,24 +19,35 @@ END_VELOCITY_LIMIT = float(np.finfo(np.float32).eps)
 """Largest magnitude of a last point's velocity that counts as zero [rad/s] (ros2_controllers)."""
 
 
+_FIELDS: tuple[tuple[str, Callable[[TrajectoryPoint], Values]], ...] = (
+    ("position", lambda point: point.positions),
+    ("velocity", lambda point: point.velocities),
+    ("acceleration", lambda point: point.accelerations),
+)
+
+
 def refusal(trajectory: Trajectory, parameters: ControllerParameters, now_ns: int) -> Refusal | None:
-    """Reason for which a trajectory cannot be executed.
-
-    Args:
-        trajectory: What has been asked for.
-        parameters: Those of the controller.
-        now_ns: Current time [ns].
-
-    Returns:
-        One sentence for the first rule that is broken, or None if the trajectory can be executed.
-    """
-    for rule, code in _RULES:
-        if (text := rule(trajectory, parameters, now_ns)) is not None:
-            return Refusal(code, text)
-    return None
+    """The first rule that a trajectory breaks at the present time [ns]; None if it can be executed."""
+    answers = _judge(trajectory, parameters, now_ns)
+    return next((Refusal(code, text) for code, text in answers if text is not None), None)
 
 
-def _too_few_joints(trajectory: Trajectory, parameters: ControllerParameters, _now_ns: int) -> str | None:
+def _judge(
+    trajectory: Trajectory, parameters: ControllerParameters, now_ns: int
+) -> Iterator[tuple[ErrorCode, str | None]]:
+    """Check one rule after the other; each may rely on those before it."""
+    yield ErrorCode.INVALID_JOINTS, _too_few_joints(trajectory, parameters)
+    yield ErrorCode.INVALID_GOAL, _no_points(trajectory)
+    yield ErrorCode.INVALID_JOINTS, _wrong_joints(trajectory, parameters)
+    yield ErrorCode.INVALID_GOAL, _wrong_sizes(trajectory, parameters)
+    yield ErrorCode.INVALID_GOAL, _not_finite(trajectory)
+    yield ErrorCode.INVALID_GOAL, _moving_end(trajectory, parameters)
+    yield ErrorCode.OLD_HEADER_TIMESTAMP, _over_already(trajectory, now_ns)
+    yield ErrorCode.INVALID_GOAL, _wrong_times(trajectory)
+    yield ErrorCode.INVALID_GOAL, _effort(trajectory)
+
+
+def _too_few_joints(trajectory: Trajectory, parameters: ControllerParameters) -> str | None:
     names, joints = trajectory.joint_names, parameters.joints
     if not parameters.allow_partial_joints_goal and len(names) != len(joints):
         counts = f"expected all {len(joints)} of {_join(joints)}; got {len(names)}: {_join(names)}"
@@ -46,11 +57,11 @@ def _too_few_joints(trajectory: Trajectory, parameters: ControllerParameters, _n
     return None
 
 
-def _no_points(trajectory: Trajectory, _parameters: ControllerParameters, _now_ns: int) -> str | None:
+def _no_points(trajectory: Trajectory) -> str | None:
     return None if len(trajectory.points) else "Empty trajectory received. (expected at least 1 point; got 0)"
 
 
-def _wrong_joints(trajectory: Trajectory, parameters: ControllerParameters, _now_ns: int) -> str | None:
+def _wrong_joints(trajectory: Trajectory, parameters: ControllerParameters) -> str | None:
     names, joints = trajectory.joint_names, parameters.joints
     for name in names:
         if name not in joints:
@@ -61,7 +72,7 @@ def _wrong_joints(trajectory: Trajectory, parameters: ControllerParameters, _now
     return None
 
 
-def _wrong_sizes(trajectory: Trajectory, parameters: ControllerParameters, _now_ns: int) -> str | None:
+def _wrong_sizes(trajectory: Trajectory, parameters: ControllerParameters) -> str | None:
     expected = len(trajectory.joint_names)
     integrates = parameters.allow_integration_in_goal_trajectories
     for index, point in enumerate(trajectory.points):
@@ -79,23 +90,18 @@ def _wrong_sizes(trajectory: Trajectory, parameters: ControllerParameters, _now_
     return None
 
 
-def _not_finite(trajectory: Trajectory, _parameters: ControllerParameters, _now_ns: int) -> str | None:
-    fields: list[tuple[str, Callable[[int], Values]]] = [
-        ("Position", lambda index: trajectory.points[index].positions),
-        ("Velocity", lambda index: trajectory.points[index].velocities),
-        ("Acceleration", lambda index: trajectory.points[index].accelerations),
-    ]
-    for field, values_of in fields:
-        present = [index for index in range(len(trajectory.points)) if len(values_of(index))]
-        values = np.array([values_of(index) for index in present], dtype=np.float64)
-        if not np.isfinite(values).all():
-            row, column = np.argwhere(~np.isfinite(values))[0]
-            where = f"{field} of joint {trajectory.joint_names[column]} at point #{present[row]}"
-            return f"{where} is not finite: {values[row, column]}"
+def _not_finite(trajectory: Trajectory) -> str | None:
+    for field, values_of in _FIELDS:
+        present = [(index, values) for index, point in enumerate(trajectory.points) if len(values := values_of(point))]
+        table = np.array([values for _, values in present], dtype=np.float64)
+        if not np.isfinite(table).all():
+            row, column = np.argwhere(~np.isfinite(table))[0]
+            where = f"{field.capitalize()} of joint {trajectory.joint_names[column]} at point #{present[row][0]}"
+            return f"{where} is not finite: {table[row, column]}"
     return None
 
 
-def _moving_end(trajectory: Trajectory, parameters: ControllerParameters, _now_ns: int) -> str | None:
+def _moving_end(trajectory: Trajectory, parameters: ControllerParameters) -> str | None:
     if parameters.allow_nonzero_velocity_at_trajectory_end:
         return None
     velocities = trajectory.points[-1].velocities
@@ -106,7 +112,7 @@ def _moving_end(trajectory: Trajectory, parameters: ControllerParameters, _now_n
     return None
 
 
-def _over_already(trajectory: Trajectory, _parameters: ControllerParameters, now_ns: int) -> str | None:
+def _over_already(trajectory: Trajectory, now_ns: int) -> str | None:
     if not trajectory.stamp_ns:
         return None
     end_ns = trajectory.stamp_ns + trajectory.points[-1].time_from_start_ns
@@ -116,7 +122,7 @@ def _over_already(trajectory: Trajectory, _parameters: ControllerParameters, now
     return f"Received trajectory with {times} (expected an end at {now_ns / 1e9:f} or later)"
 
 
-def _wrong_times(trajectory: Trajectory, _parameters: ControllerParameters, _now_ns: int) -> str | None:
+def _wrong_times(trajectory: Trajectory) -> str | None:
     times_ns = [point.time_from_start_ns for point in trajectory.points]
     if times_ns[0] < 0:
         return f"Time of point 0 is negative, it is {times_ns[0] / 1e9:f} (expected 0 or more)"
@@ -127,7 +133,7 @@ def _wrong_times(trajectory: Trajectory, _parameters: ControllerParameters, _now
     return None
 
 
-def _effort(trajectory: Trajectory, _parameters: ControllerParameters, _now_ns: int) -> str | None:
+def _effort(trajectory: Trajectory) -> str | None:
     for index, point in enumerate(trajectory.points):
         if len(point.effort):
             rule = "Trajectories with effort fields are only supported for controllers using the 'effort' command"
@@ -137,16 +143,3 @@ def _effort(trajectory: Trajectory, _parameters: ControllerParameters, _now_ns: 
 
 def _join(names: Sequence[str]) -> str:
     return ", ".join(names) or "none"
-
-
-_RULES: tuple[tuple[Callable[[Trajectory, ControllerParameters, int], str | None], ErrorCode], ...] = (
-    (_too_few_joints, ErrorCode.INVALID_JOINTS),
-    (_no_points, ErrorCode.INVALID_GOAL),
-    (_wrong_joints, ErrorCode.INVALID_JOINTS),
-    (_wrong_sizes, ErrorCode.INVALID_GOAL),
-    (_not_finite, ErrorCode.INVALID_GOAL),
-    (_moving_end, ErrorCode.INVALID_GOAL),
-    (_over_already, ErrorCode.OLD_HEADER_TIMESTAMP),
-    (_wrong_times, ErrorCode.INVALID_GOAL),
-    (_effort, ErrorCode.INVALID_GOAL),
-)

@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from throwcollect.control.goal import Trajectory, TrajectoryPoint, Values
+from throwcollect.control.outcome import JointState
 
 LINE, CUBIC, QUINTIC = 0, 1, 2
-"""What a point has besides positions: nothing, velocities, accelerations too."""
+"""Content of a point: positions alone, velocities too, accelerations too."""
 
 
 @dataclass(frozen=True)
@@ -23,7 +24,7 @@ class Waypoints:
         positions: [rad], shape ``(n_points, n_joints)``.
         velocities: [rad/s], shape ``(n_points, n_joints)``; 0 where a point has none.
         accelerations: [rad/s²], shape ``(n_points, n_joints)``; 0 where a point has none.
-        content: What a point has, shape ``(n_points,)``: `LINE`, `CUBIC` or `QUINTIC`.
+        content: Content of each point, shape ``(n_points,)``: `LINE`, `CUBIC` or `QUINTIC`.
     """
 
     times_ns: NDArray[np.int64]
@@ -39,52 +40,24 @@ class Waypoints:
         velocities: NDArray[np.float64] | None = None,
         accelerations: NDArray[np.float64] | None = None,
     ) -> Waypoints:
-        """One point at the trajectory's start, to be held.
-
-        Args:
-            positions: [rad], shape ``(n_joints,)``.
-            velocities: [rad/s], shape ``(n_joints,)``; None for 0.
-            accelerations: [rad/s²], shape ``(n_joints,)``; None for 0.
-
-        Returns:
-            The point.
-        """
+        """One point at the trajectory's start, to be held; velocities and accelerations of None are 0."""
         still = np.zeros(len(positions))
         rows = [still if row is None else row for row in (positions, velocities, accelerations)]
         p, v, a = (row[np.newaxis] for row in rows)
         return cls(np.zeros(1, np.int64), p, v, a, np.zeros(1, np.int64))
 
 
-@dataclass(frozen=True)
-class StartState:
-    """Where a trajectory begins.
-
-    Attributes:
-        time_ns: When, since the trajectory's start [ns]; points before it are over.
-        positions: [rad], shape ``(n_joints,)``.
-        velocities: [rad/s], shape ``(n_joints,)``; None for 0.
-        accelerations: [rad/s²], shape ``(n_joints,)``; None for 0.
-    """
-
-    time_ns: int
-    positions: NDArray[np.float64]
-    velocities: NDArray[np.float64] | None = None
-    accelerations: NDArray[np.float64] | None = None
-
-
 def arrange(
-    trajectory: Trajectory, joints: Sequence[str], command: NDArray[np.float64], start: StartState
+    trajectory: Trajectory, joints: Sequence[str], command: NDArray[np.float64], start: JointState, start_ns: int
 ) -> Waypoints:
-    """Points of a valid trajectory in the controller's joint order.
+    """Points of a valid trajectory for all joints of the controller, in the controller's order.
 
     Args:
-        trajectory: What has been asked for.
+        trajectory: The trajectory that was asked for.
         joints: Joints of the controller, in order.
         command: Last commanded positions [rad], shape ``(n_joints,)``: joints that are left out stay there.
         start: Where the trajectory begins: points without positions are integrated from there.
-
-    Returns:
-        The points for all joints of the controller.
+        start_ns: When, since the trajectory's start [ns]; points before that are over.
     """
     points = trajectory.points
     columns = [joints.index(name) for name in trajectory.joint_names]
@@ -99,7 +72,7 @@ def arrange(
     content[moving] = CUBIC
     content[[index for index in accelerating if content[index] == CUBIC]] = QUINTIC
     waypoints = Waypoints(times_ns, positions, velocities, accelerations, content)
-    return waypoints if len(placed) == len(points) else _integrate(waypoints, points, columns, start)
+    return waypoints if len(placed) == len(points) else _integrate(waypoints, points, columns, start, start_ns)
 
 
 def _table(
@@ -113,14 +86,14 @@ def _table(
 
 
 def _integrate(
-    waypoints: Waypoints, points: Sequence[TrajectoryPoint], columns: list[int], start: StartState
+    waypoints: Waypoints, points: Sequence[TrajectoryPoint], columns: list[int], start: JointState, start_ns: int
 ) -> Waypoints:
     """Fill in positions, and velocities too where a point has accelerations alone, by the trapezoidal rule."""
     positions, velocities, content = waypoints.positions.copy(), waypoints.velocities.copy(), waypoints.content.copy()
     still = np.zeros(positions.shape[1])
-    time_ns = min(start.time_ns, int(waypoints.times_ns[0]))
+    time_ns = min(start_ns, int(waypoints.times_ns[0]))
     p = start.positions
-    v, a = (still if values is None else values for values in (start.velocities, start.accelerations))
+    v, a = still if start.velocities is None else start.velocities, still
     for index, point in enumerate(points):
         seconds = (int(waypoints.times_ns[index]) - time_ns) / 1e9
         if not len(point.positions):

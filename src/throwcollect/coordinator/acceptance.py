@@ -1,4 +1,4 @@
-"""Whether an episode that arrives is the one that was asked for."""
+"""Compares episodes that arrive with what the coordinator has asked for."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from throwcollect.tasks.task import task_of
 from throwcollect.trial.conditions import Conditions, Settings, conditions_from_json
 
 _MOST_TOLD = 3
-"""Differences that are told of one episode."""
+"""Largest number of differences that the reason for refusing one episode names."""
 
 
 class Acceptance:
-    """Knows what each trial of a plan has to be simulated with.
+    """Works out the conditions that each trial of a plan has to be simulated under.
 
     Args:
         config: Configuration of the collection.
@@ -25,30 +25,27 @@ class Acceptance:
         self._build = build_digest(config.sim.engine)
         self._settings = Settings(config)
 
-    def find_difference(self, said: str, plan: Plan, trial: Trial, *, token: str) -> str | None:
+    def find_difference(self, text: str, plan: Plan, trial: Trial, *, token: str) -> str | None:
         """Why an episode is not the one that was asked for; None if it is.
 
         Args:
-            said: What the simulation says that it was simulated with, in JSON.
+            text: The conditions that the simulation names, in JSON.
             plan: The plan.
             trial: Its trial.
-            token: That of its lease.
+            token: Token of the lease.
         """
         try:
-            conditions = conditions_from_json(said)
+            conditions = conditions_from_json(text)
         except DatasetError as error:
             return error.message
-        differences = list(conditions.differences(self.expect(plan, trial, token=token)))
-        more = f" and {len(differences) - _MOST_TOLD} more" if len(differences) > _MOST_TOLD else ""
-        return "; ".join(differences[:_MOST_TOLD]) + more or None
-
-    def expect(self, plan: Plan, trial: Trial, *, token: str) -> Conditions:
-        """What a trial has to be simulated with, for the lease of a token."""
         config = plan.config_of(trial)
-        return Conditions(
+        expected = Conditions(
             build=self._build,
             settings=self._settings.digest,
             values=self._settings.find_replaced(config),
             trajectory=task_of(config).trajectory().digest,
             lease=token,
         )
+        differences = list(conditions.differences(expected))
+        more = f" and {len(differences) - _MOST_TOLD} more" if len(differences) > _MOST_TOLD else ""
+        return "; ".join(differences[:_MOST_TOLD]) + more or None

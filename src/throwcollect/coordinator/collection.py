@@ -1,4 +1,4 @@
-"""The trials of a plan on their way into the dataset, whoever simulates them and however that is reached.
+"""The trials of a plan on their way into the dataset, for any kind of simulation.
 
 It decides which trial a simulation gets next, whether an episode is the one that was asked for, and what is written. It
 knows no network and no processes: the coordinator's node drives it with simulations that it finds in the ROS graph, a
@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 import time
 from collections import Counter, deque
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from types import TracebackType
 
@@ -46,9 +46,9 @@ class TrialCollection:
 
     Attributes:
         writer: The dataset that is filled.
-        warn: Is told of trials that go to another simulation; to be replaced by whoever knows a log.
-        on_change: Is called when simulations may have other trials to do than before: the plan has grown, or none shall
-            be begun any more.
+        warn: Called with a warning when a trial goes to another simulation; the coordinator's node sets it to its log.
+        on_change: Called when the trials of simulations may have changed: the plan has grown, or no further trial shall
+            begin.
 
     Args:
         writer: A dataset that is open.
@@ -84,7 +84,8 @@ class TrialCollection:
 
         Args:
             directory: Directory of the dataset, as `prepare` or `resume` left it.
-            say: Is told how much was there, and before that how far the search has come, if it takes long.
+            say: Called with how many episodes were found, and before that with how far the search has come, if it takes
+                long.
             processes: As `DatasetWriter.recover` takes it.
 
         Raises:
@@ -92,20 +93,20 @@ class TrialCollection:
             ConfigError: If its ``config.yaml`` is wrong.
         """
         collection = cls(DatasetWriter.open(directory), directory)
-        found = 0
+        count = 0
         told = time.monotonic()
 
         def tell(trial: int, result: Result) -> None:
-            nonlocal found, told
+            nonlocal count, told
             # Episodes come file by file, so these are all of some files.
-            if found and time.monotonic() >= told + _TELL_EVERY_S:
+            if count and time.monotonic() >= told + _TELL_EVERY_S:
                 told = time.monotonic()
-                say(f"has found {format_count(found, 'episode')} of an earlier collection so far")
-            found += 1
+                say(f"has found {format_count(count, 'episode')} of an earlier collection so far")
+            count += 1
             collection.recall(trial, result)
 
         if collection.writer.recover(tell, processes=processes):
-            say(f"keeps {format_count(found, 'episode')} of an earlier collection")
+            say(f"keeps {format_count(count, 'episode')} of an earlier collection")
         return collection
 
     def __enter__(self) -> TrialCollection:
@@ -121,11 +122,6 @@ class TrialCollection:
     def backlog(self) -> int:
         """Number of episodes that have arrived but are not written yet."""
         return len(self._backlog)
-
-    @property
-    def draining(self) -> bool:
-        """Whether no more trials are leased."""
-        return self._draining
 
     @property
     def finished(self) -> bool:
@@ -153,63 +149,45 @@ class TrialCollection:
             self.on_change()
 
     def recall(self, trial: int, result: Result) -> None:
-        """Count a trial as ended whose episode is in the dataset already, before anything is leased.
-
-        Args:
-            trial: Number of the trial.
-            result: What came of it.
-        """
+        """Count a trial as ended whose episode is in the dataset already; only before anything is leased."""
         self._leases.recall(trial)
         self._note(trial, result)
         self._ends = deque([(time.monotonic(), self._leases.ended)])
 
     def join(self, simulation: str, name: str) -> None:
-        """Take note of a simulation that can be given trials.
-
-        Args:
-            simulation: Its address.
-            name: Name of its node.
-        """
+        """Note the address of a simulation that can be given trials, and the name of its node."""
         self._names[simulation] = name
         self._took_part.add(name)
 
     def leave(self, simulation: str, reason: str) -> None:
-        """Take its trials back from a simulation that is gone, and forget it; the next of its name is another one."""
+        """Take its trials back from a simulation that is gone, and forget it: the next of its name is another one."""
         self.take_back(simulation, reason)
         self._leases.forget(simulation)
         self._lookahead.forget(simulation)
         del self._names[simulation]
 
     def lease(self, simulation: str) -> tuple[int, ...]:
-        """Give further trials to a simulation that has few.
-
-        Returns:
-            All trials that it shall do, in their order.
-        """
+        """Give further trials to a simulation that has few; return all that it shall do, in their order."""
         held = self._leases.find_held(simulation)
-        wanted = self._lookahead.count_for(
+        count = self._lookahead.count_for(
             simulation, waiting=self._leases.waiting + len(held), simulations=len(self._names)
         )
-        if self._draining or len(held) > wanted // 2:
+        if self._draining or len(held) > count // 2:
             return held
         if not held:
             self._lookahead.begin(simulation)
-        while len(held) < wanted and (trial := self._leases.lease(simulation, others=self._names)) is not None:
+        while len(held) < count and (trial := self._leases.lease(simulation, others=self._names)) is not None:
             self.writer.note("lease", trial=trial, simulation=self.name_of(simulation))
             held = (*held, trial)
         return held
 
-    def values_of(self, trial: int) -> Mapping[str, float]:
-        """What a trial replaces of the configuration, by dotted key."""
-        return self.writer.plan.trial(trial).values
-
     def take_in(self, simulation: str, delivery: Delivery, token: str = "") -> None:
-        """Take an episode in, to be written by `write_one`; one that is not as it was asked for goes back.
+        """Take in an episode, which `write_one` writes later; refuse one that is not what was asked for.
 
         Args:
             simulation: The simulation that has handed it over, which holds its trial.
-            delivery: The episode, with what the simulation says of it.
-            token: That of its lease; empty if there was none.
+            delivery: The episode, with its result and its conditions.
+            token: Token of the lease; empty if there was none.
         """
         episode = delivery.episode
         trial = episode.header.trial
@@ -228,17 +206,11 @@ class TrialCollection:
         self._backlog.append((episode, result))
 
     def refuse(self, simulation: str, trial: int, reason: str) -> None:
-        """Take a trial back that a simulation could not do, or did otherwise; it may refuse all others, too.
-
-        Args:
-            simulation: Its address.
-            trial: The trial, which it holds.
-            reason: Why, kept as evidence.
-        """
+        """Take back a trial that a simulation could not do, or did otherwise; it may refuse all others, too."""
         self._give_back(simulation, trial, reason, self._leases.fail(simulation, trial, reason, refused=True))
 
     def take_back(self, simulation: str, reason: str, *, refused: bool = False) -> None:
-        """Take all trials back from a simulation; it failed with the first, the others it had not begun.
+        """Take all trials back from a simulation, which failed with the first and had not begun the others.
 
         Args:
             simulation: Its address.
@@ -260,18 +232,26 @@ class TrialCollection:
         self._note(episode.header.trial, result)
 
     def grow_plan(self) -> bool:
-        """Get on with the next round of the plan, for some milliseconds.
-
-        Returns:
-            Whether there was something to do.
+        """Work on the next round of the plan for some milliseconds, and return whether there was something to do.
 
         Raises:
             DatasetError: If the plan, or a shard that is complete without further trials, cannot be written.
         """
-        return self._growth is not None and self._grow(self._growth)
+        if self._growth is None:
+            return False
+        if self._growth.over:
+            self._growth = None
+            self.writer.close_plan()
+            return True
+        trials = None if self._draining else self._growth.step()
+        if trials:
+            self.writer.extend(trials)
+            self._leases.add(trials.numbers_to_run)
+            self.on_change()
+        return trials is not None
 
     def look_after(self) -> None:
-        """Have what is written survive a power cut, now and then, and end a collection that cannot go on.
+        """Make what is written survive a power cut, once a second, and end a collection that cannot go on.
 
         Raises:
             WorkerError: If every simulation refuses every trial.
@@ -282,9 +262,9 @@ class TrialCollection:
         if time.monotonic() >= self._synced_at + _SYNC_EVERY_S:
             self._synced_at = time.monotonic()
             self.writer.sync()
-        left = self._leases.total - self._leases.ended
+        remaining = self._leases.total - self._leases.ended
         settled = self._growth is None and not self._draining
-        if settled and not self._replay.begun and left <= _REPLAY_AHEAD_S * self._rate:
+        if settled and not self._replay.begun and remaining <= _REPLAY_AHEAD_S * self._rate:
             self._replay.begin(list(self.writer.plan.trials.numbers_to_run))
 
     def progress(self, hung: Iterable[str] = ()) -> Progress:
@@ -298,7 +278,7 @@ class TrialCollection:
         self._ends.append((now, ended))
         while self._ends[0][0] < now - _RATE_WINDOW_S:
             self._ends.popleft()
-        # Of a plan that ends when enough trials have succeeded, nobody knows how many trials it will have.
+        # The number of trials of a plan that ends when enough have succeeded is not known.
         expected = self._growth.most if self._growth is not None and self._config.until is None else 0
         return Progress(
             total=self._leases.total + expected,
@@ -318,7 +298,7 @@ class TrialCollection:
 
         Args:
             meanwhile: Called again and again while that process works.
-            say: Is told what was simulated again.
+            say: Called with a sentence on what was simulated again.
 
         Raises:
             Interrupted: If the collection was drained before its last trial.
@@ -332,34 +312,22 @@ class TrialCollection:
                 f"interrupted; what is finished is in {known or 'the volume'}",
                 hint=command("resume", known) if known else None,
             )
-        if (said := self._replay.compare(self.writer.digests(), meanwhile=meanwhile)) is not None:
-            say(said)
+        if (sentence := self._replay.compare(self.writer.digests(), meanwhile=meanwhile)) is not None:
+            say(sentence)
         outcomes = self.writer.finish(simulations=len(self._took_part) or None)
         lost = explain_loss(outcomes, hint=f"{command('resume', known)} runs them again" if known else None)
         if lost is not None:
             raise lost
 
     def name_of(self, simulation: str) -> str:
-        """Name of a simulation's node, also when it has left."""
+        """Name of a simulation's node, also after the simulation has left."""
         return self._names.get(simulation, simulation.strip("/"))
 
     @property
     def _rate(self) -> float:
-        """Trials that end in a second of real time, when it was last asked how far the collection has come."""
+        """Trials that ended per second of real time, as of the last call of `progress`."""
         (since, before), (now, ended) = self._ends[0], self._ends[-1]
         return (ended - before) / (now - since) if now > since else 0.0
-
-    def _grow(self, growth: Growth) -> bool:
-        if growth.over:
-            self._growth = None
-            self.writer.close_plan()
-            return True
-        trials = None if self._draining else growth.step()
-        if trials:
-            self.writer.extend(trials)
-            self._leases.add(trials.numbers_to_run)
-            self.on_change()
-        return trials is not None
 
     def _note(self, trial: int, result: Result) -> None:
         self._outcomes[result.outcome.value] += 1
@@ -367,13 +335,13 @@ class TrialCollection:
             self._growth.tell(trial, result)
 
     def _tell_set_aside(self) -> None:
-        aside = {each: reason for each in self._names if (reason := self._leases.why_set_aside(each)) is not None}
+        aside = {name: reason for name in self._names if (reason := self._leases.why_set_aside(name)) is not None}
         for simulation in aside.keys() - self._set_aside.keys():
             self.warn(f"{simulation}: gets no more trials, as others could do what it refused: {aside[simulation]}")
         self._set_aside = aside
 
     def _give_back(self, simulation: str, trial: int, reason: str, given_up: list[str] | None) -> None:
-        """Tell of a trial that goes to another simulation, or write that it is lost, with the reasons."""
+        """Report a trial that goes to another simulation, or record it as lost, with all reasons."""
         self.warn(f"{simulation}: trial {trial} is given to another simulation: {reason}")
         self.writer.note("fail", trial=trial, simulation=self.name_of(simulation), reason=reason)
         if given_up is not None:

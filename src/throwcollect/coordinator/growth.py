@@ -1,4 +1,4 @@
-"""Makes the further rounds of a plan that grows, a little at a time, while its trials are run."""
+"""Makes the further rounds of a plan that grows, piece by piece, while its trials are run."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class Growth:
         return 0 if self.over else self._rounds.limit - self._rounds.planned
 
     def tell(self, trial: int, result: Result) -> None:
-        """Take in what came of a trial."""
+        """Take in the result of a trial."""
         self._rounds.tell(trial, result)
 
     def step(self) -> Trials | tuple[()] | None:

@@ -1,4 +1,4 @@
-"""Which trial goes to which simulation next: a state machine without clocks, network or files."""
+"""Decides which trial goes to which simulation next: a state machine without clocks, network or files."""
 
 from __future__ import annotations
 
@@ -22,11 +22,15 @@ class Leases:
     Args:
         trials: Numbers of the trials to do.
         retries: How often a trial may come back before it is given up.
+
+    Attributes:
+        total: Number of trials in all.
+        ended: Number of trials that were completed or given up.
     """
 
     def __init__(self, trials: Iterable[int], *, retries: int) -> None:
         self._fresh = bytearray()
-        """Of each number, whether it is that of a trial that nobody has held yet; there may be millions."""
+        """For each number, whether that trial has not been handed out yet; bytes, as there may be millions."""
         self._next = 0
         """No trial below this one is fresh."""
         self._waiting_fresh = 0
@@ -38,20 +42,10 @@ class Leases:
         """Trials that a simulation has refused since it could do one, with the reasons."""
         self._wrong_refusals: dict[str, int] = {}
         """Number of trials that each simulation has refused and another one could do."""
-        self._total = 0
-        self._ended = 0
+        self.total = 0
+        self.ended = 0
         self._completed = 0
         self.add(trials)
-
-    @property
-    def total(self) -> int:
-        """Number of trials in all."""
-        return self._total
-
-    @property
-    def ended(self) -> int:
-        """Number of trials that were completed or given up."""
-        return self._ended
 
     @property
     def leased(self) -> int:
@@ -66,10 +60,10 @@ class Leases:
     @property
     def finished(self) -> bool:
         """Whether every trial was completed or given up."""
-        return self._ended == self._total
+        return self.ended == self.total
 
     def why_set_aside(self, simulation: str) -> str | None:
-        """Why a simulation gets no more trials: it has refused too many that others could do. None if it gets them."""
+        """Why a simulation gets no more trials, as it refused too many that others could do; None if it gets them."""
         if self._wrong_refusals.get(simulation, 0) < _MOST_IN_A_ROW:
             return None
         return self._refusals[simulation][-1][1]
@@ -85,7 +79,7 @@ class Leases:
         for trial in trials:
             self._fresh.extend(bytes(max(0, trial + 1 - len(self._fresh))))
             self._waiting_fresh += not self._fresh[trial]
-            self._total += not self._fresh[trial]
+            self.total += not self._fresh[trial]
             self._fresh[trial] = True
 
     def find_held(self, simulation: str) -> tuple[int, ...]:
@@ -93,14 +87,11 @@ class Leases:
         return tuple(self._held.get(simulation, ()))
 
     def lease(self, simulation: str, *, others: Collection[str] = ()) -> int | None:
-        """Give the next trial to a simulation.
+        """Give the next trial to a simulation; None when none is waiting for it.
 
         Args:
             simulation: Name of a simulation.
             others: Names of the other simulations that there are.
-
-        Returns:
-            Number of the trial, or None when none is waiting for it.
         """
         rivals = [other for other in others if other != simulation and not self._is_doubted(other)]
         if self.why_set_aside(simulation) is not None or (rivals and self._is_doubted(simulation)):
@@ -117,7 +108,7 @@ class Leases:
         return trial
 
     def recall(self, trial: int) -> None:
-        """Count a trial as completed that was so before any was handed out.
+        """Count a trial as completed that an earlier collection has completed.
 
         Raises:
             ValueError: If it does not wait to be handed out.
@@ -125,7 +116,7 @@ class Leases:
         if not self._fresh[trial]:
             raise ValueError(trial)
         self._take_fresh(trial)
-        self._ended += 1
+        self.ended += 1
 
     def complete(self, simulation: str, trial: int) -> None:
         """A simulation has done a trial that it held.
@@ -137,9 +128,9 @@ class Leases:
         self._refusals.pop(simulation, None)
         self._wrong_refusals.pop(simulation, None)
         for other, refused in self._refusals.items():
-            wrong = sum(each == trial for each, _ in refused)
+            wrong = sum(number == trial for number, _ in refused)
             self._wrong_refusals[other] = self._wrong_refusals.get(other, 0) + wrong
-        self._ended += 1
+        self.ended += 1
         self._completed += 1
 
     def fail(self, simulation: str, trial: int, reason: str, *, refused: bool = False) -> list[str] | None:
@@ -165,15 +156,15 @@ class Leases:
         if len(failures) <= self._retries:
             self._returned.append(trial)
             return None
-        self._ended += 1
+        self.ended += 1
         if self._completed:
-            # Nobody could do it, so that is the trial's fault.
+            # No simulation could do the trial, so its refusals are not held against them.
             for name, refusals in self._refusals.items():
-                self._refusals[name] = [each for each in refusals if each[0] != trial]
+                self._refusals[name] = [(number, why) for number, why in refusals if number != trial]
         return [f"{name}: {why}" for name, why in failures]
 
     def release(self, simulation: str) -> None:
-        """Take from a simulation all trials but the first, which runs; they were not begun, so nobody failed."""
+        """Take from a simulation all trials but the first, which runs; the others have not begun, so none failed."""
         held = self._held.get(simulation, [])
         self._returned += held[1:]
         del held[1:]

@@ -6,11 +6,11 @@ import math
 import time
 
 _AHEAD_S = 0.5
-"""Real time that the trials of a simulation last: what is lost with it, and what others wait for at the end."""
+"""Real time that the trials of a simulation last: as much is lost with it, and others wait as long at the end."""
 _MOST = 16
 """A list of more trials saves no time that could be measured."""
 _WEIGHT = 0.3
-"""Of the last trial in the mean time of a trial."""
+"""Weight of the last trial in the mean duration of a trial."""
 
 
 class Lookahead:
@@ -45,8 +45,8 @@ class Lookahead:
 
         Args:
             simulation: The simulation.
-            waiting: Number of trials that no simulation has.
-            simulations: Number of simulations that there are.
+            waiting: Number of trials that wait or that this simulation holds.
+            simulations: Number of simulations in the run.
         """
         duration = self._durations.get(simulation)
         if duration is None:

@@ -36,7 +36,7 @@ def run(directory: Path) -> None:
         LossError: If the dataset is finished, and trials of it are lost.
         Interrupted: If a signal ended the collection before its last trial.
     """
-    # The dataset is opened before there is a node: a large one takes its time, in which nobody would get an answer.
+    # The dataset is opened before the node exists, because opening a large one takes long and a node has to answer.
     with TrialCollection.open(directory, say=_say, processes=count_cores()) as collection:
         ros.init()
         if not ros.joins_protected():
@@ -51,7 +51,7 @@ def run(directory: Path) -> None:
         executor = ros.SingleThreadedExecutor()
         executor.add_node(node)
         check_answers(node, executor)
-        # All objects of now stay until the end, so the garbage collector need not go through them again and again.
+        # The present objects stay until the end, so the garbage collector need not go through them again and again.
         gc.freeze()
         heartbeat = Heartbeat()
 
@@ -69,7 +69,7 @@ def run(directory: Path) -> None:
 
 
 def _collect(node: Coordinator, collection: TrialCollection, executor: ros.Executor, heartbeat: Heartbeat) -> None:
-    """Have all trials run, or drain.
+    """Collect until all trials have ended, or those that run when it drains.
 
     Raises:
         WorkerError: If every simulation refuses every trial.
@@ -78,7 +78,7 @@ def _collect(node: Coordinator, collection: TrialCollection, executor: ros.Execu
     told = time.monotonic()
     while not collection.finished:
         heartbeat.beat()
-        # Simulations come first: what can wait is done when no message is there.
+        # Messages of simulations come first; other work is done when there is none.
         waiting = collection.backlog or collection.grow_plan()
         ros.spin_some(executor, timeout_sec=0.0 if waiting else _IDLE_S)
         if collection.backlog:

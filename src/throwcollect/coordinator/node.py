@@ -23,13 +23,13 @@ from throwcollect.trial.lease import Lease
 _DISCOVERY_PERIOD_S = 0.05
 _REPORT_PERIOD_S = 0.2
 _UNREADABLE_PERIOD_S = 10.0
-"""Time between two warnings of episodes that cannot be read, as whoever publishes such may do so often."""
+"""Time between two warnings of episodes that cannot be read, because anybody may publish such, and often."""
 _SHARED_PERIOD_S = 10.0
 """Time between two warnings of simulations that share a namespace."""
 _UNKNOWN = "_NODE_NAME_UNKNOWN_"
-"""What an RMW calls a node that it has not heard of yet, unlike its publisher."""
+"""An RMW gives this name to a node when it has heard of its publisher, and not yet of the node."""
 _REACH_S = 6.0
-"""Time after which a simulation counts as out of reach: nodes that see each other are connected within a second."""
+"""A simulation that cannot be asked for so long is out of reach: nodes usually connect within a second."""
 
 
 class Coordinator(Node):
@@ -50,7 +50,7 @@ class Coordinator(Node):
         self._visible: set[str] = set()
         self._unreached: dict[str, float] = {}
         self._signer = Signer.of_environment()
-        # With a real-time factor a trial takes as long as onlookers were promised, so the simulation is not lost.
+        # A real-time factor slows trials down on purpose; add that time before a simulation counts as lost.
         slowed_s = config.sim.max_trial_s / (config.sim.real_time_factor or math.inf)
         self._patience_s = config.run.trial_timeout_s + slowed_s
         self._showing = Showing(self)
@@ -82,7 +82,7 @@ class Coordinator(Node):
         self._notice_unreached(now)
 
     def _notice_unreached(self, now: float) -> None:
-        """Notice simulations that are in the graph and cannot be asked: the connection to them was never made whole."""
+        """Note since when simulations are in the graph and cannot be asked, because they are connected in part only."""
         reached = {namespace for namespace, simulation in self._simulations.items() if simulation.ready()}
         self._unreached = {
             namespace: self._unreached.get(namespace, now) for namespace in self._visible if namespace not in reached
@@ -90,7 +90,7 @@ class Coordinator(Node):
 
     @property
     def _unreachable(self) -> set[str]:
-        """Names of simulations that have been out of reach for too long; started again, they may well be within it."""
+        """Names of simulations that have been out of reach for too long; the launcher starts them again."""
         latest = time.monotonic() - _REACH_S
         return {self._collection.name_of(namespace) for namespace, since in self._unreached.items() if since < latest}
 
@@ -102,7 +102,7 @@ class Coordinator(Node):
             if name != simulation.name:
                 self._lose(namespace, "left the ROS graph")
             elif publishers - simulation.publishers:
-                # A node that died may count as there for a while, so the one in its place is seen first.
+                # The graph may keep a dead node for a while and show the one in its place before that ends.
                 self._lose(namespace, "was started again")
         for namespace in offered.keys() - self._simulations.keys():
             self._simulations[namespace] = SimulationClient(
@@ -131,7 +131,7 @@ class Coordinator(Node):
             if publishers:
                 self._visible.add(above or "/")
             names = publishers.keys() - {_UNKNOWN}
-            # Whoever else publishes there, the simulation sim_0 is the node sim_0 in the namespace /sim_0.
+            # If other nodes publish there too, the simulation is the node with the name of the namespace.
             names = names & {above.removeprefix("/")} or names
             if len(names) > 1:
                 self.get_logger().warning(
@@ -155,14 +155,14 @@ class Coordinator(Node):
             simulation.deadline = time.monotonic() + self._patience_s
 
     def _make_lease(self, namespace: str, trial: int) -> Lease:
-        return Lease.make(namespace, trial, self._collection.values_of(trial), self._signer)
+        return Lease.make(namespace, trial, self._collection.writer.plan.trial(trial).values, self._signer)
 
     def _receive(self, namespace: str, message: bytes) -> None:
         try:
             handed = unpack(message, self._signer)
             token = handed.token if isinstance(handed, Refusal) else conditions_from_json(handed.conditions).lease
         except DatasetError as error:
-            # Anybody may have sent it, so it says nothing about the simulation.
+            # Anybody may have sent it, so the simulation is not blamed.
             self.get_logger().warning(
                 f"{namespace}: an episode is dropped: {error}", throttle_duration_sec=_UNREADABLE_PERIOD_S
             )

@@ -27,15 +27,15 @@ _MANY_TRIALS = 500
 """From here on, checking trials side by side is worth the start of processes."""
 _TRIALS_A_PIECE = 100
 _MOST_PIECES = 10_000
-"""To hand over many more takes a minute, in which nothing is found and Ctrl-C has to wait."""
+"""To hand over many more pieces takes a minute, in which no trial is checked and Ctrl-C has no effect."""
 _TOLD_TRIALS = 20_000
-"""From here on it is told at once what goes on, as seconds pass until the first trials are checked."""
+"""From here on the user is told at once what happens, because seconds pass until the first trials are checked."""
 _TELL_FIRST_S = 2.0
 _TELL_EVERY_S = 10.0
 _SUNKEN_M = 0.01
-"""From this depth on, it is no matter of how a sole is modelled that a robot stands in the ground."""
+"""A robot that stands deeper in the ground is misplaced; less can come from the shape of its sole."""
 _LEAST_BYTES = 40
-"""Of a trial in the file of a plan: its digest and its seed, which nothing compresses."""
+"""Bytes that each trial takes in the file of a plan: its digest and its seed, which nothing compresses."""
 
 Say = Callable[[str], object]
 
@@ -48,7 +48,7 @@ def draw_plan(config: Config, *, directory: Path, processes: int = 1, say: Say =
         directory: Where a relative `sweep.file` is looked for: the directory of the configuration's file.
         processes: How many processes may check the trials of a large plan; more than one import the program that calls
             this, as those of `multiprocessing` do.
-        say: Is told now and then how many trials of a large plan have been checked.
+        say: Called now and then with how many trials of a large plan have been checked.
 
     Raises:
         ConfigError: If the sweep cannot be drawn, or no trial is left.
@@ -69,17 +69,17 @@ def _count_before(config: Config) -> int:
 
 
 def _check_trials(config: Config, points: Points, *, processes: int, say: Say) -> Plan:
-    """The plan of points, in which trials are refused that the robot cannot do; as `draw_plan`."""
+    """Make the plan of points, and refuse the trials that the robot cannot do (see `draw_plan`)."""
     if sentence := find_sunken_robot(config):
         say(sentence)
     count = len(points.values)
     size = max(_TRIALS_A_PIECE, count // _MOST_PIECES)
     if count >= _TOLD_TRIALS:
         say(f"plan: checks {count} trials")
-    # The first ones are small, so that something can be told soon.
+    # The first pieces are small, so that progress can be reported soon.
     firsts = [*range(0, min(size, count), _TRIALS_A_PIECE), *range(size, count, size)]
     pieces = [(first, points[first:stop]) for first, stop in pairwise([*firsts, count])]
-    found = work_side_by_side(
+    checked = work_side_by_side(
         pieces,
         _make_checked_trials,
         (config,),
@@ -87,8 +87,8 @@ def _check_trials(config: Config, points: Points, *, processes: int, say: Say) -
         doing="checks trials",
     )
     tell_at = time.monotonic() + _TELL_FIRST_S
-    trials = next(found)
-    for piece in found:
+    trials = next(checked)
+    for piece in checked:
         trials.extend(piece)
         if time.monotonic() >= tell_at:
             tell_at = time.monotonic() + _TELL_EVERY_S
@@ -118,7 +118,7 @@ def find_sunken_robot(config: Config) -> str | None:
 
 
 def _make_checked_trials(config: Config) -> Callable[[tuple[int, Points]], Trials]:
-    """Make what makes trials of the number of the first one and their points, refused where they cannot be run."""
+    """Make a function that makes the trials of some points, given the number of the first, and refuses as needed."""
     check = feasibility_check(config)
 
     def make(piece: tuple[int, Points]) -> Trials:
@@ -130,9 +130,9 @@ def _make_checked_trials(config: Config) -> Callable[[tuple[int, Points]], Trial
 
 
 def feasibility_check(config: Config) -> Check:
-    """Says of trials of a configuration why the robot cannot do them, in 1 to 5 ms each.
+    """Make a function that says why the robot cannot do a trial, in 1 to 5 ms each.
 
-    With `sweep.feasibility` nominal, it is the robot that somebody believes to have: what differs is not known to him.
+    With `sweep.feasibility` nominal, it asks about the robot as its owner believes it to be: without what differs.
 
     Raises:
         ConfigError: If the robot's files cannot be read.
@@ -144,7 +144,7 @@ def feasibility_check(config: Config) -> Check:
 
 
 def _believe(config: Config) -> Config:
-    """The configuration with the robot, the tool and the ball that nobody has measured: all numbers are defaults."""
+    """The configuration with the defaults in place of all numbers of robot, tool and ball that one has to measure."""
     robot, defaults = config.robot, RobotConfig()
     kept = {"name": robot.name, "posture": robot.posture, "locked": robot.locked, "base_height_m": robot.base_height_m}
     tool = type(config.tool).model_validate({"name": config.tool.name})
@@ -154,13 +154,12 @@ def _believe(config: Config) -> Config:
 
 
 def more_trials(plan: Plan) -> str:
-    """What is said behind the number of a plan's trials: whether more will follow, and how many."""
-    rounds = Rounds(plan.config) if plan.config.grows else None
-    if rounds is None or len(plan.trials) >= rounds.limit:
+    """Words that follow the number of a plan's trials: whether more will follow, and how many."""
+    if not plan.config.grows or len(plan.trials) >= (limit := Rounds(plan.config).limit):
         return ""
-    wanted = plan.config.until
-    until = f", until {wanted.wanted} have {wanted.outcome()}" if wanted else ""
-    return f"; more follow from their results{until}, at most {rounds.limit} in all"
+    goal = plan.config.until
+    until = f", until {goal.wanted} have {goal.outcome()}" if goal else ""
+    return f"; more follow from their results{until}, at most {limit} in all"
 
 
 def make_self_contained(config: Config) -> Config:
@@ -173,9 +172,7 @@ def make_self_contained(config: Config) -> Config:
 def read_listed_points(config: Config, *, directory: Path) -> Points | None:
     """All points of the list that a configuration names, whether its plan takes them or not; None if it names none.
 
-    Args:
-        config: The configuration.
-        directory: Where a relative `sweep.file` is looked for.
+    A relative `sweep.file` is looked for in the directory.
 
     Raises:
         ConfigError: If the list cannot be used.
@@ -184,14 +181,14 @@ def read_listed_points(config: Config, *, directory: Path) -> Points | None:
 
 
 def _check_room(directory: Path, trials: int) -> None:
-    """Make sure, before trials are checked for hours, that the disk is not too small for their plan at any rate.
+    """Refuse, before trials are checked for hours, a plan that is certainly too large for the disk.
 
     Raises:
-        ConfigError: If it is.
+        ConfigError: If it is too large.
     """
-    there = next((each for each in (directory, *directory.absolute().parents) if each.is_dir()), None)
-    least, free = trials * _LEAST_BYTES, None if there is None else shutil.disk_usage(there).free
-    if free is not None and free < least:
+    parent = next(path for path in (directory, *directory.absolute().parents) if path.is_dir())
+    least, free = trials * _LEAST_BYTES, shutil.disk_usage(parent).free
+    if free < least:
         sizes = f"takes {least / 1e6:.1f} MB or more, and {free / 1e6:.1f} MB are free"
         raise ConfigError(
             f"{directory}: a plan of {trials} trials {sizes}",
@@ -212,7 +209,7 @@ def prepare(
         say: As `draw_plan` takes it.
 
     Raises:
-        ConfigError: If the sweep or the directory cannot be used; nothing is left behind then.
+        ConfigError: If the sweep or the directory cannot be used; nothing stays on the disk then.
         WorkerError: If a process that checks trials is killed.
     """
     _check_room(directory, _count_before(config))
@@ -223,6 +220,6 @@ def prepare(
     try:
         create(directory, plan, listed=read_listed_points(config, directory=sweep_directory))
     except DatasetError as error:
-        # Nothing has been started yet, so what is wrong is the choice of the directory.
+        # Nothing has been started yet, so the error is in the choice of the directory.
         raise ConfigError(error.message, hint=error.hint) from error
     return plan

@@ -1,4 +1,4 @@
-"""What the coordinator tells about its progress; `topics` carries it."""
+"""The progress of a collection, as the coordinator publishes it (see `topics`)."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from throwcollect.wording import format_count
 
 @dataclass(frozen=True)
 class Progress:
-    """The state of a collection, whole in every message, so that anybody may join late.
+    """The state of a collection; each message has all of it, so that a subscriber may join late.
 
     Attributes:
         total: Number of trials to run; with `wanted`, of those that are known so far.
@@ -25,7 +25,7 @@ class Progress:
         wanted: Number of trials that are to succeed; None if the collection ends with its plan.
         set_aside: Why simulations get no more trials, by their names.
         success: Outcome of trials that succeeded.
-        noun: What a trial is called.
+        noun: Word for a trial.
     """
 
     total: int
@@ -56,7 +56,7 @@ class Progress:
 
     @property
     def steps(self) -> tuple[int, int]:
-        """How far it has come and has to go: in trials that succeeded if a number of them is wanted, else in trials."""
+        """Number of trials done and to do; of those that succeed, if the collection ends with a number of them."""
         if self.wanted is None:
             return self.ended, self.total
         return min(self.succeeded, self.wanted), self.wanted
@@ -64,12 +64,11 @@ class Progress:
     @property
     def counts(self) -> str:
         """Trials that succeeded and that failed, simulations and speed, in one line."""
-        parts = [f"{self.succeeded} {self.success}", *self._others]
-        return ", ".join(parts)
+        return ", ".join([f"{self.succeeded} {self.success}", *self._others])
 
     @property
     def line(self) -> str:
-        """All of it that people want to see, in one line."""
+        """The progress in one line, for people."""
         if self.wanted is None:
             return f"{self.ended}/{format_count(self.total, self.noun)}: {self.counts}"
         succeeded = f"{self.succeeded}/{self.wanted} {self.success}"
@@ -82,12 +81,12 @@ class Progress:
         return [f"{self.failed} failed", *lost, simulations, f"{self.throws_per_s:.1f} {self.noun}s/s"]
 
     def to_json(self) -> str:
-        """All of it as JSON, as `read` takes it."""
+        """The progress as JSON, for `read`."""
         return json.dumps(asdict(self))
 
     @classmethod
     def read(cls, text: str) -> Progress | None:
-        """Progress from its JSON; None if somebody else has published something else there."""
+        """Progress from its JSON; None if the text is anything else, as anybody may publish on the topic."""
         try:
             return _PROGRESS.validate_json(text, strict=True)
         except ValidationError:

@@ -21,7 +21,7 @@ from throwcollect.wording import format_count
 class ReplayCheck:
     """Compares episodes with what a process that knows nothing but configuration and plan makes of their trials.
 
-    Such a process takes a second before its first trial. So it can be begun while the last trials are still with
+    Such a process takes a second before its first trial. So it can begin while the last trials are still with
     simulations, by a guess at which will be chosen. What is compared in the end does not depend on that guess.
 
     Attributes:
@@ -44,7 +44,7 @@ class ReplayCheck:
         """Begin with the trials that are chosen if all of these get an episode.
 
         Args:
-            trials: Numbers of trials of the plan, which is complete.
+            trials: Numbers of all trials of the plan that are to run.
 
         Raises:
             OSError: If no process can be started.
@@ -54,14 +54,11 @@ class ReplayCheck:
             self._early = _Process(self._directory, chosen)
 
     def compare(self, digests: Mapping[int, str], *, meanwhile: Callable[[], None]) -> str | None:
-        """Compare some of the episodes.
+        """Compare some of the episodes, and return a sentence on that; None if there was nothing to compare.
 
         Args:
             digests: Digest of each episode, by trial.
             meanwhile: Called again and again while a process works.
-
-        Returns:
-            What was done, in words; None if nothing was to be done.
 
         Raises:
             DatasetError: If an episode came out otherwise.
@@ -70,7 +67,7 @@ class ReplayCheck:
         trials = choose_trials(sorted(digests), count=self._count, seed=self._seed)
         again: dict[int, str] = {}
         if self._early is not None:
-            # A trial that was lost may well never end there, either.
+            # The process is not waited for if its guess was wrong: a trial that was lost may never end there, either.
             if self._early.trials == trials:
                 self._early.wait(meanwhile)
             self._early.end()
@@ -103,14 +100,17 @@ class _Process:
 
     Attributes:
         trials: The trials.
-        digests: What it has printed, by trial; empty until `end`.
+        digests: Those that it has printed, by trial; empty until `end`.
+        errors: Text of its standard error; empty until `end`.
+        exit_code: Its exit code; None until `end`.
     """
 
     def __init__(self, directory: Path, trials: Sequence[int]) -> None:
         self.trials = trials
         self.digests: dict[int, str] = {}
-        self._errors = ""
-        # Files, as nobody reads while it works, and a pipe that is full would stop it.
+        self.errors = ""
+        self.exit_code: int | None = None
+        # Files instead of pipes, because nobody reads while it works, and a full pipe would stop it.
         self._printed, self._said = TemporaryFile(), TemporaryFile()  # noqa: SIM115 - closed at its end
         self._process = subprocess.Popen(
             [sys.executable, "-m", "throwcollect", "simulate", str(directory), *map(str, trials)],
@@ -126,22 +126,15 @@ class _Process:
             meanwhile()
 
     def end(self) -> None:
-        """End it, whatever it does; more than once is not needed, and does no harm."""
+        """Kill it; a second call does no harm."""
         self._process.kill()
-        self._process.wait()
+        self.exit_code = self._process.wait()
         if not self._printed.closed:
             with self._printed, self._said:
                 lines = _contents(self._printed).splitlines(keepends=True)
-                self._errors = _contents(self._said).strip()
-            self.digests = {each["trial"]: each["digest"] for each in (json.loads(x) for x in lines if x[-1] == "\n")}
-
-    def failure(self) -> WorkerError:
-        """Why trials are missing, once it has ended."""
-        counted = format_count(len(self.trials), "trial")
-        return WorkerError(
-            f"{counted} could not be simulated again (exit code {self._process.returncode})",
-            evidence=self._errors or None,
-        )
+                self.errors = _contents(self._said).strip()
+            whole = (json.loads(line) for line in lines if line[-1] == "\n")
+            self.digests = {printed["trial"]: printed["digest"] for printed in whole}
 
 
 def _simulate(directory: Path, trials: Sequence[int], meanwhile: Callable[[], None]) -> Mapping[int, str]:
@@ -156,10 +149,13 @@ def _simulate(directory: Path, trials: Sequence[int], meanwhile: Callable[[], No
     finally:
         process.end()
     if len(process.digests) < len(trials):
-        raise process.failure()
+        counted = format_count(len(trials), "trial")
+        raise WorkerError(
+            f"{counted} could not be simulated again (exit code {process.exit_code})", evidence=process.errors or None
+        )
     return process.digests
 
 
 def _contents(file: IO[bytes]) -> str:
-    # The process writes where the two of them stand in the file, so that stays where it is.
+    # The process shares the file's position and writes there, so read without moving it.
     return os.pread(file.fileno(), os.fstat(file.fileno()).st_size, 0).decode(errors="replace")

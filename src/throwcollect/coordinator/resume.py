@@ -1,8 +1,8 @@
-"""Goes on with a dataset that a collection has left, whatever ended it: makes sure of its configuration and plan."""
+"""Prepares a dataset that a collection has left for the next one, by its configuration and its plan."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Collection
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,7 +12,7 @@ from throwcollect.config.loader import dump_yaml, load, load_locating_errors
 from throwcollect.config.problems import quote
 from throwcollect.config.schema import Config
 from throwcollect.config.values import differences
-from throwcollect.coordinator.prepare import draw_plan, make_self_contained, prepare, read_listed_points
+from throwcollect.coordinator.prepare import Say, draw_plan, make_self_contained, prepare, read_listed_points
 from throwcollect.dataset.directory import CONFIG, METADATA, PLAN, SHARD_SUFFIX, SOURCES, TRIALS, config_path
 from throwcollect.dataset.lock import hold_lock
 from throwcollect.dataset.manifest import is_as_written
@@ -27,11 +27,9 @@ from throwcollect.sweep.point_file import encode_points
 from throwcollect.tasks.result import LOST
 from throwcollect.wording import command
 
-Say = Callable[[str], None]
-
 _MAY_GROW = ("trials", "until")
 _MUCH_BYTES = 50_000_000
-"""A core takes a second to look through so much."""
+"""A core takes a second to look through so many bytes."""
 
 
 def begun(directory: Path) -> bool:
@@ -42,7 +40,7 @@ def begun(directory: Path) -> bool:
 def resume(
     config: Config, directory: Path, *, sweep_directory: Path, check: bool = False, say: Say = lambda _: None
 ) -> Plan:
-    """Have a dataset's directory hold a configuration and its plan, of which some trials may have run already.
+    """Write a configuration and its plan into a dataset's directory; some of its trials may have run already.
 
     A finished dataset of which a file is missing or damaged counts as unfinished from then on.
 
@@ -51,7 +49,7 @@ def resume(
         directory: Directory of the dataset.
         sweep_directory: Where a relative `sweep.file` is looked for, should the plan be made anew.
         check: Whether the files of a finished dataset are compared byte for byte, and not only by their sizes.
-        say: Told what of a finished dataset is missing or damaged, and what the coordinator has to look through.
+        say: Called with what of a finished dataset is missing or damaged, and with how much there is to look through.
 
     Raises:
         ConfigError: If the configuration is another one, or has fewer trials, or other ones.
@@ -71,7 +69,7 @@ def resume(
                 hint=f"{command('up', 'CONFIG', '--resume', directory)}, with the file that sweep.file of CONFIG names",
             )
         if old is not None and PLAN in damaged and (not config.grows or find_wrong_trials(old)):
-            # It is drawn again; one that grew with the results cannot be, and stays if its trials are what they were.
+            # The plan is drawn again. One that grew with the results cannot be, and stays if its trials are intact.
             old = None
         remove_unfinished(directory)
         plan = _write(config, directory, sweep_directory, stored, old, damaged, say)
@@ -80,11 +78,7 @@ def resume(
 
 
 def prepare_or_resume(path: Path, directory: Path) -> Plan:
-    """Have a directory hold the plan of a configuration's file: a new one, or the one that an earlier collection left.
-
-    Args:
-        path: The configuration's file.
-        directory: Directory of the dataset.
+    """Write the plan of a configuration's file into a dataset's directory, or keep that of an earlier collection.
 
     Raises:
         ConfigError: If the configuration, the sweep or the directory cannot be used.
@@ -113,14 +107,14 @@ def _write(
     else:
         plan = replace(old, config=config)
     if damaged or (stored is not None and stored.without_run() != config.without_run()):
-        # It was perhaps finished by the configuration that it had, or with files that are not there any more.
+        # The dataset may be finished only by its earlier configuration, or by files that are gone.
         remove(directory / METADATA)
-    # A finished dataset stays as it is, and says nothing of how it is run.
+    # A finished dataset stays as it is, without the keys that say how it is run.
     kept = config.without_run() if finished(directory, plan) else config
     replanned = old is None or plan.trials != old.trials or kept.without_run() != old.config.without_run()
     if stored != kept:
         if replanned:
-            # A plan that does not belong to its configuration is nobody's; a missing one is made again.
+            # No kill may leave a plan beside another configuration; a missing plan is made again.
             remove(directory / PLAN)
         write_file(directory / CONFIG, dump_yaml(kept).encode())
     if replanned or PLAN in damaged:
@@ -129,7 +123,7 @@ def _write(
 
 
 def _announce_search(directory: Path, say: Say) -> None:
-    """Say how much an earlier collection has left, if looking through it takes long."""
+    """Report the size of what an earlier collection has left, if looking through it takes long."""
     if is_there(directory / METADATA):
         return
     size = sum(path.lstat().st_size for path in directory.glob(f"*{SHARD_SUFFIX}*"))
@@ -141,7 +135,7 @@ def _find_damaged(directory: Path, plan: Plan | None, *, check: bool, say: Say) 
     """Names of the files of a finished dataset that are missing or damaged; none if it is not finished.
 
     Raises:
-        DatasetError: If the list of what the dataset was derived from is among them, as nothing else has it.
+        DatasetError: If the list of sources of a derived dataset is among them, as it cannot be made again.
     """
     if not is_there(directory / METADATA):
         return frozenset()
@@ -167,15 +161,15 @@ def finished(directory: Path, plan: Plan) -> bool:
 
 
 def _read_stored_config(directory: Path) -> Config | None:
-    """The configuration that a dataset was begun with; None unless it is there from its first key to its last."""
+    """The configuration that a dataset was begun with; None unless its file is complete."""
     try:
         path = config_path(directory)
         config = load(path)
-        # A finished dataset of an earlier version has fewer keys, and stays as its manifest says.
-        whole = path.read_text(encoding="utf-8") == dump_yaml(config) or is_as_written(directory, CONFIG)
+        # A finished dataset of an earlier version has fewer keys, and counts as complete if its manifest says so.
+        complete = path.read_text(encoding="utf-8") == dump_yaml(config) or is_as_written(directory, CONFIG)
     except (ConfigError, OSError):
         return None
-    return config if whole else None
+    return config if complete else None
 
 
 def _read_stored_plan(directory: Path, stored: Config | None, config: Config) -> Plan | None:
@@ -188,22 +182,17 @@ def _read_stored_plan(directory: Path, stored: Config | None, config: Config) ->
                 hint=f"restore {CONFIG}, or remove {PLAN} if it is the one that is wrong",
             ) from error
         if stored is None:
-            # A power cut may have cost the configuration; then only the plan can tell that it was this one.
+            # If a power cut has cost the configuration, only the plan can tell whether the given one was its own.
             hint = f"{command('up', 'CONFIG', '--resume', directory)}, as at first"
             raise DatasetError(error.message, hint=hint) from error
         return None
 
 
 def refuse_changes(directory: Path, stored: Config, config: Config) -> None:
-    """Refuse another configuration than the one that a dataset was begun with.
-
-    Args:
-        directory: Directory of the dataset.
-        stored: The configuration that it was begun with.
-        config: The other one, which may differ in how it is run, and may let a plan grow further.
+    """Refuse a configuration that differs from the stored one, with which a dataset was begun.
 
     Raises:
-        ConfigError: If it differs in anything else.
+        ConfigError: If it differs in anything else than how it is run, or how far its plan may grow.
     """
     changed = differences(stored.without_run(), config.without_run())
     problems = [
@@ -216,7 +205,7 @@ def refuse_changes(directory: Path, stored: Config, config: Config) -> None:
 
 
 def _grows(before: int | None, after: int | None, config: Config) -> bool:
-    """Whether a number of trials may take the place of another; none is the largest."""
+    """Whether a number of trials may replace an earlier one; None stands for no limit."""
     if not config.grows:
         # `_extend` compares the trials of a plan that does not grow.
         return True

@@ -1,6 +1,6 @@
-"""Shows the newest episodes to whoever looks on: once a second, and only while somebody does.
+"""Publishes the newest episodes for onlookers, once a second, and only while a topic has subscribers.
 
-Nobody but the coordinator may subscribe to the episodes themselves: a simulation waits until all who do have got each.
+Onlookers must not subscribe to the episodes themselves, because a simulation waits until all subscribers have got each.
 """
 
 from __future__ import annotations
@@ -41,8 +41,8 @@ class Showing:
             self._newest[simulation] = message
 
     def _show(self) -> None:
-        self._watched = {each for each, publisher in self._publishers.items() if publisher.get_subscription_count()}
-        self._newest = {each: message for each, message in self._newest.items() if each in self._watched}
+        self._watched = {name for name, publisher in self._publishers.items() if publisher.get_subscription_count()}
+        self._newest = {name: message for name, message in self._newest.items() if name in self._watched}
         if self._newest:
             simulation = next(iter(self._newest))
             self._publishers[simulation].publish(self._newest.pop(simulation))

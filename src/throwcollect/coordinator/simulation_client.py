@@ -1,4 +1,4 @@
-"""One simulation as the coordinator sees it: what it is sent for a trial, and what it answers."""
+"""One simulation as the coordinator sees it: leases go there, episodes and refusals come back."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from throwcollect.trial.lease import LEASES, Lease, leases_to_json
 from throwcollect.wording import format_count
 
 _ANSWER_S = 5.0
-"""Leases are answered within milliseconds, or between two slices of a trial; what is not answered in this real time
-went astray, as on the way through a router that was started again."""
+"""A request without an answer in this real time got lost, as when the router is started again. Others are answered
+within milliseconds, or between two slices of a trial."""
 
 EPISODE_TOPIC = "episode"
 EPISODE_QOS = QoSProfile(history=HistoryPolicy.KEEP_ALL, reliability=ReliabilityPolicy.RELIABLE)
@@ -86,7 +86,7 @@ class SimulationClient:
             trials: All trials that it shall do, in their order.
 
         Returns:
-            Whether it was not asked for just these already.
+            Whether that is another request than the last one.
         """
         if tuple(trials) == self.trials:
             return False
@@ -96,10 +96,10 @@ class SimulationClient:
         return True
 
     def remind(self) -> str | None:
-        """Ask once more if there was no answer, with new leases, as episodes of the old ones may be lost, too.
+        """Ask once more if there was no answer, with new leases, because episodes of the old ones may be lost, too.
 
         Returns:
-            What had no answer, in words; None if there is nothing to remind of yet.
+            The number of trials asked for, in words; None if there is no reason to ask again yet.
         """
         if not self.unanswered or time.monotonic() < self._sent_at + self._patience_s:
             return None
@@ -110,13 +110,10 @@ class SimulationClient:
         return format_count(len(self._leases), "trial")
 
     def finish(self, token: str) -> int | None:
-        """Take note that a trial was handed over, or refused.
-
-        Args:
-            token: That of its lease.
+        """Forget the lease with a token, as its trial was handed over or refused.
 
         Returns:
-            The trial; None if the simulation was not asked for that, or is not any more.
+            The trial; None if there is no such lease, or not any more.
         """
         trial = next((trial for trial, lease in self._leases.items() if lease.token == token), None)
         if trial is not None:

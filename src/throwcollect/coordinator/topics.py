@@ -1,4 +1,4 @@
-"""The topics on which the coordinator tells what goes on, for whoever comes, however late."""
+"""Topics of the coordinator for onlookers, who may subscribe late."""
 
 from __future__ import annotations
 
@@ -10,13 +10,9 @@ PROGRESS_TOPIC = "/coordinator/progress"
 PROGRESS_QOS = ros.QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 SHOWN_QOS = ros.QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
-"""Whoever is slow misses some, and holds nobody up."""
+"""A slow subscriber misses some and delays nobody."""
 
 
 def make_shown_topic(simulation: str) -> str:
-    """Topic of the newest episode of a simulation, as it arrived: a std_msgs/UInt8MultiArray.
-
-    Args:
-        simulation: Name of its node.
-    """
+    """Topic of the newest episode of a simulation, given the name of its node: the std_msgs/UInt8MultiArray it sent."""
     return f"/coordinator/shown/{simulation}"

@@ -1,4 +1,4 @@
-"""Which bodies press on the ball, and for how long."""
+"""Notes which bodies press on the ball, and for how long."""
 
 from __future__ import annotations
 
@@ -20,12 +20,7 @@ class ContactLog:
         return self._open.keys()
 
     def update(self, bodies: Set[str], step: int) -> None:
-        """Take note of what presses on the ball since a step.
-
-        Args:
-            bodies: Names of all bodies that pressed on the ball.
-            step: Number of the step; later than that of the call before.
-        """
+        """Note the names of all bodies that press on the ball from a step on; steps must ascend from call to call."""
         for body in self._open.keys() - bodies:
             self._closed.append((self._open.pop(body), body, step))
         for body in bodies - self._open.keys():

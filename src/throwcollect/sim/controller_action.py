@@ -3,20 +3,31 @@
 from __future__ import annotations
 
 from collections.abc import Hashable
+from dataclasses import dataclass, field
 from typing import Any
 
-from throwcollect.control import ControllerState, GoalResult, GoalStatus, Refusal
+from throwcollect.control import ControllerState, GoalResult, GoalStatus
 from throwcollect.ros import ActionServer, CancelResponse, Future, GoalResponse, Node
 from throwcollect.ros.action import FollowJointTrajectory
 from throwcollect.sim.controller_messages import feedback_message, read_goal
 from throwcollect.sim.simulation import Simulation
 
 _RESULT_TIMEOUT_S = 10
-"""How long a result can be asked for, on the simulation's clock; rcl's default."""
+"""Simulated time for which a result can be asked for; rcl's default."""
+
+
+@dataclass
+class _Goal:
+    """A goal that was taken; its handle comes later."""
+
+    result: Future
+    handle: Any = None
+    feedback: list[Any] = field(default_factory=list)
+    """Messages that wait for the handle."""
 
 
 class ControllerAction:
-    """Takes goals for a controller, and tells what becomes of them.
+    """Takes goals for a controller, and sends feedback and results.
 
     Args:
         node: Node of the controller.
@@ -33,11 +44,8 @@ class ControllerAction:
         self._aborts_refused = aborts_refused
         self._count = 0
         self._told_ns = 0
-        self._considered: dict[Hashable, list[Any]] = {}
-        """Goals that have no handle yet, the oldest first, and the feedback that waits for it."""
-        self._keys: dict[bytes, int] = {}
-        self._handles: dict[Hashable, Any] = {}
-        self._results: dict[Hashable, Future] = {}
+        self._goals: dict[Hashable, _Goal] = {}
+        """The goals whose results have not been sent, by their identities in the simulation, the oldest first."""
         name = f"{node.get_name()}/follow_joint_trajectory"
         self._feedback_topic = f"{name}/_action/feedback"
         self._server = ActionServer(
@@ -52,78 +60,72 @@ class ControllerAction:
         )
 
     def finish(self, result: GoalResult) -> None:
-        """Answer whoever waits for the result of a goal."""
-        if (future := self._results.get(result.goal_id)) is not None:
-            future.set_result(result)
-            # A goal that has ended gets no more feedback, also if it ended in the middle of the last slice.
-            self._handles.pop(result.goal_id, None)
+        """Send the result of a goal to the client that waits for it."""
+        if (goal := self._goals.get(result.goal_id)) is not None:
+            goal.result.set_result(result)
 
     @property
     def heard(self) -> bool:
-        """Whether somebody listens to feedback."""
+        """Whether feedback has subscribers."""
         return self._node.count_subscribers(self._feedback_topic) > 0
 
     @property
     def watched(self) -> bool:
-        """Whether a goal has been taken and somebody listens to its feedback."""
-        return bool(self._results) and self.heard
+        """Whether a goal has been taken and feedback has subscribers."""
+        return bool(self._goals) and self.heard
 
     @property
     def owes_feedback(self) -> bool:
-        """Whether somebody listens to feedback, and some time has passed since the last one."""
+        """Whether feedback has subscribers, and enough simulated time has passed since the last message."""
         passed_ns = self._simulation.now_ns - self._told_ns
         return passed_ns != 0 and not 0 < passed_ns < self._simulation.feedback_ns and self.watched
 
     def publish_feedback(self, state: ControllerState) -> None:
-        """Tell how far the goals have come."""
+        """Send feedback on all goals."""
         passed_ns = self._simulation.now_ns - self._told_ns
         # Feedback is due by a clock of its own, as slices of time need not end just then.
         self._told_ns += passed_ns - passed_ns % (self._simulation.feedback_ns or 1)
         feedback = feedback_message(state)
-        for handle in self._handles.values():
-            handle.publish_feedback(feedback)
-        for key, waiting in self._considered.items():
-            if not self._results[key].done():
-                waiting.append(feedback)
+        for goal in self._goals.values():
+            # A goal that has ended gets no more feedback, even if it ended in the middle of the last slice.
+            if goal.result.done():
+                continue
+            if goal.handle is None:
+                goal.feedback.append(feedback)
+            else:
+                goal.handle.publish_feedback(feedback)
 
     def _consider(self, request: FollowJointTrajectory.Goal) -> GoalResponse:
-        # The controller takes the goal here, as it alone can tell whether it is acceptable. Its handle follows in the
-        # same order, but perhaps after the next goal, after time has passed, or after its own end.
+        # The controller takes the goal here, because it alone can tell whether the goal is acceptable. Handles come in
+        # the same order, but perhaps after the next goal, after time has passed, or after the goal's own end.
         refusal = self._simulation.submit(self._controller, self._count + 1, read_goal(request))
         if refusal is not None and not self._aborts_refused:
             return GoalResponse.REJECT
         self._count += 1
         # Send no feedback until simulated time has passed since the goal was accepted.
         self._told_ns = self._simulation.now_ns
-        self._considered[self._count] = []
-        self._results[self._count] = Future()
+        self._goals[self._count] = _Goal(Future())
         if refusal is not None:
-            self.finish(self._abort(self._count, refusal))
+            self.finish(GoalResult(self._count, GoalStatus.ABORTED, refusal.error_code, refusal.text))
         return GoalResponse.ACCEPT
 
-    def _abort(self, key: int, refusal: Refusal) -> GoalResult:
-        return GoalResult(key, GoalStatus.ABORTED, refusal.error_code, refusal.text, self._simulation.now_ns)
-
     def _accept(self, handle: Any) -> None:
-        key = next(iter(self._considered))
-        self._keys[_uuid(handle)] = key
-        for feedback in self._considered.pop(key):
+        goal = next(goal for goal in self._goals.values() if goal.handle is None)
+        goal.handle = handle
+        for feedback in goal.feedback:
             handle.publish_feedback(feedback)
-        if not self._results[key].done():
-            self._handles[key] = handle
         handle.execute()
 
     def _cancel(self, handle: Any) -> CancelResponse:
         # The client gets the result of the cancelled goal when its execution goes on, after this answer.
-        key = self._keys.get(_uuid(handle))
+        key = self._find_key(handle)
         cancelled = key is not None and self._simulation.cancel(self._controller, key)
         return CancelResponse.ACCEPT if cancelled else CancelResponse.REJECT
 
     async def _execute(self, handle: Any) -> FollowJointTrajectory.Result:
-        key = self._keys[_uuid(handle)]
-        result: GoalResult = await self._results[key]
-        del self._keys[_uuid(handle)], self._results[key]
-        self._handles.pop(key, None)
+        key = self._find_key(handle)
+        result: GoalResult = await self._goals[key].result
+        del self._goals[key]
         if result.status == GoalStatus.SUCCEEDED:
             handle.succeed()
         elif result.status == GoalStatus.CANCELED:
@@ -131,6 +133,10 @@ class ControllerAction:
         else:
             handle.abort()
         return FollowJointTrajectory.Result(error_code=int(result.error_code), error_string=result.error_string)
+
+    def _find_key(self, handle: Any) -> Hashable | None:
+        uuid = _uuid(handle)
+        return next((key for key, goal in self._goals.items() if goal.handle and _uuid(goal.handle) == uuid), None)
 
 
 def _uuid(handle: Any) -> bytes:

@@ -13,12 +13,7 @@ _TYPE = "joint_trajectory_controller/JointTrajectoryController"
 
 
 class ControllerManager(Node):
-    """Offers ``~/list_controllers`` in the namespace of a simulation.
-
-    Args:
-        parent: The simulation's node.
-        simulation: The simulation.
-    """
+    """Offers ``~/list_controllers`` in the namespace of a simulation's node."""
 
     def __init__(self, parent: Node, simulation: Simulation) -> None:
         super().__init__("controller_manager", namespace=parent.get_namespace(), context=parent.context)

@@ -6,24 +6,12 @@ import logging
 import math
 import time
 
-from throwcollect.control import ControllerState, GoalResult
-from throwcollect.control.log import REPEATED
-from throwcollect.ros import (
-    DurabilityPolicy,
-    Node,
-    QoSProfile,
-    Time,
-    pass_on_log,
-    provide_time,
-)
+from throwcollect.control import REPEATED, ControllerState, GoalResult
+from throwcollect.ros import DurabilityPolicy, Node, QoSProfile, Time, pass_on_log, provide_time
 from throwcollect.ros.msg import JointTrajectory, JointTrajectoryControllerState, SpeedScalingFactor
 from throwcollect.ros.srv import QueryTrajectoryState
 from throwcollect.sim.controller_action import ControllerAction
-from throwcollect.sim.controller_messages import (
-    nanoseconds,
-    read_trajectory,
-    state_message,
-)
+from throwcollect.sim.controller_messages import nanoseconds, read_trajectory, state_message
 from throwcollect.sim.controller_parameters import ParameterFace
 from throwcollect.sim.simulation import Simulation
 
@@ -61,31 +49,31 @@ class ControllerNode(Node):
         self._states = self.create_publisher(JointTrajectoryControllerState, "~/controller_state", _STATES)
 
     def finish(self, result: GoalResult) -> None:
-        """Answer whoever waits for the result of a goal."""
+        """Send the result of a goal to the client that waits for it."""
         self._action.finish(result)
 
     @property
     def heard(self) -> bool:
-        """Whether somebody listens to the controller's state or to its feedback."""
+        """Whether the controller's state or its feedback has subscribers."""
         return self.wants_states or self._action.heard
 
     @property
     def watched(self) -> bool:
-        """Whether somebody listens to the controller's state, or to the feedback of a goal that was taken."""
+        """Whether the controller's state, or the feedback of a goal that was taken, has subscribers."""
         return self.wants_states or self._action.watched
 
     @property
     def wants_states(self) -> bool:
-        """Whether somebody listens to the controller's state."""
+        """Whether the controller's state has subscribers."""
         return bool(self._states.get_subscription_count())
 
     def publish_state(self) -> None:
-        """Publish the controller's states since the last time, and the feedback of its goal, to whoever listens."""
+        """Publish the controller's states since the last time, and the feedback of its goal, to subscribers."""
         states = self._limb.pop_states()
         if not self.watched:
             return
         if self.wants_states and not (states or self._simulation.running):
-            # While time stands still no state is new, but a listener that has just come has not seen the present one.
+            # While time stands still no state is new, but a new subscriber has not seen the present one.
             states = [self._present_state()]
         for state in states:
             self._states.publish(state_message(state))
@@ -127,7 +115,7 @@ class ControllerNode(Node):
 
 
 class _LogHandler(logging.Handler):
-    """Passes on what a controller logs to the log of its node: of records marked as repeated, one a second."""
+    """Passes a controller's log records on to the log of its node: of each repeated one, one a second."""
 
     def __init__(self, node: Node) -> None:
         super().__init__()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from typing import Any
 
 from throwcollect.control import ControllerParameters
@@ -14,7 +14,7 @@ from throwcollect.sim.limb_controller import LimbController
 from throwcollect.sim.present_trial import PresentTrial
 
 COMMAND_INTERFACES = ("position",)
-"""What is commanded to all joints."""
+"""Interfaces that are commanded, for every joint."""
 
 _CHANGEABLE = {
     "allow_partial_joints_goal": "Whether goals may leave joints out",
@@ -22,14 +22,14 @@ _CHANGEABLE = {
     "allow_nonzero_velocity_at_trajectory_end": "Whether the last point may have a velocity",
     "cmd_timeout": "How long after the end of a trajectory the joints are stopped [s]; 0 never",
 }
-_LEAST = {"action_monitor_rate": 0.1}
-"""Least value of each parameter that may not go down to 0."""
+_LEAST_RATE_HZ = 0.1
+"""Least `action_monitor_rate`; no other number has a bound but 0."""
 
 
 class ParameterFace:
     """Declares the parameters of a limb's controller on its node, and hands changes on.
 
-    What is changed holds for the next goal. The gains of ros2_controllers are left out, as controllers that command
+    Changes hold for the next goal. The gains of ros2_controllers are left out, as controllers that command
     positions have none.
 
     Args:
@@ -44,7 +44,9 @@ class ParameterFace:
         for name, value, description, read_only in _list_declared(limb.controller.parameters):
             descriptor = ParameterDescriptor(description=description, read_only=read_only)
             if isinstance(value, float):
-                descriptor.floating_point_range = [floating_range(_LEAST.get(name, 0.0), None)]
+                descriptor.floating_point_range = [
+                    floating_range(_LEAST_RATE_HZ if name == "action_monitor_rate" else 0.0, None)
+                ]
             node.declare_parameter(name, value, descriptor)
         node.add_on_set_parameters_callback(self._check)
         node.add_post_set_parameters_callback(self._apply)
@@ -53,22 +55,40 @@ class ParameterFace:
         if self._trial.leased:
             return SetParametersResult(successful=False, reason=self._trial.lease_in_words)
         try:
-            _change(self._limb.controller.parameters, _values(parameters))
+            self._change(parameters)
         except ConfigError as error:
             return SetParametersResult(successful=False, reason=str(error))
         return SetParametersResult(successful=True)
 
     def _apply(self, parameters: list[Parameter]) -> None:
-        controller = self._limb.controller
-        controller.parameters = _change(controller.parameters, _values(parameters))
+        self._limb.controller.parameters = self._change(parameters)
 
+    def _change(self, changes: list[Parameter]) -> ControllerParameters:
+        """The controller's parameters with new values for some ROS parameters that are declared.
 
-def _values(parameters: list[Parameter]) -> dict[str, Any]:
-    return {parameter.name: parameter.value for parameter in parameters}
+        Raises:
+            ConfigError: If the values are not valid.
+        """
+        parameters = self._limb.controller.parameters
+        constraints = parameters.constraints
+        joints = dict(constraints.joints)
+        own: dict[str, Any] = {}
+        common: dict[str, Any] = {}
+        for name, value in ((change.name, change.value) for change in changes):
+            section, _, rest = name.partition(".")
+            joint, _, key = rest.rpartition(".")
+            if section == "constraints" and joint:
+                joints[joint] = dataclasses.replace(joints[joint], **{key: value})
+            elif section == "constraints":
+                common[key] = value
+            elif name in _CHANGEABLE:
+                own[name] = value
+        changed = dataclasses.replace(constraints, joints=joints, **common)
+        return dataclasses.replace(parameters, **own, constraints=changed)
 
 
 def state_interfaces(parameters: ControllerParameters) -> tuple[str, ...]:
-    """What is measured of all joints of a controller."""
+    """Interfaces that are measured, for every joint of a controller."""
     return ("position", "velocity") if parameters.measures_velocity else ("position",)
 
 
@@ -101,25 +121,3 @@ def _list_declared(parameters: ControllerParameters) -> Iterator[tuple[str, Any,
         yield f"{key}.trajectory", limits.trajectory, path, False
         yield f"{key}.goal", limits.goal, "Largest position error at the end [rad]; 0 is not checked", False
         yield f"{key}.max_deceleration_on_cancel", limits.max_deceleration_on_cancel, "How hard it brakes", True
-
-
-def _change(parameters: ControllerParameters, values: Mapping[str, Any]) -> ControllerParameters:
-    """Parameters with new values for some ROS parameters that are declared.
-
-    Raises:
-        ConfigError: If the values are not valid.
-    """
-    constraints = parameters.constraints
-    joints = dict(constraints.joints)
-    own: dict[str, Any] = {}
-    common: dict[str, Any] = {}
-    for name, value in values.items():
-        section, _, rest = name.partition(".")
-        joint, _, key = rest.rpartition(".")
-        if section == "constraints" and joint:
-            joints[joint] = dataclasses.replace(joints.get(joint, constraints.of(joint)), **{key: value})
-        elif section == "constraints":
-            common[key] = value
-        elif name in _CHANGEABLE:
-            own[name] = value
-    return dataclasses.replace(parameters, **own, constraints=dataclasses.replace(constraints, joints=joints, **common))

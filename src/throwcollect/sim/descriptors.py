@@ -1,7 +1,7 @@
-"""What the configuration says of its keys, as descriptors of ROS parameters, which editors of parameters show.
+"""Descriptors of ROS parameters, which editors of parameters show, from what the configuration says of its keys.
 
-A range of ROS has no open ends: where a bound itself is not allowed, or bounds depend on each other, the constraints in
-words say so, and whoever is asked to set the value refuses it.
+A range of ROS includes its bounds. Where a bound itself is not allowed, or bounds depend on each other, the constraints
+in words say so, and the node refuses the value.
 """
 
 from __future__ import annotations
@@ -34,22 +34,13 @@ def integer_range(low: int | None, high: int | None) -> IntegerRange:
 
 
 def of_key(key: str, value: object, *, read_only: bool = False) -> ParameterDescriptor:
-    """Descriptor of the parameter that shows a key of the configuration.
-
-    Args:
-        key: Dotted key.
-        value: Value of the parameter, whose type decides the kind of range.
-        read_only: Whether the parameter cannot be set.
-
-    Returns:
-        A rcl_interfaces/msg/ParameterDescriptor.
-    """
+    """Descriptor of the parameter that shows a dotted key; the type of its value decides the kind of range."""
     parts = [int(part) if part.isdecimal() else part for part in key.split(".")]
     shape = shape_of(parts)
     descriptor = ParameterDescriptor(
         description=_meaning(parts), additional_constraints=str(shape), read_only=read_only
     )
-    number = next((each for each in shape.alternatives if each.node.get("type") in ("number", "integer")), None)
+    number = next((option for option in shape.alternatives if option.node.get("type") in ("number", "integer")), None)
     if number is None:
         return descriptor
     low, high = _bounds(number, whole=isinstance(value, int))
@@ -63,7 +54,7 @@ def of_key(key: str, value: object, *, read_only: bool = False) -> ParameterDesc
 
 
 def _meaning(parts: list[str | int]) -> str:
-    """What a key says of itself, or the one above that holds it, as joints have no meaning of their own."""
+    """Description of a key, or of the key that holds it where it has none, as those of single joints."""
     for length in range(len(parts), 0, -1):
         if text := shape_of(parts[:length]).node.get("description"):
             return re.sub(r"\s+", " ", text)

@@ -1,4 +1,4 @@
-"""What is in the world, by name: ball, robot, and what clients have spawned."""
+"""The entities of a world, by name: ball, robot, and the bodies that clients have spawned."""
 
 from __future__ import annotations
 
@@ -6,8 +6,11 @@ import math
 from dataclasses import dataclass
 from enum import IntEnum
 
-from throwcollect.engines.engine import BodyModel, BodyState, Box, Quaternion, Vector
+import numpy as np
+
+from throwcollect.engines.engine import BodyModel, BodyState, Box, Vector
 from throwcollect.errors import RequestError
+from throwcollect.pinocchio_library import pinocchio
 from throwcollect.sim.world import World
 
 BALL = "ball"
@@ -33,13 +36,7 @@ class Category(IntEnum):
 
 @dataclass(frozen=True)
 class EntityInfo:
-    """What is said about an entity.
-
-    Attributes:
-        category: Constant of `Category`.
-        description: For people.
-        tags: For filters.
-    """
+    """Description of an entity for people, and category and tags for filters."""
 
     category: int
     description: str = ""
@@ -69,12 +66,12 @@ class Entities:
         return (BALL, self._robot, *self._world.spawned.names)
 
     def forget_infos(self) -> None:
-        """Go back to what is said about ball and robot at the start; forget what was said about what is gone."""
+        """Restore the descriptions of ball and robot, and forget those of entities that are gone."""
         for name in [name for name in self._infos if name not in self._world.spawned]:
             del self._infos[name]
 
     def info(self, name: str) -> EntityInfo:
-        """What is said about an entity.
+        """The description of an entity.
 
         Raises:
             RequestError: ``RESULT_NOT_FOUND`` if there is none of that name.
@@ -83,7 +80,7 @@ class Entities:
         return self._infos.get(name) or self._first_infos[name]
 
     def set_info(self, name: str, info: EntityInfo) -> None:
-        """Say something else about an entity.
+        """Replace the description of an entity.
 
         Raises:
             RequestError: ``RESULT_NOT_FOUND`` if there is none of that name, ``RESULT_OPERATION_FAILED`` if there is no
@@ -159,12 +156,12 @@ class Entities:
                 known = ", ".join((WORLD_FRAME, *self.names))
                 raise RequestError("INVALID_POSE", f"no frame {frame!r:.80}", expected=known)
             base = self.state(frame)
-            turn = base.orientation_xyzw
+            turn = pinocchio.Quaternion(np.array(base.orientation_xyzw))
             state = BodyState(
-                _add(base.position, _rotate(turn, state.position)),
-                _multiply(turn, state.orientation_xyzw),
-                _rotate(turn, state.linear_velocity),
-                _rotate(turn, state.angular_velocity),
+                tuple((base.position + turn * np.array(state.position)).tolist()),
+                tuple((turn * pinocchio.Quaternion(np.array(state.orientation_xyzw))).coeffs().tolist()),
+                tuple((turn * np.array(state.linear_velocity)).tolist()),
+                tuple((turn * np.array(state.angular_velocity)).tolist()),
             )
         if not all(abs(value) <= _LARGEST_COORDINATE_M for value in state.position):
             expected = f"within {_LARGEST_COORDINATE_M:g} m of the world's origin"
@@ -192,19 +189,12 @@ class Entities:
         """
         if name in self._world.spawned:
             return _unite(self._world.spawned.engine_bodies(name).bounds(name))
-        # The robot's axes are those of the world, and the ball looks the same from everywhere.
-        box = _unite(self.boxes(name))
+        # The robot's axes are those of the world, and a ball has the same box along any axes.
         origin = self.state(name).position
-        return box and (_subtract(box[0], origin), _subtract(box[1], origin))
+        return _unite([tuple(np.subtract(box, origin).tolist()) for box in self.boxes(name)])
 
     def add(self, name: str, model: BodyModel, start: BodyState, description: str) -> None:
-        """Put a new entity into the world.
-
-        Args:
-            name: Its name, which is free.
-            model: What it is.
-            start: Its state in the world.
-            description: For people.
+        """Put a new entity into the world, under a name that is free.
 
         Raises:
             RequestError: ``RESULT_OPERATION_FAILED`` if the world is full, ``RESOURCE_PARSE_ERROR`` if the engine does
@@ -242,29 +232,3 @@ def _unite(boxes: list[Box]) -> Box | None:
     lowest: Vector = tuple(map(min, zip(*lows, strict=True)))
     highest: Vector = tuple(map(max, zip(*highs, strict=True)))
     return lowest, highest
-
-
-def _add(point: Vector, other: Vector) -> Vector:
-    return (point[0] + other[0], point[1] + other[1], point[2] + other[2])
-
-
-def _subtract(point: Vector, origin: Vector) -> Vector:
-    return (point[0] - origin[0], point[1] - origin[1], point[2] - origin[2])
-
-
-def _multiply(turn: Quaternion, other: Quaternion) -> Quaternion:
-    """The quaternion (xyzw) that turns first by `other`, then by `turn`."""
-    x, y, z, w = turn
-    a, b, c, d = other
-    return (
-        w * a + x * d + y * c - z * b,
-        w * b - x * c + y * d + z * a,
-        w * c + x * b - y * a + z * d,
-        w * d - x * a - y * b - z * c,
-    )
-
-
-def _rotate(turn: Quaternion, vector: Vector) -> Vector:
-    x, y, z, w = turn
-    rotated = _multiply(_multiply(turn, (*vector, 0.0)), (-x, -y, -z, w))
-    return rotated[:3]

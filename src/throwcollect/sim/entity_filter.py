@@ -1,102 +1,82 @@
-"""Which entities a client means: by name, category, tags and place."""
+"""Which entities a client means: by name, category, tags and place (simulation_interfaces/msg/EntityFilters)."""
 
 from __future__ import annotations
 
-from collections.abc import Collection
-from dataclasses import dataclass
+import math
+from collections.abc import Callable
 from typing import Any
 
+import numpy as np
 import re2
 
-from throwcollect.engines.engine import Box, Vector
+from throwcollect.engines.engine import Box
 from throwcollect.errors import RequestError
+from throwcollect.ros.msg import Bounds, EntityFilters, TagsFilter
 from throwcollect.sim.entities import Entities
 
 _LONGEST_EXPRESSION = 256
+_CORNERS = 2
+_MOST_WANTED = 1000
+"""Largest number of categories, and of tags, in one filter."""
 
 
-@dataclass(frozen=True)
-class BoxRegion:
-    """A box along the axes of the world.
+def select(entities: Entities, filters: EntityFilters) -> list[str]:
+    """Names of the entities that meet every condition of a filter, in order; a condition that is empty always holds.
 
-    Attributes:
-        lowest: One corner [m].
-        highest: The opposite one [m].
+    Raises:
+        RequestError: ``RESULT_FEATURE_UNSUPPORTED`` for a kind of bounds that is not known here,
+            ``RESULT_OPERATION_FAILED`` for conditions that make no sense.
     """
+    tags = filters.tags
+    if len(tags.tags) > _MOST_WANTED or len(filters.categories) > _MOST_WANTED:
+        raise _senseless(f"more than {_MOST_WANTED} tags or categories")
+    if tags.filter_mode not in (TagsFilter.FILTER_MODE_ANY, TagsFilter.FILTER_MODE_ALL):
+        raise _senseless(f"no tags filter mode {tags.filter_mode}")
+    has_enough = all if tags.filter_mode == TagsFilter.FILTER_MODE_ALL else any
+    categories = {int(category.category) for category in filters.categories}
+    overlaps = _region(filters.bounds)
+    pattern = _compile(filters.filter)
 
-    lowest: Vector
-    highest: Vector
-
-    def overlaps(self, box: Box) -> bool:
-        """Whether a box reaches into the region."""
-        return all(
-            low <= upper and lower <= high
-            for lower, upper, low, high in zip(*box, self.lowest, self.highest, strict=True)
+    def fits(name: str) -> bool:
+        info = entities.info(name)
+        return (
+            bool(pattern.search(name))
+            and (not categories or info.category in categories)
+            and (not tags.tags or has_enough(tag in info.tags for tag in tags.tags))
+            and (overlaps is None or any(overlaps(box) for box in entities.boxes(name)))
         )
 
+    return [name for name in entities.names if fits(name)]
 
-@dataclass(frozen=True)
-class SphereRegion:
-    """A sphere.
 
-    Attributes:
-        centre: Its centre in the world [m].
-        radius: Its radius [m].
+def _region(bounds: Bounds) -> Callable[[Box], bool] | None:
+    """Test for boxes along the axes of the world that reach into a region; None if there are no bounds.
+
+    Raises:
+        RequestError: As `select` does.
     """
-
-    centre: Vector
-    radius: float
-
-    def overlaps(self, box: Box) -> bool:
-        """Whether a box reaches into the region."""
-        outside = (max(lower - x, 0.0, x - upper) for x, lower, upper in zip(self.centre, *box, strict=True))
-        return sum(distance * distance for distance in outside) <= self.radius**2
-
-
-@dataclass(frozen=True)
-class EntityFilter:
-    """Conditions that an entity must meet; an empty one matches every entity.
-
-    Attributes:
-        name: POSIX extended regular expression that is found in its name; empty for any.
-        categories: Its category is one of these.
-        tags: It has these tags.
-        needs_all_tags: Whether it must have all of them; otherwise one will do.
-        region: It reaches into this region.
-    """
-
-    name: str = ""
-    categories: Collection[int] = ()
-    tags: Collection[str] = ()
-    needs_all_tags: bool = False
-    region: BoxRegion | SphereRegion | None = None
-
-    def select(self, entities: Entities) -> list[str]:
-        """Names of the entities that are meant, in order.
-
-        Raises:
-            RequestError: ``RESULT_OPERATION_FAILED`` if the regular expression is malformed.
-        """
-        pattern = _compile(self.name)
-        return [
-            name
-            for name in entities.names
-            if pattern.search(name) and self._fits_info(entities, name) and self._fits_place(entities, name)
-        ]
-
-    def _fits_info(self, entities: Entities, name: str) -> bool:
-        info = entities.info(name)
-        found = [tag in info.tags for tag in self.tags]
-        has_tags = all(found) if self.needs_all_tags else any(found)
-        return (not self.categories or info.category in self.categories) and (not found or has_tags)
-
-    def _fits_place(self, entities: Entities, name: str) -> bool:
-        region = self.region
-        return region is None or any(region.overlaps(box) for box in entities.boxes(name))
+    if bounds.type == Bounds.TYPE_EMPTY:
+        return None
+    if bounds.type not in (Bounds.TYPE_BOX, Bounds.TYPE_SPHERE):
+        message = f"bounds of type {bounds.type}; boxes and spheres are supported"
+        raise RequestError("RESULT_FEATURE_UNSUPPORTED", message)
+    if len(bounds.points) != _CORNERS:
+        raise _senseless(f"bounds with {len(bounds.points)} points; a box and a sphere have {_CORNERS}")
+    first, second = ((float(point.x), float(point.y), float(point.z)) for point in bounds.points)
+    if bounds.type == Bounds.TYPE_SPHERE:
+        radius = second[0]
+        if not radius >= 0:
+            raise _senseless(f"a sphere of radius {radius:g} m")
+        return lambda box: math.dist(np.clip(first, *box), first) <= radius
+    if not all(low <= high for high, low in zip(first, second, strict=True)):
+        raise _senseless(f"a box whose upper corner {first} is not above its lower one {second}")
+    return lambda box: all(
+        low <= upper and lower <= high for lower, upper, low, high in zip(*box, second, first, strict=True)
+    )
 
 
 def _compile(expression: str) -> Any:
-    """Compile an expression of a client; to search a name by it takes time in proportion to the name, whatever it is.
+    """Compile a POSIX extended regular expression of a client; searching takes time in proportion to the name.
 
     Raises:
         RequestError: ``RESULT_OPERATION_FAILED`` if it is malformed.
@@ -111,5 +91,8 @@ def _compile(expression: str) -> Any:
     except (ValueError, re2.error) as error:
         # The library gives its reason as bytes.
         reason = error.args[0].decode() if isinstance(error.args[0], bytes) else error.args[0]
-        message = f"filter {expression!r:.80} is no extended regular expression: {reason}"
-        raise RequestError("RESULT_OPERATION_FAILED", message) from error
+        raise _senseless(f"filter {expression!r:.80} is no extended regular expression: {reason}") from error
+
+
+def _senseless(message: str) -> RequestError:
+    return RequestError("RESULT_OPERATION_FAILED", message)

@@ -1,10 +1,9 @@
-"""Services about the entities that are there: which, where, how large, what is said about them."""
+"""Services about the entities in the world: their names, states, bounds and descriptions."""
 
 from __future__ import annotations
 
-from throwcollect.errors import RequestError
 from throwcollect.ros import Node
-from throwcollect.ros.msg import Bounds, EntityFilters, EntityState, TagsFilter, Vector3
+from throwcollect.ros.msg import Bounds, EntityState, Vector3
 from throwcollect.ros.srv import (
     DeleteEntity,
     GetEntities,
@@ -17,22 +16,13 @@ from throwcollect.ros.srv import (
 )
 from throwcollect.sim.body_messages import body_state, entity_state
 from throwcollect.sim.entities import EntityInfo
-from throwcollect.sim.entity_filter import BoxRegion, EntityFilter, SphereRegion
+from throwcollect.sim.entity_filter import select
 from throwcollect.sim.service_results import answering
 from throwcollect.sim.simulation import Simulation
 
-_CORNERS = 2
-_MOST_WANTED = 1000
-"""Largest number of categories, and of tags, in one filter."""
-
 
 class EntityServices:
-    """Offers the services under relative names, so that they stand in the simulation's namespace.
-
-    Args:
-        node: The simulation's node.
-        simulation: Whose entities they are.
-    """
+    """Offers the services under relative names, so that they stand in the simulation's namespace."""
 
     def __init__(self, node: Node, simulation: Simulation) -> None:
         self._simulation = simulation
@@ -50,10 +40,10 @@ class EntityServices:
             node.create_service(service, name, answering(service, fill))
 
     def _list(self, request: GetEntities.Request, response: GetEntities.Response) -> None:
-        response.entities = _filter(request.filters).select(self._entities)
+        response.entities = select(self._entities, request.filters)
 
     def _list_states(self, request: GetEntitiesStates.Request, response: GetEntitiesStates.Response) -> None:
-        response.entities = _filter(request.filters).select(self._entities)
+        response.entities = select(self._entities, request.filters)
         response.states = [self._state(name) for name in response.entities]
 
     def _get_state(self, request: GetEntityState.Request, response: GetEntityState.Response) -> None:
@@ -62,8 +52,7 @@ class EntityServices:
     def _state(self, name: str) -> EntityState:
         return entity_state(self._entities.state(name), self._simulation.now_ns)
 
-    def _set_state(self, request: SetEntityState.Request, response: SetEntityState.Response) -> None:
-        del response
+    def _set_state(self, request: SetEntityState.Request, _response: SetEntityState.Response) -> None:
         self._simulation.trial.require_free()
         state, acceleration = request.state, request.state.acceleration
         accelerations = (acceleration.linear, acceleration.angular)
@@ -80,8 +69,7 @@ class EntityServices:
         response.info.description = info.description
         response.info.tags = list(info.tags)
 
-    def _set_info(self, request: SetEntityInfo.Request, response: SetEntityInfo.Response) -> None:
-        del response
+    def _set_info(self, request: SetEntityInfo.Request, _response: SetEntityInfo.Response) -> None:
         info = request.info
         self._entities.set_info(
             request.entity, EntityInfo(int(info.category.category), info.description, tuple(info.tags))
@@ -93,51 +81,6 @@ class EntityServices:
             response.bounds.type = Bounds.TYPE_BOX
             response.bounds.points = [Vector3(x=x, y=y, z=z) for x, y, z in reversed(box)]
 
-    def _delete(self, request: DeleteEntity.Request, response: DeleteEntity.Response) -> None:
-        del response
+    def _delete(self, request: DeleteEntity.Request, _response: DeleteEntity.Response) -> None:
         self._simulation.trial.require_free()
         self._entities.remove(request.entity)
-
-
-def _filter(filters: EntityFilters) -> EntityFilter:
-    """What simulation_interfaces/msg/EntityFilters means.
-
-    Raises:
-        RequestError: ``RESULT_FEATURE_UNSUPPORTED`` for a kind of bounds that is not known here,
-            ``RESULT_OPERATION_FAILED`` for what makes no sense.
-    """
-    tags = filters.tags
-    if len(tags.tags) > _MOST_WANTED or len(filters.categories) > _MOST_WANTED:
-        raise _senseless(f"more than {_MOST_WANTED} tags or categories")
-    if tags.filter_mode not in (TagsFilter.FILTER_MODE_ANY, TagsFilter.FILTER_MODE_ALL):
-        raise _senseless(f"no tags filter mode {tags.filter_mode}")
-    return EntityFilter(
-        name=filters.filter,
-        categories={int(category.category) for category in filters.categories},
-        tags=tuple(tags.tags),
-        needs_all_tags=tags.filter_mode == TagsFilter.FILTER_MODE_ALL,
-        region=_region(filters.bounds),
-    )
-
-
-def _region(bounds: Bounds) -> BoxRegion | SphereRegion | None:
-    if bounds.type == Bounds.TYPE_EMPTY:
-        return None
-    if bounds.type not in (Bounds.TYPE_BOX, Bounds.TYPE_SPHERE):
-        message = f"bounds of type {bounds.type}; boxes and spheres are supported"
-        raise RequestError("RESULT_FEATURE_UNSUPPORTED", message)
-    if len(bounds.points) != _CORNERS:
-        raise _senseless(f"bounds with {len(bounds.points)} points; a box and a sphere have {_CORNERS}")
-    first, second = ((float(point.x), float(point.y), float(point.z)) for point in bounds.points)
-    if bounds.type == Bounds.TYPE_SPHERE:
-        radius = second[0]
-        if not radius >= 0:
-            raise _senseless(f"a sphere of radius {radius:g} m")
-        return SphereRegion(first, radius)
-    if not all(low <= high for high, low in zip(first, second, strict=True)):
-        raise _senseless(f"a box whose upper corner {first} is not above its lower one {second}")
-    return BoxRegion(second, first)
-
-
-def _senseless(message: str) -> RequestError:
-    return RequestError("RESULT_OPERATION_FAILED", message)

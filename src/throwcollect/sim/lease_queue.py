@@ -11,7 +11,7 @@ from throwcollect.sim.trial_runner import TrialRunner
 from throwcollect.trial.lease import Lease
 
 _REMEMBERED = 1000
-"""Leases that were done, which a list that was on its way meanwhile may still name; a list never has as many."""
+"""Number of done leases that are remembered, because a list that was under way may still name them; none is as long."""
 
 
 class LeaseQueue:
@@ -28,30 +28,22 @@ class LeaseQueue:
         self._done: deque[str] = deque(maxlen=_REMEMBERED)
 
     def replace(self, leases: Iterable[Lease]) -> None:
-        """Have these trials simulated, and no others; one that runs goes on if it is among them.
-
-        Args:
-            leases: The leases in their order; those that were done already are left out.
-        """
-        wanted = [lease for lease in leases if lease.token not in self._done]
-        if self._running is not None and self._running.token not in {lease.token for lease in wanted}:
+        """Have these trials simulated in their order, and no others; one that runs goes on if it is among them."""
+        pending = [lease for lease in leases if lease.token not in self._done]
+        if self._running is not None and self._running.token not in {lease.token for lease in pending}:
             self._running = None
             self._runner.drop()
         running = self._running.token if self._running else ""
-        self._waiting = deque(lease for lease in wanted if lease.token != running)
+        self._waiting = deque(lease for lease in pending if lease.token != running)
 
     def clear(self) -> None:
-        """Forget all leases; the trial that runs is nobody's any more."""
+        """Forget all leases; the trial that runs goes on without one."""
         self._running = None
         self._waiting.clear()
         self._runner.disown()
 
     def begin_next(self) -> Refusal | None:
-        """Begin the next trial if none runs.
-
-        Returns:
-            Why it cannot be begun; None if it was, or if nothing was to be begun.
-        """
+        """Begin the next trial if none runs; return the refusal of one that cannot begin."""
         if self._running is not None or not self._waiting:
             return None
         lease = self._waiting.popleft()
@@ -64,11 +56,11 @@ class LeaseQueue:
         return None
 
     def hand_over(self) -> Delivery | Refusal | None:
-        """What the trial that has just ended yielded, or why it is not handed over; None if none has ended."""
+        """The episode of the trial that has just ended, or its refusal; None if no trial has ended."""
         try:
             delivery = self._runner.hand_over()
         except ThrowcollectError as error:
-            # Only what was begun for a lease is judged, and so refused.
+            # Only episodes of leased trials are judged, and can so be refused.
             lease, self._running = self._running, None
             return self._refuse(lease, error) if lease else None
         if delivery is not None and self._running is not None:

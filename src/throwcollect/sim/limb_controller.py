@@ -1,4 +1,4 @@
-"""One limb: its joint trajectory controller, and which of its joints the physics moves."""
+"""One limb: binds its joint trajectory controller to those of its joints that the physics moves."""
 
 from __future__ import annotations
 
@@ -12,7 +12,6 @@ from throwcollect.control import (
     Constraints,
     ControllerParameters,
     ControllerState,
-    Deviations,
     ErrorCode,
     GoalResult,
     JointConstraints,
@@ -51,9 +50,8 @@ class LimbController:
             self.name,
             self._configured,
             period_ns=period_ns,
-            deviations=Deviations(
-                hold="command" if config.hold == "command" else "measured", topic_aborts_goal=config.topic_aborts_goal
-            ),
+            holds_command=config.hold == "command",
+            topic_aborts_goal=config.topic_aborts_goal,
         )
         self.watched = False
         """Whether the state of every update is kept for `pop_states`."""
@@ -70,8 +68,7 @@ class LimbController:
     @property
     def controller(self) -> JointTrajectoryController:
         """The controller, in the state of the last reset or later."""
-        if self._start_ns is not None:
-            self._wake()
+        self._wake()
         return self._controller
 
     @property
@@ -88,19 +85,17 @@ class LimbController:
             speed: Speed of the controller's clock [-].
         """
         self._speed = speed
-        self._posture = np.array([posture[joint] for joint in self._joints])
-        # The controller itself is reset when somebody asks for it, as most limbs are idle in most trials.
+        self._posture = np.array([posture[joint] for joint in self._joints], dtype=float)
+        # The controller itself is reset only when it is used, because most limbs are idle in most trials.
         self._start_ns = time_ns
         self._elapsed_ns, self._points, self._states = [], [], []
         if self._controller.goal_id is not None:
             self._wake()
 
     def restore(self) -> None:
-        """Undo whatever clients have changed of the controller: its parameters and the speed of its clock."""
+        """Undo what clients have changed of the controller's parameters; its speed is set anew by `reset`."""
         if self._controller.parameters != self._configured:
             self._controller.parameters = self._configured
-        if self._controller.speed_scaling_factor != self._speed:
-            self._controller.scale_speed(self._speed)
 
     def pop_results(self) -> tuple[GoalResult, ...]:
         """Results of the goals that have ended since the last call, oldest first."""
@@ -112,29 +107,20 @@ class LimbController:
         return states
 
     def refuse_locked(self, trajectory: Trajectory) -> Refusal | None:
-        """Refuse a trajectory that would move joints which are locked.
-
-        Returns:
-            None if it moves no such joint, else the reason of the refusal.
-        """
+        """Refuse a trajectory that would move joints which are locked."""
         for column, joint in enumerate(trajectory.joint_names):
             if joint not in self._joints or self._joints.index(joint) in self._own:
                 continue
             held = self._posture[self._joints.index(joint)]
             for point in trajectory.points:
-                wanted = point.positions[column] if column < len(point.positions) else held
-                if not abs(wanted - held) <= _LOCKED_TOLERANCE_RAD:
-                    text = f"{joint} is locked at {held:.6g} rad (robot.locked) and cannot go to {wanted:.6g} rad"
+                target = point.positions[column] if column < len(point.positions) else held
+                if not abs(target - held) <= _LOCKED_TOLERANCE_RAD:
+                    text = f"{joint} is locked at {held:.6g} rad (robot.locked) and cannot go to {target:.6g} rad"
                     return self._controller.refuse(Refusal(ErrorCode.INVALID_GOAL, text))
         return None
 
     def measure(self, positions: Sequence[float], velocities: Sequence[float]) -> JointState:
-        """State of this limb's joints.
-
-        Args:
-            positions: Position of each of the world's moving joints [rad].
-            velocities: Their velocities [rad/s].
-        """
+        """State of this limb's joints, given positions [rad] and velocities [rad/s] of the world's moving joints."""
         state = self._posture.copy()
         state[self._own] = [positions[index] for index in self._worlds]
         if not self._configured.measures_velocity:
@@ -143,22 +129,21 @@ class LimbController:
         speeds[self._own] = [velocities[index] for index in self._worlds]
         return JointState(state, speeds)
 
-    def update(self, time_ns: int, period_ns: int, measured: JointState, command: NDArray[np.float64]) -> None:
-        """One control period with a look at the measured state.
+    def update(self, time_ns: int, measured: JointState, command: NDArray[np.float64]) -> None:
+        """Make one update, in which the controller sees the measured state.
 
         Args:
             time_ns: Time of this update [ns].
-            period_ns: Time since the update before [ns].
             measured: State of this limb's joints.
             command: Command of each of the world's moving joints, written in place [rad].
         """
-        row = self.controller.update(time_ns, period_ns, measured)
+        row = self.controller.update(time_ns, measured)
         command[self._worlds] = row[self._own]
         if self.watched:
             self._states.append(self._controller.state())
 
     def take(self, commands: NDArray[np.float64]) -> None:
-        """Many control periods that need no look at the measured state.
+        """Make as many updates as there are rows, without a look at the measured state.
 
         Args:
             commands: Commands of the world's moving joints, shape ``(n_updates, n_moving)``, written in place [rad].
@@ -184,16 +169,12 @@ class LimbController:
         if start_ns is None:
             return
         still = np.zeros(len(self._joints)) if self._configured.measures_velocity else None
-        measured = JointState(self._posture.copy(), still)
-        self._controller.reset(start_ns, measured)
-        if self._speed != 1.0:
-            self._controller.scale_speed(self._speed)
-        # This update begins the hold: from then on an idle limb has the same command and need not be driven.
-        self._controller.update(start_ns, 0, measured)
+        self._controller.reset(start_ns, JointState(self._posture, still))
+        self._controller.scale_speed(self._speed)
 
 
 def _configure(robot: Robot, joints: tuple[str, ...], config: ControllersConfig) -> ControllerParameters:
-    """Parameters of a controller of some joints: what the robot has, and the one thing that configurations may change.
+    """Parameters of a controller of some joints: the robot's, and how configurations have them stopped.
 
     The real Talos has no measured velocities, by which joints brake with ``hold: decelerate``.
     """

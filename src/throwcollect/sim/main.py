@@ -20,7 +20,7 @@ from throwcollect.sim.simulation import Simulation
 def run(config: Path, *, name: str, namespace: str | None = None) -> None:
     """Serve one simulation until SIGTERM, SIGINT or SIGHUP, or until a client sets its state to quitting.
 
-    Inputs are looked at between slices of a running trial; otherwise the process sleeps until one arrives.
+    It reads messages between slices of a running trial; otherwise the process sleeps until one arrives.
 
     Args:
         config: YAML file of the collection.
@@ -40,8 +40,9 @@ def run(config: Path, *, name: str, namespace: str | None = None) -> None:
     except ros.NameValidationException as error:
         raise ConfigError(str(error)) from error
     executor = ros.SingleThreadedExecutor()
-    for each in (node, *node.companions):
-        executor.add_node(each)
+    nodes = (node, *node.companions)
+    for served in nodes:
+        executor.add_node(served)
     stopped = 0
 
     def stop(number: int, _frame: FrameType | None) -> None:
@@ -52,7 +53,7 @@ def run(config: Path, *, name: str, namespace: str | None = None) -> None:
     for number in stop_signals():
         signal.signal(number, stop)
     check_answers(node, executor)
-    # What is here now stays until the end; the garbage collector need not go through it again and again.
+    # The present objects stay until the end, so the garbage collector need not go through them again and again.
     gc.freeze()
     heartbeat = Heartbeat()
     print(ready_line(name), flush=True)
@@ -65,6 +66,6 @@ def run(config: Path, *, name: str, namespace: str | None = None) -> None:
             node.follow_up()
         node.get_logger().info(f"ends: {signal.Signals(stopped).name if stopped else 'a client asked for it'}")
     finally:
-        for each in (*node.companions, node):
-            each.destroy_node()
+        for served in reversed(nodes):
+            served.destroy_node()
         ros.shutdown()

@@ -22,13 +22,7 @@ _VERTEX = re.compile(rb"\bvertex\s+(\S+)\s+(\S+)\s+(\S+)")
 
 
 def read_mesh(path: Path) -> Triangles:
-    """Read an STL file, binary or text, or the faces of an OBJ file.
-
-    Args:
-        path: The file; its suffix tells the format.
-
-    Returns:
-        At least one triangle; all numbers are finite.
+    """Read at least one triangle of an STL file, binary or text, or of an OBJ file; all numbers are finite.
 
     Raises:
         RequestError: ``MISSING_ASSETS`` if there is no such file, ``UNSUPPORTED_ASSETS`` if its format is another, it
@@ -50,10 +44,7 @@ def read_mesh(path: Path) -> Triangles:
 
 
 def check_mesh(path: Path) -> None:
-    """Check that a mesh is there, as far as can be told without reading it.
-
-    Args:
-        path: The file.
+    """Check a mesh as far as that is possible without reading it.
 
     Raises:
         RequestError: ``MISSING_ASSETS`` if there is no such file, ``UNSUPPORTED_ASSETS`` if its format is another or it
@@ -98,7 +89,7 @@ def _read_obj(content: bytes) -> Triangles:
 
 
 def _obj_index(number: int, vertices: int) -> int:
-    """Index of a vertex: OBJ counts from one, or backwards from the last one so far.
+    """Index of a vertex: OBJ counts from one, or from the last vertex so far backwards.
 
     Raises:
         ValueError: If there is no such vertex.

@@ -11,10 +11,10 @@ from throwcollect.robots.motor_lag import lag_behind
 
 
 class Motors:
-    """What is wanted of the moving joints, from one step to the next.
+    """Turns commands of the moving joints into targets of their motors, step by step.
 
-    A command is the position wanted at the end of a step. A motor is told where it should be at the beginning of the
-    step, and the velocity that leads from there to the command.
+    A command is the position that a joint should have at the end of a step. A motor is given the position that it
+    should have at the beginning of the step, and the velocity that leads from there to the command.
 
     Args:
         start: Position that the joints hold before the first command [rad].
@@ -35,18 +35,15 @@ class Motors:
 
     @property
     def target(self) -> list[float]:
-        """Position wanted at the end of the last step [rad], after the delay."""
+        """Position that the joints should have at the end of the last step [rad], after the delay."""
         target: list[float] = self._targets[0].tolist()
         return target
 
     def plan(self, commands: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Work out what is wanted in the next steps; `advance` then says how many of them were taken.
+        """Work out targets and velocities of the next steps (see `Steps`); `advance` then says how many were taken.
 
         Args:
             commands: Position wanted at the end of each step [rad], before the delay, shape ``(n_steps, n_moving)``.
-
-        Returns:
-            Targets and velocities as `throwcollect.engines.engine.Steps` has them.
         """
         count = len(commands)
         self._planned = np.concatenate((self._acting, commands))

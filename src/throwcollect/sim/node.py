@@ -1,4 +1,4 @@
-"""The ROS 2 node of one simulation: everything that a client of the real robot, or of a simulator, expects."""
+"""The ROS 2 node of one simulation, with the interfaces that clients of the real robot, or of a simulator, expect."""
 
 from __future__ import annotations
 
@@ -51,22 +51,22 @@ NUMBER, CONTROLLERS = "trial.number", "trial.controllers"
 _LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 _SAMPLED = QoSProfile(depth=100)
 _WHOLE = QoSProfile(history=HistoryPolicy.KEEP_ALL)
-"""No episode is dropped, so each reaches every subscriber, however slow it is."""
+"""No episode is dropped; each reaches every subscriber, however slow."""
 
 _IDLE_S = 0.1
-"""Longest wait for messages: signals are heeded after it, as their handlers must not disturb an executor at work."""
+"""Longest wait for messages. Signals take effect after it, because their handlers must not disturb a busy executor."""
 
 _REPEAT_S = 0.02
-"""Real time between two messages on a topic of samples while time stands still; that of the robot's joint states."""
+"""Real time between two messages on a topic of samples while time stands still, as between the robot's joint states."""
 
 _FACTOR = "sim.real_time_factor"
 DESCRIPTION = "robot_description"
-"""The parameter of ROS' robot_state_publisher, too."""
+"""Named as the parameter of ROS' robot_state_publisher."""
 _OF_ONLOOKERS = (_FACTOR, DESCRIPTION)
-"""Parameters that change nothing that is recorded, so anybody may set them, in the middle of a trial, too."""
+"""Parameters that change nothing that is recorded, so anybody may set them even in the middle of a trial."""
 _NO_LIMIT = 0.0
 _HIDDEN = (Effect.PLAN, Effect.RUN)
-"""Effects of keys that the node does not show as parameters, as they say nothing of a simulation."""
+"""Effects of keys that the node does not show as parameters, because they do not concern a simulation."""
 
 _MOST_TRIALS = 10_000_000
 """Largest number of trials that a configuration may ask for; even the last starts at a time that fits into a stamp."""
@@ -77,7 +77,7 @@ class SimulationNode(Node):
 
     Args:
         name: Name of the node.
-        simulation: What it serves.
+        simulation: The simulation that it serves.
         namespace: Namespace of the node and of all names; None for ``/<name>``.
 
     Raises:
@@ -117,12 +117,12 @@ class SimulationNode(Node):
 
     @property
     def companions(self) -> tuple[Node, ...]:
-        """The other nodes of the simulation: one for each controller, and that which lists them."""
+        """The other nodes of the simulation: one for each controller, and the controller manager."""
         return (*self._controllers.values(), self._manager)
 
     @property
     def patience_s(self) -> float:
-        """How long may be waited for inputs while time stands still [s]."""
+        """How long the process may wait for messages while time stands still [s]."""
         return _REPEAT_S if self._listened and self._rests else _IDLE_S
 
     @property
@@ -132,12 +132,12 @@ class SimulationNode(Node):
 
     @property
     def watched(self) -> bool:
-        """Whether somebody listens to samples, states or feedback."""
+        """Whether samples, states or feedback have subscribers."""
         self._notice_listeners()
         return bool(self._listened) or any(controller.watched for controller in self._heard)
 
     def follow_up(self) -> None:
-        """Tell the world what has happened since the last call: time, samples, feedback, results, the episode."""
+        """Publish what has happened since the last call: time, samples, feedback, results, the episode."""
         simulation = self._simulation
         now = Time(nanoseconds=simulation.now_ns)
         self.get_clock().set_ros_time_override(now)
@@ -150,20 +150,20 @@ class SimulationNode(Node):
         for controller in self._heard:
             controller.publish_state()
         if (handed := self._leases.hand_over()) is not None:
-            # The next trial begins before the last one leaves, so that nobody can reach a controller in between.
+            # The next trial begins before the last one leaves, so that no client can reach a controller in between.
             self._begin_next()
             self._episodes.publish(pack(handed, self._signer))
         self._control.follow_up()
 
     def _require_own_namespace(self) -> None:
-        """Refuse to live where another simulation lives: clients could not tell the two apart.
+        """Refuse the namespace of another simulation, because clients could not tell the two apart.
 
         Raises:
             ConfigError: If there is another one.
         """
         others = {info.node_name for info in self.get_publishers_info_by_topic(_EPISODE)} - {self.get_name()}
         if others:
-            # The names are read before the node is destroyed, as rclpy tells nothing of it afterwards.
+            # The names are read before the node is destroyed, because rclpy has none afterwards.
             name, namespace = self.get_name(), self.get_namespace()
             self.destroy_node()
             raise ConfigError(
@@ -185,12 +185,12 @@ class SimulationNode(Node):
         self._publish_steps(samples)
 
     def _repeats(self) -> bool:
-        """Whether the last sample is due once more: robots go on to tell their state while they rest."""
+        """Whether to publish the last sample once more: robots go on to publish their state while they rest."""
         return self._rests and time.monotonic() - self._published_at >= _REPEAT_S
 
     @property
     def _rests(self) -> bool:
-        """Whether time stands still as there is nothing to do; not in a collection, where each sample is told once."""
+        """Whether time stands still for lack of work; not in a collection, which publishes each sample once."""
         simulation = self._simulation
         return simulation.state == State.PLAYING and not simulation.running and simulation.trial.setup.number < 0
 
@@ -208,7 +208,7 @@ class SimulationNode(Node):
                 publisher.publish(message)
 
     def _notice_listeners(self) -> None:
-        """Find out who listens, if the graph has changed since the last time."""
+        """Find out which topics have subscribers, if the graph has changed since the last time."""
         changes = graph_changes(self)
         if changes == self._noticed_changes:
             return
@@ -228,7 +228,7 @@ class SimulationNode(Node):
         """Declare the parameter by which viewers are given another description to draw."""
         about = "URDF that viewers draw; only what is seen may differ from that of the configuration."
         self.declare_parameter(DESCRIPTION, self._description, ParameterDescriptor(description=about))
-        (self._described,) = (each for each in self._latched if each.topic_name.endswith(DESCRIPTION))
+        (self._described,) = (topic for topic in self._latched if topic.topic_name.endswith(DESCRIPTION))
 
         def show(parameters: list[Parameter]) -> None:
             for parameter in parameters:
@@ -296,7 +296,7 @@ class SimulationNode(Node):
         return leases
 
     def _take_leases(self, parameters: list[Parameter]) -> None:
-        """Begin what a coordinator has asked for; what it does not say is as configured, whatever was set before."""
+        """Begin the trials that a coordinator has asked for; parameters that clients have set do not count for them."""
         if not any(parameter.name == LEASES and parameter.value for parameter in parameters):
             return
         self._leases.replace(self._asked)
@@ -341,7 +341,7 @@ class SimulationNode(Node):
             raise ConfigError(f"{_FACTOR}: should be a finite number, 0 for no limit, got {factor}")
 
     def _restore_physics(self) -> None:
-        """Have the node show the physics of the configuration, should somebody have set another one before."""
+        """Show the physics of the configuration in the parameters again, in case a client has set another one."""
         stray = [key for key, value in self._physics.items() if self._get_value(key) != value]
         if stray:
             self._restoring = True
@@ -353,6 +353,6 @@ class SimulationNode(Node):
 
 
 def _everything(config: Config) -> Config:
-    """The configuration, recording all topics that come with every sample."""
+    """The configuration with all topics recorded that have a message for every sample."""
     record = config.record.model_copy(update={"topics": ["joint_states", "ball/odometry", "tf", "clock"]})
     return config.model_copy(update={"record": record})

@@ -1,4 +1,4 @@
-"""Keeping pace with real time, in slices so short that everything is told when it happens."""
+"""Keeping pace with real time, in slices so short that messages leave when things happen."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ import math
 import time
 
 _SHORTEST_S = 0.004
-"""Shortest slice in real time: a millisecond of it goes into what is done between two slices."""
+"""Shortest slice in real time: the work between two slices takes a millisecond."""
 _LONGEST_S = 0.05
-"""Longest slice in real time: inputs wait for its end."""
+"""Longest slice in real time: messages wait for its end."""
 _LATE_S = 0.05
-"""A delay up to this is made up for; after a longer one, such as a rest, time goes on from the present."""
+"""A delay up to this is made up for. After a longer one, such as a rest, the schedule begins anew."""
 
 
 def longest_steps(factor: float, hz: int) -> int:
@@ -24,11 +24,11 @@ def slice_steps(factor: float, hz: int, period: int, phase: int) -> int:
     Args:
         factor: Simulated over real time [-].
         hz: Physics steps per simulated second.
-        period: Physics steps after which there is something to tell.
-        phase: Physics steps since there was.
+        period: Physics steps from one sample to the next.
+        phase: Physics steps since the last sample.
 
     Returns:
-        What is left of the period, or a multiple of it where it is shorter than a slice can be; in slow motion less.
+        The rest of the period, or of a multiple where periods are shorter than a slice can be; in slow motion less.
     """
     periods = math.ceil(_SHORTEST_S * factor * hz / period)
     steps = min(periods * period, longest_steps(factor, hz))
@@ -36,7 +36,7 @@ def slice_steps(factor: float, hz: int, period: int, phase: int) -> int:
 
 
 class Pace:
-    """Ends each slice when it is due by a schedule that goes on from slice to slice, so that nothing adds up."""
+    """Ends each slice on a schedule that goes on from slice to slice, so that delays do not add up."""
 
     def __init__(self) -> None:
         self._factor = 0.0

@@ -1,4 +1,4 @@
-"""The trial that a simulation is set up for: for whom, what has reached its controllers, and what became of that."""
+"""The trial that a simulation is set up for: its lease, and the goals of its controllers with their results."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _EXECUTING = 2
 
 @dataclass(frozen=True)
 class TrialSetup:
-    """What the next reset prepares.
+    """The trial that the next reset prepares.
 
     Attributes:
         number: Number of the trial; negative for none.
@@ -31,12 +31,12 @@ class TrialSetup:
 
 
 class PresentTrial:
-    """What a simulation knows of its trial besides the physics.
+    """The trial of a simulation, without the physics.
 
     Attributes:
-        setup: What the next reset prepares.
-        leased: Whether the trial belongs to a coordinator, until its episode is handed over; meanwhile nobody else may
-            change anything.
+        setup: The trial that the next reset prepares.
+        leased: Whether the trial belongs to a coordinator, until its episode is handed over; meanwhile no other client
+            may change anything.
 
     Args:
         config: Configuration of the collection.
@@ -49,12 +49,12 @@ class PresentTrial:
         self._goals: dict[str, GoalOutcome] = {}
 
     def set_up_nothing(self) -> None:
-        """Take the trial from its coordinator, who will not accept the episode any more; all is as configured."""
+        """End the lease, after which the coordinator does not accept the episode; go back to the configuration."""
         self.leased = False
         self.setup = TrialSetup(_NO_TRIAL, (), self._config)
 
     def begin(self) -> None:
-        """Forget what has reached the controllers."""
+        """Forget the goals of the trial before."""
         self._goals = {}
 
     @property
@@ -73,24 +73,24 @@ class PresentTrial:
 
     @property
     def lease_in_words(self) -> str:
-        """Why something is refused while the simulation is leased."""
+        """Sentence by which requests are refused while the simulation is leased."""
         return f"the simulation is leased for trial {self.setup.number}, until its episode is handed over"
 
     @property
     def refusal(self) -> Refusal | None:
-        """Why nothing may reach a controller from outside; None if it may."""
+        """Refusal of goals and trajectories while the simulation is leased; otherwise None."""
         return Refusal(ErrorCode.INVALID_GOAL, self.lease_in_words) if self.leased else None
 
     def note_goal(self, controller: str) -> None:
-        """A controller has accepted a goal."""
+        """Note that a controller has accepted a goal."""
         self._goals[controller] = GoalOutcome(controller, _EXECUTING, 0, "")
 
     def note_result(self, controller: str, result: GoalResult) -> None:
-        """The goal of a controller has ended."""
+        """Note that the goal of a controller has ended."""
         if controller in self._goals:
             outcome = GoalOutcome(controller, result.status, result.error_code, result.error_string)
             self._goals[controller] = outcome
 
     def outcomes(self, controllers: Iterable[str]) -> tuple[GoalOutcome, ...]:
-        """What became of the goals of these controllers, in their order."""
+        """Outcomes of the goals of these controllers, in their order."""
         return tuple(self._goals[name] for name in controllers if name in self._goals)

@@ -1,4 +1,4 @@
-"""Samples as engines give them, laid out as arrays."""
+"""Lays the samples of engines out as arrays."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def to_samples(
         joints: All joints of the robot, in its order.
         moving: The joints of each sample.
         locked: Angle [rad] of each joint that is not in the samples.
-        offsets: By how much farther each joint of the samples stands than it says [rad], shape ``(n_moving,)``.
+        offsets: How much farther each joint of the samples stands than its sensor shows [rad], shape ``(n_moving,)``.
     """
     count, width = len(rows), 3 * len(moving) + BALL_NUMBERS
     table = np.fromiter(chain.from_iterable(rows), float, count * width).reshape(count, width)

@@ -1,10 +1,9 @@
-"""What can be spawned: descriptions found by URI, and the files that they refer to."""
+"""Finds what can be spawned: descriptions by their URIs, and the files that they refer to."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from pathlib import Path
 from urllib.parse import quote, unquote, urlsplit
@@ -21,25 +20,12 @@ _LARGEST_FILE = 4 * 2**20
 _MOST_ENTRIES = 20_000
 
 
-@dataclass(frozen=True)
-class Resource:
-    """A description that lies ready to be spawned.
-
-    Attributes:
-        uri: What to ask for.
-        name: The name that it gives itself.
-    """
-
-    uri: str
-    name: str
-
-
 def load_model(uri: str, text: str, robot: Robot) -> BodyModel:
-    """Read the description that a client means.
+    """Read the description that a client names or sends.
 
     Args:
         uri: ``file://`` or ``package://`` URI of a URDF file.
-        text: URDF text; what counts if there is no URI.
+        text: URDF text, which is used if there is no URI.
         robot: The robot, beside whose description those of ``package://`` are.
 
     Raises:
@@ -64,7 +50,7 @@ def load_model(uri: str, text: str, robot: Robot) -> BodyModel:
     return read_model(content, lambda filename: read_mesh(_locate(filename, path.parent, robot)))
 
 
-def find_resources(sources: Sequence[str], robot: Robot) -> tuple[list[Resource], list[str]]:
+def find_resources(sources: Sequence[str], robot: Robot) -> tuple[dict[str, str], list[str]]:
     """Look for descriptions that can be spawned.
 
     Args:
@@ -72,31 +58,32 @@ def find_resources(sources: Sequence[str], robot: Robot) -> tuple[list[Resource]
         robot: The robot.
 
     Returns:
-        What was found, in order of the URIs, and what is wrong with each source that cannot be searched.
+        The name that each description gives itself, by its URI, and what is wrong with each source that cannot be
+        searched.
     """
-    found = list(_find_installed(robot))
+    names = dict(_find_installed(robot))
     useless = []
     for source in sources:
         try:
             directory = _path(source, robot, missing="RESULT_NOT_FOUND")
             if not directory.is_dir():
                 raise RequestError("RESULT_NOT_FOUND", f"{source!r:.255}: no such directory")
-            found += _search(directory, Path.as_uri, robot)
+            names |= _search(directory, Path.as_uri, robot)
         except (OSError, ValueError) as error:
             useless.append(f"{source!r:.255}: cannot be searched: {error}")
         except RequestError as error:
             useless.append(str(error))
-    return sorted(set(found), key=lambda resource: resource.uri), useless
+    return names, useless
 
 
 @cache
-def _find_installed(robot: Robot) -> tuple[Resource, ...]:
+def _find_installed(robot: Robot) -> Mapping[str, str]:
     share = robot.share()
 
     def uri_of(path: Path) -> str:
         return f"package://{quote(path.relative_to(share).as_posix())}"
 
-    return tuple(_search(share / _package_of(robot), uri_of, robot))
+    return _search(share / _package_of(robot), uri_of, robot)
 
 
 def _package_of(robot: Robot) -> str:
@@ -104,26 +91,25 @@ def _package_of(robot: Robot) -> str:
     return robot.urdf.split("/", 1)[0]
 
 
-def _search(directory: Path, uri_of: Callable[[Path], str], robot: Robot) -> list[Resource]:
-    """Descriptions below a directory whose collision shapes are all there.
+def _search(directory: Path, uri_of: Callable[[Path], str], robot: Robot) -> dict[str, str]:
+    """Names of the descriptions below a directory whose collision shapes are all there, by their URIs.
 
     Raises:
         RequestError: ``RESULT_NOT_FOUND`` if there are too many files to search.
     """
-    found = []
+    names = {}
     seen = 0
     for parent, directories, files in os.walk(directory):
-        directories.sort()
         seen += len(files) + len(directories)
         if seen > _MOST_ENTRIES:
             raise RequestError("RESULT_NOT_FOUND", f"{directory}: more than {_MOST_ENTRIES} files; name a part of it")
-        for path in (Path(parent, name) for name in sorted(files) if name.endswith(".urdf")):
+        for path in (Path(parent, name) for name in files if name.endswith(".urdf")):
             try:
                 if path.is_file() and path.stat().st_size <= _LARGEST_FILE:
-                    found.append(Resource(uri_of(path), _spawnable_name(path, robot)))
+                    names[uri_of(path)] = _spawnable_name(path, robot)
             except (RequestError, OSError):
                 continue
-    return found
+    return names
 
 
 def _spawnable_name(path: Path, robot: Robot) -> str:
@@ -149,12 +135,7 @@ def _locate(filename: str, directory: Path | None, robot: Robot) -> Path:
 
 
 def _path(uri: str, robot: Robot, *, missing: str) -> Path:
-    """File that a URI means.
-
-    Args:
-        uri: The URI.
-        robot: The robot, whose share the packages are in.
-        missing: Reason to give if there is no such package.
+    """File that a URI means; packages are looked for in the share of the robot.
 
     Raises:
         RequestError: ``UNSUPPORTED_FORMAT`` if it has another scheme, `missing` if its package is not known.

@@ -1,4 +1,4 @@
-"""What a configuration says of the world, as values for a physics engine."""
+"""Values for a physics engine, from a configuration."""
 
 from __future__ import annotations
 
@@ -11,16 +11,11 @@ from throwcollect.robots.limits import joint_limits
 from throwcollect.tools.tool import tool_of
 
 _OPENING = (1.0, 0.0, 0.0)
-"""Where every tool is open, in the frame of its link."""
+"""Direction in which every tool is open, in the frame of its link."""
 
 
 def scene_of(config: Config, description: Description) -> Scene:
-    """What the world of a trial is made of.
-
-    Args:
-        config: Configuration of the trial.
-        description: Its robot.
-    """
+    """The world of a trial, with the robot of a description."""
     tool = tool_of(config.tool)
     return Scene(
         urdf=description.urdf,
@@ -34,12 +29,7 @@ def scene_of(config: Config, description: Description) -> Scene:
 
 
 def physics_of(config: Config, moving: tuple[str, ...]) -> Physics:
-    """The numbers that the physics of a trial depends on.
-
-    Args:
-        config: Configuration of the trial.
-        moving: The moving joints.
-    """
+    """The numbers that the physics of a trial with these moving joints depends on."""
     robot = robot_of(config)
     efforts = joint_limits(robot).effort * config.robot.effort_scale
     return Physics(

@@ -1,4 +1,4 @@
-"""How the services of simulation_interfaces answer: with a result code, and in words if something is wrong."""
+"""Answers of the services of simulation_interfaces: a result code, and a sentence on errors."""
 
 from __future__ import annotations
 
@@ -13,12 +13,7 @@ Fill = Callable[[Any, Any], None]
 
 
 def answering(service: Any, fill: Fill) -> Callable[[Any, Any], Any]:
-    """Callback of a service that answers with what went wrong instead of failing.
-
-    Args:
-        service: Class of the service.
-        fill: Fills the response; the result is set if it raises nothing.
-    """
+    """Make the callback of a service, which fills the response, or answers with the error that `fill` raises."""
 
     def answer(request: Any, response: Any) -> Any:
         response.result.result = Result.RESULT_OK
@@ -41,11 +36,9 @@ _R = TypeVar("_R", bound=_WithResult)
 
 
 def refusal(response_type: type[_R], error: RequestError) -> _R:
-    """Response, or any other message with a ``result``, that says why something cannot be done.
+    """Response, or any other message with a ``result``, that gives the reason of an error.
 
-    Args:
-        response_type: Its class, whose constants are looked at before those of all services.
-        error: What is wrong.
+    A code that the message has of its own comes before one of the same name that all services have.
     """
     constants = response_type if hasattr(response_type, error.reason) else Result
     response = response_type()

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Hashable, Iterable, Mapping
+from dataclasses import dataclass
 from enum import IntEnum, IntFlag
 
 import numpy as np
@@ -21,14 +22,13 @@ from throwcollect.sim.entities import Entities
 from throwcollect.sim.limb_controller import LimbController
 from throwcollect.sim.pace import Pace, longest_steps, slice_steps
 from throwcollect.sim.present_trial import PresentTrial, TrialSetup
-from throwcollect.sim.step_request import StepRequest
 from throwcollect.sim.world import World
 
 _SLICE_S = 0.5
-"""Simulated time between two looks at the inputs in a trial or in many steps: about 20 ms of real time."""
+"""Simulated time between two looks at messages in a trial or in many steps: about 20 ms of real time."""
 
 _WATCHED_SLICE_S = 0.05
-"""The same while somebody watches, and outside of trials: the period in which ros2_controllers give feedback."""
+"""Simulated time of such a slice while a client watches, and outside of trials: ros2_controllers' feedback period."""
 
 
 class State(IntEnum):
@@ -41,12 +41,32 @@ class State(IntEnum):
 
 
 class Scope(IntFlag):
-    """What a reset resets, by the constants of simulation_interfaces/srv/ResetSimulation."""
+    """Parts that a reset resets, by the constants of simulation_interfaces/srv/ResetSimulation."""
 
     TIME = 1
     STATE = 2
     SPAWNED = 4
     ALL = TIME | STATE | SPAWNED
+
+
+@dataclass
+class StepRequest:
+    """Physics steps that a client wants while the clock stands still, and how far they have come.
+
+    Attributes:
+        wanted: Number of steps.
+        taken: How many have been taken so far.
+        interruption: Why no more will be taken; None if nothing has interrupted them.
+    """
+
+    wanted: int
+    taken: int = 0
+    interruption: str | None = None
+
+    @property
+    def is_over(self) -> bool:
+        """Whether no more steps will be taken."""
+        return self.interruption is not None or self.taken >= self.wanted
 
 
 class Simulation:
@@ -92,11 +112,11 @@ class Simulation:
         return self._steps is not None or (self._running and self.state == State.PLAYING)
 
     def lease(self, number: int, config: Config, goals: Mapping[str, TrajectoryGoal]) -> None:
-        """Begin a trial for a coordinator, with controllers as they are configured, which nobody else may touch.
+        """Begin a trial for a coordinator, with controllers as they are configured, which no other client may touch.
 
         Args:
             number: Number of the trial.
-            config: Configuration of the trial.
+            config: Configuration with the trial's values.
             goals: Goal of each controller that moves.
 
         Raises:
@@ -114,7 +134,7 @@ class Simulation:
         self.trial.leased = True
 
     def end_lease(self) -> None:
-        """Forget a leased trial that nobody wants any more; all is as configured."""
+        """Forget a leased trial that the coordinator has taken back, and go back to the configuration."""
         self.trial.set_up_nothing()
         self.reset()
 
@@ -146,7 +166,7 @@ class Simulation:
         of_time, of_state, of_spawned = Scope.TIME in scope, Scope.STATE in scope, Scope.SPAWNED in scope
         if of_spawned:
             self.world.spawned.clear()
-            # What clients have said of entities belongs to the world that ends here.
+            # Descriptions that clients have given to entities belong to the world that ends here.
             if of_time and of_state:
                 self.entities.forget_infos()
         if not (of_time or of_state):
@@ -174,11 +194,7 @@ class Simulation:
         self._published = 0
 
     def submit(self, controller: str, goal_id: Hashable, goal: TrajectoryGoal) -> Refusal | None:
-        """Give a goal to a controller; the run begins when the last awaited one has its goal.
-
-        Returns:
-            None if the goal is accepted, else the reason of the refusal.
-        """
+        """Give a goal to a controller, or refuse it; the run begins when the last awaited controller has its goal."""
         if (leased := self.trial.refusal) is not None:
             return leased
         limb = self.limbs[controller]
@@ -186,15 +202,11 @@ class Simulation:
         self._collect_results()
         if refusal is None:
             self.trial.note_goal(controller)
-            self._run_unless_awaiting()
+            self._running |= self.trial.has_all_goals
         return refusal
 
     def cancel(self, controller: str, goal_id: Hashable) -> bool:
-        """Cancel a goal.
-
-        Returns:
-            Whether it was being executed, and may be cancelled.
-        """
+        """Cancel a goal; return whether it was being executed, and may be cancelled."""
         if self.trial.leased:
             return False
         cancelled = self.observe(controller).cancel(goal_id)
@@ -202,32 +214,30 @@ class Simulation:
         return cancelled
 
     def follow(self, controller: str, trajectory: Trajectory) -> Refusal | None:
-        """Let a controller follow a trajectory that is no goal; it begins a run unless goals are awaited.
-
-        Returns:
-            None if it is accepted, else the reason of the refusal.
-        """
+        """Let a controller follow a trajectory that is no goal, or refuse it; a run begins unless goals are awaited."""
         if (leased := self.trial.refusal) is not None:
             return leased
         limb = self.limbs[controller]
         refusal = limb.refuse_locked(trajectory) or limb.controller.replace(trajectory, self.now_ns)
         self._collect_results()
         if refusal is None:
-            self._run_unless_awaiting()
+            self._running |= self.trial.has_all_goals
         return refusal
 
     def advance(self, *, watched: bool) -> None:
         """Run for a slice of time, or until the run ends; it ends on time where a real-time factor asks for it.
 
         Args:
-            watched: Whether somebody wants to see it happen: slices are short then.
+            watched: Whether a client listens, so that slices have to be short.
         """
         began_s, since_ns, factor = time.monotonic(), self.now_ns, self.real_time_factor
-        # A long slice costs the least; a short one lets messages in between, which only those who watch need.
+        # A long slice costs the least. A short one lets messages be sent in between, which only watching clients need.
         slice_s = _SLICE_S if (self._in_trial or self._steps) and not (watched or factor) else _WATCHED_SLICE_S
         steps = max(1, round(slice_s * self.config.sim.physics_hz))
-        if self._steps is not None:
-            self._take_steps(self._steps, steps)
+        if (request := self._steps) is not None:
+            request.taken += self.step(min(steps, request.wanted - request.taken))
+            if request.is_over:
+                self._steps = None
             return
         if factor:
             steps = slice_steps(factor, self.config.sim.physics_hz, self._stride, self.world.steps % self._stride)
@@ -250,11 +260,7 @@ class Simulation:
     def request_steps(self, steps: int) -> StepRequest:
         """Have `advance` take physics steps while the clock stands still; trials may end on the way.
 
-        Args:
-            steps: How many.
-
-        Returns:
-            How far it has come, kept up to date.
+        The request that is returned is kept up to date.
 
         Raises:
             RequestError: ``RESULT_OPERATION_FAILED`` if the simulation is not paused, ``RESULT_INCORRECT_STATE`` if the
@@ -277,20 +283,16 @@ class Simulation:
             self._interrupt_steps("cancelled")
 
     def step(self, steps: int) -> int:
-        """Take physics steps; fewer if the trial ends, or a goal outside of a trial.
-
-        Returns:
-            How many were taken.
-        """
+        """Take physics steps, fewer if the trial ends, or a goal outside of a trial; return how many were taken."""
         if not self._in_trial:
             self.world.forget_samples()
-        left = steps
-        while left > 0 and not (self._in_trial and self.world.end_reason is not None):
-            left -= self._step_some(left)
+        remaining = steps
+        while remaining > 0 and not (self._in_trial and self.world.end_reason is not None):
+            remaining -= self._step_some(remaining)
             if self._results and not self._in_trial:
-                # Whoever waits for the result shall have it before time goes on.
+                # A client that waits for the result gets it before time goes on.
                 break
-        return steps - left
+        return steps - remaining
 
     def pop_results(self) -> list[tuple[str, GoalResult]]:
         """Controllers and results of the goals that have ended since the last call, oldest first."""
@@ -307,7 +309,7 @@ class Simulation:
         return self.world.samples(self.world.recorded - 1)
 
     def episode(self) -> tuple[EpisodeHeader, Samples, Mapping[str, ControllerSamples]] | None:
-        """What the trial yielded, once it has ended; then never again until the next reset."""
+        """The recording of a trial that has ended, given out once; None before that, and until the next trial ends."""
         if not self._in_trial or self.world.end_reason is None:
             return None
         self._in_trial = self.trial.leased = False
@@ -334,20 +336,12 @@ class Simulation:
         return limb.controller
 
     def watch(self, controllers: Iterable[str]) -> None:
-        """Keep the states of these controllers, in every control period, for `LimbController.pop_states`."""
+        """Keep the states of these controllers, and of no others, for `LimbController.pop_states`."""
         self._watched = [self.limbs[name] for name in controllers]
         for limb in self.limbs.values():
             limb.watched = limb in self._watched
             if not limb.watched:
                 limb.pop_states()
-
-    def _run_unless_awaiting(self) -> None:
-        self._running |= self.trial.has_all_goals
-
-    def _take_steps(self, request: StepRequest, most: int) -> None:
-        request.taken += self.step(min(most, request.wanted - request.taken))
-        if request.is_over:
-            self._steps = None
 
     def _interrupt_steps(self, reason: str) -> None:
         if self._steps is not None:
@@ -385,7 +379,7 @@ class Simulation:
         positions, velocities = self.world.joints()
         keeps = self._keeps_states and self.world.steps % self._stride == 0
         for limb in limbs:
-            limb.update(self.now_ns, self._period_ns, limb.measure(positions, velocities), self._command)
+            limb.update(self.now_ns, limb.measure(positions, velocities), self._command)
             if keeps:
                 limb.keep_state()
 

@@ -46,16 +46,11 @@ _WHOLE_SCOPES = (ResetSimulation.Request.SCOPE_DEFAULT, ResetSimulation.Request.
 
 
 class SimulationControl:
-    """Offers all services, and the action, under relative names, so that they stand in the simulation's namespace.
-
-    Args:
-        node: The simulation's node.
-        simulation: What is controlled.
-    """
+    """Offers all services, and the action, under relative names, so that they stand in the simulation's namespace."""
 
     def __init__(self, node: Node, simulation: Simulation) -> None:
         self._simulation = simulation
-        # This service stands alone, as its response is the only one that has no result code.
+        # This service has no result code, unlike all others.
         node.create_service(GetSimulatorFeatures, "get_simulator_features", self._get_features)
         for service, name, fill in (
             (GetSimulationState, "get_simulation_state", self._get_state),
@@ -68,7 +63,7 @@ class SimulationControl:
         self._stepping = Stepping(node, simulation)
 
     def follow_up(self) -> None:
-        """Tell those who wait for steps how far it has come; call it after each slice."""
+        """Send feedback and results to clients that wait for steps; call it after each slice."""
         self._stepping.follow_up()
 
     def _get_features(
@@ -87,20 +82,18 @@ class SimulationControl:
     def _get_state(self, _request: GetSimulationState.Request, response: GetSimulationState.Response) -> None:
         response.state.state = int(self._simulation.state)
 
-    def _set_state(self, request: SetSimulationState.Request, response: SetSimulationState.Response) -> None:
-        del response
-        wanted = request.state.state
-        if wanted not in list(State):
-            raise RequestError("INCORRECT_TRANSITION", f"state {wanted} cannot be set")
-        if wanted == self._simulation.state:
-            raise RequestError("ALREADY_IN_TARGET_STATE", f"the simulation is {State(wanted).name} already")
+    def _set_state(self, request: SetSimulationState.Request, _response: SetSimulationState.Response) -> None:
+        target = request.state.state
+        if target not in list(State):
+            raise RequestError("INCORRECT_TRANSITION", f"state {target} cannot be set")
+        if target == self._simulation.state:
+            raise RequestError("ALREADY_IN_TARGET_STATE", f"the simulation is {State(target).name} already")
         try:
-            self._simulation.set_state(State(wanted))
+            self._simulation.set_state(State(target))
         except ConfigError as error:
             raise RequestError("STATE_TRANSITION_ERROR", str(error)) from error
 
-    def _reset(self, request: ResetSimulation.Request, response: ResetSimulation.Response) -> None:
-        del response
+    def _reset(self, request: ResetSimulation.Request, _response: ResetSimulation.Response) -> None:
         self._simulation.trial.require_free()
         if request.scope in _WHOLE_SCOPES:
             self._simulation.reset()

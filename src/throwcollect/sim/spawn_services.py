@@ -1,6 +1,9 @@
-"""Services that put new entities into the world, and that tell what there is to put."""
+"""Services that put new entities into the world, and that list descriptions for that."""
 
 from __future__ import annotations
+
+import re
+from itertools import count
 
 from throwcollect.errors import RequestError
 from throwcollect.robots.description import robot_of
@@ -9,25 +12,25 @@ from throwcollect.ros.msg import Resource, Result, Spawnable, SpawnResult
 from throwcollect.ros.msg import SpawnEntity as SpawnWish
 from throwcollect.ros.srv import GetSpawnables, SpawnEntities, SpawnEntity
 from throwcollect.sim.body_messages import body_state
-from throwcollect.sim.resources import find_resources
+from throwcollect.sim.entities import WORLD_FRAME
+from throwcollect.sim.resources import find_resources, load_model
 from throwcollect.sim.service_results import answering, refusal
 from throwcollect.sim.simulation import Simulation
-from throwcollect.sim.spawning import SpawnRequest, spawn
 
 _MOST_REQUESTS = 200
 _MOST_SOURCES = 100
+_LONGEST_NAME = 100
+_NAME = re.compile(rf"[A-Za-z0-9_][A-Za-z0-9_.-]{{0,{_LONGEST_NAME - 1}}}")
+_NAMESPACE = re.compile(r"/?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*|/?")
+_LONGEST_NAMESPACE = 245
+"""The limit of rmw."""
 
 
 class SpawnServices:
-    """Offers the services under relative names, so that they stand in the simulation's namespace.
-
-    Args:
-        node: The simulation's node.
-        simulation: Where to put entities.
-    """
+    """Offers the services under relative names, so that they stand in the simulation's namespace."""
 
     def __init__(self, node: Node, simulation: Simulation) -> None:
-        self._simulation = simulation
+        self._trial = simulation.trial
         self._entities = simulation.entities
         self._robot = robot_of(simulation.config)
         for service, name, fill in (
@@ -38,11 +41,11 @@ class SpawnServices:
             node.create_service(service, name, answering(service, fill))
 
     def _spawn_one(self, request: SpawnEntity.Request, response: SpawnEntity.Response) -> None:
-        self._simulation.trial.require_free()
+        self._trial.require_free()
         response.entity_name = self._spawn(request, request)
 
     def _spawn_all(self, request: SpawnEntities.Request, response: SpawnEntities.Response) -> None:
-        self._simulation.trial.require_free()
+        self._trial.require_free()
         if len(request.spawn_requests) > _MOST_REQUESTS:
             message = f"{len(request.spawn_requests)} requests in one call; at most {_MOST_REQUESTS}"
             raise RequestError("RESULT_OPERATION_FAILED", message)
@@ -61,25 +64,50 @@ class SpawnServices:
             response.result.error_message = f"{failed} of {len(results)} entities were not spawned; see their results"
 
     def _spawn(self, wish: SpawnWish | SpawnEntity.Request, resource: Resource | SpawnEntity.Request) -> str:
-        pose = wish.initial_pose
-        return spawn(
-            self._entities,
-            SpawnRequest(
-                name=wish.name,
-                allow_renaming=bool(wish.allow_renaming),
-                uri=resource.uri,
-                text=resource.resource_string,
-                namespace=wish.entity_namespace,
-                start=body_state(pose.pose),
-                frame=pose.header.frame_id,
-            ),
-            self._robot,
-        )
+        """Put a new entity into the world and return its name; a wish that cannot be met changes nothing.
+
+        Raises:
+            RequestError: ``NAME_INVALID``, ``NAME_NOT_UNIQUE``, ``NAMESPACE_INVALID``, ``INVALID_POSE``, the reasons of
+                `load_model`, and those of `Entities.add`.
+        """
+        if wish.name or not wish.allow_renaming:
+            self._check_name(wish.name, allow_renaming=wish.allow_renaming)
+        if len(wish.entity_namespace) > _LONGEST_NAMESPACE or not _NAMESPACE.fullmatch(wish.entity_namespace):
+            message = f"namespace {wish.entity_namespace!r:.80}"
+            raise RequestError("NAMESPACE_INVALID", message, expected="such as /left/table, or nothing")
+        start = self._entities.in_world(body_state(wish.initial_pose.pose), wish.initial_pose.header.frame_id)
+        model = load_model(resource.uri, resource.resource_string, self._robot)
+        name = self._find_free_name(wish.name or model.name)
+        origin = f"URDF {model.name!r:.80}" + (f" of {resource.uri:.500}" if resource.uri else "")
+        namespace = f", namespace {wish.entity_namespace}" if wish.entity_namespace else ""
+        self._entities.add(name, model, start, origin + namespace)
+        return name
+
+    def _check_name(self, name: str, *, allow_renaming: bool) -> None:
+        if not _NAME.fullmatch(name) or name == WORLD_FRAME:
+            raise RequestError(
+                "NAME_INVALID",
+                f"name {name!r:.120}",
+                expected=f"1 to {_LONGEST_NAME} letters, digits and _ . -, beginning with neither . nor -, other than "
+                f"{WORLD_FRAME}",
+                hint=None if name else "allow_renaming, and the name of the description is taken",
+            )
+        if name in self._entities.names and not allow_renaming:
+            raise RequestError("NAME_NOT_UNIQUE", f"there is an entity {name!r}", hint="allow_renaming")
+
+    def _find_free_name(self, wish: str) -> str:
+        """A name that no entity has: the one that is wished for, or that with a number."""
+        stem = re.sub(r"[^A-Za-z0-9_]", "_", wish[:_LONGEST_NAME]) if not _NAME.fullmatch(wish) else wish
+        stem = stem or "entity"
+        taken = {WORLD_FRAME, *self._entities.names}
+        if stem not in taken:
+            return stem
+        return next(name for number in count(1) if (name := f"{stem[: _LONGEST_NAME - 4]}_{number}") not in taken)
 
     def _list_spawnables(self, request: GetSpawnables.Request, response: GetSpawnables.Response) -> None:
         if len(request.sources) > _MOST_SOURCES:
             message = f"{len(request.sources)} sources in one call; at most {_MOST_SOURCES}"
             raise RequestError("RESULT_OPERATION_FAILED", message)
-        resources, useless = find_resources(request.sources, self._robot)
-        response.spawnables = [Spawnable(uri=resource.uri, description=resource.name) for resource in resources]
+        names, useless = find_resources(request.sources, self._robot)
+        response.spawnables = [Spawnable(uri=uri, description=name) for uri, name in sorted(names.items())]
         response.result.error_message = "\n".join(useless)

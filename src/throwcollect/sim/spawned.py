@@ -29,12 +29,7 @@ class SpawnedBodies:
         return tuple(self._spawned)
 
     def add(self, name: str, model: BodyModel, start: BodyState) -> None:
-        """Put a body into the world.
-
-        Args:
-            name: Its name, which no other body has.
-            model: What it is.
-            start: Its state; only the pose matters.
+        """Put a body into the world, under a name that no other body has; of its state only the pose matters.
 
         Raises:
             RequestError: ``RESULT_FEATURE_UNSUPPORTED`` if the engine takes no bodies, ``RESOURCE_PARSE_ERROR`` if it
@@ -55,20 +50,20 @@ class SpawnedBodies:
             self.remove(name)
 
     def load(self) -> None:
-        """Put all bodies that the world has lost where they were spawned, as it loses them when it is loaded."""
+        """Put back where they were spawned all bodies that the world has lost, as it does when it is loaded."""
         for name, (model, start) in self._spawned.items():
             if name not in self._bodies:
                 self._bodies.add(name, model, start)
 
     def model(self, name: str) -> BodyModel:
-        """What a body is."""
+        """The model of a body."""
         return self._spawned[name][0]
 
     def engine_bodies(self, name: str) -> Bodies:
-        """The bodies of the engine, of which this one is one.
+        """The bodies of the engine, among which is the one of this name.
 
         Raises:
-            RequestError: ``RESULT_INCORRECT_STATE`` if there is no world that it could be in.
+            RequestError: ``RESULT_INCORRECT_STATE`` if no world is loaded.
         """
         if name not in self._bodies:
             raise RequestError("RESULT_INCORRECT_STATE", f"{name}: there is no world until a reset succeeds")

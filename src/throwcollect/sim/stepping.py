@@ -1,4 +1,4 @@
-"""Stepping through a paused simulation: a service that answers when it is done, an action that tells how far it is."""
+"""Stepping through a paused simulation: a service that answers at the end, and an action with feedback."""
 
 from __future__ import annotations
 
@@ -10,8 +10,7 @@ from throwcollect.ros.action import SimulateSteps
 from throwcollect.ros.msg import Result
 from throwcollect.ros.srv import StepSimulation
 from throwcollect.sim.service_results import refusal
-from throwcollect.sim.simulation import Simulation
-from throwcollect.sim.step_request import StepRequest
+from throwcollect.sim.simulation import Simulation, StepRequest
 
 _ACTION = "simulate_steps"
 _MOST_STEPS = 100_000
@@ -26,7 +25,7 @@ class Stepping:
 
     Args:
         node: The simulation's node.
-        simulation: What is stepped through.
+        simulation: The simulation that is stepped through.
     """
 
     def __init__(self, node: Node, simulation: Simulation) -> None:
@@ -44,7 +43,7 @@ class Stepping:
         )
 
     def follow_up(self) -> None:
-        """Tell those who wait how far it has come; call it after each slice."""
+        """Send feedback and results to clients that wait for steps; call it after each slice."""
         for awaited in list(self._awaited):
             request, future, handle = awaited
             if handle is not None:
@@ -100,9 +99,9 @@ class Stepping:
             raise RequestError("RESULT_OPERATION_FAILED", message)
 
     def _publish_feedback(self, request: StepRequest, handle: Any) -> None:
-        """Tell of every step, as the action promises, if somebody listens."""
+        """Send feedback for every step, as the action promises, if it has subscribers."""
         first, self._told = self._told + 1, request.taken
         if self._node.count_subscribers(f"{_ACTION}/_action/feedback"):
             for completed in range(first, request.taken + 1):
-                left = request.wanted - completed
-                handle.publish_feedback(SimulateSteps.Feedback(completed_steps=completed, remaining_steps=left))
+                remaining = request.wanted - completed
+                handle.publish_feedback(SimulateSteps.Feedback(completed_steps=completed, remaining_steps=remaining))

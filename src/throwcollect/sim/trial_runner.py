@@ -1,4 +1,4 @@
-"""Runs trials of a collection in one simulation: begins them, and makes of each what a coordinator takes in."""
+"""Runs trials of a collection in one simulation: begins them, and makes their episodes for the coordinator."""
 
 from __future__ import annotations
 
@@ -33,10 +33,10 @@ class _Begun:
 
 
 class TrialRunner:
-    """Begins trials and hands over what they yielded; whoever uses it advances the simulation in between.
+    """Begins trials and hands over their episodes; the caller advances the simulation in between.
 
     Attributes:
-        channels: What is recorded of a trial.
+        channels: The topics that are recorded of a trial.
 
     Args:
         simulation: The simulation that they run in.
@@ -56,8 +56,8 @@ class TrialRunner:
 
         Args:
             trial: Number of the trial.
-            values: What the trial replaces of the configuration, by dotted key.
-            token: That of its lease; empty if it is leased by nobody.
+            values: Values that replace those of the configuration, by dotted key.
+            token: Token of its lease; empty without a lease.
 
         Raises:
             ConfigError: If the values make no motion, or no start state.
@@ -70,22 +70,19 @@ class TrialRunner:
         self._begun = _Begun(config, trajectory, token)
 
     def disown(self) -> None:
-        """Let the trial that runs be nobody's: its episode is not judged, and names no lease."""
+        """Take its lease from the trial that runs: its episode is not judged, and names no lease."""
         self._begun = None
 
     def drop(self) -> None:
-        """Break off the trial that runs; all is as configured."""
+        """Break off the trial that runs, and go back to the configuration."""
         self.disown()
         self._simulation.end_lease()
 
     def hand_over(self) -> Delivery | None:
-        """What a trial has yielded, once it has ended; then never again.
-
-        Returns:
-            The episode, judged if `begin` began it; None if none has ended.
+        """The episode of a trial that has ended, given out once, and judged if `begin` began it; None if there is none.
 
         Raises:
-            ThrowcollectError: If it yielded what nobody could want in a dataset: numbers that are not finite.
+            ThrowcollectError: If it has numbers that are not finite, which no dataset may have.
         """
         ended = self._simulation.episode()
         if ended is None:
@@ -101,7 +98,7 @@ class TrialRunner:
             lease=begun.token if begun else "",
         )
         records = self._encoder.lay_out(samples, states)
-        # Judged is what the records say, as everybody does who reads them: they hold velocities in the ball's frame.
+        # The records are judged, as by every reader of the dataset: they hold velocities in the ball's frame.
         result = self._judge(begun, MessageTable(records, header.samples).samples, header) if begun else ""
         episode = Episode(header, self._encoder.compress(records, samples), hashlib.sha256(records).hexdigest())
         return Delivery(episode, result, conditions.to_json())

@@ -1,14 +1,16 @@
-"""Robots and objects in URDF, from untrusted files: checked, and written anew for the physics engine.
+"""Reads URDF of robots and objects from untrusted files, checks it, and writes it anew for the physics engine.
 
-Bullet ends its process on some descriptions and guesses on others, so it gets to see only what was understood here:
-links with mass and inertia, collision shapes, joints that form a tree.
+Bullet ends its process on some descriptions and guesses on others. So it sees only what was understood here: links with
+mass and inertia, collision shapes, joints that form a tree.
 """
 
 from __future__ import annotations
 
 import math
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Sequence
+from graphlib import CycleError, TopologicalSorter
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +18,6 @@ from numpy.typing import NDArray
 from throwcollect.engines.engine import BodyModel
 from throwcollect.errors import RequestError
 from throwcollect.sim.mesh import Triangles
-from throwcollect.sim.urdf_tree import Joint, check_tree, rigid_root
 
 _MOST_LINKS = 128
 """As many as Bullet takes."""
@@ -91,41 +92,30 @@ class _Reader:
     def __init__(self, root: ElementTree.Element, read_mesh: Callable[[str], Triangles]) -> None:
         self._root = root
         self._read_mesh = read_mesh
-        self._meshes: dict[str, int] = {}
-        self._triangles: list[Triangles] = []
+        self._meshes: dict[str, Triangles] = {}
 
     def read(self) -> BodyModel:
-        masses = {}
-        robot = ElementTree.Element("robot", name="entity")
+        masses: dict[str, float] = {}
         for link in self._root.findall("link"):
             name = _name(link)
             if name in masses:
                 raise _malformed(f"link {name} is there twice")
-            masses[name] = self._mass(link)
+            masses[name] = _mass(link)
         if not 1 <= len(masses) <= _MOST_LINKS:
             raise _malformed(f"{len(masses)} links; 1 to {_MOST_LINKS} can be simulated")
-        joints = [self._joint(joint) for joint in self._root.findall("joint")]
-        root = check_tree(list(masses), joints)
-        group = rigid_root(root, joints)
-        is_fixed = root == "world" or sum(masses[link] for link in group) == 0
-        movable = [joint for joint in joints if joint.kind != "fixed"]
+        joints = [_joint(joint) for joint in self._root.findall("joint")]
+        rigid = _find_rigid_links(masses, joints)
+        is_fixed = rigid[0] == "world" or sum(masses[link] for link in rigid) == 0
+        robot = ElementTree.Element("robot", name="entity")
         for link in self._root.findall("link"):
-            robot.append(self._link(link, masses[_name(link)], exact=is_fixed and _name(link) in group))
+            robot.append(self._link(link, masses[_name(link)], exact=is_fixed and _name(link) in rigid))
         robot.extend(joint.element for joint in joints)
         # Bullet reads lines of bounded length.
         ElementTree.indent(robot)
         text = ElementTree.tostring(robot, encoding="unicode") + "\n"
-        own_name = self._root.get("name", "")
-        return BodyModel(own_name, text, tuple(self._triangles), joints=len(movable), is_fixed=is_fixed)
-
-    def _mass(self, link: ElementTree.Element) -> float:
-        mass = link.find("inertial/mass")
-        if mass is None:
-            return 0.0
-        (value,) = _numbers(mass, "value", 1, of=link)
-        if value < 0:
-            raise _malformed(f"link {_name(link)}: mass should not be negative, got {value:g} kg")
-        return value
+        movable = sum(joint.kind != "fixed" for joint in joints)
+        meshes = tuple(self._meshes.values())
+        return BodyModel(self._root.get("name", ""), text, meshes, joints=movable, is_fixed=is_fixed)
 
     def _link(self, link: ElementTree.Element, mass: float, *, exact: bool) -> ElementTree.Element:
         clean = ElementTree.Element("link", name=_name(link))
@@ -159,26 +149,87 @@ class _Reader:
         return ElementTree.Element(shape.tag, {key: _text(values) for key, values in sizes.items()})
 
     def _mesh(self, filename: str) -> int:
-        if filename not in self._meshes:
-            self._triangles.append(self._read_mesh(filename))
-            self._meshes[filename] = len(self._triangles) - 1
-            if (count := sum(map(len, self._triangles))) > _MOST_TRIANGLES:
-                raise RequestError("UNSUPPORTED_ASSETS", f"{count} triangles in all; at most {_MOST_TRIANGLES}")
-        return self._meshes[filename]
+        """Number of a mesh, which is read when the description first names it.
 
-    def _joint(self, joint: ElementTree.Element) -> Joint:
-        name = _name(joint)
-        kind = joint.get("type", "")
-        if kind not in ("fixed", "revolute", "continuous", "prismatic"):
-            raise _malformed(f"joint {name}: joints of type {kind!r:.40} are not simulated")
-        parent, child = _link_of(joint, "parent"), _link_of(joint, "child")
-        clean = ElementTree.Element("joint", name=name, type=kind)
-        ElementTree.SubElement(clean, "parent", link=parent)
-        ElementTree.SubElement(clean, "child", link=child)
-        clean.append(_origin(joint, of=joint))
-        if kind != "fixed":
-            _add_motion(clean, joint)
-        return Joint(name, kind, parent, child, clean)
+        Raises:
+            RequestError: ``UNSUPPORTED_ASSETS`` if all meshes together are too large.
+        """
+        if filename not in self._meshes:
+            self._meshes[filename] = self._read_mesh(filename)
+            if (count := sum(map(len, self._meshes.values()))) > _MOST_TRIANGLES:
+                raise RequestError("UNSUPPORTED_ASSETS", f"{count} triangles in all; at most {_MOST_TRIANGLES}")
+        return list(self._meshes).index(filename)
+
+
+class _Joint(NamedTuple):
+    """One joint; its element is as it is written for the physics engine."""
+
+    name: str
+    kind: str
+    parent: str
+    child: str
+    element: ElementTree.Element
+
+
+def _mass(link: ElementTree.Element) -> float:
+    mass = link.find("inertial/mass")
+    if mass is None:
+        return 0.0
+    (value,) = _numbers(mass, "value", 1, of=link)
+    if value < 0:
+        raise _malformed(f"link {_name(link)}: mass should not be negative, got {value:g} kg")
+    return value
+
+
+def _joint(joint: ElementTree.Element) -> _Joint:
+    name = _name(joint)
+    kind = joint.get("type", "")
+    if kind not in ("fixed", "revolute", "continuous", "prismatic"):
+        raise _malformed(f"joint {name}: joints of type {kind!r:.40} are not simulated")
+    clean = ElementTree.Element("joint", name=name, type=kind)
+    ends = {}
+    for end in ("parent", "child"):
+        element = joint.find(end)
+        if element is None or not (link := element.get("link")):
+            raise _malformed(f"joint {name}: it has no {end}")
+        ElementTree.SubElement(clean, end, link=link)
+        ends[end] = link
+    clean.append(_origin(joint, of=joint))
+    if kind != "fixed":
+        _add_motion(clean, joint)
+    return _Joint(name, kind, ends["parent"], ends["child"], clean)
+
+
+def _find_rigid_links(links: Collection[str], joints: Sequence[_Joint]) -> list[str]:
+    """The root of the tree of links, and then all links that are rigidly connected to it.
+
+    Raises:
+        RequestError: ``RESOURCE_PARSE_ERROR`` if the joints do not connect all links to one tree.
+    """
+    carriers: dict[str, _Joint] = {}
+    names = set()
+    for joint in joints:
+        for link in (joint.parent, joint.child):
+            if link not in links:
+                raise _malformed(f"joint {joint.name}: there is no link {link:.80}")
+        if joint.name in names:
+            raise _malformed(f"joint {joint.name} is there twice")
+        if joint.child in carriers:
+            raise _malformed(f"link {joint.child} hangs on two joints: {carriers[joint.child].name} and {joint.name}")
+        names.add(joint.name)
+        carriers[joint.child] = joint
+    roots = [link for link in links if link not in carriers]
+    if len(roots) > 1:
+        raise _malformed(f"links {roots[0]} and {roots[1]} are not connected")
+    rigid = roots
+    try:
+        # Parents come before what they carry.
+        for link in TopologicalSorter({child: [joint.parent] for child, joint in carriers.items()}).static_order():
+            if link in carriers and carriers[link].kind == "fixed" and carriers[link].parent in rigid:
+                rigid.append(link)
+    except CycleError as error:
+        raise _malformed("the joints form a ring") from error
+    return rigid
 
 
 def _add_motion(clean: ElementTree.Element, joint: ElementTree.Element) -> None:
@@ -215,13 +266,6 @@ def _name(element: ElementTree.Element) -> str:
             f"a {element.tag} is called {name!r:.80}; wanted a printable name of at most {_LONGEST_NAME} characters"
         )
     return name
-
-
-def _link_of(joint: ElementTree.Element, end: str) -> str:
-    element = joint.find(end)
-    if element is None or not element.get("link"):
-        raise _malformed(f"joint {_name(joint)}: it has no {end}")
-    return element.get("link", "")
 
 
 def _numbers(

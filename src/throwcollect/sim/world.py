@@ -49,8 +49,8 @@ class World(Observer):
         config: Configuration of the first trial; of all trials, the engine is that of this one.
 
     Attributes:
-        engine: What simulates.
-        spawned: What clients have put into the world.
+        engine: The physics engine.
+        spawned: The bodies that clients have put into the world.
 
     Raises:
         ConfigError: If the configuration does not describe a world (see `reset`).
@@ -180,7 +180,7 @@ class World(Observer):
         return taken
 
     def on_touch(self, step: int, bodies: frozenset[str]) -> None:
-        """Take note of what presses on the ball since a step of the present `run`."""
+        """Note the bodies that press on the ball since a step of the present `run`."""
         self._touching = bodies
         self._contacts.update(bodies, self._first_step + step)
 
@@ -205,7 +205,7 @@ class World(Observer):
         return to_samples(rows, stamps, self._joints, self._moving, self._locked, self._offsets)
 
     def forget_samples(self) -> None:
-        """Drop the recorded samples but the last two, so that a world can go on for ever; numbers go on counting."""
+        """Drop the recorded samples but the last two, so that a world can go on for ever; their numbers stay."""
         self._forgotten += len(self._rows[:-2])
         self._rows = self._rows[-2:]
 
@@ -214,13 +214,13 @@ class World(Observer):
         return self._contacts.intervals(self._stamp_ns)
 
     def joints(self) -> tuple[Sample, Sample]:
-        """Position [rad] and velocity [rad/s] that each moving joint says to have now."""
+        """Position [rad] and velocity [rad/s] of each moving joint now, as its sensor shows them."""
         count, sample = len(self._moving), self.engine.state.sample
-        said = tuple((np.array(sample[:count]) - self._offsets).tolist()) if self._offsets.any() else sample[:count]
-        return said, sample[count : 2 * count]
+        shown = tuple((np.array(sample[:count]) - self._offsets).tolist()) if self._offsets.any() else sample[:count]
+        return shown, sample[count : 2 * count]
 
     def posture(self) -> Mapping[str, float]:
-        """Position that each joint of the robot says to have now [rad]."""
+        """Position of each joint of the robot now [rad], as its sensor shows it."""
         return {**self._locked, **dict(zip(self._moving, self.joints()[0], strict=True))}
 
     @property
@@ -254,7 +254,7 @@ class World(Observer):
         self._end_reason = None
 
     def _settle(self, trial: Config) -> None:
-        """Find the state in which the ball has come to rest in the tool of the still robot."""
+        """Let the ball come to rest in the tool of the still robot, and keep that state."""
         description = self._description(trial)
         try:
             self.engine.load(scene_of(trial, description))
@@ -268,7 +268,7 @@ class World(Observer):
             seat = tool.ball_seat(trial.ball.radius_m)
             self.engine.configure(physics_of(trial, self._moving))
             self.engine.rest(self._start, seat)
-            # One step is always taken, as contact forces and motor torques are those of the last step.
+            # One step is always taken, because contact forces and motor torques are those of the last step.
             steps = max(1, round(trial.sim.settle_s * trial.sim.physics_hz))
             targets, velocities = self._make_motors(trial).plan(np.tile(self._start, (steps, 1)))
             self.engine.run(Steps(targets, velocities, first_sample=steps + 1, stride=1), Observer())
@@ -277,7 +277,7 @@ class World(Observer):
             self.spawned.load()
 
     def _description(self, trial: Config) -> Description:
-        """The robot as the trial needs it; the one of the trial before if it is the same."""
+        """The robot's description for a trial; that of the trial before is kept while it is the same."""
         key = (trial.tool, find_locked_joints(trial))
         if self._described is None or self._described[0] != key:
             self._described = key, physics_description(trial)
@@ -288,7 +288,7 @@ class World(Observer):
         return Motors(self._start, hz=sim.physics_hz, delay_s=sim.command_delay_s, lag_s=robot.motor_lag_s)
 
     def _record_start(self) -> None:
-        # The motor torques are those of the settled state, as engines have none before the first step.
+        # The motor torques are those of the settled state, because engines have none before the first step.
         self._rows = [(*self._start_joints, *self.engine.state.sample[-BALL_NUMBERS:])]
         self._forgotten = 0
 
@@ -296,7 +296,7 @@ class World(Observer):
         return self._start_ns + step * NS_PER_S // self._hz
 
     def _judge(self, target: Sequence[float]) -> EndReason | None:
-        """Whether the trial ends with the sample just recorded, and why."""
+        """Reason for which the trial ends with the sample just recorded; None if it goes on."""
         before, now = self._rows[-2:]
         if now[BALL_HEIGHT] < self._landing_height <= before[BALL_HEIGHT] and self._tool not in self._contacts.bodies:
             return "landed"

@@ -1,1 +1,1 @@
-"""What coordinator and simulation agree on about a trial: its lease, and the conditions of its episode."""
+"""The agreement of coordinator and simulation on a trial: its lease, its goals, and the conditions of its episode."""

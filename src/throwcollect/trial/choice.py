@@ -1,4 +1,4 @@
-"""Which trials are looked at once more: a random choice that is always the same for the same seed."""
+"""Chooses trials to be simulated once more: at random, and the same for the same seed."""
 
 from __future__ import annotations
 
@@ -8,13 +8,7 @@ import numpy as np
 
 
 def choose_trials(trials: Sequence[int], *, count: int, seed: int) -> list[int]:
-    """Some of the trials, in their order.
-
-    Args:
-        trials: Numbers of trials.
-        count: How many at most.
-        seed: Root seed of the collection.
-    """
+    """At most `count` of the trials, in their order, by the root seed of the collection."""
     if count >= len(trials):
         return list(trials)
     picked = np.random.default_rng(seed).choice(len(trials), size=count, replace=False)

@@ -1,7 +1,7 @@
-"""Everything that an episode was simulated with besides its start: worked out twice, and compared.
+"""The conditions that an episode was simulated under: worked out twice, and compared.
 
 The coordinator works the conditions of a trial out from the plan, the simulation from what it really used. An episode
-whose conditions differ is not one of the plan, whoever or whatever caused that.
+whose conditions differ does not belong to the plan, for whatever reason.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ _HEEDED = (Effect.PHYSICS, Effect.ENCODING)
 
 @dataclass(frozen=True)
 class Conditions:
-    """What one episode was simulated with.
+    """The conditions of one episode.
 
     Attributes:
         build: Digest of sources, engine and model (`build.build_digest`).
-        settings: Digest of what the configuration of the whole collection says of the simulation.
-        values: What the trial replaces of it, by dotted key.
+        settings: Digest of the keys of the collection's configuration that concern the simulation.
+        values: Values of the trial that replace those of the configuration, by dotted key.
         trajectory: Digest of the joint trajectory that its controllers were given.
         lease: Token of the lease that it was simulated for; empty if for none.
     """
@@ -45,7 +45,7 @@ class Conditions:
         return json.dumps(asdict(self), sort_keys=True)
 
     def differences(self, expected: Conditions) -> Iterator[str]:
-        """In what these conditions differ from those that were expected, a phrase each."""
+        """One phrase for each difference from the conditions that were expected."""
         if self.lease != expected.lease:
             yield "it was not simulated for this lease"
         if self.build != expected.build:
@@ -53,9 +53,9 @@ class Conditions:
         if self.settings != expected.settings:
             yield "its configuration is another one"
         for key in sorted({*self.values, *expected.values}):
-            used, wanted = self.values.get(key), expected.values.get(key)
-            if used != wanted:
-                yield f"{key} was {_describe(used)}, not {_describe(wanted)}"
+            used, planned = self.values.get(key), expected.values.get(key)
+            if used != planned:
+                yield f"{key} was {_describe(used)}, not {_describe(planned)}"
         if self.trajectory != expected.trajectory:
             yield "its controllers were given another trajectory"
 
@@ -80,7 +80,7 @@ def conditions_from_json(text: str) -> Conditions:
 
 
 class Settings:
-    """What of a configuration concerns simulations, apart from what is swept.
+    """The part of a configuration that concerns simulations, without the swept values.
 
     Attributes:
         digest: SHA-256, in hexadecimal.
@@ -90,27 +90,23 @@ class Settings:
     """
 
     def __init__(self, config: Config) -> None:
-        found = list(leaves(config))
+        keys = list(leaves(config))
         physics = set(sweepable_keys(config, Effect.PHYSICS))
-        self._physics = [(leaf.name, leaf.name.split("."), leaf.value) for leaf in found if leaf.name in physics]
-        heeded = {leaf.name: leaf.value for leaf in found if leaf.key.effect in _HEEDED}
+        self._physics = [(leaf.name, leaf.name.split("."), leaf.value) for leaf in keys if leaf.name in physics]
+        heeded = {leaf.name: leaf.value for leaf in keys if leaf.key.effect in _HEEDED}
         # Which joints move decides which are simulated as rigid; where they go, the trajectory says.
         heeded["task.end"] = sorted(config.task.end)
         lines = [f"{key}={json.dumps(value)}" for key, value in sorted(heeded.items())]
         self.digest = hashlib.sha256("\n".join(lines).encode()).hexdigest()
 
     def find_replaced(self, trial: Config) -> dict[str, float]:
-        """What the configuration of a trial replaces, by dotted key.
-
-        Args:
-            trial: The configuration, with some of the physics replaced.
-        """
+        """Values of a trial's configuration that replace those of the collection, by dotted key."""
         values = ((key, _value(trial, path), configured) for key, path, configured in self._physics)
         return {key: float(value) for key, value, configured in values if value != configured}
 
 
 def _value(config: Config, path: Sequence[str]) -> Any:
-    """The value of a key; looking up all keys of a configuration takes ten times as long, in every trial."""
+    """The value of a key; `leaves` would take ten times as long, in every trial."""
     holder: Any = config
     for part in path:
         holder = holder[part] if isinstance(holder, dict) else getattr(holder, part)

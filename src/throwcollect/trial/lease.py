@@ -1,4 +1,4 @@
-"""Leases: what a coordinator asks of a simulation, in words that nobody else can say.
+"""Leases: signed notes by which a coordinator gives trials to a simulation.
 
 A simulation holds a list of leases and simulates them in order. The coordinator sends the whole list again whenever it
 changes, as one parameter of the simulation's node, so a list that arrives twice changes nothing.
@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import secrets
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 from pydantic import TypeAdapter, ValidationError
@@ -28,9 +28,9 @@ class Lease:
     Attributes:
         simulation: Namespace of the simulation, such as ``/sim_0``.
         trial: Number of the trial.
-        values: What the trial replaces of the configuration, by dotted key.
-        nonce: Tells the lease from every other one of the same trial.
-        signature: That of a coordinator over all of this.
+        values: Values of the trial that replace those of the configuration, by dotted key.
+        nonce: Random text by which two leases of the same trial differ.
+        signature: The coordinator's, over all of these.
     """
 
     simulation: str
@@ -41,17 +41,9 @@ class Lease:
 
     @classmethod
     def make(cls, simulation: str, trial: int, values: Mapping[str, float], signer: Signer) -> Lease:
-        """Make a new lease.
-
-        Args:
-            simulation: Namespace of the simulation.
-            trial: Number of the trial.
-            values: What the trial replaces of the configuration, by dotted key.
-            signer: That of the run.
-        """
-        nonce = secrets.token_hex(8)
-        said = cls(simulation, trial, values, nonce)
-        return cls(simulation, trial, values, nonce, signer.sign(said._text))
+        """Make a new lease, and sign it with the key of the run."""
+        unsigned = cls(simulation, trial, values, secrets.token_hex(8))
+        return replace(unsigned, signature=signer.sign(unsigned._text))
 
     def is_signed(self, signer: Signer) -> bool:
         """Whether it was signed with the key of this run."""
@@ -59,7 +51,7 @@ class Lease:
 
     @property
     def token(self) -> str:
-        """What stands for this lease alone."""
+        """Text by which this lease is told from all others."""
         return f"{self.nonce}.{self.signature}"
 
     @cached_property

@@ -11,7 +11,6 @@ import numpy as np
 
 from throwcollect.control import (
     ControllerParameters,
-    Deviations,
     ErrorCode,
     GoalResult,
     GoalStatus,
@@ -74,6 +73,7 @@ class Plant:
     position: np.ndarray = field(default_factory=lambda: np.array(START))
     velocity: float | Sequence[float] = 0.0
     lag_s: float = 0.1
+    measures_velocity: bool = False
 
     def apply(self, command: np.ndarray) -> None:
         if self.kind == "ideal":
@@ -85,6 +85,8 @@ class Plant:
             self.position = self.position + share * (command - self.position)
 
     def measured(self) -> JointState:
+        if not self.measures_velocity:
+            return JointState(self.position)
         return JointState(self.position, np.broadcast_to(self.velocity, self.position.shape))
 
 
@@ -96,10 +98,10 @@ class Bench:
         parameters: ControllerParameters = SHIPPED,
         plant: Plant | None = None,
         now_s=1000.0,
-        deviations: Deviations | None = None,
+        **deviations: bool,
     ) -> None:
-        self.plant = plant or Plant()
-        self.controller = JointTrajectoryController("c", parameters, period_ns=PERIOD_NS, deviations=deviations)
+        self.plant = dataclasses.replace(plant or Plant(), measures_velocity=parameters.measures_velocity)
+        self.controller = JointTrajectoryController("c", parameters, period_ns=PERIOD_NS, **deviations)
         self.now_ns = seconds(now_s)
         self.controller.reset(self.now_ns, self.plant.measured())
         self.k = 0
@@ -120,7 +122,7 @@ class Bench:
         for _ in range(updates):
             self.k += 1
             self.now_ns += PERIOD_NS
-            command = self.controller.update(self.now_ns, PERIOD_NS, self.plant.measured())
+            command = self.controller.update(self.now_ns, self.plant.measured())
             self.commands[self.k] = np.array(command)
             self.plant.apply(command)
             self.collect()

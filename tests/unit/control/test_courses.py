@@ -12,7 +12,6 @@ import pytest
 
 from throwcollect.control import (
     ControllerParameters,
-    Deviations,
     ErrorCode,
     GoalStatus,
     TrajectoryGoal,
@@ -53,7 +52,7 @@ class Course:
     decided: tuple[int, GoalStatus, ErrorCode, str] | None = None
     parameters: ControllerParameters = SHIPPED
     plant: Plant = field(default_factory=Plant)
-    deviations: Deviations | None = None
+    deviations: dict[str, bool] = field(default_factory=dict)
     start: Sequence[float] = START
     idle: int = 0
     updates: int = 150
@@ -279,7 +278,7 @@ COURSES = [
         {50: 1.6, 51: 1.6, 150: 1.6},
         (50, *CANCELED),
         plant=OFFSET,
-        deviations=Deviations(hold="command"),
+        deviations={"holds_command": True},
         during={50: cancel},
         final=(1.3, 1.8, 2.8),
     ),
@@ -290,7 +289,7 @@ COURSES = [
         (12, GoalStatus.ABORTED, ErrorCode.PATH_TOLERANCE_VIOLATED, OFF_PATH),
         parameters=constrained(trajectory=0.105),
         plant=FROZEN,
-        deviations=Deviations(hold="command"),
+        deviations={"holds_command": True},
     ),
     Course(
         "D7 cancel by braking",
@@ -337,7 +336,7 @@ COURSES = [
         goal(to(1.0, 2.1)),
         {30: 1.4, 31: 1.392, 80: 1.0},
         (30, GoalStatus.ABORTED, ErrorCode.INVALID_GOAL, "Current goal preempted by a trajectory on the topic."),
-        deviations=Deviations(topic_aborts_goal=True),
+        deviations={"topic_aborts_goal": True},
         during={30: lambda bench: bench.controller.replace(goal(to(0.5, 1.0)).trajectory, bench.now_ns)},
     ),
     Course(
@@ -393,7 +392,7 @@ COURSES = [
 @pytest.mark.parametrize("case", COURSES, ids=lambda case: case.id)
 def test_goals_take_the_course_they_take_upstream(case: Course) -> None:
     plant = dataclasses.replace(case.plant, position=np.array(case.start))
-    bench = Bench(case.parameters, plant, deviations=case.deviations)
+    bench = Bench(case.parameters, plant, **case.deviations)
     bench.step(case.idle)
     assert bench.send(case.goal) is None
     for _ in range(case.updates):

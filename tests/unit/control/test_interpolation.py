@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 
 from throwcollect.control.goal import Trajectory, TrajectoryPoint
 from throwcollect.control.interpolation import Curve, interpolate
-from throwcollect.control.waypoints import StartState, Waypoints, arrange
+from throwcollect.control.outcome import JointState
+from throwcollect.control.waypoints import Waypoints, arrange
 
 from .bench import seconds
 
@@ -32,8 +33,8 @@ def trajectories(draw: st.DrawFn) -> Trajectory:
 
 
 def curve_of(trajectory: Trajectory, start=(0.5, -0.5), velocity=(0.2, -0.2)) -> Curve:
-    state = StartState(0, np.array(start), np.array(velocity))
-    return interpolate(arrange(trajectory, JOINTS, np.zeros(2), state), state)
+    state = JointState(np.array(start), np.array(velocity))
+    return interpolate(arrange(trajectory, JOINTS, np.zeros(2), state, 0), state, 0)
 
 
 @settings(max_examples=200, deadline=None)
@@ -122,21 +123,21 @@ def test_accelerations_without_velocities_make_no_curve() -> None:
 
 
 def test_points_that_are_over_are_not_blended() -> None:
-    state = StartState(seconds(0.5), np.array((9.0, 9.0)))
+    state, start_ns = JointState(np.array((9.0, 9.0))), seconds(0.5)
     trajectory = Trajectory(JOINTS, [TrajectoryPoint(0, (1, 1)), TrajectoryPoint(seconds(1), (2, 2))])
-    curve = interpolate(arrange(trajectory, JOINTS, np.zeros(2), state), state)
+    curve = interpolate(arrange(trajectory, JOINTS, np.zeros(2), state, start_ns), state, start_ns)
     assert curve.positions(np.array([seconds(0.5), seconds(0.75)]))[:, 0] == pytest.approx([1.5, 1.75])
 
 
 def test_a_single_point_is_held_from_the_start() -> None:
-    curve = interpolate(Waypoints.single(np.array((1.0, 2.0))), StartState(0, np.array((9.0, 9.0))))
+    curve = interpolate(Waypoints.single(np.array((1.0, 2.0))), JointState(np.array((9.0, 9.0))), 0)
     assert curve.end_ns == 0
     assert curve.positions(np.array([0, 10**18])).tolist() == [[1, 2], [1, 2]]
 
 
 def test_joints_that_are_left_out_keep_their_command() -> None:
     trajectory = Trajectory(("b",), [TrajectoryPoint(1, (5,), (6,), (7,)), TrajectoryPoint(2, (8,))])
-    waypoints = arrange(trajectory, JOINTS, np.array((0.25, 9.0)), StartState(0, np.array((0.25, 9.0))))
+    waypoints = arrange(trajectory, JOINTS, np.array((0.25, 9.0)), JointState(np.array((0.25, 9.0))), 0)
     assert waypoints.positions.tolist() == [[0.25, 5], [0.25, 8]]
     assert waypoints.velocities.tolist() == [[0, 6], [0, 0]]
     assert waypoints.accelerations.tolist() == [[0, 7], [0, 0]]

@@ -8,8 +8,9 @@ from throwcollect.config.schema import Config
 from throwcollect.engines.engine import BodyState
 from throwcollect.errors import ConfigError, RequestError
 from throwcollect.robots.description import start_posture
+from throwcollect.ros.msg import Bounds, EntityFilters, Vector3
 from throwcollect.sim.entities import Category, Entities, EntityInfo
-from throwcollect.sim.entity_filter import BoxRegion, EntityFilter, SphereRegion
+from throwcollect.sim.entity_filter import select
 from throwcollect.sim.urdf import read_model
 from throwcollect.sim.world import World
 
@@ -17,6 +18,14 @@ CONFIG = Config()
 TURNED = (0.0, 0.0, 0.6, 0.8)
 LOPSIDED = '<inertia ixx="1" iyy="2" izz="2.5" ixy="0.3" ixz="0" iyz="0.1"/>'
 """The engine locates such a body by axes that are not those of the link."""
+
+
+def within(kind: int, *points: tuple[float, float, float]) -> EntityFilters:
+    return EntityFilters(bounds=Bounds(type=kind, points=[Vector3(x=x, y=y, z=z) for x, y, z in points]))
+
+
+def sphere(centre: tuple[float, float, float], radius: float) -> EntityFilters:
+    return within(Bounds.TYPE_SPHERE, centre, (radius, 0.0, 0.0))
 
 
 def model(text):
@@ -111,8 +120,7 @@ def test_joints_hold_with_the_effort_of_their_limits(world: World, entities: Ent
 def test_something_without_shape_has_no_bounds_and_is_nowhere(entities: Entities) -> None:
     entities.add("frame", model("<robot name='f'><link name='world'/></robot>"), BodyState((0.0, 0.0, 0.0)), "")
     assert entities.bounds("frame") is None
-    everywhere = EntityFilter(region=SphereRegion((0.0, 0.0, 0.0), 1e3))
-    assert everywhere.select(entities) == ["ball", "talos"]
+    assert select(entities, sphere((0.0, 0.0, 0.0), 1e3)) == ["ball", "talos"]
 
 
 def test_categories_follow_from_what_it_is(entities: Entities) -> None:
@@ -138,15 +146,15 @@ def test_what_is_said_about_what_is_gone_is_forgotten(world: World, entities: En
 def test_regions_touch_boxes(entities: Entities) -> None:
     entities.add("crate", model(box("2 2 2", mass=0)), BodyState((10.0, 0.0, 5.0)), "")
 
-    def found(region: BoxRegion | SphereRegion) -> bool:
-        return EntityFilter(name="crate", region=region).select(entities) == ["crate"]
+    def found(region: EntityFilters) -> bool:
+        return "crate" in select(entities, region)
 
-    assert found(SphereRegion((10.0, 0.0, 5.0), 0.0))
-    assert found(SphereRegion((12.0, 2.0, 5.0), 1.42))
-    assert not found(SphereRegion((12.0, 2.0, 5.0), 1.41))
-    assert found(BoxRegion((10.9, 0.9, 5.9), (20.0, 20.0, 20.0)))
-    assert not found(BoxRegion((11.1, 0.9, 5.9), (20.0, 20.0, 20.0)))
-    assert found(BoxRegion((-1e9,) * 3, (float("inf"),) * 3))
+    assert found(sphere((10.0, 0.0, 5.0), 0.0))
+    assert found(sphere((12.0, 2.0, 5.0), 1.42))
+    assert not found(sphere((12.0, 2.0, 5.0), 1.41))
+    assert found(within(Bounds.TYPE_BOX, (20.0, 20.0, 20.0), (10.9, 0.9, 5.9)))
+    assert not found(within(Bounds.TYPE_BOX, (20.0, 20.0, 20.0), (11.1, 0.9, 5.9)))
+    assert found(within(Bounds.TYPE_BOX, (float("inf"),) * 3, (-1e9,) * 3))
 
 
 def test_bodies_stay_when_a_start_state_cannot_be_reached(world: World, entities: Entities) -> None:
