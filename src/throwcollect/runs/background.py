@@ -9,7 +9,6 @@ import os
 import shutil
 import signal
 import subprocess
-import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime, timezone
@@ -45,7 +44,7 @@ from throwcollect.side_by_side import count_cores
 
 @dataclass(frozen=True)
 class Order:
-    """What `begin_run` sends to the new process.
+    """The order that `begin_run` sends to the new process.
 
     Attributes:
         config: Absolute path of the configuration's file.
@@ -150,13 +149,7 @@ def _make_record(opened: OpenRun, name: str, directory: Path, kind: Kind, origin
 
 
 def _begin(opened: OpenRun, record: Record, order: bytes, lay_out: Callable[[], None] = lambda: None) -> Run:
-    """Start the process of a run, and write the record.
-
-    Args:
-        opened: The run.
-        record: The record, in which this function writes the id of the process.
-        order: Bytes that the process reads.
-        lay_out: Makes files of the run.
+    """Start the process of a run, write the record with its id, and send it the order; `lay_out` makes further files.
 
     Raises:
         ConfigError: If the record cannot be written.
@@ -167,7 +160,12 @@ def _begin(opened: OpenRun, record: Record, order: bytes, lay_out: Callable[[], 
         logs = Path(record.logs)
         logs.mkdir(exist_ok=True)
         lay_out()
-        process = _start_process(opened, logs)
+        # The process can handle signals only after a second; one that asks it to stop has to wait until then.
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, stop_signals())
+        try:
+            process = opened.start_process("begin", logs, stdin=subprocess.PIPE)
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
         opened.write(replace(record, launcher=process.pid))
         # The process waits for the order before it changes the record, so the record has to be written first.
         with cast(IO[bytes], process.stdin) as pipe:
@@ -184,33 +182,11 @@ def _begin(opened: OpenRun, record: Record, order: bytes, lay_out: Callable[[], 
     return Records().get(opened.run)
 
 
-def _start_process(run: OpenRun, logs: Path) -> subprocess.Popen[bytes]:
-    words = [sys.executable, "-m", "throwcollect", "begin", run.run, "--lock", str(run.lock)]
-    # The process can handle signals only after a second; one that asks it to stop has to wait until then.
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, stop_signals())
-    try:
-        with open(open_log(NodeLogs(logs).path(LAUNCHER)), "ab") as log:
-            return subprocess.Popen(
-                words,
-                stdin=subprocess.PIPE,
-                stdout=log,
-                stderr=subprocess.STDOUT,
-                start_new_session=True,
-                pass_fds=[run.lock],
-            )
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
-
-
 def carry_out(run: str, lock: int, order: bytes, *, onlooker: Onlooker, interruptions: Callable[[], int]) -> None:
     """Prepare and launch a run in the process that `begin_run` or `begin_container` has started.
 
-    Args:
-        run: Id of the run.
-        lock: Descriptor of the locked file, which this process has inherited.
-        order: The order that this process was sent.
-        onlooker: Is told what goes on.
-        interruptions: How often somebody has asked to stop; this function unblocks the signals that ask for it.
+    This process has inherited the locked file, and was sent the order. Signals that ask it to stop are blocked until
+    here; from now on, `interruptions` counts them.
 
     Raises:
         ThrowcollectError: If the run fails; the error is written into the record, too.

@@ -68,13 +68,7 @@ def check_order(order: ContainerOrder) -> None:
 def launch_container(
     run: OpenRun, order: ContainerOrder, *, onlooker: Onlooker, interruptions: Callable[[], int]
 ) -> None:
-    """Run the container until it ends, the run that it joins ends, or somebody asks to stop.
-
-    Args:
-        run: The run, with a record; this function writes the end of the run there, and closes it.
-        order: The order for the container.
-        onlooker: Is told what goes on.
-        interruptions: How often somebody has asked to stop.
+    """Run the container until it ends, the run that it joins ends, or somebody asks to stop; close the run.
 
     Raises:
         ConfigError: If the container needs something that is not there, or cannot join that run.

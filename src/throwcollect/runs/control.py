@@ -34,12 +34,7 @@ _ANSWER_S = 10.0
 def stop(run: Run, *, keep_on: Callable[[], bool] = lambda: True) -> Run:
     """Drain a run: the trials that run are finished and written, no other is started, and all nodes end.
 
-    Args:
-        run: The run.
-        keep_on: Is asked again and again whether to go on waiting.
-
-    Returns:
-        The run, as it was when the waiting ended.
+    This function waits for the end of the run as long as `keep_on` returns true, and returns the run as it is then.
 
     Raises:
         ConfigError: If the run has ended, or its record cannot be read.
@@ -119,16 +114,7 @@ def scale(run: Run, simulations: int) -> None:
 
 
 def set_parameter(run: Run, nodes: Sequence[str], name: str, value: float | str) -> list[SetParametersResult]:
-    """Set a parameter of several nodes of a run at the same time.
-
-    Args:
-        run: The run.
-        nodes: Names of the nodes, with their namespaces.
-        name: Name of the parameter.
-        value: Value of the parameter.
-
-    Returns:
-        The answer of each node.
+    """Set a parameter of several nodes of a run, named with their namespaces, at the same time; the answer of each.
 
     Raises:
         WorkerError: If the router or a node does not answer.

@@ -35,11 +35,9 @@ class Look:
 
 
 def follow(run: Run, *, keep_on: Callable[[], bool] = lambda: True) -> Iterator[Look]:
-    """Look at a run several times a second until it ends; a program may follow several runs at once.
+    """Look at a run several times a second until it ends, or `keep_on` refuses to go on.
 
-    Args:
-        run: The run.
-        keep_on: Is asked again and again whether to go on.
+    A program may follow several runs at once.
 
     Yields:
         A look; the last one shows a run that has ended or died, unless `keep_on` refused.

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import subprocess
-import sys
 import time
 from collections.abc import Callable, Sequence
 from datetime import datetime, timezone
@@ -18,11 +17,10 @@ from throwcollect.dataset.directory import config_path
 from throwcollect.dataset.lock import hold_together
 from throwcollect.dataset.summary import explain_loss
 from throwcollect.errors import ConfigError, Interrupted, LossError, ThrowcollectError, WorkerError
-from throwcollect.files import open_log
 from throwcollect.runs.events import EventLog
 from throwcollect.runs.onlooker import Onlooker
-from throwcollect.runs.record import Failure, Record, Summary
-from throwcollect.runs.records import OpenRun, Records
+from throwcollect.runs.record import Failure, Summary
+from throwcollect.runs.records import OpenRun, Records, Run
 from throwcollect.runtimes.node_logs import NodeLogs
 from throwcollect.runtimes.nodes import LAUNCHER
 from throwcollect.runtimes.registry import get_runtime
@@ -121,7 +119,7 @@ def launch_host(
 
 
 class _Session:
-    """Writes what happens in a run into its record and its events; the run goes on even if it cannot write."""
+    """A `runtime.Session` that writes the record and the events of a run; the run goes on even if that fails."""
 
     def __init__(self, run: OpenRun, onlooker: Onlooker, interruptions: Callable[[], int]) -> None:
         self.interruptions = interruptions
@@ -136,22 +134,19 @@ class _Session:
         self._failed = False
 
     def update(self, progress: Progress) -> None:
-        """Take in a progress report of the coordinator, which is written together with the next change."""
+        # It is written together with the next change.
         self._progress = progress
         self._onlooker.update(progress)
 
     def event(self, event: RunEvent, **details: Any) -> None:
-        """Write an event of the run."""
         self._write(lambda: self._events.run_event(event, **details))
         if event == "stopping":
             self._write(lambda: self._run.update(stopping=True))
 
     def take_over(self, states: Sequence[NodeState]) -> None:
-        """Take over nodes whose events an earlier launcher has written."""
         self._states = list(states)
 
     def nodes(self, states: Sequence[NodeState], *, endpoint: str | None, simulations: int) -> None:
-        """Write the states of the nodes, and an event for each change."""
         if states != self._states:
             before, self._states = self._states, list(states)
             self._write(lambda: self._events.node_events(before, states))
@@ -193,31 +188,6 @@ class _Session:
                 self._onlooker.warn(f"what happens in this run is not written down any more: {reason}")
 
 
-def start_launcher(run: OpenRun) -> subprocess.Popen[bytes]:
-    """Start a launcher for a prepared run, in a session of its own, so that it outlives the terminal; close the run.
-
-    Raises:
-        WorkerError: If the launcher cannot be started.
-    """
-    path = NodeLogs(Path(run.record.logs)).path(LAUNCHER)
-    words = [sys.executable, "-m", "throwcollect", "launch", run.run, "--lock", str(run.lock)]
-    try:
-        with open(open_log(path), "ab") as log:
-            return subprocess.Popen(
-                words,
-                stdin=subprocess.DEVNULL,
-                stdout=log,
-                stderr=subprocess.STDOUT,
-                start_new_session=True,
-                # The launcher holds the lock from its first moment, so the run never looks dead.
-                pass_fds=[run.lock],
-            )
-    except OSError as error:
-        raise WorkerError(f"the launcher cannot be started: {error}") from error
-    finally:
-        run.close()
-
-
 def launch_inherited(run: str, lock: int, *, onlooker: Onlooker, interruptions: Callable[[], int]) -> None:
     """Launch a prepared run in the process that `start_launcher` has started, which has inherited the locked file.
 
@@ -229,37 +199,37 @@ def launch_inherited(run: str, lock: int, *, onlooker: Onlooker, interruptions: 
     launch(inherited, config, onlooker=onlooker, interruptions=interruptions)
 
 
-def wait_for_nodes(
-    records: Records, record: Record, process: subprocess.Popen[bytes], *, interruptions: Callable[[], int]
-) -> None:
-    """Wait until a new launcher has started its nodes.
+def start_launcher(records: Records, opened: OpenRun, *, interruptions: Callable[[], int]) -> Run:
+    """Launch a prepared run in a process of its own, and return when its nodes are started.
 
-    Args:
-        records: All runs.
-        record: The record of the run.
-        process: The launcher.
-        interruptions: How often the user has asked to stop; if so, the launcher is asked, and waited for.
+    If the user asks to stop, the launcher is asked, and waited for.
 
     Raises:
         ConfigError: If the record cannot be read.
         ThrowcollectError: The error with which the run ended, if it did.
-        WorkerError: If the launcher ended and left no reason.
+        WorkerError: If the launcher cannot be started, or ended and left no reason.
         Interrupted: If the user stopped it.
     """
-    told = 0
-    while (run := records.get(record.run)).status == "running":
-        if interruptions() > told:
-            told = interruptions()
+    try:
+        process = opened.start_process("launch", Path(opened.record.logs), stdin=subprocess.DEVNULL)
+    except OSError as error:
+        raise WorkerError(f"the launcher cannot be started: {error}") from error
+    finally:
+        opened.close()
+    forwarded = 0
+    while (run := records.get(opened.run)).status == "running":
+        if interruptions() > forwarded:
+            forwarded = interruptions()
             process.terminate()
         nodes = run.record.nodes
-        if nodes and all(node.handle for node in nodes) and not told:
-            return
+        if nodes and all(node.handle for node in nodes) and not forwarded:
+            return run
         time.sleep(_POLL_S)
     if run.record.ended is not None:
-        if (error := run.record.error) is not None:
-            raise error
-    elif told:
+        if (failure := run.record.error) is not None:
+            raise failure
+        return run
+    if forwarded:
         raise Interrupted("interrupted before any node was started")
-    else:
-        evidence = NodeLogs(Path(record.logs)).tail(LAUNCHER)
-        raise WorkerError(f"run {record.run}: its launcher died", evidence=evidence or None)
+    evidence = NodeLogs(Path(run.record.logs)).tail(LAUNCHER)
+    raise WorkerError(f"run {run.id}: its launcher died", evidence=evidence or None)

@@ -190,13 +190,7 @@ def _take_over(
 
 
 def prepare_run(records: Records, request: Request, onlooker: Onlooker, *, run: OpenRun | None = None) -> PreparedRun:
-    """Prepare a run; if that fails, all files that were made for it are removed.
-
-    Args:
-        records: All runs.
-        request: The request for the run.
-        onlooker: Is told what goes on.
-        run: The run, if it has a record already, which stays even if the preparation fails; None makes a new one.
+    """Prepare a run, a new one if None is given; if that fails, all files that were made here are removed.
 
     Raises:
         ConfigError: If the dataset is in a volume, from which a collection cannot go on.

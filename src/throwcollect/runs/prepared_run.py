@@ -28,11 +28,6 @@ class PreparedRun:
         directory: Directory of the dataset, as the user named it; None if the dataset is in a volume.
 
     Args:
-        records: All runs.
-        run: The run, with a record.
-        config: The configuration.
-        directory: Directory of the dataset, as the user named it.
-        onlooker: Is told what goes on.
         runtime: The runtime, if it has begun something for the run; else None.
         held: Keeps others from the directory until the launcher, which may be another process, does so itself.
         undo: Removes what was made for the run, if it is not launched.
@@ -134,13 +129,10 @@ class PreparedRun:
             WorkerError: If the launcher cannot be started.
             ThrowcollectError: The error with which the run has ended, if it did so already.
         """
-        from throwcollect.runs.launcher import start_launcher, wait_for_nodes
+        from throwcollect.runs.launcher import start_launcher
 
         self._undo.pop_all()
         if self._runtime is not None:
             # The launcher, as another process, cannot use what the runtime has begun in this one.
             self._runtime.close()
-        record = self._run.record
-        process = start_launcher(self._run)
-        wait_for_nodes(self._records, record, process, interruptions=interruptions)
-        return self._records.get(record.run)
+        return start_launcher(self._records, self._run, interruptions=interruptions)

@@ -17,6 +17,8 @@ import json
 import os
 import secrets
 import shutil
+import subprocess
+import sys
 import time
 from collections.abc import Iterable
 from contextlib import ExitStack, suppress
@@ -29,11 +31,13 @@ from pydantic import TypeAdapter, ValidationError
 from pydantic_core import to_json
 
 from throwcollect.errors import ConfigError, ConflictError, NotFoundError
-from throwcollect.files import beside, write_all
+from throwcollect.files import beside, open_log, write_all
 from throwcollect.ros.connection import Connection
 from throwcollect.run_key import RunKey
 from throwcollect.runs.record import VERSION, Record
 from throwcollect.runs.state_directory import is_locked, state_directory, unusable
+from throwcollect.runtimes.node_logs import NodeLogs
+from throwcollect.runtimes.nodes import LAUNCHER
 from throwcollect.runtimes.registry import get_runtime
 from throwcollect.runtimes.runtime import Place
 from throwcollect.units import NS_PER_S
@@ -167,6 +171,21 @@ class OpenRun:
         changed = replace(self.record, **changes)
         if changed != self.record:
             self.write(changed)
+
+    def start_process(self, command: str, logs: Path, *, stdin: int) -> subprocess.Popen[bytes]:
+        """Start a command of throwcollect that takes this run over, and prints into the launcher's log.
+
+        The process has a session of its own, so that it outlives the terminal. It holds the lock from its first moment,
+        so that the run never looks dead.
+
+        Raises:
+            OSError: If the process cannot be started.
+        """
+        words = [sys.executable, "-m", "throwcollect", command, self.run, "--lock", str(self.lock)]
+        with open(open_log(NodeLogs(logs).path(LAUNCHER)), "ab") as log:
+            return subprocess.Popen(
+                words, stdin=stdin, stdout=log, stderr=subprocess.STDOUT, start_new_session=True, pass_fds=[self.lock]
+            )
 
     def close(self) -> None:
         """Release the lock of the run; the record stays."""

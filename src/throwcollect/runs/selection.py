@@ -134,10 +134,7 @@ def _list(ids: Sequence[str]) -> str:
 def find_left_in(records: Records, directory: Path, *, own: str | None = None) -> Run | None:
     """Find a run that collects, or has collected, into a directory, and whose nodes are still there without a launcher.
 
-    Args:
-        records: All runs.
-        directory: Directory of a dataset.
-        own: Id of the run that this process prepares, which is not looked at.
+    The run that this process prepares, whose id is `own`, is not looked at.
 
     Raises:
         ConfigError: If a run whose launcher lives collects into the directory.

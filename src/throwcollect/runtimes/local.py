@@ -72,8 +72,6 @@ class LocalNodes(NodeHost):
     kernel ends them when the launcher dies.
 
     Args:
-        place: The place of the run.
-        config: The configuration of the run.
         elsewhere: Endpoint of a router on another machine; None if the router is one of the nodes.
         server: The server that forks the nodes, which its owner closes; None makes one that this host closes.
 

@@ -130,7 +130,7 @@ class NodeServer:
             self._silent = False
             with contextlib.suppress(OSError):
                 return self._request(request, log)
-            # What the process said that `begin` started went to no file. Its successor says the same into the log.
+            # The process that `begin` started had no log for its error; its successor writes the error into this one.
             self.close()
         return self._request(request, log)
 

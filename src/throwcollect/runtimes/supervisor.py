@@ -29,8 +29,6 @@ class Supervisor:
     """Keeps the nodes of one run alive; use it as a context manager, which closes the host and so ends all nodes.
 
     Args:
-        host: The host of the nodes.
-        run: The section `run` of the configuration.
         roster: The nodes that the run is to have, in the order in which they are started; at most one is the main one.
     """
 

@@ -42,7 +42,7 @@ CONTAINER = "container"
 _POLL_S = 0.1
 _GRACE_S = 3
 _OVER_S = 3.0
-"""When a run ends, a container that has joined it loses its router up to this time before the record tells the end."""
+"""A container that has joined a run loses the router when the run ends, up to this time before the record tells it."""
 
 
 @dataclass(frozen=True)
@@ -63,13 +63,7 @@ class Way:
 
 
 def find_way(run: str, runtime: str, connection: Connection, spec: ContainerSpec) -> Way:
-    """Find the way for a container into a run.
-
-    Args:
-        run: Id of the run.
-        runtime: Name of the run's runtime.
-        connection: The way into the run for processes of this machine.
-        spec: The container, as the catalogue describes it.
+    """Find the way for a container into a run of a runtime, which processes of this machine join by `connection`.
 
     Raises:
         ConfigError: If the container cannot join the run.
@@ -107,8 +101,6 @@ class ComponentContainer:
 
     Args:
         place: The place of the run that consists of this container.
-        component: Name of the component.
-        spec: The container, as the catalogue describes it.
         way: The way into a run that the container joins; None if it joins none.
         goes_on: Is asked again and again whether that run goes on.
         warn: Is told in one line when the engine is silent for long.

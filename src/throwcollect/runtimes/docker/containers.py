@@ -61,7 +61,6 @@ class DockerNodes(NodeHost):
 
     Args:
         place: The place of the run; its id has to be unique on the engine.
-        config: The configuration of the run.
         warn: Is told in one line when the engine is silent for long.
         client: Client of the engine; None connects to the engine that ``DOCKER_HOST`` names.
 
