@@ -56,14 +56,15 @@ class DockerRuntime(Runtime):
         if is_installed("docker"):
             check_socket()
         from throwcollect.runtimes.docker.engine import connect
-        from throwcollect.runtimes.docker.image import ensure, is_outdated
+        from throwcollect.runtimes.docker.image import ensure, is_outdated, rmw_of
         from throwcollect.runtimes.docker.options import image
 
+        name = image(config)
         with closing(connect(timeout_s=None if config.run.runtime == "docker" else _PROBE_S)) as client:
-            ensure(client, image(config), say=say)
-            if is_outdated(client, image(config)):
-                _handle_outdated_image(client, config, warn)
-            return _middleware_of_image(client, config, middleware)
+            ensure(client, name, say=say)
+            if is_outdated(client, name):
+                _handle_outdated_image(client, name, config, warn)
+            return _choose_middleware(rmw_of(client, name), name, config, middleware)
 
     def check(self) -> Check:
         """Whether an engine answers, and has the image of these sources."""
@@ -124,18 +125,14 @@ class DockerRuntime(Runtime):
         return remove(connect(), run, volumes=volumes)
 
 
-def _middleware_of_image(client: DockerClient, config: Config, launcher: Middleware) -> Middleware:
-    """The middleware of containers: one that their image has, and that the launcher can join.
+def _choose_middleware(rmw: str | None, image: str, config: Config, launcher: Middleware) -> Middleware:
+    """Choose the middleware of containers: the image has to have it, and the launcher has to be able to join it.
 
     Raises:
         ConfigError: If rclpy is asked for, and the image has none, or the launcher could not join its nodes.
     """
-    from throwcollect.runtimes.docker.image import rmw_of
-    from throwcollect.runtimes.docker.options import image
-
-    rmw = rmw_of(client, image(config))
     if rmw is None:
-        problem = f"the image {image(config)} has no rclpy"
+        problem = f"the image {image} has no rclpy"
     elif (found := Middleware("rclpy", rmw)).joining.backend == "embedded":
         return found if config.run.ros != "embedded" else Middleware()
     elif not is_local():
@@ -147,16 +144,14 @@ def _middleware_of_image(client: DockerClient, config: Config, launcher: Middlew
     return Middleware()
 
 
-def _handle_outdated_image(client: DockerClient, config: Config, warn: Callable[[str], None]) -> None:
+def _handle_outdated_image(client: DockerClient, name: str, config: Config, warn: Callable[[str], None]) -> None:
     """Use an image of other sources only if the user has named it, as it may collect other bytes; else build a new one.
 
     Raises:
         WorkerError: If ``run.runtime: auto`` may use processes instead, or the image cannot be built.
     """
     from throwcollect.runtimes.docker.image import build
-    from throwcollect.runtimes.docker.options import image
 
-    name = image(config)
     finding = f"the image {name} was made from other sources than these"
     if config.containers.image is not None:
         warn(f"{finding}; it is used, as containers.image names it")
