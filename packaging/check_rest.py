@@ -18,7 +18,7 @@ from typing import Any
 import uvicorn
 
 from throwcollect.errors import WorkerError
-from throwcollect.runs.records import STATE_VARIABLE
+from throwcollect.runs.state_directory import STATE_VARIABLE
 from throwcollect.serve import instances as instances_module
 from throwcollect.serve.access import Access, Keys
 from throwcollect.serve.app import make_app

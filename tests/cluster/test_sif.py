@@ -24,7 +24,7 @@ from throwcollect import runs
 from throwcollect.errors import ConfigError
 from throwcollect.runtimes.apptainer.contents import check_sif, read_contents
 from throwcollect.runtimes.apptainer.sif import make_sif
-from throwcollect.runtimes.docker.saved_image import save_image
+from throwcollect.runtimes.docker.image import save_image
 from throwcollect.runtimes.image_sources import SOURCES_LABEL
 
 pytestmark = pytest.mark.cluster

@@ -31,6 +31,7 @@ from throwcollect.runtimes.docker.options import KEY_LABEL
 from throwcollect.runtimes.local import LocalNodes
 from throwcollect.runtimes.node_collection import roster
 from throwcollect.runtimes.nodes import COORDINATOR, ROUTER, NodeExit, NodeSpec, Role
+from throwcollect.runtimes.ports import split_address
 from throwcollect.runtimes.supervisor import Supervisor
 from throwcollect.version import __version__
 
@@ -148,7 +149,7 @@ def test_a_router_that_comes_back_at_another_address_is_found_again(
 ) -> None:
     with collecting(client, tmp_path) as collection:
         collection.until_more_is_written()
-        address = collection.runtime.router_address()
+        endpoint = collection.runtime.endpoint
         router = container(client, collection, ROUTER)
         network = router.attrs["HostConfig"]["NetworkMode"]
         squatter = client.containers.create(
@@ -156,7 +157,7 @@ def test_a_router_that_comes_back_at_another_address_is_found_again(
         )
         router.kill()
         squatter.start()
-        collection.until(lambda: collection.runtime.router_address() not in (address, None))
+        collection.until(lambda: collection.runtime.endpoint not in (endpoint, None))
         assert collection.finish() == digest
         assert collection.news == [
             "router was lost (ended by SIGKILL) and is started again; its log ends: router listening on tls/router:7447"
@@ -292,12 +293,13 @@ def test_a_published_router_is_reached_on_the_loopback_interface_alone(bare: Any
     runtime = bare(f"run.router_port={port}")
     runtime.start(NodeSpec(ROUTER, ("router", "--listen", runtime.listen), Role.EXPENDABLE))
     until(lambda: runtime.log_tail(ROUTER) != "")
-    assert runtime.router_address() == ("127.0.0.1", port)
+    assert runtime.endpoint is not None
+    assert split_address(runtime.endpoint) == ("127.0.0.1", port)
     socket.create_connection(("127.0.0.1", port), 5).close()
     ports = client.containers.get(runtime.handle(ROUTER)).attrs["NetworkSettings"]["Ports"]
     assert ports == {"7447/tcp": [{"HostIp": "127.0.0.1", "HostPort": str(port)}]}
     runtime.stop([ROUTER])
-    assert runtime.router_address() is None
+    assert runtime.endpoint is None
 
 
 def test_a_node_has_the_key_as_files_of_the_caller_which_the_engine_tells_nobody(
@@ -398,7 +400,7 @@ def test_an_engine_that_does_not_answer_any_more_is_said_so_with_what_is_safe(
     trouble: str,
     evidence: str,
 ) -> None:
-    monkeypatch.setattr("throwcollect.runtimes.docker.containers.SILENCE_S", 3.0)
+    monkeypatch.setattr("throwcollect.runtimes.docker.clock.SILENCE_S", 3.0)
     runtime = bare(through=connect())
     runtime.start(NodeSpec(ROUTER, ("router", "--listen", runtime.listen), Role.EXPENDABLE))
     until(lambda: runtime.log_tail(ROUTER) != "")

@@ -1,6 +1,6 @@
-"""Runs: prepared, launched, followed, scaled and ended, by the command line or by a Python program.
+"""Runs: the command line and Python programs prepare, launch, follow, scale and end them with these functions.
 
-What stands behind these names is imported when they are taken; see ``docs/runs.md``.
+A name is imported when it is used for the first time; see ``docs/runs.md``.
 """
 
 from typing import TYPE_CHECKING
@@ -24,7 +24,7 @@ else:
     def __getattr__(name: str) -> object:
         from importlib import import_module
 
-        rooms = {
+        modules = {
             "control": ("down", "scale", "stop"),
             "following": ("Look", "follow", "wait"),
             "onlooker": ("Onlooker",),
@@ -34,9 +34,9 @@ else:
             "records": ("Run",),
             "selection": ("find",),
         }
-        for room, names in rooms.items():
+        for module, names in modules.items():
             if name in names:
-                return getattr(import_module(f"throwcollect.runs.{room}"), name)
+                return getattr(import_module(f"throwcollect.runs.{module}"), name)
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
     def __dir__() -> list[str]:

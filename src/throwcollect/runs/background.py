@@ -1,6 +1,6 @@
-"""Runs that begin in a process of their own: it makes the plan, too, so whoever asks for one need not wait for that.
+"""Begins runs in processes of their own, which also make the plan, so that a client does not have to wait for it.
 
-Such a run has a record from its first moment. Whatever its preparation fails of is written there, as all else is.
+Such a run has a record from its first moment, in which also an error of its preparation is written.
 """
 
 from __future__ import annotations
@@ -9,7 +9,6 @@ import os
 import shutil
 import signal
 import subprocess
-import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime, timezone
@@ -45,13 +44,13 @@ from throwcollect.side_by_side import count_cores
 
 @dataclass(frozen=True)
 class Order:
-    """What a run is to be made from.
+    """The order that `begin_run` sends to the new process.
 
     Attributes:
         config: Absolute path of the configuration's file.
-        overrides: What replaces keys of it: ``key=value`` pairs, as ``--set`` takes them.
-        output: Absolute path of the dataset's directory; unused by a run that collects none.
-        resumed: Whether that holds a dataset, with which the run goes on.
+        overrides: Keys to change: ``key=value`` pairs, as ``--set`` takes them.
+        output: Absolute path of the dataset's directory; a session does not use it.
+        resumed: Whether the directory holds a dataset with which the run goes on.
     """
 
     config: Path
@@ -73,16 +72,16 @@ def begin_run(
     kind: Literal["collection", "session"] = "collection",
     resumed: bool = False,
 ) -> Run:
-    """Begin a run in a process of its own, which outlives this one; come back as soon as the run has a record.
+    """Begin a run in a process of its own, which outlives this one; return as soon as the run has a record.
 
     Args:
         config: The configuration's file.
-        overrides: What replaces keys of it: ``key=value`` pairs, as ``--set`` takes them.
-        output: Directory of the dataset, new or empty unless it is resumed; unused by a run that collects none.
-        run: Id of the run; None for one that nobody has.
-        origin: What was asked for; None if no client did.
-        kind: Whether it collects a dataset, or has simulations for clients alone.
-        resumed: Whether the directory holds a dataset, with which the run goes on.
+        overrides: Keys to change: ``key=value`` pairs, as ``--set`` takes them.
+        output: Directory of the dataset, new or empty unless it is resumed; a session does not use it.
+        run: Id of the run; None makes a new one.
+        origin: The request of a client; None if no client asks.
+        kind: Kind of the run.
+        resumed: Whether the directory holds a dataset with which the run goes on.
 
     Raises:
         ConflictError: If there is a run of that id.
@@ -93,14 +92,11 @@ def begin_run(
     if kind == "session":
         _check_session(read)
     opened = Records().new(read.name, run=run)
-    record = _new_record(
-        opened,
-        name=read.name,
-        directory=opened.directory / "data" if kind == "session" else output.absolute(),
+    directory = opened.directory / "data" if kind == "session" else output.absolute()
+    record = replace(
+        _make_record(opened, read.name, directory, kind, origin),
         domain_id=read.run.domain_id,
         simulations=read.run.simulations,
-        kind=kind,
-        origin=origin,
     )
     order = Order(config.absolute(), tuple(overrides), output.absolute(), resumed)
     return _begin(opened, record, _ORDERS.dump_json(order))
@@ -110,22 +106,20 @@ def begin_container(order: ContainerOrder, *, run: str, origin: Origin, urdf: Pa
     """Begin a run that is a container of the catalogue, in a process of its own, as `begin_run` does.
 
     Args:
-        order: What it is to be made from.
+        order: The order for the container.
         run: Id of the run.
-        origin: What was asked for.
-        urdf: File of a description of the robot that viewers are told; None for none.
+        origin: The request of the client.
+        urdf: File with a description of the robot for viewers; None if the component has none.
 
     Raises:
-        ConflictError: If there is a run of that id, or the one that it is to join has ended.
-        ConfigError: If something is not there that the catalogue asks for, or it cannot join that run.
+        ConflictError: If there is a run of that id, or the run that the container is to join has ended.
+        ConfigError: If the container needs something that is not there, or cannot join that run.
         WorkerError: If no engine answers, it does not have the image, or the process cannot be started.
     """
     check_order(order)
     opened = Records().new(order.component, run=run)
     directory = opened.directory / "data"
-    record = _new_record(
-        opened, name=order.component, directory=directory, domain_id=0, simulations=0, kind="container", origin=origin
-    )
+    record = _make_record(opened, order.component, directory, "container", origin)
 
     def lay_out() -> None:
         directory.mkdir()
@@ -135,28 +129,19 @@ def begin_container(order: ContainerOrder, *, run: str, origin: Origin, urdf: Pa
     return _begin(opened, replace(record, runtime="docker"), CONTAINER_ORDERS.dump_json(order), lay_out)
 
 
-def _new_record(
-    opened: OpenRun,
-    *,
-    name: str,
-    directory: Path,
-    domain_id: int,
-    simulations: int,
-    kind: Kind,
-    origin: Origin | None,
-) -> Record:
+def _make_record(opened: OpenRun, name: str, directory: Path, kind: Kind, origin: Origin | None) -> Record:
     return Record(
         run=opened.run,
         name=name,
         runtime="",
         directory=str(directory),
         volume=None,
-        # What happens before there is a directory of the dataset, which has to be empty until then.
+        # The directory of the dataset has to be empty until the plan is made, so logs cannot lie there yet.
         logs=str(opened.directory / "logs"),
-        domain_id=domain_id,
+        domain_id=0,
         started=datetime.now(timezone.utc),
         launcher=0,
-        simulations=simulations,
+        simulations=0,
         begun_in=os.getcwd(),
         kind=kind,
         origin=origin,
@@ -164,13 +149,7 @@ def _new_record(
 
 
 def _begin(opened: OpenRun, record: Record, order: bytes, lay_out: Callable[[], None] = lambda: None) -> Run:
-    """Start the process of a run, and write the record.
-
-    Args:
-        opened: The run.
-        record: Its record, without that process.
-        order: What the process is told.
-        lay_out: Makes files of the run.
+    """Start the process of a run, write the record with its id, and send it the order; `lay_out` makes further files.
 
     Raises:
         ConfigError: If the record cannot be written.
@@ -181,9 +160,14 @@ def _begin(opened: OpenRun, record: Record, order: bytes, lay_out: Callable[[], 
         logs = Path(record.logs)
         logs.mkdir(exist_ok=True)
         lay_out()
-        process = _start_process(opened, logs)
+        # The process can handle signals only after a second; one that asks it to stop has to wait until then.
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, stop_signals())
+        try:
+            process = opened.start_process("begin", logs, stdin=subprocess.PIPE)
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
         opened.write(replace(record, launcher=process.pid))
-        # It waits for this, so that the record is there before it changes it.
+        # The process waits for the order before it changes the record, so the record has to be written first.
         with cast(IO[bytes], process.stdin) as pipe:
             pipe.write(order)
     except (ThrowcollectError, OSError) as error:
@@ -198,36 +182,14 @@ def _begin(opened: OpenRun, record: Record, order: bytes, lay_out: Callable[[], 
     return Records().get(opened.run)
 
 
-def _start_process(run: OpenRun, logs: Path) -> subprocess.Popen[bytes]:
-    words = [sys.executable, "-m", "throwcollect", "begin", run.run, "--lock", str(run.lock)]
-    # Until it can heed a signal that asks it to stop, which takes it a second, the signal waits.
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, stop_signals())
-    try:
-        with open(open_log(NodeLogs(logs).path(LAUNCHER)), "ab") as log:
-            return subprocess.Popen(
-                words,
-                stdin=subprocess.PIPE,
-                stdout=log,
-                stderr=subprocess.STDOUT,
-                start_new_session=True,
-                pass_fds=[run.lock],
-            )
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
-
-
 def carry_out(run: str, lock: int, order: bytes, *, onlooker: Onlooker, interruptions: Callable[[], int]) -> None:
-    """Prepare and launch a run in the process that `begin_run` has started.
+    """Prepare and launch a run in the process that `begin_run` or `begin_container` has started.
 
-    Args:
-        run: Id of the run.
-        lock: Descriptor of its locked file, which this process has inherited.
-        order: What it is to be made from.
-        onlooker: Is told what goes on.
-        interruptions: How often somebody has asked to stop; from now on, signals that do so arrive.
+    This process has inherited the locked file, and was sent the order. Signals that ask it to stop are blocked until
+    here; from now on, `interruptions` counts them.
 
     Raises:
-        ThrowcollectError: What it failed of; that is in its record, too.
+        ThrowcollectError: If the run fails; the error is written into the record, too.
     """
     signal.pthread_sigmask(signal.SIG_UNBLOCK, stop_signals())
     records = Records()
@@ -235,11 +197,10 @@ def carry_out(run: str, lock: int, order: bytes, *, onlooker: Onlooker, interrup
     if opened.record.kind == "container":
         launch_container(opened, CONTAINER_ORDERS.validate_json(order), onlooker=onlooker, interruptions=interruptions)
         return
-    made_from = _ORDERS.validate_json(order)
     log = NodeLogs(Path(opened.record.logs)).path(LAUNCHER)
     try:
         prepare = _prepare_session if opened.record.kind == "session" else _prepare_collection
-        prepared = prepare(records, opened, made_from, onlooker)
+        prepared = prepare(records, opened, _ORDERS.validate_json(order), onlooker)
         if prepared is None:
             opened.update(ended=datetime.now(timezone.utc), exit_code=0)
             opened.close()
@@ -255,10 +216,10 @@ def carry_out(run: str, lock: int, order: bytes, *, onlooker: Onlooker, interrup
 
 
 def _move_log(before: Path, after: Path) -> None:
-    """Go on printing where the logs of the nodes are, below what was printed before there was such a place.
+    """Move the launcher's log to the logs of the nodes, whose directory is there by now, and go on printing there.
 
     Raises:
-        WorkerError: If that is impossible.
+        WorkerError: If the new log cannot be written.
     """
     try:
         if before == after or not os.path.samestat(os.fstat(1), before.stat()):
@@ -279,7 +240,7 @@ def _prepare_collection(records: Records, run: OpenRun, order: Order, onlooker: 
     if order.resumed:
         prepared = resume(order.output, overrides=order.overrides, ahead=True, onlooker=onlooker, run=run)
         if prepared is not None and prepared.record.run != run.run:
-            # Its containers had outlived their launcher, and go on as the run that they were.
+            # `resume` has taken over a run whose containers outlived their launcher; that run keeps its own id.
             run.forget()
         return prepared
     with load_locating_errors(order.config, order.overrides) as config:
@@ -288,12 +249,11 @@ def _prepare_collection(records: Records, run: OpenRun, order: Order, onlooker: 
             order.config.parent,
             order.output,
             record.started,
-            resumed=False,
             processes=count_cores(),
             ahead=True,
             origin=record.origin,
         )
-        return prepare_run(records, request, None, onlooker, run=run)
+        return prepare_run(records, request, onlooker, run=run)
 
 
 def _prepare_session(records: Records, run: OpenRun, order: Order, onlooker: Onlooker) -> PreparedRun:
@@ -305,16 +265,16 @@ def _prepare_session(records: Records, run: OpenRun, order: Order, onlooker: Onl
         choice = choose(config, say=onlooker.say, warn=onlooker.warn)
         simulations = choice.runtime.simulations(config)
         run.update(runtime=choice.name, middleware=choice.middleware, simulations=simulations)
-        # A dry run, as that of a collection.
-        choice.runtime.host(run.record.place(run.key), config, warn=onlooker.warn).close()
+        # As for a collection, this shows errors before the run is launched.
+        choice.runtime.host(run.place, config, warn=onlooker.warn).close()
         return PreparedRun(records, run, config, directory, onlooker=onlooker, runtime=choice.runtime)
 
 
 def _check_session(config: Config) -> None:
-    """Refuse what has no nodes that a client could talk to.
+    """Check that a session has nodes to which its clients can talk.
 
     Raises:
-        ConfigError: If all is to happen in one process.
+        ConfigError: If the run is to be one process without nodes.
     """
     if config.run.runtime != "auto" and not get_runtime(config.run.runtime).can_be_scaled:
         raise ConfigError(

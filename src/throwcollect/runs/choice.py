@@ -1,4 +1,4 @@
-"""Which runtime a run has, and what carries its messages."""
+"""Chooses the runtime of a run, and the middleware of its nodes."""
 
 from __future__ import annotations
 
@@ -15,13 +15,7 @@ from throwcollect.runtimes.runtime import Runtime
 
 @dataclass(frozen=True)
 class Choice:
-    """What has the trials of a run simulated, and what carries their messages.
-
-    Attributes:
-        name: Name of the runtime.
-        runtime: The runtime.
-        middleware: What carries the messages.
-    """
+    """The runtime of a run, by its name and as an object, and the middleware that carries the messages of its nodes."""
 
     name: str
     runtime: Runtime
@@ -29,14 +23,14 @@ class Choice:
 
 
 def begin(config: Config) -> Choice | None:
-    """Have the runtime that a run will have begin what it can, if it can be seen at a glance which one that is.
+    """Let the runtime that the run will most likely have begin what it can before there is a plan.
 
     Returns:
-        The runtime, for `choose`, to be closed whatever comes of it; None if there is none.
+        The runtime, to be handed to `choose` and to be closed in any case; None if no runtime seems to be there.
 
     Raises:
         ConfigError: If rclpy is asked for, and is not there, or there is no such runtime.
-        MissingExtraError: If what the runtime needs is not installed.
+        MissingExtraError: If the runtime needs a package that is not installed.
     """
     middleware = choose_middleware(config.run.ros)
     for name in _candidates(config):
@@ -50,55 +44,46 @@ def begin(config: Config) -> Choice | None:
 def choose(
     config: Config, *, say: Callable[[str], None], warn: Callable[[str], None], begun: Choice | None = None
 ) -> Choice:
-    """What a configuration asks for; with ``auto``, containers where they can be had, and rclpy where it is installed.
+    """Choose the runtime that a configuration asks for, and make sure that it can be used.
+
+    With ``auto``, that is containers where there is an engine for them. rclpy is used where it is installed.
 
     Args:
         config: The configuration.
-        say: Told in one line what was chosen, and before that what is done to get it.
-        warn: Told in one line of what may not be as it should, such as an image that is not that of these sources.
-        begun: What `begin` gave.
+        say: Is told in one line what was chosen, and before that what is done to get it.
+        warn: Is told in one line of what may be wrong, such as an image that was made from other sources.
+        begun: The runtime that `begin` returned.
 
     Raises:
         ConfigError: If rclpy is asked for, and is not there, or there is no such runtime.
-        MissingExtraError: If what the runtime needs is not installed.
-        WorkerError: If the runtime that is asked for cannot be had.
+        MissingExtraError: If the runtime needs a package that is not installed.
+        WorkerError: If the runtime that is asked for cannot be used.
     """
     launcher = choose_middleware(config.run.ros)
-    candidates = _candidates(config)
+
+    def prepare(name: str, note: str) -> Choice:
+        runtime = begun.runtime if begun is not None and begun.name == name else get_runtime(name)
+        # A runtime imports the packages that only it needs when it is used.
+        with explain_missing():
+            middleware = runtime.prepare(config, launcher, say=say, warn=warn)
+        rclpy = f" on genuine rclpy with {middleware.rmw}" if middleware.backend == "rclpy" else ""
+        say(f"runtime: {runtime.in_words(config)}{rclpy}{note}")
+        return Choice(name, runtime, middleware)
+
+    *others, last = candidates = _candidates(config)
     note = " (auto)" if candidates == AUTOMATIC else ""
-    for name in candidates[:-1]:
+    for name in others:
         try:
-            return _choose(_runtime(name, begun), name, config, launcher, note, say, warn)
+            return prepare(name, note)
         except MissingExtraError as error:
             note = f" (auto, as the package {error.package} is not installed)"
         except WorkerError as error:
             note = f" (auto, as {error.message})"
-    return _choose(_runtime(candidates[-1], begun), candidates[-1], config, launcher, note, say, warn)
+    return prepare(last, note)
 
 
 def _candidates(config: Config) -> tuple[str, ...]:
-    """Names of the runtimes that may be had, in the order in which they are tried."""
-    # Processes of other machines join processes.
-    wanted = config.run.runtime if config.run.listen is None else "local"
-    return AUTOMATIC if wanted == "auto" else (wanted,)
-
-
-def _runtime(name: str, begun: Choice | None) -> Runtime:
-    return begun.runtime if begun is not None and begun.name == name else get_runtime(name)
-
-
-def _choose(
-    found: Runtime,
-    name: str,
-    config: Config,
-    launcher: Middleware,
-    note: str,
-    say: Callable[[str], None],
-    warn: Callable[[str], None],
-) -> Choice:
-    # A runtime imports what only it needs when it is asked for.
-    with explain_missing():
-        middleware = found.prepare(config, launcher, say=say, warn=warn)
-    rclpy = f" on genuine rclpy with {middleware.rmw}" if middleware.backend == "rclpy" else ""
-    say(f"runtime: {found.in_words(config)}{rclpy}{note}")
-    return Choice(name, found, middleware)
+    """Names of the runtimes that the run may have, in the order in which they are tried."""
+    # Simulations of other machines can join a run only if its nodes are processes.
+    name = config.run.runtime if config.run.listen is None else "local"
+    return AUTOMATIC if name == "auto" else (name,)

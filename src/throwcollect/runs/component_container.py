@@ -1,4 +1,4 @@
-"""Runs that are one container of the operator's catalogue, which may join another run."""
+"""Runs that consist of one container of the operator's catalogue, which may join another run."""
 
 from __future__ import annotations
 
@@ -22,20 +22,20 @@ if TYPE_CHECKING:
     from throwcollect.runtimes.docker.component import Way
 
 DESCRIPTION = "robot.urdf"
-"""Description of the robot that viewers are told, in the directory of the run."""
+"""File in the directory of the run that describes the robot for viewers."""
 _POLL_S = 0.2
 _ANSWER_S = 5.0
-"""Whoever asks for a container waits for the engine as long."""
+"""A client that asks for a container waits this long for the engine."""
 
 
 @dataclass(frozen=True)
 class ContainerOrder:
-    """What a container is to be made from.
+    """The order for a container.
 
     Attributes:
-        component: Name of its component.
-        spec: What the catalogue says.
-        joins: Id of the run that it joins; None if it joins none.
+        component: Name of the component.
+        spec: The container, as the catalogue describes it.
+        joins: Id of the run that the container joins; None if it joins none.
     """
 
     component: str
@@ -47,14 +47,14 @@ CONTAINER_ORDERS = TypeAdapter(ContainerOrder)
 
 
 def check_order(order: ContainerOrder) -> None:
-    """Refuse what can be seen to fail at once.
+    """Refuse an order that would fail at once.
 
     Raises:
-        NotFoundError: If there is no such run as it is to join.
-        ConflictError: If that has ended, or has no router to join.
-        ConfigError: If a mount or a network is not there or must not be used, or it cannot join that run.
+        NotFoundError: If the run that the container is to join is not there.
+        ConflictError: If that run has ended, or has no router to join.
+        ConfigError: If a mount or a network is not there or must not be used, or the container cannot join that run.
         WorkerError: If no engine answers, or it does not have the image.
-        MissingExtraError: If the client of the engine is not installed.
+        MissingExtraError: If the package that asks the engine is not installed.
     """
     with explain_missing():
         from throwcollect.runtimes.docker.checks import check_container
@@ -68,21 +68,15 @@ def check_order(order: ContainerOrder) -> None:
 def launch_container(
     run: OpenRun, order: ContainerOrder, *, onlooker: Onlooker, interruptions: Callable[[], int]
 ) -> None:
-    """Run the container until it ends, the run that it joins does, or somebody asks for it.
-
-    Args:
-        run: The run, with a record; its end is written there, and the run is let go of.
-        order: What it is to be made from.
-        onlooker: Is told what goes on.
-        interruptions: How often somebody has asked to stop.
+    """Run the container until it ends, the run that it joins ends, or somebody asks to stop; close the run.
 
     Raises:
-        ConfigError: If something is not there that the catalogue asks for, or it cannot join that run.
-        ConflictError: If the run that it is to join has ended.
+        ConfigError: If the container needs something that is not there, or cannot join that run.
+        ConflictError: If the run that the container is to join has ended.
         WorkerError: If the engine or the container fails.
         Interrupted: If somebody asked to stop before there was a container.
     """
-    # Whoever asks for a container needs none of it.
+    # `serve` imports this module for `check_order`, and should not wait for the launcher's imports.
     from throwcollect.runs.launcher import launch_host
 
     def host(place: Place) -> Host:
@@ -103,12 +97,12 @@ def _goes_on(run: str) -> bool:
 
 
 def _wait_for_way(run: str, spec: ContainerSpec, interruptions: Callable[[], int]) -> Way:
-    """The way into a run, which may just be starting.
+    """Wait for the way into a run, which may just be starting.
 
     Raises:
-        ConfigError: If a container cannot join it.
-        ConflictError: If it has ended, or has no router to join.
-        WorkerError: If its launcher died.
+        ConfigError: If the container cannot join the run.
+        ConflictError: If the run has ended, or has no router to join.
+        WorkerError: If the launcher of the run died.
         Interrupted: If somebody asked to stop.
     """
     while (way := _find_way(Records().get(run), spec)) is None:
@@ -119,12 +113,12 @@ def _wait_for_way(run: str, spec: ContainerSpec, interruptions: Callable[[], int
 
 
 def _find_way(run: Run, spec: ContainerSpec) -> Way | None:
-    """The way into a run; None while it has no router yet.
+    """The way into a run; None while the run has no router yet.
 
     Raises:
-        ConfigError: If a container cannot join it.
-        ConflictError: If it has ended, or has no router to join.
-        WorkerError: If its launcher died.
+        ConfigError: If the container cannot join the run.
+        ConflictError: If the run has ended, or has no router to join.
+        WorkerError: If the launcher of the run died.
     """
     from throwcollect.runtimes.docker.component import find_way
     from throwcollect.runtimes.registry import get_runtime

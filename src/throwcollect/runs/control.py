@@ -1,4 +1,4 @@
-"""End and scale a run from another process than its launcher."""
+"""Ends and scales a run from another process than its launcher."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import os
 import signal
 import time
 from collections.abc import Callable, Sequence
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from typing import TYPE_CHECKING
 
 from throwcollect.errors import ConfigError, ThrowcollectError, WorkerError
@@ -20,31 +20,25 @@ from throwcollect.runtimes.registry import get_runtime
 from throwcollect.wording import command
 
 if TYPE_CHECKING:
-    from throwcollect import ros
     from throwcollect.ros.msg import SetParametersResult
 
 _POLL_S = 0.05
 _STOP_S = 60.0
-"""More than a launcher needs to drain and to end all nodes."""
+"""A launcher needs less to drain the run and to end all nodes."""
 _GRACE_S = 3.0
 _FORCE_S = 10.0
 _ANSWER_S = 10.0
-"""Time in which a router, and then a launcher, answers: one may be starting again, the other ending simulations."""
+"""The router and then the nodes may each take this long: a router may be starting again, a launcher ending nodes."""
 
 
 def stop(run: Run, *, keep_on: Callable[[], bool] = lambda: True) -> Run:
-    """Drain a run: no new trial is started, running ones are finished and written, all nodes end.
+    """Drain a run: the trials that run are finished and written, no other is started, and all nodes end.
 
-    Args:
-        run: The run.
-        keep_on: Asked again and again whether to wait on.
-
-    Returns:
-        The run, as it is by then.
+    This function waits for the end of the run as long as `keep_on` returns true, and returns the run as it is then.
 
     Raises:
         ConfigError: If the run has ended, or its record cannot be read.
-        WorkerError: If its launcher died, or does not end.
+        WorkerError: If the launcher died, or does not end.
     """
     _signal(run.records, require_living(run), signal.SIGTERM)
     deadline = time.monotonic() + _STOP_S
@@ -59,22 +53,22 @@ def stop(run: Run, *, keep_on: Callable[[], bool] = lambda: True) -> Run:
 
 
 def down(named: str | Run | None, *, volumes: bool = False) -> tuple[str, list[str]]:
-    """End everything of a run, by force if need be, and forget it; a dataset in a directory stays.
+    """End all nodes of a run, by force if need be, and forget the run; a dataset in a directory stays.
 
     Args:
-        named: A run, or what `to_change` takes, or the id of a run of which only a runtime knows; None for the only run
-            of the current directory that lives, or whose launcher died.
+        named: A run, or a name as for `to_change`, or the id of a run that has no record, but of which a runtime holds
+            containers. None takes the only run of the current directory that lives, or whose launcher died.
         volumes: Whether a volume that holds the dataset is removed, too.
 
     Returns:
-        Id of the run, and names of what was removed.
+        Id of the run, and names of the containers, networks and volumes that were removed.
 
     Raises:
         ConfigError: If there is no such run, or more than one.
         WorkerError: If something cannot be ended or removed.
     """
     records, held = Records(), find_held_runs()
-    # What a runtime holds besides may be somebody else's, so that has to be named.
+    # A run without a record may be another user's, so it is removed only if it is named.
     if named is None:
         run = to_change(records, None, command="down -v" if volumes else "down", died=True).id
     elif isinstance(named, Run):
@@ -120,16 +114,7 @@ def scale(run: Run, simulations: int) -> None:
 
 
 def set_parameter(run: Run, nodes: Sequence[str], name: str, value: float | str) -> list[SetParametersResult]:
-    """Set a parameter of nodes of a run.
-
-    Args:
-        run: The run.
-        nodes: Names of the nodes, with their namespaces.
-        name: Name of the parameter.
-        value: Its value.
-
-    Returns:
-        What each of them answers.
+    """Set a parameter of several nodes of a run, named with their namespaces, at the same time; the answer of each.
 
     Raises:
         WorkerError: If the router or a node does not answer.
@@ -139,44 +124,30 @@ def set_parameter(run: Run, nodes: Sequence[str], name: str, value: float | str)
         raise _silent(run, nodes[0])
     connection.middleware.joining.settle()
     from throwcollect import ros
+    from throwcollect.ros.srv import SetParameters
 
     context = ros.Context()
     ros.init(context=context, connection=connection)
-    try:
+    with ExitStack() as undo:
+        undo.callback(ros.shutdown, context=context)
         asking = ros.Node(make_own_name(), context=context)
-        results = _set_parameters(asking, context, nodes, ros.Parameter(name, value=value))
-        asking.destroy_node()
-        if None in results:
-            raise _silent(run, nodes[results.index(None)])
-        return [result for result in results if result is not None]
-    finally:
-        ros.shutdown(context=context)
-
-
-def _set_parameters(
-    asking: ros.Node, context: ros.Context, nodes: Sequence[str], wanted: ros.Parameter
-) -> list[SetParametersResult | None]:
-    """What nodes answer, which are asked at the same time; None for each that does not."""
-    from throwcollect import ros
-    from throwcollect.ros.srv import SetParameters
-
-    executor = ros.SingleThreadedExecutor(context=context)
-    executor.add_node(asking)
-    futures: list[ros.Future | None] = []
-    for node in nodes:
-        client = asking.create_client(SetParameters, f"{node}/set_parameters")
-        if not client.wait_for_service(_ANSWER_S):
-            futures.append(None)
-            break
-        futures.append(client.call_async(SetParameters.Request(parameters=[wanted.to_parameter_msg()])))
-    deadline = time.monotonic() + _ANSWER_S
-    results: list[SetParametersResult | None] = []
-    for future in futures:
-        if future is not None:
+        undo.callback(asking.destroy_node)
+        executor = ros.SingleThreadedExecutor(context=context)
+        executor.add_node(asking)
+        request = SetParameters.Request(parameters=[ros.Parameter(name, value=value).to_parameter_msg()])
+        futures = []
+        for node in nodes:
+            client = asking.create_client(SetParameters, f"{node}/set_parameters")
+            # A request that is sent before the service is found is lost.
+            if not client.wait_for_service(_ANSWER_S):
+                raise _silent(run, node)
+            futures.append(client.call_async(request))
+        deadline = time.monotonic() + _ANSWER_S
+        for node, future in zip(nodes, futures, strict=True):
             executor.spin_until_future_complete(future, timeout_sec=max(0.0, deadline - time.monotonic()))
-        results.append(future.result().results[0] if future is not None and future.done() else None)
-    executor.remove_node(asking)
-    return results
+            if not future.done():
+                raise _silent(run, node)
+        return [future.result().results[0] for future in futures]
 
 
 def _silent(run: Run, node: str) -> WorkerError:
@@ -189,7 +160,7 @@ def _silent(run: Run, node: str) -> WorkerError:
 
 
 def _end_launcher(records: Records, record: Record) -> None:
-    """End a launcher, and with it the processes that it started: it may drain, is told to hurry, and then killed."""
+    """End a launcher, and with it its processes: ask it to drain, then to end at once, then kill it."""
     for number, patience_s in ((signal.SIGTERM, _GRACE_S), (signal.SIGTERM, _FORCE_S), (signal.SIGKILL, _FORCE_S)):
         _signal(records, record, number)
         deadline = time.monotonic() + patience_s
@@ -198,7 +169,7 @@ def _end_launcher(records: Records, record: Record) -> None:
 
 
 def _signal(records: Records, record: Record, number: signal.Signals) -> None:
-    """Send a signal to a launcher, but to no process that got its pid later."""
+    """Send a signal to a launcher, but never to another process that has got its process id later."""
     with suppress(ProcessLookupError):
         process = os.pidfd_open(record.launcher)
         try:

@@ -1,4 +1,4 @@
-"""What this machine can do for a collection, in plain words."""
+"""Examines whether this machine has everything that a collection needs."""
 
 from __future__ import annotations
 
@@ -33,10 +33,10 @@ from throwcollect.wording import format_count, join_names
 
 _GIB = 1024**3
 _SIMULATION_MEMORY_GIB = 0.3
-"""Resident memory of one simulation, generously."""
+"""Upper limit of the resident memory of one simulation."""
 
 _ROS_ROUTER_PORT = 7447
-"""Port where ROS 2 nodes on rmw_zenoh_cpp look for a router."""
+"""Port at which ROS 2 nodes on rmw_zenoh_cpp look for a router."""
 
 _LEAST_DISK_GIB = 1.0
 
@@ -66,7 +66,7 @@ def _check_memory() -> Check:
 
 
 def _check_engine(name: str) -> Check:
-    """An engine that is missing is a problem if no other one that simulates contacts is there."""
+    """Check a physics engine; a missing one is a problem only if no other engine that simulates contacts is there."""
     package = PACKAGES[name]
     if is_installed(package.module):
         return Check(package.module, "ok", version(package.distribution))
@@ -84,13 +84,13 @@ def _check_robot() -> Check:
 
 
 def _check_extras() -> Check:
-    """Extras that are installed, and those of which at least a package is missing."""
-    lacking = sorted({extra for package, extra in EXTRA_OF.items() if has_wheel(package) and not is_installed(package)})
-    there = join_names(sorted(set(EXTRA_OF.values()) - set(lacking)))
-    if not lacking:
-        return Check("extras", "ok", there)
-    without = f"without {join_names(lacking)} (try: {install_command(','.join(lacking))})"
-    return Check("extras", "note", f"{there}, {without}" if there else without)
+    """List the extras that are installed, and those of which at least one package is missing."""
+    missing = sorted({extra for package, extra in EXTRA_OF.items() if has_wheel(package) and not is_installed(package)})
+    complete = join_names(sorted(set(EXTRA_OF.values()) - set(missing)))
+    if not missing:
+        return Check("extras", "ok", complete)
+    without = f"without {join_names(missing)} (try: {install_command(','.join(missing))})"
+    return Check("extras", "note", f"{complete}, {without}" if complete else without)
 
 
 def _check_runtime(name: str) -> Check | None:
@@ -131,7 +131,7 @@ def _check_embedded() -> Check:
         return Check("embedded", "problem", f"Zenoh is not installed; try: {MissingExtraError('zenoh').hint}")
     found = f"Zenoh {version('eclipse-zenoh')}"
     try:
-        # Its package loads the backend that is chosen.
+        # Importing from `throwcollect.ros` loads the chosen backend, which may fail.
         from throwcollect.ros.middleware import VARIABLE, uses_rclpy
 
         chosen = "rclpy" if uses_rclpy() else "the embedded backend"
@@ -150,14 +150,7 @@ def _check_disk(directory: Path) -> Check:
 
 
 def examine(directory: Path) -> list[Check]:
-    """Look at everything a collection needs.
-
-    Args:
-        directory: Where datasets would be written.
-
-    Returns:
-        The findings, in a fixed order.
-    """
+    """Check everything that a collection into a directory needs; the findings come in a fixed order."""
     machine: list[Callable[[], Check]] = [
         _check_python,
         _check_extras,

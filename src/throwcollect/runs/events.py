@@ -1,4 +1,4 @@
-"""What happened in a run: one JSON document a line in ``events.jsonl`` beside the logs."""
+"""The events of a run: one JSON document a line in ``events.jsonl`` beside the logs."""
 
 from __future__ import annotations
 
@@ -22,16 +22,16 @@ _ALARMING = ("lost", "given up", "frozen")
 
 @dataclass(frozen=True)
 class Event:
-    """Something that happened to a run, or to one of its nodes.
+    """An event of a run, or of one of its nodes.
 
     Attributes:
-        time: When, by RFC 3339.
+        time: Time of the event, in the form of RFC 3339.
         run: Id of the run.
-        event: What: a `RunEvent`, or a `NodeEvent` if there is a node.
+        event: Kind of the event: a `RunEvent`, or a `NodeEvent` if there is a node.
         node: Name of the node.
         handle: Process or container id of a node that was started.
         reason: Why a node or the run ended, in words.
-        simulations: Number of simulations that are wanted, when that was set.
+        simulations: Number of simulations that the run is to have from now on.
         exit_code: Exit code of a run that has ended.
     """
 
@@ -46,7 +46,7 @@ class Event:
 
     @property
     def alarming(self) -> bool:
-        """Whether somebody who follows the run wants to see it: a node was lost or is frozen."""
+        """Whether a terminal that follows the run should show the event: a node was lost or is frozen."""
         return self.node is not None and self.event in _ALARMING
 
     def __str__(self) -> str:
@@ -54,17 +54,12 @@ class Event:
         details = [self.reason.partition("\n")[0] if self.reason else None]
         details += [format_count(self.simulations, "simulation") if self.simulations is not None else None]
         details += [f"exit code {self.exit_code}" if self.exit_code else None, self.handle and self.handle[:12]]
-        told = ", ".join(filter(None, details))
-        return f"{self.node or self.run} {self.event}" + (f": {told}" if told else "")
+        text = ", ".join(filter(None, details))
+        return f"{self.node or self.run} {self.event}" + (f": {text}" if text else "")
 
 
 class EventLog:
-    """Appends the events of one run.
-
-    Args:
-        logs: Directory of the logs, which exists or is made.
-        run: Id of the run.
-    """
+    """Appends the events of one run to a file in its directory of logs, which is made if need be."""
 
     def __init__(self, logs: Path, run: str) -> None:
         self._path = logs / EVENTS
@@ -81,15 +76,15 @@ class EventLog:
         """Append an event of the run.
 
         Raises:
-            OSError: If it cannot be written.
+            OSError: If the file cannot be written.
         """
         self._append([Event(_now(), self._run, event, None, None, reason, simulations, exit_code)])
 
     def node_events(self, before: Sequence[NodeState], after: Sequence[NodeState]) -> None:
-        """Append what happened to the nodes between two looks at them.
+        """Append an event for each difference between two lists of states of the nodes.
 
         Raises:
-            OSError: If it cannot be written.
+            OSError: If the file cannot be written.
         """
         now = _now()
         self._append(
@@ -107,7 +102,7 @@ class EventLog:
 
 
 def parse(line: str) -> Event | None:
-    """The event that a line holds; None if it is torn."""
+    """Read an event from a line; None if the line is incomplete."""
     try:
         return Event(**json.loads(line))
     except (ValueError, TypeError):
@@ -118,7 +113,7 @@ _Change = tuple[NodeState, NodeEvent, str | None, str | None]
 
 
 def _changes(before: Sequence[NodeState], after: Sequence[NodeState]) -> list[_Change]:
-    """Node, event, handle and reason of everything that changed."""
+    """Compare two lists of states: node, event, handle and reason of each change."""
     known = {state.name: state for state in before}
     changes: list[_Change] = []
     for state in after:

@@ -1,4 +1,4 @@
-"""What a run tells while it lives: how far it has come, what its nodes print, and what happens to them."""
+"""Follows a run while it lives: its progress, the logs of its nodes, and its events."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ _READ_S = 0.2
 
 @dataclass(frozen=True)
 class Look:
-    """What is seen of a run at a time.
+    """One look at a run.
 
     Attributes:
-        run: The run, as it is by then.
-        progress: How far it has come, if its coordinator has told so since the last look.
-        events: What has happened since the last look.
+        run: The run, as it was at that moment.
+        progress: The latest report of the coordinator since the last look; None if there was none.
+        events: Events since the last look.
     """
 
     run: Run
@@ -35,47 +35,42 @@ class Look:
 
 
 def follow(run: Run, *, keep_on: Callable[[], bool] = lambda: True) -> Iterator[Look]:
-    """Look at a run until it ends, several times a second; a program may follow several at once.
+    """Look at a run several times a second until it ends, or `keep_on` refuses to go on.
 
-    Args:
-        run: The run.
-        keep_on: Asked again and again whether to go on.
+    A program may follow several runs at once.
 
     Yields:
-        What is seen; at last of a run that has ended or died, unless `keep_on` refused.
+        A look; the last one shows a run that has ended or died, unless `keep_on` refused.
 
     Raises:
-        ConfigError: If its record vanishes or cannot be read.
+        ConfigError: If the record of the run vanishes or cannot be read.
     """
     run.record.middleware.joining.settle()
     from throwcollect.runtimes.run_listener import RunListener
 
     events = Tail(Path(run.record.logs) / EVENTS)
     events.skip()
-    told: list[Progress] = []
-    with RunListener(told.append) as listener:
+    reports: list[Progress] = []
+    with RunListener(reports.append) as listener:
         yield Look(run)
         while run.status == "running" and keep_on():
-            told.clear()
+            reports.clear()
             listener.spin(run.connection, _POLL_S)
             run = run.now()
             happened = tuple(event for line in events.lines() if (event := parse(line)))
-            yield Look(run, told[-1] if told else None, happened)
+            yield Look(run, reports[-1] if reports else None, happened)
 
 
 def wait(run: Run) -> Summary:
     """Wait until a run has ended.
 
-    Args:
-        run: The run.
-
     Returns:
-        What its dataset holds; its outcomes say whether trials are lost.
+        The summary of the dataset; its outcomes tell whether trials are lost.
 
     Raises:
-        WorkerError: If its launcher died.
-        ThrowcollectError: What it ended with, if its dataset is not complete.
-        ConfigError: If its record vanishes or cannot be read.
+        WorkerError: If the launcher of the run died.
+        ThrowcollectError: The error with which the run ended, if its dataset is not complete.
+        ConfigError: If the record of the run vanishes or cannot be read.
     """
     while run.status == "running":
         time.sleep(_READ_S)
@@ -88,15 +83,15 @@ def wait(run: Run) -> Summary:
 
 
 def read_logs(run: Run, nodes: Collection[str], *, follow: bool) -> Iterator[tuple[str, str, int]]:
-    """What the nodes of a run have printed, and then print.
+    """Read the logs of nodes of a run.
 
     Args:
         run: The run.
-        nodes: Names of nodes; all if none.
-        follow: Whether to go on until the run ends.
+        nodes: Names of the nodes; empty takes all.
+        follow: Whether to go on with new lines until the run ends.
 
     Yields:
-        A line after the name of its node, and the length of the longest name so far.
+        The name of a node, a line that it printed, and the length of the longest name so far.
 
     Raises:
         ConfigError: If there is no such node, or the record vanishes.
@@ -118,13 +113,10 @@ def read_logs(run: Run, nodes: Collection[str], *, follow: bool) -> Iterator[tup
 
 
 def read_events(run: Run) -> Iterator[tuple[Event, str]]:
-    """What happens in a run, from its start until it ends.
-
-    Args:
-        run: The run.
+    """Read the events of a run, from its start until it ends.
 
     Yields:
-        An event, and the line of JSON that it is written as.
+        An event, and the line of JSON in which it is written.
 
     Raises:
         ConfigError: If the record vanishes.
@@ -137,7 +129,7 @@ def read_events(run: Run) -> Iterator[tuple[Event, str]]:
 
 
 def _looks(run: Run, *, follow: bool) -> Iterator[bool]:
-    """Again and again, as long as a run lives: False, and True for the last look, which comes after its end."""
+    """Yield False several times a second while a run lives (if it is to be followed), and True once after its end."""
     while follow and run.now().status == "running":
         yield False
         time.sleep(_READ_S)

@@ -1,4 +1,4 @@
-"""Adds simulations of this machine to a run of another one, and takes them away again at any time."""
+"""Adds simulations of this machine to a run of another machine; they may leave it again at any time."""
 
 from __future__ import annotations
 
@@ -27,10 +27,10 @@ from throwcollect.runtimes.supervisor import Supervisor
 from throwcollect.wording import format_count
 
 _ANSWER_S = 15.0
-"""Time in which a router, and then a launcher, answers."""
+"""Time in which the router, and then the launcher, has to answer."""
 _POLL_S = 0.1
 _SILENT_S = 120.0
-"""A run of which nothing is heard for this long is over: a link that is cut may come back before that."""
+"""If no report arrives for this long, the run is taken to be over. A network that fails may be back before."""
 _OVER_S = 5.0
 """The same for a run whose last trial has ended."""
 
@@ -42,16 +42,16 @@ def join_run(
     onlooker: Onlooker = SILENT,
     interruptions: Callable[[], int] = lambda: 0,
 ) -> None:
-    """Simulate trials of a run that another machine has begun, until it is over.
+    """Simulate trials of a run that another machine has begun, until the run is over.
 
     Args:
         word: The token of the run.
         simulations: Number of simulations that are started here.
         onlooker: Is told what goes on.
-        interruptions: How often somebody has asked to stop; what is simulated just then, others do again.
+        interruptions: How often somebody has asked to stop; other simulations then do the running trials again.
 
     Raises:
-        ConfigError: If the token is none, or other throws would be computed here.
+        ConfigError: If the word is no token, or this machine would compute other throws.
         WorkerError: If the run cannot be reached, or the simulations cannot be kept alive.
     """
     token = JoinToken.decode(word)
@@ -77,8 +77,8 @@ def _simulate(
     """
     from throwcollect.runtimes.run_listener import RunListener
 
-    heard = _Heard(onlooker)
-    # The name is this machine's, and the number this process's: several may join from one machine.
+    reports = _Reports(onlooker)
+    # Names of nodes have to be unique, and several processes of one machine may join.
     name = simulation_name_of(f"{socket.gethostname()}_{os.getpid()}")
     cores = sorted(os.sched_getaffinity(0))
     bound = host.place.simulations >= len(cores)
@@ -91,44 +91,44 @@ def _simulate(
         )
         for index in range(host.place.simulations)
     ]
-    with Supervisor(host, config.run, roster) as supervisor, RunListener(heard.update) as listener:
+    with Supervisor(host, config.run, roster) as supervisor, RunListener(reports.update) as listener:
         supervisor.start()
-        while not heard.over and not interruptions():
+        while not reports.over and not interruptions():
             listener.spin(connection, _POLL_S)
             _, news = supervisor.poll()
             for line in news:
                 onlooker.warn(line)
     if interruptions():
         onlooker.say("left; the run goes on without the simulations of this machine")
-    elif heard.finished:
+    elif reports.finished:
         onlooker.say("the run is over")
     else:
         raise WorkerError(f"nothing was heard of the run for {_SILENT_S:g} s", hint="join it again if it still goes on")
 
 
-class _Heard:
-    """What was heard of the run, and when."""
+class _Reports:
+    """Passes reports of the coordinator on, and concludes from them whether the run is over."""
 
     def __init__(self, onlooker: Onlooker) -> None:
         self._onlooker = onlooker
-        self._at = time.monotonic()
+        self._last_at = time.monotonic()
         self.finished = False
 
     def update(self, progress: Progress) -> None:
-        self._at = time.monotonic()
+        self._last_at = time.monotonic()
         self.finished = progress.steps[0] >= progress.steps[1]
         self._onlooker.update(progress)
 
     @property
     def over(self) -> bool:
-        return time.monotonic() > self._at + (_OVER_S if self.finished else _SILENT_S)
+        return time.monotonic() > self._last_at + (_OVER_S if self.finished else _SILENT_S)
 
 
 def _read_configuration(connection: Connection, token: JoinToken) -> str:
-    """Ask the launcher of the run for its configuration.
+    """Ask the launcher of the run for the configuration.
 
     Raises:
-        WorkerError: If it does not answer.
+        WorkerError: If the router or the launcher does not answer.
     """
     if not answers(connection.endpoint, patience_s=_ANSWER_S):
         raise WorkerError(
@@ -149,7 +149,7 @@ def _read_configuration(connection: Connection, token: JoinToken) -> str:
         client = node.create_client(GetParameters, f"/{LAUNCHER}/get_parameters")
         if not client.wait_for_service(_ANSWER_S):
             raise WorkerError(f"run {token.run}: its launcher is not to be found at {connection.endpoint}")
-        # What is asked before the service is found is lost.
+        # A request that is sent before the service is found is lost.
         future = client.call_async(GetParameters.Request(names=[CONFIGURATION]))
         executor.spin_until_future_complete(future, timeout_sec=_ANSWER_S)
         if not future.done():

@@ -1,10 +1,9 @@
-"""The launcher of a run: the process that has its trials simulated, and the only one that changes its record."""
+"""The launcher of a run: the process that drives the run's host, and the only one that changes the run's record."""
 
 from __future__ import annotations
 
 import os
 import subprocess
-import sys
 import time
 from collections.abc import Callable, Sequence
 from datetime import datetime, timezone
@@ -18,11 +17,10 @@ from throwcollect.dataset.directory import config_path
 from throwcollect.dataset.lock import hold_lock
 from throwcollect.dataset.summary import explain_loss
 from throwcollect.errors import ConfigError, Interrupted, LossError, ThrowcollectError, WorkerError
-from throwcollect.files import open_log
 from throwcollect.runs.events import EventLog
 from throwcollect.runs.onlooker import Onlooker
-from throwcollect.runs.record import Failure, Record, Summary
-from throwcollect.runs.records import OpenRun, Records
+from throwcollect.runs.record import Failure, Summary
+from throwcollect.runs.records import OpenRun, Records, Run
 from throwcollect.runtimes.node_logs import NodeLogs
 from throwcollect.runtimes.nodes import LAUNCHER
 from throwcollect.runtimes.registry import get_runtime
@@ -41,19 +39,19 @@ def launch(
     interruptions: Callable[[], int],
     runtime: Runtime | None = None,
 ) -> Summary | None:
-    """Launch a prepared run until its last trial has ended, or go on with one whose launcher died.
+    """Launch a prepared run until its last trial has ended, or go on with a run whose launcher died.
 
-    A run that collects nothing goes on until the user stops it.
+    A run that collects no dataset goes on until the user stops it.
 
     Args:
-        run: The run, with a record; its end is written there, and the run is let go of.
-        config: Configuration of the collection.
+        run: The run, with a record; this function writes the end of the run there, and closes it.
+        config: Configuration of the run.
         onlooker: Is told what goes on.
-        interruptions: How often the user has asked to stop: at first running trials are finished, then no more.
-        runtime: That of the run, with what it has begun, which is ended here; None if nothing has been begun.
+        interruptions: How often the user has asked to stop: the first time, running trials are still finished.
+        runtime: The runtime, if it has begun something for the run, which this function closes; else None.
 
     Returns:
-        What the dataset holds, and whose outcomes say whether trials are lost; None if the run collects nothing.
+        The summary of the dataset, whose outcomes tell whether trials are lost; None if the run collects none.
 
     Raises:
         ConfigError: If the configuration cannot be used after all.
@@ -79,24 +77,21 @@ def launch_host(
     is_open: bool = False,
     end: Callable[[], None] | None = None,
 ) -> Summary | None:
-    """Have the host of a run do what the run is for, and write down what happens, and its end.
+    """Let the host of a run do its work, and write the events and the end of the run; the rest is as for `launch`.
 
     Args:
-        run: The run, with a record; it is let go of.
-        make_host: Makes its host.
+        run: The run, with a record.
+        make_host: Makes the host.
         onlooker: Is told what goes on.
         interruptions: How often the user has asked to stop.
         is_open: Whether anybody can join the run.
-        end: Called when the host is closed; None for nothing.
-
-    Returns:
-        As `launch`.
+        end: Is called after the host is closed; None calls nothing.
 
     Raises:
         ThrowcollectError: As `launch`.
     """
     session = _Session(run, onlooker, interruptions)
-    place = run.record.place(run.key)
+    place = run.place
     code, summary = 1, None
     failure: Failure | None = Failure("internal error")
     host: Host | None = None
@@ -115,7 +110,7 @@ def launch_host(
     finally:
         if end is not None:
             end()
-        # What was there before may be there still, if it could not even be looked for.
+        # Without a host, nobody has looked for containers of an earlier launcher, so what the record says still holds.
         left = run.record.left if host is None else not host.cleared
         if left:
             onlooker.warn(f"containers of this run may be left: {command('down', '--run', run.run)} ends them")
@@ -124,7 +119,7 @@ def launch_host(
 
 
 class _Session:
-    """Writes down what happens in a run; where that is impossible, the run itself may still go on."""
+    """A `runtime.Session` that writes the record and the events of a run; the run goes on even if that fails."""
 
     def __init__(self, run: OpenRun, onlooker: Onlooker, interruptions: Callable[[], int]) -> None:
         self.interruptions = interruptions
@@ -139,22 +134,19 @@ class _Session:
         self._failed = False
 
     def update(self, progress: Progress) -> None:
-        """A progress report of the coordinator, to be written with what comes next."""
+        # It is written together with the next change.
         self._progress = progress
         self._onlooker.update(progress)
 
     def event(self, event: RunEvent, **details: Any) -> None:
-        """Something that happened to the run."""
         self._write(lambda: self._events.run_event(event, **details))
         if event == "stopping":
             self._write(lambda: self._run.update(stopping=True))
 
     def take_over(self, states: Sequence[NodeState]) -> None:
-        """Nodes of which a launcher before this one has written."""
         self._states = list(states)
 
     def nodes(self, states: Sequence[NodeState], *, endpoint: str | None, simulations: int) -> None:
-        """How the nodes are by now."""
         if states != self._states:
             before, self._states = self._states, list(states)
             self._write(lambda: self._events.node_events(before, states))
@@ -167,22 +159,24 @@ class _Session:
         )
 
     def end(self, code: int, failure: Failure | None, summary: Summary | None, *, left: bool) -> None:
-        """How the run ended, last of all, and whether containers of it may be left."""
+        """Write the end of the run; `left` tells whether its containers may still exist."""
         event: RunEvent = "failed"
         if code in (0, LossError.exit_code):
             event = "finished"
         elif code == Interrupted.exit_code:
             event = "stopped"
         self.event(event, reason=failure and str(failure.error(code)), exit_code=code)
-        end = {
+        changes = {
+            "nodes": (),
+            "endpoint": None,
+            "progress": self._progress or self._run.record.progress,
             "ended": datetime.now(timezone.utc),
             "exit_code": code,
             "failure": failure,
             "summary": summary,
             "left": left,
         }
-        progress = self._progress or self._run.record.progress
-        self._write(lambda: self._run.update(nodes=(), endpoint=None, progress=progress, **end))
+        self._write(lambda: self._run.update(**changes))
 
     def _write(self, write: Callable[[], None]) -> None:
         try:
@@ -194,85 +188,48 @@ class _Session:
                 self._onlooker.warn(f"what happens in this run is not written down any more: {reason}")
 
 
-def start_launcher(run: OpenRun) -> subprocess.Popen[bytes]:
-    """Hand a prepared run over to a new process, which the terminal that started it does not take along.
-
-    Args:
-        run: The run, with a record; this process lets go of it.
-
-    Returns:
-        The process.
-
-    Raises:
-        WorkerError: If it cannot be started.
-    """
-    path = NodeLogs(Path(run.record.logs)).path(LAUNCHER)
-    words = [sys.executable, "-m", "throwcollect", "launch", run.run, "--lock", str(run.lock)]
-    try:
-        with open(open_log(path), "ab") as log:
-            return subprocess.Popen(
-                words,
-                stdin=subprocess.DEVNULL,
-                stdout=log,
-                stderr=subprocess.STDOUT,
-                start_new_session=True,
-                # It holds the lock from its first moment, so that nobody ever takes the run for dead.
-                pass_fds=[run.lock],
-            )
-    except OSError as error:
-        raise WorkerError(f"the launcher cannot be started: {error}") from error
-    finally:
-        run.close()
-
-
 def launch_inherited(run: str, lock: int, *, onlooker: Onlooker, interruptions: Callable[[], int]) -> None:
-    """Launch a prepared run in the process that `start_launcher` has started.
-
-    Args:
-        run: Id of the run.
-        lock: Descriptor of its locked file, which this process has inherited.
-        onlooker: Is told what goes on.
-        interruptions: How often somebody has asked to stop.
+    """Launch a prepared run in the process that `start_launcher` has started, which has inherited the locked file.
 
     Raises:
-        ThrowcollectError: As `launch`, or if its record or configuration cannot be read.
+        ThrowcollectError: As `launch`, or if the record or the configuration cannot be read.
     """
     inherited = Records().inherit(run, lock)
     config = load(config_path(Path(inherited.record.directory)))
     launch(inherited, config, onlooker=onlooker, interruptions=interruptions)
 
 
-def wait_for_nodes(
-    records: Records, record: Record, process: subprocess.Popen[bytes], *, interruptions: Callable[[], int]
-) -> None:
-    """Wait until a new launcher has started its nodes.
+def start_launcher(records: Records, opened: OpenRun, *, interruptions: Callable[[], int]) -> Run:
+    """Launch a prepared run in a process of its own, and return when its nodes are started.
 
-    Args:
-        records: All runs.
-        record: The run, as it was handed over.
-        process: The launcher.
-        interruptions: How often the user has asked to stop; the launcher is told then, and waited for.
+    If the user asks to stop, the launcher is asked, and waited for.
 
     Raises:
         ConfigError: If the record cannot be read.
-        ThrowcollectError: What the run ended with, if it did.
-        WorkerError: If the launcher ended without saying why.
+        ThrowcollectError: The error with which the run ended, if it did.
+        WorkerError: If the launcher cannot be started, or ended and left no reason.
         Interrupted: If the user stopped it.
     """
-    told = 0
-    while (run := records.get(record.run)).status == "running":
-        if interruptions() > told:
-            told = interruptions()
+    try:
+        process = opened.start_process("launch", Path(opened.record.logs), stdin=subprocess.DEVNULL)
+    except OSError as error:
+        raise WorkerError(f"the launcher cannot be started: {error}") from error
+    finally:
+        opened.close()
+    forwarded = 0
+    while (run := records.get(opened.run)).status == "running":
+        if interruptions() > forwarded:
+            forwarded = interruptions()
             process.terminate()
         nodes = run.record.nodes
-        if nodes and all(node.handle for node in nodes) and not told:
-            return
+        if nodes and all(node.handle for node in nodes) and not forwarded:
+            return run
         time.sleep(_POLL_S)
     if run.record.ended is not None:
-        if (error := run.record.error) is not None:
-            raise error
-    elif told:
+        if (failure := run.record.error) is not None:
+            raise failure
+        return run
+    if forwarded:
         raise Interrupted("interrupted before any node was started")
-    else:
-        evidence = NodeLogs(Path(record.logs)).tail(LAUNCHER)
-        raise WorkerError(f"run {record.run}: its launcher died", evidence=evidence or None)
+    evidence = NodeLogs(Path(run.record.logs)).tail(LAUNCHER)
+    raise WorkerError(f"run {run.id}: its launcher died", evidence=evidence or None)

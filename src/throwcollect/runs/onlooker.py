@@ -1,25 +1,25 @@
-"""Who is told what goes on in a run."""
+"""The interface by which a run tells a program or a terminal what goes on."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    # Whoever looks on is there before anything that takes long to import.
+    # A command makes its onlooker before it imports what takes long.
     from throwcollect.coordinator.progress import Progress
 
 
 class Onlooker:
-    """Is told what goes on in a run that this process prepares or launches; this one heeds nothing of it."""
+    """Is told what goes on in a run that this process prepares or launches; this class ignores everything."""
 
     def update(self, progress: Progress) -> None:
         """Take in a progress report of the coordinator."""
 
     def say(self, line: str) -> None:
-        """Take in what is good to know."""
+        """Take in a line of information."""
 
     def warn(self, line: str) -> None:
-        """Take in what went wrong."""
+        """Take in a warning."""
 
 
 SILENT = Onlooker()

@@ -1,6 +1,7 @@
-"""A directory for what one process alone needs, such as a key; it is removed however that process ends.
+"""A directory for temporary files of one process, such as a key, which must not stay after the process has ended.
 
-A process that is killed cannot remove it, so the next one does. Whoever lives holds a lock (flock) on its directory.
+A process that is killed cannot remove its directory, so the next process does. A process that lives holds a lock on its
+directory.
 """
 
 from __future__ import annotations
@@ -15,23 +16,20 @@ from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
 _YOUNG_S = 60.0
-"""A directory that is younger may not be locked yet."""
+"""A younger directory is left alone, because its process may not have locked it yet."""
 
 
 @contextmanager
 def make_own_directory(prefix: str) -> Iterator[Path]:
-    """Make a directory for temporary files that nobody else can read, and remove those of processes that were killed.
-
-    Args:
-        prefix: What the names of all such directories begin with.
+    """Make a directory that only this user can read, and remove directories of the same prefix that were abandoned.
 
     Yields:
-        The directory; it is gone after the block.
+        The directory; it is removed after the block.
     """
     path = Path(tempfile.mkdtemp(prefix=prefix))
     try:
         with ExitStack() as held:
-            with suppress(OSError):  # where there are no locks, none is removed by others
+            with suppress(OSError):  # on a file system without locks, other processes do not remove it either
                 held.enter_context(_hold(path))
             for other in path.parent.glob(f"{prefix}*"):
                 if other != path:
@@ -42,7 +40,7 @@ def make_own_directory(prefix: str) -> Iterator[Path]:
 
 
 def _remove_abandoned(directory: Path) -> None:
-    """Remove the directory of a process of this user that has ended; whatever else it is, it stays."""
+    """Remove a path if it is the directory of a process of this user that has ended."""
     with suppress(OSError):
         status = directory.lstat()
         if status.st_uid == os.getuid() and time.time() - status.st_mtime > _YOUNG_S:
@@ -55,7 +53,7 @@ def _hold(directory: Path) -> Iterator[None]:
     """Hold the lock of a directory.
 
     Raises:
-        OSError: If it is no directory, another process holds it, or its file system has no locks.
+        OSError: If the path is no directory, another process holds the lock, or the file system has no locks.
     """
     descriptor = os.open(directory, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
     try:

@@ -1,4 +1,4 @@
-"""From a configuration to a run that is ready to be launched: checked, planned, recorded, and with a place to live."""
+"""Prepares a run from a configuration: checks it, makes the plan and the record, and chooses the runtime."""
 
 from __future__ import annotations
 
@@ -26,33 +26,33 @@ from throwcollect.runtimes.ports import reserve_port
 from throwcollect.wording import command, format_count
 
 if TYPE_CHECKING:
-    # What takes long to import is imported when the runtime has begun what it can, at the same time.
+    # This import takes long; it happens only once the runtime has begun, so that both run at the same time.
     from throwcollect.sweep.plan import Plan
 
 _MANY_TRIALS = 1000
-"""From here on the plan takes long enough to be announced."""
+"""A plan of this many trials takes seconds, so the user is told before."""
 
 
 @dataclass(frozen=True)
 class Request:
-    """What the user asked for.
+    """The run that a user or a client asks for.
 
     Attributes:
         config: The configuration.
-        sweep_directory: Where its file lies.
+        sweep_directory: Directory of the configuration's file, in which lists of trials are looked for.
         directory: Directory of the dataset.
-        started: When.
-        resumed: Whether the directory holds a dataset, with which the run goes on.
-        processes: How many processes may check the trials of a large plan.
+        started: Time at which it was asked for.
+        plan: The plan, if the directory holds a dataset with which the run goes on; None for a new dataset.
+        processes: Number of processes that may check the trials of a large plan.
         ahead: Whether the runtime begins what it can before there is a plan, for `PreparedRun.collect`.
-        origin: What a client asked for; None if a command or a program did.
+        origin: The request of a client; None if a command or a program asks.
     """
 
     config: Config
     sweep_directory: Path
     directory: Path
     started: datetime
-    resumed: bool
+    plan: Plan | None = None
     processes: int = 1
     ahead: bool = False
     origin: Origin | None = None
@@ -71,17 +71,17 @@ def prepare(
 
     Args:
         config: The configuration's file.
-        overrides: What replaces keys of it: ``key=value`` pairs, as ``--set`` takes them.
-        output: Directory of the dataset, new or empty; None for one that is named after the configuration.
-        processes: How many processes may check the trials of a large plan; more than one import the program that calls
-            this, as those of `multiprocessing` do.
-        ahead: Whether processes that nodes need start while the plan is made, which is worth it if `collect` follows;
-            they end with the run, or when it is left.
+        overrides: Keys to change: ``key=value`` pairs, as ``--set`` takes them.
+        output: Directory of the dataset, new or empty; None names one after the configuration.
+        processes: Number of processes that may check the trials of a large plan; if there are several, each imports the
+            main program, as processes of `multiprocessing` do.
+        ahead: Whether processes that nodes need start while the plan is made, which saves time if `collect` follows;
+            they end with the run, or when the block of the prepared run is left.
         onlooker: Is told what goes on.
 
     Raises:
         ConfigError: If the configuration, the sweep or the output directory cannot be used.
-        WorkerError: If the runtime that is asked for cannot be had.
+        WorkerError: If the runtime that is asked for cannot be used.
         DatasetError: If the dataset cannot be written.
     """
     started = datetime.now(timezone.utc)
@@ -90,14 +90,12 @@ def prepare(
         records = Records()
         if (run := _take_over(records, directory, read, onlooker)) is not None:
             return run
-        request = Request(
-            read, Path(config).parent, directory, started, resumed=False, processes=processes, ahead=ahead
-        )
-        return prepare_run(records, request, None, onlooker)
+        request = Request(read, Path(config).parent, directory, started, processes=processes, ahead=ahead)
+        return prepare_run(records, request, onlooker)
 
 
 def _name_directory(name: str) -> Path:
-    """Where a dataset goes if nobody says so: ``datasets/NAME``, or with the time behind it where something is."""
+    """Directory of a dataset that the user did not name: ``datasets/NAME``; if that is taken, followed by the time."""
     directory = Path("datasets", name)
     taken = os.path.lexists(directory) and not (directory.is_dir() and not any(directory.iterdir()))
     return directory.with_name(f"{name}-{datetime.now():%Y%m%d-%H%M%S}") if taken else directory
@@ -113,23 +111,23 @@ def resume(
     onlooker: Onlooker = SILENT,
     run: OpenRun | None = None,
 ) -> PreparedRun | None:
-    """Prepare to go on with the dataset that an earlier collection has left.
+    """Prepare to go on with a dataset that an earlier collection did not finish.
 
     Args:
         directory: Directory of the dataset.
-        config: File with its configuration; None for the configuration that lies in the directory.
-        overrides: What replaces keys of it, as `prepare` takes it.
+        config: File with its configuration; None takes the configuration that lies in the directory.
+        overrides: Keys to change, as for `prepare`.
         check: Whether the files of a finished dataset are compared byte for byte, and not only by their sizes.
-        ahead: As `prepare` takes it.
+        ahead: As for `prepare`.
         onlooker: Is told what goes on.
-        run: The run, if it has a record already; None for a new one.
+        run: The run, if it has a record already; None makes a new one.
 
     Returns:
-        The run; None if every trial has ended, and nothing is left to do.
+        The run; None if every trial has ended, so that nothing is left to do.
 
     Raises:
         ConfigError: If there is no such dataset, or the configuration is another one.
-        WorkerError: If the runtime that is asked for cannot be had.
+        WorkerError: If the runtime that is asked for cannot be used.
         DatasetError: If the dataset cannot be written.
     """
     from throwcollect.coordinator.resume import begun, finished
@@ -157,17 +155,19 @@ def resume(
             onlooker.say(f"{directory}: every trial has ended, nothing is left to do")
             return None
         origin = None if run is None else run.record.origin
-        request = Request(read, sweep_directory, directory, started, resumed=True, ahead=ahead, origin=origin)
-        return prepare_run(records, request, plan, onlooker, run=run)
+        request = Request(read, sweep_directory, directory, started, plan, ahead=ahead, origin=origin)
+        return prepare_run(records, request, onlooker, run=run)
 
 
 def _take_over(
     records: Records, directory: Path, config: Config, onlooker: Onlooker, *, own: str | None = None
 ) -> PreparedRun | None:
-    """The run into a directory whose nodes go on without a launcher, with its own configuration; None if there is none.
+    """Take over the run whose containers collect into a directory without a launcher; None if there is no such run.
+
+    Its own configuration goes on to hold.
 
     Raises:
-        ConfigError: If it collects with another configuration, or somebody else takes it over.
+        ConfigError: If the run collects with another configuration, or another process takes it over.
     """
     if (left := find_left_in(records, directory, own=own)) is None:
         return None
@@ -182,31 +182,22 @@ def _take_over(
     run = records.take(left.id)
     if run is None:
         raise busy(left.record)
-    # Its containers are there until this launcher has removed them, whatever happens to it.
+    # If this launcher dies, too, the containers are still there.
     run.update(ended=None, exit_code=None, failure=None, left=True)
     fate = "died" if left.status == "died" else "given up"
     onlooker.say(f"run {run.run}: its launcher had {fate}; it goes on where its containers are")
     return PreparedRun(records, run, kept, directory, onlooker=onlooker)
 
 
-def prepare_run(
-    records: Records, request: Request, plan: Plan | None, onlooker: Onlooker, *, run: OpenRun | None = None
-) -> PreparedRun:
-    """A run that is ready to be launched; nothing is left behind if that fails.
-
-    Args:
-        records: All runs.
-        request: What the user asked for.
-        plan: The plan that lies in the directory; None if it is still to be made.
-        onlooker: Is told what goes on.
-        run: The run, if it has a record already, which is kept even so; None for a new one.
+def prepare_run(records: Records, request: Request, onlooker: Onlooker, *, run: OpenRun | None = None) -> PreparedRun:
+    """Prepare a run, a new one if None is given; if that fails, all files that were made here are removed.
 
     Raises:
         ConfigError: If the dataset is in a volume, from which a collection cannot go on.
-        WorkerError: If the runtime that is asked for cannot be had.
+        WorkerError: If the runtime that is asked for cannot be used.
         DatasetError: If another process changes the dataset, or it cannot be written.
     """
-    config = request.config
+    config, plan = request.config, request.plan
     with ExitStack() as held, ExitStack() as undo:
         if (begun := begin(config) if request.ahead else None) is not None:
             undo.callback(begun.runtime.close)
@@ -214,8 +205,8 @@ def prepare_run(
             run = records.new(config.name)
             undo.callback(run.forget)
         reserve_port(config.run).close()
-        # Getting an image may take minutes, so all that may be wrong is found before; but where there is a volume, it
-        # is the runtime that decides where the dataset is.
+        # A runtime may take minutes to get an image, so it is chosen after all other checks. Only where a volume is
+        # named it comes first, as it decides whether the dataset goes there.
         volume = config.containers.volume
         choice = choose(config, say=onlooker.say, warn=onlooker.warn, begun=begun) if volume else None
         if choice is not None and not choice.runtime.has_volumes:
@@ -226,14 +217,14 @@ def prepare_run(
                 expected="a dataset in a directory",
             )
         directory = run.directory / "data" if volume else request.directory
-        made = not directory.exists()
+        is_new = not directory.exists()
         plan = plan or _make_plan(request, directory, onlooker)
         held.enter_context(hold_lock(directory, alone=False))
-        if not request.resumed:
-            undo.callback(_remove_plan, directory, made=made)
+        if request.plan is None:
+            undo.callback(_remove_plan, directory, is_new=is_new)
         choice = choice or choose(config, say=onlooker.say, warn=onlooker.warn, begun=begun)
         record = _record(run, request, choice, directory, volume)
-        # A dry run: the host looks for image, mounts, networks and ports when it is made.
+        # A host looks for image, mounts, networks and ports when it is made, so errors show before the run is launched.
         choice.runtime.host(record.place(run.key), config, warn=onlooker.warn).close()
         run.write(record)
         _warn_of_company(config, choice.middleware, onlooker)
@@ -288,7 +279,7 @@ def _record(run: OpenRun, request: Request, choice: Choice, directory: Path, vol
 
 
 def _warn_of_company(config: Config, middleware: Middleware, onlooker: Onlooker) -> None:
-    """Say in one line that others may join a run, if they may."""
+    """Warn the user if others may join the run."""
     if config.run.open:
         onlooker.warn("run.open: anybody who reaches the router may join, read and disturb this run")
     elif middleware.is_fast_dds:
@@ -297,9 +288,10 @@ def _warn_of_company(config: Config, middleware: Middleware, onlooker: Onlooker)
         onlooker.warn(f"{middleware.rmw}: anybody on its network may join and disturb this run; episodes are signed")
 
 
-def _remove_plan(directory: Path, *, made: bool) -> None:
+def _remove_plan(directory: Path, *, is_new: bool) -> None:
+    """Remove the files of a plan and, if the directory was made for them, the directory."""
     with suppress(OSError):
         for name in (CONFIG, PLAN, TRIALS):
             (directory / name).unlink(missing_ok=True)
-        if made:
+        if is_new:
             directory.rmdir()

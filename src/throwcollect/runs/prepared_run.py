@@ -1,4 +1,4 @@
-"""A run that is ready to be launched: in this process, or in one of its own."""
+"""A run that is ready to be launched, in this process or in one of its own."""
 
 from __future__ import annotations
 
@@ -20,22 +20,16 @@ from throwcollect.runtimes.runtime import Place, Runtime
 
 
 class PreparedRun:
-    """A run that is ready to be launched; use it as a context manager, so that nothing is left if it is not.
+    """A run that is ready to be launched; use it as a context manager, which removes its files if it is not launched.
 
-    Until it is launched, nobody else prepares a run into its directory.
+    Until it is launched, nobody else can prepare a run into its directory.
 
     Attributes:
-        records: All runs.
-        config: Its configuration.
-        directory: Directory of the dataset, as it was named; None if the dataset is in a volume.
+        config: The configuration.
+        directory: Directory of the dataset, as the user named it; None if the dataset is in a volume.
 
     Args:
-        records: All runs.
-        run: The run, with a record.
-        config: Its configuration.
-        directory: Directory of the dataset, as it was named.
-        onlooker: Is told what goes on.
-        runtime: Its runtime, with what that has begun; None if it has begun nothing.
+        runtime: The runtime, if it has begun something for the run; else None.
         held: Keeps others from the directory until the launcher, which may be another process, does so itself.
         undo: Removes what was made for the run, if it is not launched.
     """
@@ -52,9 +46,9 @@ class PreparedRun:
         held: ExitStack | None = None,
         undo: ExitStack | None = None,
     ) -> None:
-        self.records = records
         self.config = config
         self.directory = None if run.record.volume else directory
+        self._records = records
         self._run = run
         self._onlooker = onlooker
         self._runtime = runtime
@@ -73,20 +67,20 @@ class PreparedRun:
 
     @property
     def record(self) -> Record:
-        """What is known of it."""
+        """The record of the run."""
         return self._run.record
 
     @property
     def place(self) -> Place:
-        """Where it lies."""
-        return self._run.record.place(self._run.key)
+        """The place of the run."""
+        return self._run.place
 
     @property
     def token(self) -> str:
-        """The word by which other machines join it; a secret, as whoever has it may do so.
+        """The token with which simulations of other machines join the run; keep it secret.
 
         Raises:
-            ConfigError: If it listens to this machine alone, or its key cannot be read.
+            ConfigError: If the router listens to this machine alone, or the key of the run cannot be read.
         """
         from throwcollect.build import build_digest
 
@@ -99,25 +93,22 @@ class PreparedRun:
         return JoinToken(run, endpoint, secret, domain_id, engine, build_digest(engine)).encode()
 
     def collect(self, *, interruptions: Callable[[], int] = lambda: 0) -> Summary:
-        """Launch it in this process, and come back when it has ended; see `launcher.launch`.
+        """Launch the run in this process, and return when it has ended; see `launcher.launch`.
 
         Args:
             interruptions: How often the user has asked to stop.
 
         Returns:
-            What the dataset holds; its outcomes say whether trials are lost.
+            The summary of the dataset; its outcomes tell whether trials are lost.
 
         Raises:
             ThrowcollectError: As `launcher.launch`.
         """
-        # Nobody but `background` begins runs that collect nothing.
+        # Only `background` begins runs that collect no dataset.
         return cast(Summary, self.launch(interruptions=interruptions))
 
-    def launch(self, *, interruptions: Callable[[], int] = lambda: 0) -> Summary | None:
-        """Launch it in this process, whatever it is for; see `collect`.
-
-        Returns:
-            What the dataset holds; None if the run collects nothing.
+    def launch(self, *, interruptions: Callable[[], int]) -> Summary | None:
+        """Do the same as `collect`, for a run of any kind: a run without a dataset has no summary.
 
         Raises:
             ThrowcollectError: As `launcher.launch`.
@@ -130,22 +121,19 @@ class PreparedRun:
         )
 
     def start(self, *, interruptions: Callable[[], int] = lambda: 0) -> Run:
-        """Launch it in a process of its own, which outlives this one, and come back when its nodes are started.
+        """Launch the run in a process of its own, which outlives this one, and return when its nodes are started.
 
         Args:
-            interruptions: How often the user has asked to stop; the launcher is told then, and waited for.
+            interruptions: How often the user has asked to stop; if so, the launcher is asked, and waited for.
 
         Raises:
-            WorkerError: If it cannot be started.
-            ThrowcollectError: What it ended with, if it did so already.
+            WorkerError: If the launcher cannot be started.
+            ThrowcollectError: The error with which the run has ended, if it did so already.
         """
-        from throwcollect.runs.launcher import start_launcher, wait_for_nodes
+        from throwcollect.runs.launcher import start_launcher
 
         self._undo.pop_all()
         if self._runtime is not None:
-            # What it has begun is of no use to another process.
+            # The launcher, as another process, cannot use what the runtime has begun in this one.
             self._runtime.close()
-        record = self._run.record
-        process = start_launcher(self._run)
-        wait_for_nodes(self.records, record, process, interruptions=interruptions)
-        return self.records.get(record.run)
+        return start_launcher(self._records, self._run, interruptions=interruptions)

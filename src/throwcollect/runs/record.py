@@ -1,4 +1,4 @@
-"""What is known of one run."""
+"""The record of one run: its facts, as they are written to a file."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ from throwcollect.runtimes.runtime import NodeState, Place
 VERSION: Literal[1] = 1
 """Version of the layout of records."""
 Kind = Literal["collection", "session", "container"]
-"""Whether a run collects a dataset, has simulations for clients alone, or is a container of the catalogue."""
+"""A run collects a dataset, or offers simulations to clients, or is a container of the catalogue."""
 _EMBEDDED = Middleware()
 _KINDS = (ConfigError, WorkerError, DatasetError, LossError, Interrupted)
 
 
 @dataclass(frozen=True)
 class Summary(Info):
-    """What the dataset of a run holds.
+    """Summary of a run's dataset.
 
     Attributes:
         open: Whether anybody could join the run.
@@ -37,14 +37,7 @@ class Summary(Info):
 
 @dataclass(frozen=True)
 class Failure:
-    """The facts of the error that a run ended with; see `errors.ThrowcollectError`.
-
-    Attributes:
-        message: Where and what.
-        expected: What would have been right.
-        evidence: What was seen.
-        hint: What gets further.
-    """
+    """The error that a run ended with, in a form that a record can hold; `errors.ThrowcollectError` has the fields."""
 
     message: str
     expected: str | None = None
@@ -53,16 +46,12 @@ class Failure:
 
     @classmethod
     def of(cls, error: ThrowcollectError) -> Failure:
-        """The facts of an error."""
+        """The failure that describes an error."""
         return cls(error.message, error.expected, error.evidence, error.hint)
 
     def error(self, exit_code: int | None) -> ThrowcollectError:
-        """The error, as it was raised.
-
-        Args:
-            exit_code: That of its kind.
-        """
-        kind = next((each for each in _KINDS if each.exit_code == exit_code), ThrowcollectError)
+        """The error, as it was raised; the exit code of the run tells its class."""
+        kind = next((kind for kind in _KINDS if kind.exit_code == exit_code), ThrowcollectError)
         error = kind(self.message)
         error.expected, error.evidence, error.hint = self.expected, self.evidence, self.hint
         return error
@@ -70,12 +59,12 @@ class Failure:
 
 @dataclass(frozen=True)
 class Origin:
-    """What a client asked for, of which a run came.
+    """The request of a client of `serve` from which a run was made.
 
     Attributes:
         component: Name of the component that the run is an instance of.
-        simulations: Number of simulations; None for that of the component's configuration.
-        changes: Values of dotted keys that replace those of the component's configuration.
+        simulations: Number of simulations; None takes that of the component's configuration.
+        changes: Dotted keys of the component's configuration that the client has changed, with their values.
         joins: Id of the run that a container joins; None if it joins none.
     """
 
@@ -87,32 +76,32 @@ class Origin:
 
 @dataclass(frozen=True)
 class Record:
-    """What is known of one run.
+    """The record of a run; its launcher changes it, everybody else reads it.
 
     Attributes:
-        run: Its id.
+        run: Id of the run.
         name: Name of the collection.
-        runtime: Where its nodes live; empty until that is chosen.
-        directory: Absolute path of the dataset; if that is in a volume, of the files that it was made from.
+        runtime: Name of the runtime; empty until one is chosen.
+        directory: Absolute path of the dataset; if the dataset is in a volume, of the files from which it was made.
         volume: Name of the volume that holds the dataset; None if a directory does.
-        logs: Absolute path of the directory of its logs.
+        logs: Absolute path of the directory with the logs.
         domain_id: ROS domain.
-        started: When it was started.
-        launcher: Process id of its launcher.
-        simulations: Number of simulations that are wanted.
-        endpoint: Zenoh endpoint of the router, as this machine reaches it; None while there is none.
-        nodes: Its nodes; none once it has ended.
-        progress: How far it has come; None before the first report of the coordinator.
-        ended: When it ended; None before.
-        exit_code: Exit code of its launcher; None before it ended.
-        left: Whether containers of it may be left, as its launcher could not remove them or did not come to it.
-        failure: The error that it ended with; None if there was none.
-        summary: What its dataset holds; None if it is not finished.
-        begun_in: Absolute path of the directory in which it was begun; empty if an older version did not note it.
-        middleware: What carries the messages of its nodes.
-        kind: Whether it collects a dataset, has simulations for clients alone, or is a container of the catalogue.
-        origin: What a client asked for; None if a command or a program began the run.
-        stopping: Whether it ends because somebody has asked for that; running trials are finished.
+        started: Time of the start.
+        launcher: Process id of the launcher.
+        simulations: Number of simulations that the run is to have.
+        endpoint: Zenoh endpoint at which this machine reaches the router; None while there is no router.
+        nodes: The nodes; empty once the run has ended.
+        progress: Last report of the coordinator; None before the first one.
+        ended: Time of the end; None before.
+        exit_code: Exit code of the launcher; None before the end.
+        left: Whether containers of the run may still exist, because its launcher did not remove them.
+        failure: The error with which the run ended; None if there was none.
+        summary: Summary of the dataset; None if the dataset is not finished.
+        begun_in: Absolute path of the directory in which the run was begun; empty if an older version did not note it.
+        middleware: The middleware that carries the messages of the nodes.
+        kind: Purpose of the run.
+        origin: The request of a client; None if a command or a program began the run.
+        stopping: Whether somebody has asked the run to stop; it still finishes the trials that run.
         version: Version of this layout.
     """
 
@@ -142,11 +131,7 @@ class Record:
     version: Literal[1] = VERSION
 
     def place(self, key: RunKey) -> Place:
-        """Where the run lies.
-
-        Args:
-            key: Its key.
-        """
+        """The place of the run, which has this key."""
         return Place(
             run=self.run,
             directory=Path(self.directory),

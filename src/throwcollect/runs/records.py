@@ -1,13 +1,13 @@
-"""What this machine remembers of its runs: one JSON file each, and a lock that its launcher holds as long as it lives.
+"""The records of this machine's runs, each with a lock that the launcher of the run holds as long as it lives.
 
-The files lie in a directory of the user, not in datasets, so that a dataset does not depend on who looked at it::
+The files lie in a directory of the user and not in datasets, so that a dataset does not depend on who looked at it::
 
-    runs/<run>.json     the record, written whole at each change
-    runs/<run>.lock     locked by the launcher: neither a pid that is used again nor a crash can feign a living one
-    runs/<run>/key/     the key of the run: whoever can read it may join
-    runs/<run>/         besides, files of a run whose dataset has no directory on this machine
+    runs/<run>.json     the record; each change writes the whole file
+    runs/<run>.lock     locked by the launcher, see `state_directory.is_locked`
+    runs/<run>/key/     the key of the run, with which everybody can join who can read it
+    runs/<run>/         further files of a run whose dataset has no directory on this machine
 
-All of it is for its owner alone.
+Only the owner can read these files.
 """
 
 from __future__ import annotations
@@ -17,8 +17,10 @@ import json
 import os
 import secrets
 import shutil
+import subprocess
+import sys
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass, field, replace
 from datetime import datetime, timezone
@@ -29,32 +31,33 @@ from pydantic import TypeAdapter, ValidationError
 from pydantic_core import to_json
 
 from throwcollect.errors import ConfigError, ConflictError, NotFoundError
-from throwcollect.files import beside, write_all
+from throwcollect.files import beside, open_log, write_all
 from throwcollect.ros.connection import Connection
 from throwcollect.run_key import RunKey
-from throwcollect.runs.lock_file import is_locked
 from throwcollect.runs.record import VERSION, Record
-from throwcollect.runs.state_directory import state_directory, unusable
+from throwcollect.runs.state_directory import is_locked, state_directory, unusable
+from throwcollect.runtimes.node_logs import NodeLogs
+from throwcollect.runtimes.nodes import LAUNCHER
 from throwcollect.runtimes.registry import get_runtime
 from throwcollect.runtimes.runtime import Place
 from throwcollect.units import NS_PER_S
 from throwcollect.wording import command
 
 _REMEMBERED_S = 7 * 24 * 3600.0
-"""Ended runs are remembered for this long."""
+"""Records of runs that have ended are kept for this long."""
 _LOCK_PATIENCE_S = 1.0
-"""Whoever asks whether a launcher lives holds its lock for a moment."""
+"""`Records.take` tries for this long, because another process may hold the lock for a moment in `is_locked`."""
 
 
 @dataclass(frozen=True)
 class Run:
-    """A run, as others than its launcher see it.
+    """A run, as processes other than its launcher see it.
 
     Attributes:
-        record: What is known of it.
-        lives: Whether its launcher lives.
-        key: What its router lets nobody in without.
-        records: Where it is remembered, for whoever wants to look again.
+        record: The record of the run, as it was when it was read.
+        lives: Whether the launcher lived at that time.
+        key: The key that the router asks for.
+        records: The records from which this run was read, so that `now` can read it again.
     """
 
     record: Record
@@ -64,25 +67,25 @@ class Run:
 
     @property
     def id(self) -> str:
-        """Its id."""
+        """Id of the run."""
         return self.record.run
 
     def now(self) -> Run:
-        """The run, as it is by now.
+        """Read the record of the run again.
 
         Raises:
-            ConfigError: If its record has vanished, or cannot be read.
+            ConfigError: If the record has vanished, or cannot be read.
         """
         return self.records.get(self.id)
 
     @property
     def place(self) -> Place:
-        """Where it lies."""
+        """The place of the run."""
         return self.record.place(self.key)
 
     @property
     def connection(self) -> Connection | None:
-        """The way into its ROS graph; None while it has no router."""
+        """The way into the ROS graph of the run; None while it has no router."""
         record = self.record
         if record.endpoint is None:
             return None
@@ -90,7 +93,7 @@ class Run:
 
     @property
     def status(self) -> Literal["running", "ended", "abandoned", "died"]:
-        """Whether it runs, has ended, ended with containers left behind, or lost its launcher before it could."""
+        """State of the run; ``abandoned``: it ended but left containers; ``died``: its launcher died before the end."""
         if self.record.ended is not None:
             return "abandoned" if self.record.left else "ended"
         return "running" if self.lives else "died"
@@ -100,45 +103,41 @@ _ADAPTER = TypeAdapter(Record)
 
 
 class OpenRun:
-    """A run that this process launches: its lock is held until `close`, or until the process dies.
+    """A run that this process launches; the process holds the lock of the run until `close` or until it dies.
 
     Attributes:
         run: Id of the run.
-        directory: Directory of the key, and for files of a run whose dataset has no directory on this machine.
-        key: What its router lets nobody in without.
-
-    Args:
-        runs: Directory of the records.
-        run: Id of the run.
-        lock: Descriptor of the locked file.
+        directory: Directory of the key, and of the files of a run whose dataset has no directory on this machine.
+        key: The key that the router asks for.
+        lock: Descriptor of the locked file, which a process that takes the run over inherits; -1 once it is closed.
     """
 
     def __init__(self, runs: Path, run: str, lock: int) -> None:
         self.run = run
         self.directory = runs / run
         self.key = _key(runs, run)
+        self.lock = lock
         self._runs = runs
-        self._lock = lock
         self._record: Record | None = None
 
     @property
-    def lock(self) -> int:
-        """Descriptor of the locked file, for a process that takes the run over."""
-        return self._lock
+    def place(self) -> Place:
+        """The place of the run."""
+        return self.record.place(self.key)
 
     @property
     def record(self) -> Record:
-        """The record.
+        """The record of the run.
 
         Raises:
-            ConfigError: If there is none yet, or it is damaged.
+            ConfigError: If there is no record yet, or it is damaged.
         """
         if self._record is None:
             self._record = _read(self._runs / f"{self.run}.json")
         return self._record
 
     def make(self) -> None:
-        """Make the directory, and the key in it.
+        """Make the directory of the run, and the key in it.
 
         Raises:
             ConfigError: If they cannot be written.
@@ -164,7 +163,7 @@ class OpenRun:
             raise unusable(path, error) from error
 
     def update(self, **changes: Any) -> None:
-        """Change fields of the record, if they are not so already.
+        """Change fields of the record, and write it if that makes a difference.
 
         Raises:
             ConfigError: If it cannot be written.
@@ -173,14 +172,29 @@ class OpenRun:
         if changed != self.record:
             self.write(changed)
 
+    def start_process(self, command: str, logs: Path, *, stdin: int) -> subprocess.Popen[bytes]:
+        """Start a command of throwcollect that takes this run over, and prints into the launcher's log.
+
+        The process has a session of its own, so that it outlives the terminal. It holds the lock from its first moment,
+        so that the run never looks dead.
+
+        Raises:
+            OSError: If the process cannot be started.
+        """
+        words = [sys.executable, "-m", "throwcollect", command, self.run, "--lock", str(self.lock)]
+        with open(open_log(NodeLogs(logs).path(LAUNCHER)), "ab") as log:
+            return subprocess.Popen(
+                words, stdin=stdin, stdout=log, stderr=subprocess.STDOUT, start_new_session=True, pass_fds=[self.lock]
+            )
+
     def close(self) -> None:
-        """Let go of the run; the record stays."""
-        if self._lock >= 0:
-            os.close(self._lock)
-            self._lock = -1
+        """Release the lock of the run; the record stays."""
+        if self.lock >= 0:
+            os.close(self.lock)
+            self.lock = -1
 
     def forget(self) -> None:
-        """Remove the record and the files of the run, but no dataset in a directory, and let go of it."""
+        """Remove the record and the files of the run, but no dataset in a directory, and release the lock."""
         for path in (self._runs / f"{self.run}.json", self._runs / f"{self.run}.lock"):
             with suppress(OSError):
                 path.unlink()
@@ -189,62 +203,60 @@ class OpenRun:
 
 
 class Records:
-    """All runs that the user has on this machine.
+    """All runs of this user on this machine.
 
     Raises:
-        ConfigError: If the directory cannot be used.
+        ConfigError: If the directory of the records cannot be used.
     """
 
     def __init__(self) -> None:
-        state = state_directory()
-        self._runs = state / "runs"
+        self._runs = state_directory() / "runs"
         try:
             self._runs.mkdir(mode=0o700, exist_ok=True)
-            # Whoever may read in the directory above, which the user has named, shall see nothing of what is in here.
+            # Others may read the directory above if the user has named it; they must not read the records.
             self._runs.chmod(0o700)
         except OSError as error:
             raise unusable(self._runs, error) from error
 
     def new(self, name: str, *, run: str | None = None) -> OpenRun:
-        """A new run, with a key but without a record yet; forgets what ended a week ago.
+        """Make a new run, with a key but without a record yet; forget runs that ended a week ago.
 
         Args:
-            name: Name of the collection; part of the id.
-            run: Its id; None for one that nobody has.
+            name: Name of the collection, with which an id begins that is made here.
+            run: Id of the run; None makes a new one.
 
         Raises:
             ConflictError: If there is a run of that id.
-            ConfigError: If it cannot be written.
+            ConfigError: If the files of the run cannot be written.
         """
         self._forget_old()
-        wanted = run
         while True:
-            run = wanted or f"{name}-{secrets.token_hex(2)}"
+            chosen = run or f"{name}-{secrets.token_hex(2)}"
             try:
-                lock = os.open(self._runs / f"{run}.lock", os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o600)
+                lock = os.open(self._runs / f"{chosen}.lock", os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o600)
             except FileExistsError as error:
-                if wanted:
+                if run:
                     raise ConflictError(f"there is a run {run} already") from error
                 continue
             except OSError as error:
-                raise unusable(self._runs / f"{run}.lock", error) from error
+                raise unusable(self._runs / f"{chosen}.lock", error) from error
             fcntl.flock(lock, fcntl.LOCK_EX)
-            made = OpenRun(self._runs, run, lock)
+            opened = OpenRun(self._runs, chosen, lock)
             with ExitStack() as undo:
-                undo.callback(made.forget)
-                made.make()
+                undo.callback(opened.forget)
+                opened.make()
                 undo.pop_all()
-            return made
+            return opened
 
     def inherit(self, run: str, lock: int) -> OpenRun:
-        """The run that the starter of this process has handed over, with its locked descriptor."""
+        """Open the run that the parent process has handed over, with the descriptor of its locked file."""
         return OpenRun(self._runs, run, lock)
 
     def take(self, run: str) -> OpenRun | None:
-        """The run, whose launcher is dead, to be launched or forgotten by this process; None if that lives.
+        """Open a run whose launcher is dead, so that this process can launch or forget it; None if the launcher lives.
 
         Raises:
-            ConfigError: If its lock cannot be opened.
+            ConfigError: If the lock of the run cannot be opened.
         """
         try:
             lock = os.open(self._runs / f"{run}.lock", os.O_RDWR | os.O_CREAT, 0o600)
@@ -263,42 +275,42 @@ class Records:
                 return OpenRun(self._runs, run, lock)
 
     def ids(self) -> list[str]:
-        """Ids of all runs that have a record, damaged or not; sorted."""
+        """Sorted ids of all runs that have a record, even a damaged one."""
         return sorted(path.stem for path in self._runs.glob("*.json"))
 
     def get(self, run: str) -> Run:
-        """A run.
+        """Read a run.
 
         Raises:
             NotFoundError: If it has no record.
-            ConfigError: If that is damaged or of another version.
+            ConfigError: If the record is damaged or of another version.
         """
-        # The lock first: a launcher that ends in between has written its end before it lets go.
+        # The lock is looked at first, because a launcher writes the end of the run before it releases the lock.
         lives = self.lives(run)
         return Run(_read(self._runs / f"{run}.json"), lives, _key(self._runs, run), self)
 
     def all(self) -> list[Run]:
         """All runs whose records can be read, the latest last."""
-        return sorted(self._read_all(self.ids()), key=lambda each: each.record.started)
+        return self._read_all(self.ids())
 
     def into(self, directory: Path) -> list[Run]:
-        """Runs that collect, or have collected, into a directory and no volume; the latest last.
-
-        There may be thousands of records, so those that do not name the directory are not taken apart.
-        """
+        """Runs that collect, or have collected, into a directory and no volume; the latest last."""
         name = str(directory.absolute())
+        # There may be thousands of records, so only those are parsed that hold the directory's name.
         written = to_json(name)
         runs = self._read_all(run for run in self.ids() if written in _read_bytes(self._runs / f"{run}.json"))
-        chosen = (run for run in runs if run.record.volume is None and run.record.directory == name)
-        return sorted(chosen, key=lambda each: each.record.started)
+        return [run for run in runs if run.record.volume is None and run.record.directory == name]
 
-    def _read_all(self, runs: Iterable[str]) -> Iterator[Run]:
-        for run in runs:
+    def _read_all(self, ids: Iterable[str]) -> list[Run]:
+        """Those of the runs whose records can be read, the latest last."""
+        runs = []
+        for run in ids:
             with suppress(ConfigError):
-                yield self.get(run)
+                runs.append(self.get(run))
+        return sorted(runs, key=lambda run: run.record.started)
 
     def read_change_ns(self, run: str) -> int | None:
-        """When the record of a run was written last, in nanoseconds of the file system's clock; None if it is gone."""
+        """Time of the last change of a run's record, in nanoseconds of the file system's clock; None if it is gone."""
         try:
             return (self._runs / f"{run}.json").stat().st_mtime_ns
         except OSError:
@@ -315,20 +327,19 @@ class Records:
 
     def _forget_old(self) -> None:
         now = datetime.now(timezone.utc)
-        # A record that was written since is not old, whatever it says, and need not be read.
-        old = [name for name in self.ids() if self._age_s(name) >= _REMEMBERED_S]
-        for each in self._read_all(old):
-            record = each.record
-            # Where nodes outlive their launcher, this record tells what they are as long as they do.
-            over = each.status == "ended" or (each.status == "died" and not _outlived(record))
+        # The age of the file tells without reading which records may be old.
+        for run in self._read_all(name for name in self.ids() if self._age_s(name) >= _REMEMBERED_S):
+            record = run.record
+            # As long as nodes outlive their launcher, only this record tells what they are.
+            over = run.status == "ended" or (run.status == "died" and not _may_outlive(record))
             if over and (now - (record.ended or record.started)).total_seconds() >= _REMEMBERED_S:
-                run = self.take(record.run)
-                if run is not None:
-                    run.forget()
+                opened = self.take(record.run)
+                if opened is not None:
+                    opened.forget()
 
 
-def _outlived(record: Record) -> bool:
-    """Whether nodes of a run may be there whose launcher is not; so it is, if nobody knows its runtime here."""
+def _may_outlive(record: Record) -> bool:
+    """Whether nodes of a run may outlive its launcher; assumed of a runtime that is not installed here."""
     try:
         return bool(record.runtime) and get_runtime(record.runtime).outlives_launcher
     except ConfigError:
@@ -355,7 +366,7 @@ def _read(path: Path) -> Record:
         if version not in (None, VERSION):
             raise ConfigError(f"{path}: the record of the run is of another version of throwcollect", hint=hint)
         if isinstance(content, dict) and (message := content.get("message")):
-            # Earlier records have all facts of the error in one text.
+            # Older versions wrote the error as one text.
             content["failure"] = {"message": message}
         return _ADAPTER.validate_python(content)
     except FileNotFoundError as error:

@@ -1,4 +1,4 @@
-"""Which run is meant, and what is left of runs that have no launcher any more."""
+"""Finds the run that a user names, and runs whose nodes are still there after their launcher has died."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ _MOST_LISTED = 5
 
 
 def to_change(records: Records, named: str | None, *, command: str, died: bool = False) -> Run:
-    """The run that a command is to change.
+    """Find the run that a command is to change.
 
     Args:
         records: All runs.
-        named: Id, unique beginning of one, or directory of the dataset; None for the only one that lives and belongs to
-            the current directory: it was begun there, or its dataset lies below.
-        command: The command without its option ``--run``, which a message adds.
-        died: Whether a run whose launcher died may be meant, too.
+        named: Id of the run, a unique beginning of its id, or directory of its dataset. None takes the only run that
+            lives and belongs to the current directory, because it was begun there or its dataset lies below.
+        command: The command without its option ``--run``, for a hint.
+        died: Whether None may also take a run whose launcher died.
 
     Raises:
         ConfigError: If there is no such run, or more than one, or the only one belongs to another directory.
@@ -33,22 +33,19 @@ def to_change(records: Records, named: str | None, *, command: str, died: bool =
     if named is not None:
         return records.get(id_of(records, named))
     runs = records.all()
-    there = [run for run in runs if run.status == "running" or (died and run.status == "died")]
-    here = [run for run in there if _belongs_here(run.record)]
-    if not here and len(there) == 1:
-        record = there[0].record
+    candidates = [run for run in runs if run.status == "running" or (died and run.status == "died")]
+    here = [run for run in candidates if _belongs_here(run.record)]
+    if not here and len(candidates) == 1:
+        (other,) = candidates
         raise ConfigError(
-            f"no run of this directory lives; {record.run} {_origin(there[0])}",
-            hint=f"throwcollect {command} --run {record.run}, if that one is meant",
+            f"no run of this directory lives; {other.id} {_origin(other)}",
+            hint=f"throwcollect {command} --run {other.id}, if that one is meant",
         )
-    return _only(here or there, runs)
+    return _only(here or candidates, runs)
 
 
 def find(named: str | os.PathLike[str]) -> Run:
-    """A run of this machine.
-
-    Args:
-        named: Its id, a unique beginning of that, or the directory of its dataset.
+    """Find a run of this machine by its id, a unique beginning of its id, or the directory of its dataset.
 
     Raises:
         ConfigError: If there is no such run, or more than one.
@@ -58,13 +55,13 @@ def find(named: str | os.PathLike[str]) -> Run:
 
 
 def to_watch(records: Records, named: str | None, *, say: Callable[[str], object]) -> Run:
-    """The run that a command is to look at.
+    """Find the run that a command is to look at.
 
     Args:
         records: All runs.
-        named: As `to_change` takes it; None for the only one that lives, or else the latest that has ended, of the
-            current directory or, if that has none, of any.
-        say: Is told which one is meant if it belongs to another directory.
+        named: As for `to_change`. None takes the only run that lives, or else the latest run, of the current directory;
+            if no run belongs to that, of any directory.
+        say: Is told which run was found if it belongs to another directory.
 
     Raises:
         ConfigError: If there is no such run, or more than one.
@@ -105,7 +102,7 @@ def _origin(run: Run) -> str:
 
 
 def id_of(records: Records, named: str) -> str:
-    """Id of the run that a user names by its id, a unique beginning of that, or the directory of the dataset.
+    """Find the id of the run that a user names by its id, a unique beginning of that, or the directory of the dataset.
 
     Raises:
         ConfigError: If there is no such run, or more than one.
@@ -114,37 +111,34 @@ def id_of(records: Records, named: str) -> str:
     if named in ids:
         return named
     if into := records.into(Path(named)):
-        return into[-1].record.run
-    alike = [run for run in ids if run.startswith(named)]
-    if len(alike) == 1:
-        return alike[0]
-    if alike:
-        raise ConfigError(f"{len(alike)} runs begin with {named!r}", expected=f"one of {_list(alike)}")
+        return into[-1].id
+    matches = [run for run in ids if run.startswith(named)]
+    if len(matches) == 1:
+        return matches[0]
+    if matches:
+        raise ConfigError(f"{len(matches)} runs begin with {named!r}", expected=f"one of {_list(matches)}")
     known = _list(_latest_first(records.all()))
     hint = "throwcollect ps -a lists all" if known else None
     raise NotFoundError(f"no run {named!r}", expected=f"one of {known}" if known else None, hint=hint)
 
 
 def _latest_first(runs: Sequence[Run]) -> list[str]:
-    return [run.record.run for run in reversed(runs)]
+    return [run.id for run in reversed(runs)]
 
 
-def _list(runs: Sequence[str]) -> str:
-    more = len(runs) - _MOST_LISTED
-    return ", ".join(runs[:_MOST_LISTED]) + (f" and {more} more" if more > 0 else "")
+def _list(ids: Sequence[str]) -> str:
+    more = len(ids) - _MOST_LISTED
+    return ", ".join(ids[:_MOST_LISTED]) + (f" and {more} more" if more > 0 else "")
 
 
 def find_left_in(records: Records, directory: Path, *, own: str | None = None) -> Run | None:
-    """The run that has no launcher any more while its nodes are left, and collect or have collected into a directory.
+    """Find a run that collects, or has collected, into a directory, and whose nodes are still there without a launcher.
 
-    Args:
-        records: All runs.
-        directory: Directory of a dataset.
-        own: Id of a run that is not meant, as this process prepares it.
+    The run that this process prepares, whose id is `own`, is not looked at.
 
     Raises:
-        ConfigError: If a run whose launcher lives collects into it.
-        WorkerError: If such a run may be left, which cannot be found out in time.
+        ConfigError: If a run whose launcher lives collects into the directory.
+        WorkerError: If the runtime does not tell in time whether nodes are left.
     """
     for run in reversed(records.into(directory)):
         if run.id == own:
@@ -165,7 +159,7 @@ def find_left_in(records: Records, directory: Path, *, own: str | None = None) -
 
 
 def busy(record: Record) -> ConflictError:
-    """The error that says that a run collects into a directory."""
+    """The error that a run collects into a directory."""
     return ConflictError(
         f"{record.directory}: run {record.run} collects into it",
         hint=f"{command('wait', '--run', record.run)} follows it",
@@ -173,7 +167,7 @@ def busy(record: Record) -> ConflictError:
 
 
 def describe_death(run: Run) -> WorkerError:
-    """The error that says that the launcher of a run died before the run ended."""
+    """The error that the launcher of a run died before the run ended."""
     hint = f"{command('down', '--run', run.id)} cleans up"
     if again := run.place.way_on:
         hint = f"{again} goes on where it ended, or with its containers if they live; {hint}"
@@ -185,11 +179,11 @@ def describe_death(run: Run) -> WorkerError:
 
 
 def require_living(run: Run) -> Record:
-    """The record of a run that lives.
+    """The record of a run, which has to live.
 
     Raises:
-        ConflictError: If it has ended.
-        WorkerError: If its launcher died.
+        ConflictError: If the run has ended.
+        WorkerError: If the launcher of the run died.
     """
     if run.status == "died":
         raise describe_death(run)
@@ -199,5 +193,5 @@ def require_living(run: Run) -> Record:
 
 
 def find_held_runs() -> dict[str, tuple[str, HeldRun]]:
-    """Runs of which a runtime holds something by their ids, each with the name of the runtime."""
+    """Find all runs of which some runtime holds nodes or a network: by id, the name of the runtime and the run."""
     return {held.run_id: (name, held) for name in names_of("runtimes") for held in get_runtime(name).find_held()}

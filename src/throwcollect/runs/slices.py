@@ -1,4 +1,4 @@
-"""Collects one slice of a dataset whose plan is frozen, as a task of a scheduler does on the machine it is given."""
+"""Collects one slice of a dataset whose plan is frozen; an array task of a scheduler does so on its machine."""
 
 from __future__ import annotations
 
@@ -42,14 +42,14 @@ def collect_slice(
 ) -> bool:
     """Collect one slice of a dataset, in a directory of its own until it is finished.
 
-    It begins with what earlier attempts at this slice have recorded.
+    The collection begins with the recordings of earlier attempts at this slice.
 
     Args:
         directory: Directory of the dataset, with its configuration and its plan.
-        slice: Which slice.
-        overrides: What replaces keys that say how it is run: ``key=value`` pairs, as ``--set`` takes them.
+        slice: The slice.
+        overrides: Keys to change that do not influence the data: ``key=value`` pairs, as ``--set`` takes them.
         onlooker: Is told what goes on.
-        interruptions: How often somebody has asked to stop: at first running trials are finished, then no more.
+        interruptions: How often somebody has asked to stop: the first time, running trials are still finished.
 
     Returns:
         Whether there was anything to do.
@@ -58,8 +58,8 @@ def collect_slice(
         ConfigError: If there is no such dataset or slice, or it cannot be collected in slices.
         WorkerError: If nodes cannot be started or kept alive.
         DatasetError: If something cannot be read or written.
-        LossError: If trials of it are lost; it is not finished then.
-        Interrupted: If somebody stopped it.
+        LossError: If trials of the slice are lost, so that it is not finished.
+        Interrupted: If somebody stopped the collection.
     """
     started = datetime.now(timezone.utc)
     directory = Path(directory)
@@ -77,8 +77,8 @@ def collect_slice(
     if scratch is None:
         remove_stopped(earlier)
     onlooker.say(f"slice {slice}: trials {plan.trials.first} to {plan.trials.numbers[-1]}")
-    request = Request(config, directory, attempt, started, resumed=True, ahead=True)
-    with prepare_run(Records(), request, plan, onlooker) as run:
+    request = Request(config, directory, attempt, started, plan, ahead=True)
+    with prepare_run(Records(), request, onlooker) as run:
         try:
             summary = run.collect(interruptions=interruptions)
         except Interrupted as error:
@@ -86,7 +86,7 @@ def collect_slice(
             raise Interrupted(f"slice {slice}: {error.message}", hint=f"{again} goes on with it") from error
         finally:
             if scratch is not None and not (attempt / METADATA).exists():
-                # The next attempt may be on another machine.
+                # The next attempt may run on another machine, which does not see the scratch directory of this one.
                 kept = make_attempt(directory, slice)
                 take_recordings([attempt], kept)
                 mark_stopped(kept)
@@ -99,11 +99,7 @@ def collect_slice(
 
 
 def read_frozen_config(directory: Path, overrides: Sequence[str] = ()) -> Config:
-    """Read the configuration of a dataset that is to be collected in slices.
-
-    Args:
-        directory: Its directory, with its plan.
-        overrides: What replaces keys that say how it is run.
+    """Read the configuration of a dataset that is to be collected in slices, with overrides as `collect_slice` has.
 
     Raises:
         ConfigError: If there is no such dataset, its plan grows, or the overrides change what is collected.
@@ -116,11 +112,7 @@ def read_frozen_config(directory: Path, overrides: Sequence[str] = ()) -> Config
 
 
 def read_changed_config(directory: Path, overrides: Sequence[str] = ()) -> Config:
-    """Read the configuration of a dataset whose plan is frozen, with other keys that say how it is run.
-
-    Args:
-        directory: Its directory, with its plan.
-        overrides: What replaces such keys.
+    """Read the configuration of a dataset whose plan is frozen, with overrides as `collect_slice` has.
 
     Raises:
         ConfigError: If there is no such dataset, or the overrides change what is collected.
@@ -135,10 +127,10 @@ def read_changed_config(directory: Path, overrides: Sequence[str] = ()) -> Confi
 
 
 def _find_scratch(config: Config) -> Path | None:
-    """The directory on this machine's own disk that the configuration names; None if it names none.
+    """The directory on this machine's own disk that `cluster.scratch` names; None if it names none.
 
     Raises:
-        ConfigError: If a variable in it is not set, or it is no absolute path.
+        ConfigError: If a variable in the name is not set, or it is no absolute path.
     """
     if (named := config.cluster.scratch) is None:
         return None
@@ -155,22 +147,19 @@ def check_sliceable(config: Config) -> None:
         ConfigError: If its plan grows with its results.
     """
     if config.grows:
+        key = "until" if config.until is not None else "sweep.target"
         raise ConfigError(
-            [Problem("a plan that grows with its results cannot be collected in slices", key=_growing_key(config))],
+            [Problem("a plan that grows with its results cannot be collected in slices", key=key)],
             expected="a fixed number of trials",
             hint="throwcollect submit --mode live collects it in one run on several nodes",
         )
 
 
 def check_closed(config: Config) -> None:
-    """Check that nobody else may join what is run on a cluster.
+    """Check that others cannot join a run on a cluster, whose nodes many users share.
 
     Raises:
-        ConfigError: If its run would be open.
+        ConfigError: If the run would be open.
     """
     if config.run.open:
         raise ConfigError([Problem("should be false, as nodes of a cluster are there for many", key="run.open")])
-
-
-def _growing_key(config: Config) -> str:
-    return "until" if config.until is not None else "sweep.target"

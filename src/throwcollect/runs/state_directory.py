@@ -1,8 +1,9 @@
-"""The directory in which this machine remembers what belongs to a user: runs, and the server that shows them."""
+"""The directory of a user's files that outlive a command: the records of runs, and the server that shows them."""
 
 from __future__ import annotations
 
 import errno
+import fcntl
 import os
 import tempfile
 from pathlib import Path
@@ -10,14 +11,16 @@ from pathlib import Path
 from throwcollect.errors import ConfigError
 
 STATE_VARIABLE = "THROWCOLLECT_STATE"
-"""Names the directory."""
+"""Environment variable that names the directory."""
 
 
 def state_directory() -> Path:
-    """A directory of this user alone; not that of the login, which vanishes when the last terminal is closed.
+    """Path of the directory, which is made if it is not there.
+
+    By default it lies in the directory for temporary files, because ``XDG_RUNTIME_DIR`` vanishes at the last logout.
 
     Raises:
-        ConfigError: If it cannot be made, or others own it or may write there.
+        ConfigError: If the directory cannot be made, another user owns it, or others may write there.
     """
     named = os.environ.get(STATE_VARIABLE)
     try:
@@ -29,12 +32,12 @@ def state_directory() -> Path:
         ) from error
     try:
         path.mkdir(mode=0o700, parents=bool(named), exist_ok=True)
-        # A link that the user has named is the user's own choice.
-        owner = path.stat(follow_symlinks=bool(named))
+        # A link is followed only if the user has named it: in /tmp, another user may have put one there.
+        status = path.stat(follow_symlinks=bool(named))
     except OSError as error:
         raise unusable(path, error) from error
-    # In a directory that all may write to, somebody else may have been faster.
-    if owner.st_uid != os.getuid() or owner.st_mode & (0o022 if named else 0o077):
+    # All users may write to /tmp, so another one may have made the directory first.
+    if status.st_uid != os.getuid() or status.st_mode & (0o022 if named else 0o077):
         raise ConfigError(
             f"{path}: runs cannot be remembered there: it belongs to somebody else, or others may write there",
             hint=f"name another directory in {STATE_VARIABLE}, or remove it",
@@ -43,9 +46,28 @@ def state_directory() -> Path:
 
 
 def unusable(path: Path, error: OSError) -> ConfigError:
-    """The error that says that a path of the directory cannot be used, and what helps."""
+    """The error that a path in the directory cannot be used, with a hint."""
     hint = "free space there" if error.errno == errno.ENOSPC else "check who may write there"
     return ConfigError(
         f"{path}: runs cannot be remembered there: {error.strerror}",
         hint=f"{hint}, or name another directory in {STATE_VARIABLE}",
     )
+
+
+def is_locked(path: Path) -> bool:
+    """Whether a process holds the lock of a file, which it does as long as it lives.
+
+    Unlike a process id, a lock cannot outlive its process or pass to another one. This function takes the lock for a
+    moment to find out.
+    """
+    try:
+        lock = os.open(path, os.O_RDONLY)
+    except OSError:
+        return False
+    try:
+        fcntl.flock(lock, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return True
+    finally:
+        os.close(lock)
+    return False

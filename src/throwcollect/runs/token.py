@@ -1,4 +1,4 @@
-"""The token of a run: one line by which another machine joins it, and nobody without."""
+"""The token of a run: one line with which another machine joins the run."""
 
 from __future__ import annotations
 
@@ -13,20 +13,20 @@ from throwcollect.build import build_digest
 from throwcollect.errors import ConfigError
 
 _START = "tc2."
-"""What tokens begin with; the number is that of their form."""
+"""Beginning of every token; the number is the version of the format."""
 
 
 @dataclass(frozen=True)
 class JoinToken:
-    """All that another machine has to know of a run. Whoever reads it may join, so it is a secret as a key is.
+    """The facts of a run that another machine needs to join it. It holds the key of the run, so it is a secret, too.
 
     Attributes:
         run: Id of the run.
-        endpoint: Endpoint of the router, as other machines reach it.
+        endpoint: Endpoint at which other machines reach the router.
         secret: Secret of the key of the run, in hexadecimal.
         domain_id: ROS domain.
-        engine: Name of the physics engine that computes there.
-        build: Digest over what computes there; see `throwcollect.build`.
+        engine: Name of the physics engine of the run.
+        build: Digest over the code that computes the run's throws; see `throwcollect.build`.
     """
 
     run: str
@@ -46,7 +46,7 @@ class JoinToken:
         """Read a token.
 
         Raises:
-            ConfigError: If it is none, or not whole.
+            ConfigError: If the word is no token, or only a part of one.
         """
         data = word.strip().removeprefix(_START)
         try:
@@ -60,10 +60,10 @@ class JoinToken:
         return token
 
     def check_build(self) -> None:
-        """Refuse to join a run whose machines would compute other throws.
+        """Check that this machine would compute the same throws as the run's own machine.
 
         Raises:
-            ConfigError: If something else computes there than here.
+            ConfigError: If sources, engine or robot model differ.
         """
         if self.build != build_digest(self.engine):
             raise ConfigError(

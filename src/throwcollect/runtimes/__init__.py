@@ -1,1 +1,1 @@
-"""Where the trials of a run are simulated: each member of the family `runtimes` is a place of its own."""
+"""Runtimes, which simulate the trials of a run: processes, containers, or the launcher itself."""

@@ -1,4 +1,4 @@
-"""A process that is forked off this one and starts afresh, with the modules that are imported already."""
+"""A process that is forked off this one and begins anew, but with the modules that are imported already."""
 
 from __future__ import annotations
 
@@ -13,20 +13,20 @@ from throwcollect.interruption import die_with_parent
 
 
 class ForkedProcess:
-    """A child without a program of its own; of `subprocess.Popen`, it has what ends it.
+    """A forked process, with the methods of `subprocess.Popen` that end it.
 
     Args:
-        work: What it does; when that comes back or raises anything, it ends.
-        environment: Its environment variables.
-        kept: The one file descriptor of this process that it keeps; standard streams lead nowhere.
+        work: Function that the process calls; the process ends when it returns or raises.
+        environment: Environment variables of the process.
+        kept: The only file descriptor that stays open in the process; its standard streams lead to ``/dev/null``.
 
     Raises:
-        OSError: If there can be no further process.
+        OSError: If the process cannot be started.
     """
 
     def __init__(self, work: Callable[[], object], *, environment: Mapping[str, str], kept: int) -> None:
         for stream in (sys.stdout, sys.stderr):
-            # The copy would write once more what is still waiting here.
+            # Otherwise the forked process would write the content of the buffer once more.
             stream.flush()
         parent = os.getpid()
         self.pid = os.fork()
@@ -34,21 +34,21 @@ class ForkedProcess:
             _do(work, parent, environment, kept)
 
     def send_signal(self, number: signal.Signals) -> None:
-        """Send it a signal, unless it has ended."""
+        """Send the process a signal, unless it has ended."""
         with suppress(ProcessLookupError):
             os.kill(self.pid, number)
 
     def kill(self) -> None:
-        """End it by force."""
+        """End the process by force."""
         self.send_signal(signal.SIGKILL)
 
     def wait(self) -> int:
-        """Wait for its end, once; says how it ended, as `subprocess.Popen.returncode` does."""
+        """Wait for the end of the process, and tell it as `subprocess.Popen.returncode` does; call this only once."""
         return os.waitstatus_to_exitcode(os.waitpid(self.pid, 0)[1])
 
 
 def _do(work: Callable[[], object], parent: int, environment: Mapping[str, str], kept: int) -> None:
-    """Work, and end this process, whatever happens: what is below on the stack is the parent's."""
+    """Work, and end this process in any case: the functions that called this one belong to the parent."""
     code = 1
     try:
         _start_afresh(parent, environment, kept)
@@ -57,12 +57,12 @@ def _do(work: Callable[[], object], parent: int, environment: Mapping[str, str],
     except SystemExit as end:
         code = end.code if isinstance(end.code, int) else 1
     finally:
-        # Any other exception ends here, too, and unseen: its streams lead nowhere, and the terminal is the parent's.
+        # Any other exception ends here, too. Nobody sees it, because the terminal belongs to the parent.
         os._exit(code)
 
 
 def _start_afresh(parent: int, environment: Mapping[str, str], kept: int) -> None:
-    """Be as a process that has just been started: let go of what is the parent's."""
+    """Release everything that belongs to the parent, as if this process had just been started."""
     import setproctitle
 
     die_with_parent(parent)
@@ -72,7 +72,7 @@ def _start_afresh(parent: int, environment: Mapping[str, str], kept: int) -> Non
         if callable(signal.getsignal(number)):
             signal.signal(number, signal.SIG_DFL)
     signal.signal(signal.SIGINT, signal.default_int_handler)
-    # It finds what `ps` shows only as long as the environment is the one that the program was started with.
+    # setproctitle looks for the title's memory at its first call, and only finds it while the environment is unchanged.
     setproctitle.getproctitle()
     os.environ.clear()
     os.environ.update(environment)
@@ -80,7 +80,7 @@ def _start_afresh(parent: int, environment: Mapping[str, str], kept: int) -> Non
     for stream in (0, 1, 2):
         os.dup2(nowhere, stream)
     for opened in map(int, os.listdir("/proc/self/fd")):
-        # The directory that is read here is closed by now.
+        # One of these descriptors was that of the listed directory, and is closed by now.
         with suppress(OSError):
             if opened > 2 and opened != kept:
                 os.close(opened)

@@ -1,4 +1,4 @@
-"""What an image is made from: a clone of the project, and the labels that say afterwards which one it was."""
+"""The sources from which an image is made, which are a clone of the project, and the labels that name them later."""
 
 from __future__ import annotations
 
@@ -17,28 +17,28 @@ DEFAULT_BASE = "python:3.11-slim-bookworm"
 """Base image, as in the Dockerfile."""
 DOCKERFILE = "docker/Dockerfile"
 SOURCES_LABEL = "throwcollect.sources"
-"""Label that tells which sources are installed in an image."""
+"""Label with the digest of the sources in an image."""
 VERSION_LABEL = "org.opencontainers.image.version"
-"""Label that tells of which version they are."""
+"""Label with the version of the sources in an image."""
 UNKNOWN = "unknown"
-"""What a label says that nobody has set."""
+"""Content of a label that was not set."""
 
 _PACKAGE = Path(__file__).parents[1]
-"""This package, as it is installed."""
+"""Directory of this package."""
 _SOURCES = ("pyproject.toml", "configs/quickstart.yaml", "src")
 _INTERFACES = ("packaging/ros_interfaces", "packaging/ros_constraints.txt")
-"""What the wheel with interfaces of ROS 2 is made from, besides sources."""
+"""Further sources of the wheel with interfaces of ROS 2."""
 _LEFT_OUT = re.compile(r"__pycache__|.*\.egg-info")
 _SCHEMES = ("https", "http", "ssh", "git")
 _SSH_ADDRESS = re.compile(r"(?:[^@:/]+@)?([^@:/]{2,}):(?!//)/?(.+)")
-"""The short form of ssh: ``git@host:path``."""
+"""An address in the short form of ssh: ``git@host:path``."""
 
 
 def source_root() -> Path:
-    """Directory of the clone that this package runs from.
+    """Find the directory of the clone from which this package runs.
 
     Raises:
-        ConfigError: If it was installed in another way than from a clone, in editable mode.
+        ConfigError: If the package was not installed from a clone in editable mode.
     """
     root = _PACKAGE.parents[1]
     if not all((root / name).exists() for name in (DOCKERFILE, *_SOURCES)):
@@ -50,7 +50,7 @@ def source_root() -> Path:
 
 
 def digest_sources(root: Path) -> str:
-    """SHA-256 over all that is installed of a clone, in hexadecimal."""
+    """SHA-256 over all files of a clone that are installed, in hexadecimal."""
     digest = hashlib.sha256()
     for path in [root / "pyproject.toml", *sorted((root / "src").rglob("*"))]:
         inside = path.relative_to(root)
@@ -61,13 +61,9 @@ def digest_sources(root: Path) -> str:
 
 
 def are_others(sources: str | None) -> bool:
-    """Whether an image was made from other sources than those of the clone that this package runs from.
+    """Whether an image with this label was made from other sources than those of this package's clone.
 
-    Args:
-        sources: What its label says; None if it has none.
-
-    Returns:
-        Whether it says so for sure: without a label, or without a clone, nobody can tell.
+    Without a label, or without a clone, nobody can tell, so the answer is no.
     """
     try:
         root = source_root()
@@ -77,11 +73,7 @@ def are_others(sources: str | None) -> bool:
 
 
 def check_wheelhouse(root: Path, wheelhouse: Path | None) -> None:
-    """Make sure that there are wheels where they are to be taken from.
-
-    Args:
-        root: Directory of the clone.
-        wheelhouse: Directory of wheels; None takes them from the package index.
+    """Make sure that a directory of wheels holds some; None takes them from the package index.
 
     Raises:
         ConfigError: If it holds none.
@@ -94,13 +86,7 @@ def check_wheelhouse(root: Path, wheelhouse: Path | None) -> None:
 
 
 def write_context(archive: IO[bytes], root: Path, wheelhouse: Path | None) -> None:
-    """Write what an image is built from, and nothing else, as a tar archive.
-
-    Args:
-        archive: The archive.
-        root: Directory of the clone.
-        wheelhouse: Directory of wheels, which are put into `docker/wheelhouse`; None if there is none.
-    """
+    """Write the files from which an image is built as a tar archive; wheels go into `docker/wheelhouse`."""
 
     def entry(info: tarfile.TarInfo) -> tarfile.TarInfo | None:
         info.uid = info.gid = 0
@@ -118,14 +104,14 @@ def write_context(archive: IO[bytes], root: Path, wheelhouse: Path | None) -> No
 
 
 def find_revision(root: Path) -> str | None:
-    """Commit of a clone; None if it is not one."""
+    """Commit of a clone, with ``-dirty`` if files differ from it; None if git does not tell."""
     if not (root / ".git").exists() or not (revision := _git(root, "rev-parse", "HEAD")):
         return None
     return revision + ("-dirty" if _git(root, "status", "--porcelain", "--", "docker", *_SOURCES) else "")
 
 
 def find_address(root: Path) -> str | None:
-    """Where others find the sources, without the name and the password that the address of a clone may hold."""
+    """Address at which others find the sources, without the name and the password that it may hold in the clone."""
     origin = (_git(root, "remote", "get-url", "origin") if (root / ".git").exists() else None) or ""
     if short := _SSH_ADDRESS.fullmatch(origin):
         return f"ssh://{short[1]}/{short[2]}"
@@ -136,7 +122,7 @@ def find_address(root: Path) -> str | None:
 
 
 def _git(root: Path, *arguments: str) -> str | None:
-    """What git prints; None where it cannot say."""
+    """Run git, and return what it prints; None if it fails."""
     try:
         answer = subprocess.run(["git", "-C", root, *arguments], capture_output=True, text=True, check=True)
     except (OSError, subprocess.CalledProcessError):

@@ -1,6 +1,7 @@
-"""One simulation and the coordinator in this process: no nodes, no ROS graph, the same dataset.
+"""The runtime ``inprocess``: one simulation and the coordinator in this process, without nodes and ROS graph.
 
-For tests, for breakpoints in a controller or a task, and for Python programs that want a dataset without processes.
+It is made for tests, for breakpoints in a controller or a task, and for Python programs that want a dataset without
+further processes. The dataset is the same.
 """
 
 from __future__ import annotations
@@ -27,30 +28,25 @@ _SIMULATION = simulation_name(0)
 
 
 class InProcessRuntime(Runtime):
-    """The launcher's own process; there is nothing to join, and nothing to scale."""
+    """Simulates in the launcher's own process; nobody can join or scale such a run."""
 
     can_be_scaled = False
 
     def in_words(self, config: Config) -> str:
-        """Where trials are simulated."""
+        """See `Runtime.in_words`."""
         return "this process, with one simulation"
 
     def simulations(self, config: Config) -> int:
-        """Number of simulations that a run begins with."""
+        """The only number of simulations that there can be."""
         return 1
 
     def host(self, place: Place, config: Config, *, warn: Callable[[str], None]) -> InProcess:
-        """This process."""
+        """Make the host of a run in this process."""
         return InProcess(place, config)
 
 
 class InProcess:
-    """Simulates one trial after the other; see `runtime.Host` for what it offers.
-
-    Args:
-        place: The run.
-        config: Its configuration.
-    """
+    """Simulates one trial after the other; a `runtime.Host`."""
 
     cleared = True
 
@@ -60,15 +56,15 @@ class InProcess:
         self._told_at = 0.0
 
     def close(self) -> None:
-        """Nothing is left when `collect` has returned."""
+        """Do nothing: `collect` leaves nothing behind."""
 
     def collect(self, session: Session) -> Info:
-        """See `runtime.Host.collect`; a trial that runs is finished before anybody's wish to stop is heeded.
+        """See `runtime.Host.collect`; an interruption takes effect when the running trial has ended.
 
         Raises:
-            Interrupted: If somebody stopped it before every trial had ended.
+            Interrupted: If somebody stopped the run before every trial had ended.
         """
-        # These take messages of ROS along, so they are imported when it is known what ROS is to run on.
+        # These import messages of ROS, so they have to wait until the backend is chosen.
         from throwcollect.coordinator.collection import TrialCollection
         from throwcollect.dataset.inspect import info
         from throwcollect.replay.throw import Replayer
@@ -85,13 +81,13 @@ class InProcess:
             if not collection.complete:
                 message = f"interrupted; finished throws are in {directory}, the dataset is not complete"
                 raise Interrupted(message, hint=self._place.way_on)
-            # The dataset is finished even if trials are lost; whoever reads its summary says so.
+            # The dataset is finished even if trials are lost; the launcher reports the loss from the summary.
             with suppress(LossError):
                 collection.finish(meanwhile=lambda: time.sleep(_IDLE_S), say=session.say)
         return info(directory)
 
     def _simulate(self, collection: TrialCollection, simulation: Replayer, session: Session) -> None:
-        """Have all trials run, or drain.
+        """Simulate all trials, or drain.
 
         Raises:
             WorkerError: If the simulation refuses every trial.

@@ -1,4 +1,4 @@
-"""Nodes as processes of this machine."""
+"""The runtime ``local``: nodes as processes of this machine."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from throwcollect.errors import WorkerError
 from throwcollect.files import open_log
 from throwcollect.own_process import may_be_forked
-from throwcollect.ros.endpoint import split_address
+from throwcollect.ros.connection import Connection
 from throwcollect.ros.middleware import Middleware
 from throwcollect.runtimes.node_logs import NodeLogs
 from throwcollect.runtimes.node_server import ForkedNode, NodeServer
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
 
 _KILLED_S = 5.0
-"""Within this time a process has ended that was ended by force."""
+"""Time in which a process ends that got SIGKILL."""
 
 
 class LocalRuntime(Runtime):
@@ -45,40 +45,35 @@ class LocalRuntime(Runtime):
         self._server: NodeServer | None = None
 
     def begin(self, config: Config, middleware: Middleware) -> None:
-        """Have what nodes need imported; see `Runtime.begin`."""
+        """Start to import the libraries of nodes; see `Runtime.begin`."""
         self._server = _make_server(middleware)
-        # Genuine ROS 2 takes its settings from the environment when it is loaded, which may have happened here.
+        # Genuine ROS 2 reads its settings from the environment when it is loaded. If this process has loaded it, forked
+        # nodes would have the settings of this process.
         self._server.begin(config, fork=may_be_forked() and middleware.backend == "embedded")
 
     def close(self) -> None:
-        """End what was begun; see `Runtime.close`."""
+        """See `Runtime.close`."""
         if self._server is not None:
             self._server.close()
 
     def in_words(self, config: Config) -> str:
-        """Where trials are simulated."""
+        """See `Runtime.in_words`."""
         return "local processes"
 
     def host(self, place: Place, config: Config, *, warn: Callable[[str], None]) -> LocalNodes:
-        """The processes of a run.
-
-        Raises:
-            ConfigError: If the router's port is taken.
-        """
+        """Make the host of a run; see `Runtime.host`."""
         return LocalNodes(place, config, server=self._server)
 
 
 class LocalNodes(NodeHost):
-    """Runs nodes as child processes, each with a log file of its own; see `nodes.NodeHost` for what it offers.
+    """Runs nodes as processes, each with a log file of its own; see `nodes.NodeHost`.
 
-    They are forked by a `NodeServer`, live in sessions of their own, so that Ctrl-C reaches the launcher alone, and are
-    ended by the kernel when the launcher dies.
+    A `NodeServer` forks the nodes. They live in sessions of their own, so that Ctrl-C reaches only the launcher. The
+    kernel ends them when the launcher dies.
 
     Args:
-        place: The run.
-        config: Its configuration.
-        elsewhere: Endpoint of the router, if that is another machine's; None if the router is one of the nodes.
-        server: What they are forked by, for its owner to close; None for one of their own.
+        elsewhere: Endpoint of a router on another machine; None if the router is one of the nodes.
+        server: The server that forks the nodes, which its owner closes; None makes one that this host closes.
 
     Raises:
         ConfigError: If the router's port is taken.
@@ -95,32 +90,33 @@ class LocalNodes(NodeHost):
         self.logs = NodeLogs(place.logs)
         self._reserved: socket.socket | None = None
         if elsewhere is not None:
-            self.listen = endpoint = elsewhere
+            self.listen = self._endpoint = elsewhere
         else:
             self._reserved = reserve_port(config.run)
             host, port = self._reserved.getsockname()[:2]
             protocol = protocol_of(config.run, place.middleware)
             self.listen = format_endpoint(protocol, host, port)
-            endpoint = format_endpoint(protocol, reach_from_here(host), port)
-        self._address = split_address(endpoint)
-        self._environment = node_environment(self.connection_at(endpoint))
+            self._endpoint = format_endpoint(protocol, reach_from_here(host), port)
+        connection = Connection(self._endpoint, place.key, config.run.domain_id, place.middleware)
+        self._environment = node_environment(connection)
         self._server = server or _make_server(place.middleware)
         self._owns_server = server is None
         self._processes: dict[str, ForkedNode] = {}
 
     def collect(self, session: Session) -> Info | None:
         """See `runtime.Host.collect`."""
-        # It takes ROS along, so it is imported when it is known what ROS is to run on.
+        # This imports ROS, so it has to wait until the backend is chosen.
         from throwcollect.runtimes.node_collection import NodeCollection
 
         return NodeCollection(self, session).run_to_the_end()
 
-    def router_address(self) -> tuple[str, int]:
-        """Host and port of the router."""
-        return self._address
+    @property
+    def endpoint(self) -> str:
+        """See `NodeHost.endpoint`."""
+        return self._endpoint
 
     def start(self, node: NodeSpec) -> None:
-        """Start a node; its name names the log file, too.
+        """Start a node.
 
         Raises:
             WorkerError: If the process cannot be started or its log cannot be written.
@@ -136,32 +132,32 @@ class LocalNodes(NodeHost):
             raise WorkerError(f"{node.name}: cannot be started: {error}") from error
 
     def handle(self, name: str) -> str | None:
-        """Process id of a running node; None if it does not run."""
+        """Process id of a running node; None if the node does not run."""
         process = self._processes.get(name)
         return None if process is None else str(process.pid)
 
     def running(self) -> tuple[str, ...]:
-        """Names of the nodes whose end has not been reported yet."""
+        """See `NodeHost.running`."""
         return tuple(self._processes)
 
     def exits(self) -> list[NodeExit]:
-        """Nodes that ended since the last call."""
+        """See `NodeHost.exits`."""
         ended = [(name, code) for name, process in self._processes.items() if (code := process.poll()) is not None]
         for name, _ in ended:
             del self._processes[name]
         return [NodeExit(name, code, _reason(code), self.log_tail(name)) for name, code in ended]
 
     def frozen(self) -> frozenset[str]:
-        """Nodes that were stopped by a signal and not continued."""
+        """Names of the nodes that a signal has stopped, and none has continued."""
         return frozenset(name for name, process in self._processes.items() if _is_stopped(process.pid))
 
     def signal(self, name: str, number: signal.Signals) -> None:
-        """Send a signal to a node; one that has ended is left alone."""
+        """See `NodeHost.signal`."""
         if (process := self._processes.get(name)) is not None:
             process.send_signal(number)
 
     def stop(self, names: Sequence[str], *, grace_s: float = 3.0) -> None:
-        """End nodes: politely, then after `grace_s` [s] by force."""
+        """See `NodeHost.stop`."""
         for name in names:
             self.signal(name, signal.SIGTERM)
         deadline = time.monotonic() + grace_s
@@ -196,5 +192,5 @@ def _is_stopped(pid: int) -> bool:
         status = Path(f"/proc/{pid}/stat").read_text(encoding="ascii", errors="replace")
     except OSError:
         return False
-    # The name of the command, in brackets, may hold anything; the state is the first field after it.
+    # The state is the first field after the name of the command, which is in brackets and may hold any character.
     return status.rpartition(")")[2].split()[0] == "T"

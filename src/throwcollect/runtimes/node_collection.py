@@ -1,6 +1,6 @@
-"""A run by nodes, from their start to their end: they are kept alive, listened to, scaled, and asked to stop.
+"""Drives a run with nodes from their start to their end: keeps them alive, listens to them, scales and stops them.
 
-The process that does so is the node ``/launcher``; setting its integer parameter ``simulations`` scales the run.
+The launcher does so as the node ``/launcher``; setting its integer parameter ``simulations`` scales the run.
 """
 
 from __future__ import annotations
@@ -35,24 +35,19 @@ from throwcollect.runtimes.supervisor import Supervisor
 SIMULATIONS = "simulations"
 """Name of the launcher's parameter."""
 CONFIGURATION = "configuration"
-"""Name of its parameter that holds the text of the configuration, for machines that join."""
+"""Name of the launcher's parameter that holds the text of the configuration, for machines that join."""
 MOST_SIMULATIONS = 256
 
 _POLL_S = 0.05
 _MEET_S = 12.0
-"""Nodes that are ready see each other within a second."""
+"""Nodes that are ready usually see each other within a second; after this time, something is wrong."""
 
 
 def roster(host: NodeHost, simulations: int) -> list[NodeSpec]:
-    """The nodes of a run: a router, simulations, and a coordinator if it collects.
-
-    Args:
-        host: Where they are to live.
-        simulations: Number of simulations.
-    """
+    """List the nodes of a run: a router, simulations, and a coordinator if the run collects a dataset."""
     rest_s = SERVER_REST_S if host.place.middleware.is_fast_dds else 0.0
     cores = sorted(os.sched_getaffinity(0))
-    # Where simulations fill all cores, moving them around was measured to cost about a tenth of the speed.
+    # Where simulations fill all cores, letting them move between cores was measured to cost a tenth of the speed.
     bound = simulations >= len(cores)
     return [
         NodeSpec(ROUTER, ("router", "--listen", host.listen), Role.VITAL, rest_s=rest_s),
@@ -76,29 +71,24 @@ def offer_scaling(
 
     Args:
         node: Node of the launcher.
-        simulations: Its value.
-        on_wanted: Called with another value when somebody sets one.
+        simulations: Value of the parameter.
+        on_wanted: Is called with each new value.
         most: Largest value that can be set.
     """
 
-    def tell(parameters: list[ros.Parameter]) -> None:
+    def report(parameters: list[ros.Parameter]) -> None:
         for parameter in parameters:
             if parameter.name == SIMULATIONS:
                 on_wanted(int(parameter.value))
 
     span = IntegerRange(from_value=0, to_value=most, step=1)
-    described = ros.ParameterDescriptor(description="Number of simulations.", integer_range=[span])
-    node.declare_parameter(SIMULATIONS, simulations, described)
-    node.add_post_set_parameters_callback(tell)
+    descriptor = ros.ParameterDescriptor(description="Number of simulations.", integer_range=[span])
+    node.declare_parameter(SIMULATIONS, simulations, descriptor)
+    node.add_post_set_parameters_callback(report)
 
 
 class NodeCollection:
-    """One run by nodes: a collection, or simulations for clients.
-
-    Args:
-        host: Where the nodes live; closed at the end.
-        session: The run.
-    """
+    """Drives one run with nodes, a collection or a session; closes the host at the end."""
 
     def __init__(self, host: NodeHost, session: Session) -> None:
         self._host = host
@@ -121,12 +111,16 @@ class NodeCollection:
             if not self._host.place.collects:
                 return None
             self._check(end)
-            # They end while the dataset is read once more.
+            # The simulations end while this process reads the dataset.
             self._supervisor.dismiss()
             return self._host.info()
 
     def _follow(self) -> NodeExit | None:
-        """How the coordinator ended; None when it had to be ended by force."""
+        """Look after the nodes until the run ends or is interrupted.
+
+        Returns:
+            How the coordinator ended; None if it had to be ended by force, or there is none.
+        """
         end = None
         while end is None and not self._session.interruptions():
             self._listen()
@@ -137,7 +131,7 @@ class NodeCollection:
             end, news = self._supervisor.poll()
             for line in news:
                 self._session.warn(line)
-            self._session.nodes(self._supervisor.states(), endpoint=self._endpoint, simulations=self._simulations)
+            self._session.nodes(self._supervisor.states(), endpoint=self._host.endpoint, simulations=self._simulations)
         if end is None:
             self._session.event("stopping")
             if not self._host.place.collects:
@@ -158,11 +152,6 @@ class NodeCollection:
             hint = place.way_on if kind is WorkerError else None
             raise kind(f"the coordinator stopped: {end.reason}", evidence=end.log or None, hint=hint)
 
-    @property
-    def _endpoint(self) -> str | None:
-        connection = self._host.connection
-        return None if connection is None else connection.endpoint
-
     def _listen(self) -> None:
         self._listener.spin(self._host.connection, _POLL_S)
 
@@ -177,10 +166,10 @@ class NodeCollection:
             )
 
     def _check_that_nodes_meet(self, progress: Progress) -> None:
-        """Start nodes again that do not see each other: on DDS that happens, and they do at the next try.
+        """Start all nodes again if they do not see each other, which at times happens on DDS.
 
         Raises:
-            WorkerError: If that did not help; the run would go on for ever with nothing done.
+            WorkerError: If they do not see each other after that either, as the run would never come to its end.
         """
         states = self._supervisor.states()
         ready = any(state.status == "running" for state in states if state.name not in (ROUTER, COORDINATOR))
@@ -192,25 +181,25 @@ class NodeCollection:
             return
         if not self._started_again:
             self._started_again = True
-            # Those that are started have as much time again; nobody reports until there is a coordinator.
+            # The new nodes have as much time again, which begins with the first report of the new coordinator.
             self._apart_since = math.inf
             self._session.warn("the coordinator does not see the simulations; all of them are started again")
             self._supervisor.replace([state.name for state in states if state.name != ROUTER])
         else:
             raise WorkerError(
                 f"simulations have been ready for {_MEET_S:g} s, twice, but the coordinator does not see them",
-                evidence=f"they use {self._host.place.middleware.rmw}, and the router at {self._endpoint}",
+                evidence=f"they use {self._host.place.middleware.rmw}, and the router at {self._host.endpoint}",
                 hint="a firewall may keep nodes apart; throwcollect doctor shows what is installed",
             )
 
     def _offer(self, node: ros.Node) -> None:
-        """Declare what others ask the launcher for: the number of simulations, and the configuration to join with."""
+        """Declare the launcher's parameters: the number of simulations, and the configuration for other machines."""
         node.declare_parameter(CONFIGURATION, dump_yaml(self._host.config), ros.ParameterDescriptor(read_only=True))
         most = 1 if self._host.config.run.root_namespace else MOST_SIMULATIONS
         offer_scaling(node, self._simulations, self._want, most=most)
-        # What reads the dataset at the end takes as long to import as simulations take to start.
+        # This import takes long, and is needed at the end. The simulations are starting now, so nobody waits for it.
         importlib.import_module("throwcollect.dataset.inspect")
 
     def _want(self, simulations: int) -> None:
-        # Not done here: whoever asks shall not have to wait for nodes that are slow to end.
+        # `_follow` scales the run, so that the client that set the parameter does not wait for nodes to end.
         self._wanted = simulations

@@ -1,10 +1,10 @@
-"""A process that has imported what nodes need, and forks one for each that is asked for.
+"""A process that imports the libraries of nodes once, and forks all nodes.
 
-A node that is started by itself takes most of a second of a processor until its libraries are imported; one that is
-forked has them at once, and shares their memory with all others. It is a process of its own all the same, which can be
-killed, stopped, bound to a core and looked at like any other.
+A process that imports the libraries itself takes most of a second of processor time for that. A forked node has them at
+once, and shares their memory with the other nodes. It is still a process of its own, which can be killed, stopped,
+bound to a core and examined like any other.
 
-`NodeServer` is the side of the launcher. `serve` is the other one; it comes back in each node, as that.
+`NodeServer` is the launcher's side. `serve` is the side of the process that forks; it returns in each forked node.
 """
 
 from __future__ import annotations
@@ -23,9 +23,8 @@ import subprocess
 import sys
 import time
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from types import MappingProxyType
 from typing import Any, BinaryIO, NoReturn
 
 from throwcollect.config import shape
@@ -38,9 +37,8 @@ from throwcollect.runtimes.forked_process import ForkedProcess
 
 _MESSAGE_BYTES = 1 << 16
 _ANSWER_S = 60.0
-"""Importing takes a second, on machines that do a lot else some more."""
+"""Importing takes a second, and more on a busy machine; after this time something is wrong."""
 _LOOK_S = 0.5
-_NO_VARIABLES: Mapping[str, str] = MappingProxyType({})
 _LIBRARIES = (
     "throwcollect.cli.main",
     "throwcollect.ros.router",
@@ -52,11 +50,11 @@ _LIBRARIES = (
 
 
 class ForkedNode:
-    """A node that a `NodeServer` has forked; of `subprocess.Popen`, it has what a launcher needs.
+    """A node that a `NodeServer` has forked, with the part of the interface of `subprocess.Popen` that hosts need.
 
     Attributes:
-        pid: Its process id.
-        returncode: As that of `subprocess.Popen`; None as long as nobody has asked after its end.
+        pid: Process id.
+        returncode: As `subprocess.Popen.returncode`; None until `poll` or `wait` has seen the end.
     """
 
     def __init__(self, server: NodeServer, pid: int) -> None:
@@ -65,19 +63,19 @@ class ForkedNode:
         self._server = server
 
     def poll(self) -> int | None:
-        """How it ended; None while it runs."""
+        """How the node ended; None while it runs."""
         if self.returncode is None:
             self.returncode = self._server.take_end(self.pid)
         return self.returncode
 
     def send_signal(self, number: signal.Signals) -> None:
-        """Send it a signal, unless it has ended."""
+        """Send the node a signal, unless it has ended."""
         if self.poll() is None:
             with contextlib.suppress(ProcessLookupError):
                 os.kill(self.pid, number)
 
     def wait(self, timeout_s: float) -> int | None:
-        """Wait for its end, and say how it ended; None if it still runs after that time [s]."""
+        """Wait for the end of the node; None if it still runs after this time [s]."""
         deadline = time.monotonic() + timeout_s
         while self.poll() is None and (left := deadline - time.monotonic()) > 0:
             self._server.await_news(left)
@@ -85,10 +83,10 @@ class ForkedNode:
 
 
 class NodeServer:
-    """Starts nodes that are there at once; if it dies, its nodes die with it, and the next node has a new one.
+    """Has nodes forked by a process of its own. If that process dies, its nodes die, and the next node has a new one.
 
     Args:
-        environment: Environment variables that hold while libraries are imported, and for all nodes.
+        environment: Environment variables for that process, and so for all nodes.
     """
 
     def __init__(self, environment: Mapping[str, str]) -> None:
@@ -101,57 +99,52 @@ class NodeServer:
         self._ends: dict[int, int] = {}
 
     def begin(self, config: Config, *, fork: bool = False) -> None:
-        """Have libraries imported from now on, so that the first node does not wait for all of that.
+        """Start the process that forks, so that the first node waits less for imports.
 
         Args:
-            config: Configuration of the nodes that will be started; what all of them make of it is made once.
-            fork: Whether this process is forked for that, and what it has imported is not imported once more.
+            config: Configuration of the nodes, from which the process computes once what all of them need.
+            fork: Whether the process is forked off this one, which spares it the imports that this one has done.
         """
         with contextlib.suppress(OSError), open(os.devnull, "wb") as nowhere:
-            connection = self._fork() if fork else self._connect(nowhere)
+            connection = self._launch(self._fork) if fork else self._connect(nowhere)
             connection.send(json.dumps({"configuration": config.model_dump(mode="json")}).encode())
             self._silent = True
             self._answer_s = min(_ANSWER_S, config.run.start_timeout_s)
 
     def start(
-        self,
-        arguments: Sequence[str],
-        *,
-        log: BinaryIO,
-        core: int | None,
-        environment: Mapping[str, str] = _NO_VARIABLES,
+        self, arguments: Sequence[str], *, log: BinaryIO, core: int | None, environment: Mapping[str, str]
     ) -> ForkedNode:
         """Start a node.
 
         Args:
             arguments: Arguments of the `throwcollect` command.
-            log: Where it prints to.
-            core: Processor core that it is bound to; None for any.
+            log: File to which the node prints.
+            core: Processor core to which the node is bound; None for any.
             environment: Further environment variables.
 
         Raises:
-            OSError: If no node can be had.
+            OSError: If the node cannot be started.
         """
         request = json.dumps({"arguments": list(arguments), "core": core, "environment": dict(environment)}).encode()
         if self._silent:
             self._silent = False
             with contextlib.suppress(OSError):
                 return self._request(request, log)
-            # Nobody has heard why; the next one has a log for that.
+            # The process that `begin` started had no log for its error; its successor writes the error into this one.
             self.close()
         return self._request(request, log)
 
     def take_end(self, pid: int) -> int | None:
-        """How a node ended, as `subprocess.Popen.returncode` says it; None while it runs. It is forgotten then."""
+        """How a node ended, as `subprocess.Popen.returncode` tells it, and forget the node; None while it runs."""
         self._read(0.0)
         return self._ends.pop(pid, None)
 
     def await_news(self, timeout_s: float) -> None:
-        """Wait until a node ends, but no longer than some time [s]."""
+        """Wait until a node ends, but no longer than this time [s]."""
         self._read(timeout_s)
 
     def close(self) -> None:
-        """End it, and with it all nodes that still run, by force."""
+        """End the process, and with it all nodes that still run, by force."""
         if self._socket is not None:
             self._socket.close()
             self._socket = None
@@ -161,10 +154,10 @@ class NodeServer:
             self._process = None
 
     def _request(self, request: bytes, log: BinaryIO) -> ForkedNode:
-        """The node that the server starts for a request.
+        """Let the process fork a node.
 
         Raises:
-            OSError: If it starts none.
+            OSError: If it does not.
         """
         socket.send_fds(self._connect(log), [request], [log.fileno()])
         pid = self._await_pid()
@@ -172,43 +165,43 @@ class NodeServer:
         return ForkedNode(self, pid)
 
     def _connect(self, log: BinaryIO) -> socket.socket:
-        """The socket to the server, which is started if none runs."""
+        """The socket to the process, which is started if it does not run; errors of its start go to the log."""
         if self._socket is not None:
             return self._socket
-        here, there = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-        with there:
-            self._process = subprocess.Popen(
-                [sys.executable, "-m", "throwcollect.runtimes.node_server", str(there.fileno())],
-                stdin=subprocess.DEVNULL,
-                # What it says when it cannot work belongs to the node that it was started for.
-                stdout=log,
-                stderr=subprocess.STDOUT,
-                env=self._environment,
-                pass_fds=[there.fileno()],
-                start_new_session=True,
-                preexec_fn=partial(die_with_parent, os.getpid()),  # noqa: PLW1509 - it calls nothing that takes a lock
-            )
-        self._socket = here
-        return here
+        return self._launch(partial(self._start_program, log))
 
-    def _fork(self) -> socket.socket:
-        """The socket to a server that is forked off this process.
+    def _launch(self, start: Callable[[socket.socket], subprocess.Popen[bytes] | ForkedProcess]) -> socket.socket:
+        """Start the process with one end of a new connection, and return the other end.
 
         Raises:
-            OSError: If there can be none.
+            OSError: If the process cannot be started.
         """
         here, there = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         with there:
-            work = partial(_run, there)
-            self._process = ForkedProcess(work, environment=self._environment, kept=there.fileno())
+            self._process = start(there)
         self._socket = here
         return here
 
+    def _start_program(self, log: BinaryIO, connection: socket.socket) -> subprocess.Popen[bytes]:
+        return subprocess.Popen(
+            [sys.executable, "-m", "throwcollect.runtimes.node_server", str(connection.fileno())],
+            stdin=subprocess.DEVNULL,
+            stdout=log,
+            stderr=subprocess.STDOUT,
+            env=self._environment,
+            pass_fds=[connection.fileno()],
+            start_new_session=True,
+            preexec_fn=partial(die_with_parent, os.getpid()),  # noqa: PLW1509 - it calls nothing that takes a lock
+        )
+
+    def _fork(self, connection: socket.socket) -> ForkedProcess:
+        return ForkedProcess(partial(_run, connection), environment=self._environment, kept=connection.fileno())
+
     def _await_pid(self) -> int:
-        """The answer to a request to start.
+        """Wait for the process id of a node that was asked for.
 
         Raises:
-            OSError: If none comes.
+            OSError: If the answer does not come in time.
         """
         deadline = time.monotonic() + self._answer_s
         while time.monotonic() < deadline:
@@ -221,10 +214,10 @@ class NodeServer:
         raise OSError(f"the process that nodes are forked from has not answered for {self._answer_s:g} s")
 
     def _read(self, timeout_s: float) -> list[dict[str, int]]:
-        """Take in what the server says, which it is given some time [s] for; ends are kept until they are asked for."""
+        """Read messages of the process, for which it has this time [s]; ends of nodes are kept for `take_end`."""
         messages: list[dict[str, int]] = []
         if self._process is not None:
-            # Nodes may be stopped, to look at them. This process must not be: nobody would hear of their ends.
+            # Somebody may have stopped this process together with the nodes; then nobody would report ends of nodes.
             self._process.send_signal(signal.SIGCONT)
         while self._socket is not None and select.select([self._socket], [], [], timeout_s)[0]:
             try:
@@ -232,7 +225,7 @@ class NodeServer:
             except ConnectionError:
                 packet = b""
             if not packet:
-                # The kernel ends its nodes by force.
+                # The process has ended, so the kernel kills its nodes.
                 self.close()
                 self._ends |= dict.fromkeys(self._running, -signal.SIGKILL)
                 self._running.clear()
@@ -247,23 +240,20 @@ class NodeServer:
 
 
 def serve(connection: socket.socket) -> list[str]:
-    """Fork nodes until the launcher closes its end of the connection.
-
-    Args:
-        connection: A connection that keeps messages apart.
+    """Fork nodes until the launcher closes its end of the connection, which has to keep messages apart.
 
     Returns:
-        In each node, the arguments that it was asked for with; in the server itself it does not return.
+        In each node, the arguments of the node; in the process that forks, this function does not return.
     """
     awake, wake = socket.socketpair()
-    for each in (awake, wake):
-        each.setblocking(False)
+    for end in (awake, wake):
+        end.setblocking(False)
     signal.set_wakeup_fd(wake.fileno(), warn_on_full_buffer=False)
-    # Without a handler of Python's, the signal would not be written there.
+    # Python writes a signal to the wakeup descriptor only if the signal has a handler.
     signal.signal(signal.SIGCHLD, lambda *_: None)
-    # Pages that the garbage collector writes to could not be shared.
+    # The garbage collector would write to the pages of all objects, and nodes could not share them any more.
     gc.freeze()
-    # The one other thread is that of Arrow's allocator, which knows of forks. From 3.12 on, Python warns of any.
+    # The only other thread is that of Arrow's allocator, which can be forked. From 3.12 on, Python warns of any thread.
     warnings.filterwarnings("ignore", "This process .* is multi-threaded", DeprecationWarning)
     server = os.getpid()
     while True:
@@ -281,10 +271,10 @@ def serve(connection: socket.socket) -> list[str]:
             gc.freeze()
             continue
         if (pid := os.fork()) == 0:
-            # By force: without router and simulations there is nothing that a coordinator could wait for.
+            # The node is killed without notice: the coordinator could not wait for router and simulations anyway.
             die_with_parent(server)
-            for each in (connection, awake, wake):
-                each.close()
+            for end in (connection, awake, wake):
+                end.close()
             request = json.loads(packet)
             os.environ.update(request["environment"])
             _become_node(logs[0], request["core"])
@@ -301,13 +291,13 @@ def _report_ends(connection: socket.socket) -> None:
 
 
 def _send(connection: socket.socket, **message: int) -> None:
-    # A launcher that is gone has closed its end, which is seen at the next request.
+    # A launcher that is gone has closed its end, which `serve` sees when it reads next.
     with contextlib.suppress(OSError):
         connection.send(json.dumps(message).encode())
 
 
 def _become_node(log: int, core: int | None) -> None:
-    """What a forked process does before it is a node like one that was started by itself."""
+    """Give a forked process the signals, session, core and streams of a process that was started by itself."""
     signal.set_wakeup_fd(-1)
     signal.signal(signal.SIGCHLD, signal.SIG_DFL)
     os.setsid()
@@ -319,18 +309,18 @@ def _become_node(log: int, core: int | None) -> None:
 
 
 def main() -> None:
-    """Serve the connection whose file descriptor the command line names."""
+    """Serve the connection whose descriptor is the only argument of the command line."""
     _run(socket.socket(fileno=int(sys.argv[1])))
 
 
 def _run(connection: socket.socket) -> None:
-    """Serve a connection, and be a node where one is forked."""
+    """Serve a connection; in a forked process, run the node."""
     _show("throwcollect.runtimes.node_server", str(connection.fileno()))
     _import_libraries()
     arguments = serve(connection)
     _show("throwcollect", *arguments)
     sys.argv[1:] = arguments
-    # A command that was forked for this has it, and would not import it once more.
+    # If this process was forked off a command, the module is there already, and `runpy` would warn.
     sys.modules.pop("throwcollect.__main__", None)
     try:
         runpy.run_module("throwcollect", run_name="__main__", alter_sys=True)
@@ -341,20 +331,20 @@ def _run(connection: socket.socket) -> None:
 
 
 def _show(module: str, *arguments: str) -> None:
-    """Have `ps` show what this process does, and not what the one was started for that it was forked off."""
+    """Let `ps` show the command of this process, and not that of the process off which it was forked."""
     import setproctitle
 
     setproctitle.setproctitle(" ".join([sys.executable, "-m", module, *arguments]))
 
 
 def _leave(code: int) -> NoReturn:
-    """End this process without taking the interpreter apart: it writes to all memory that is shared with other nodes.
+    """End this process without the usual end of the interpreter, which writes to all memory that nodes share.
 
-    Nodes have closed their files and sessions before. What Zenoh leaves of such a process in /dev/shm is removed by the
-    next one that ends as usual, which is the launcher. Libraries of genuine ROS 2 tidy up behind Python, so theirs end
-    in the usual way.
+    Nodes have closed their files and sessions before. Zenoh leaves files of such a process in /dev/shm, which the next
+    process removes that ends as usual: the launcher. Nodes on genuine ROS 2 do not end in this way, because its
+    libraries clean up after the end of the interpreter.
     """
-    # As `multiprocessing` ends what it forks.
+    # `multiprocessing` ends its forked processes in the same way.
     atexit._run_exitfuncs()
     for stream in (sys.stdout, sys.stderr):
         with contextlib.suppress(OSError, ValueError):
@@ -363,7 +353,7 @@ def _leave(code: int) -> NoReturn:
 
 
 def _import_libraries() -> None:
-    """Import what nodes import, and make what all of them need; what is missing is told by the node that needs it."""
+    """Import the libraries of nodes; if one is missing, the node that needs it reports the error."""
     for module in _LIBRARIES:
         with contextlib.suppress(ImportError, ThrowcollectError):
             importlib.import_module(module)
@@ -371,9 +361,9 @@ def _import_libraries() -> None:
 
 
 def _prepare_for(values: Mapping[str, Any]) -> None:
-    """Make what all nodes of a configuration make, and keep; what is wrong is told by the node that needs it.
+    """Compute and cache what all nodes of a configuration need; if that fails, a node reports the error.
 
-    That are the digest of what computes, types and layouts of messages, and a model of the robot; the task and the
+    This is the digest of the build, the types and layouts of messages, and a model of the robot. The task and the
     physics engine are only imported.
     """
     from throwcollect.build import build_digest

@@ -1,4 +1,4 @@
-"""Nodes that are started, watched and ended, wherever they live: what all runtimes with nodes have in common."""
+"""The interface of hosts that start, watch and end nodes, and what all of these hosts have in common."""
 
 from __future__ import annotations
 
@@ -14,18 +14,17 @@ from throwcollect.config.run import RunConfig
 from throwcollect.ros.connection import Connection
 from throwcollect.ros.middleware import Middleware
 from throwcollect.runtimes.node_logs import NodeLogs
-from throwcollect.runtimes.ports import format_endpoint
 from throwcollect.runtimes.runtime import Place
 
 if TYPE_CHECKING:
-    # Whoever scales a run needs names of nodes, and not what takes long to import.
+    # Modules that need only the names of nodes should not wait for these imports.
     from throwcollect.config.schema import Config
     from throwcollect.dataset.summary import Info
 
 ROUTER = "router"
 COORDINATOR = "coordinator"
 LAUNCHER = "launcher"
-"""Lives beside the nodes, never in a container."""
+"""Name of the launcher's node; the launcher never runs in a container."""
 
 
 def simulation_name(index: int) -> str:
@@ -34,12 +33,12 @@ def simulation_name(index: int) -> str:
 
 
 def simulation_name_of(host: str) -> str:
-    """Name of the one simulation on a host, as in a container."""
+    """Name of the only simulation on a host, as in a container."""
     return "sim_" + re.sub(r"[^a-z0-9_]", "_", host.lower())
 
 
 class Role(Enum):
-    """What the end of a node means to its run."""
+    """The consequence that the end of a node has for the run."""
 
     VITAL = "the run ends if the node cannot be kept alive"
     EXPENDABLE = "the run goes on as long as one of these can be kept alive"
@@ -51,11 +50,11 @@ class NodeSpec:
     """A node that a run is to have.
 
     Attributes:
-        name: Its name.
+        name: Name of the node.
         arguments: Arguments of the `throwcollect` command.
-        role: What its end means to the run.
-        core: Processor core that it is bound to; None for any.
-        rest_s: Shortest time after which it is started again when it has ended [s].
+        role: The consequence that the end of the node has.
+        core: Processor core to which the node is bound; None for any.
+        rest_s: Shortest time between the end of the node and its next start [s].
     """
 
     name: str
@@ -70,10 +69,10 @@ class NodeExit:
     """A node that ended.
 
     Attributes:
-        name: Its name.
-        code: Exit code; None when it never ran.
-        reason: How it ended, in words, such as ``exit code 3`` or ``ended by SIGKILL``.
-        log: Last lines of what it printed.
+        name: Name of the node.
+        code: Exit code; None if the node never ran.
+        reason: How the node ended, in words, such as ``exit code 3`` or ``ended by SIGKILL``.
+        log: Last lines that the node printed.
     """
 
     name: str
@@ -83,17 +82,17 @@ class NodeExit:
 
 
 class NodeHost(ABC):
-    """A place where the nodes of one run live: it starts, watches and ends them.
+    """Starts, watches and ends the nodes of one run.
 
-    What to do about a node that ended, froze or hangs is not decided here, but by the `supervisor` for all places.
+    A host does not decide what to do about a node that ended, froze or hangs: the `supervisor` does, for all hosts.
 
     Attributes:
         data: Directory of the dataset, as nodes see it.
         listen: Zenoh endpoint at which the router is to listen.
-        cleared: Whether nothing of the run is left but the dataset, once it is closed.
-        place: The run.
-        config: Its configuration.
-        logs: The log files of its nodes.
+        cleared: As for `runtime.Host`.
+        place: The place of the run.
+        config: The configuration of the run.
+        logs: The log files of the nodes.
     """
 
     data: str
@@ -105,20 +104,16 @@ class NodeHost(ABC):
 
     @property
     def connection(self) -> Connection | None:
-        """How this process joins the run; None while there is no way to its router."""
-        if (address := self.router_address()) is None:
+        """The connection with which this process joins the run; None while it cannot reach the router."""
+        if (endpoint := self.endpoint) is None:
             return None
-        return self.connection_at(format_endpoint(self.listen.partition("/")[0], *address))
-
-    def connection_at(self, endpoint: str) -> Connection:
-        """The way into the run over an endpoint of its router."""
         return Connection(endpoint, self.place.key, self.config.run.domain_id, self.place.middleware)
 
     def open(self) -> tuple[str, ...]:
-        """Make what the nodes need.
+        """Make what the nodes need, such as a network.
 
         Returns:
-            Names of the nodes that a launcher that died has left, and that run on as nodes of this one.
+            Names of the nodes of a launcher that died, which run on as nodes of this launcher.
 
         Raises:
             WorkerError: If that is impossible.
@@ -126,7 +121,7 @@ class NodeHost(ABC):
         return ()
 
     def info(self) -> Info:
-        """What the finished dataset holds.
+        """Read the summary of the finished dataset.
 
         Raises:
             DatasetError: If it is not finished.
@@ -135,43 +130,41 @@ class NodeHost(ABC):
 
         return info(self.place.directory)
 
+    @property
     @abstractmethod
-    def router_address(self) -> tuple[str, int] | None:
-        """Host and port at which this process reaches the router; None while there is no way to it."""
+    def endpoint(self) -> str | None:
+        """Zenoh endpoint at which this process reaches the router; None while it cannot."""
 
     @abstractmethod
     def start(self, node: NodeSpec) -> None:
-        """Start a node, or begin to; if it fails later, that is one of `exits`.
-
-        Args:
-            node: The node; none of its name runs.
+        """Start a node, of whose name none runs, or begin to; if the start fails later, `exits` reports it.
 
         Raises:
-            WorkerError: If it cannot be started.
+            WorkerError: If the node cannot be started.
         """
 
     @abstractmethod
     def handle(self, name: str) -> str | None:
-        """Process or container id of a running node; None if it does not run (yet)."""
+        """Process or container id of a running node; None if the node does not run (yet)."""
 
     @abstractmethod
     def running(self) -> tuple[str, ...]:
-        """Names of the nodes whose end has not been reported yet."""
+        """Names of the nodes whose end `exits` has not reported yet."""
 
     @abstractmethod
     def exits(self) -> list[NodeExit]:
-        """Nodes that ended since the last call.
+        """The nodes that ended since the last call.
 
         Raises:
-            WorkerError: If nothing can be known of the nodes any more.
+            WorkerError: If the host cannot tell the state of the nodes any more.
         """
 
     @abstractmethod
     def frozen(self) -> frozenset[str]:
-        """Nodes that run but were stopped in their tracks: paused, or by SIGSTOP."""
+        """Names of the nodes that are paused or were stopped by SIGSTOP."""
 
     def ready(self, name: str) -> bool:
-        """Whether a simulation of this name has ever been ready for trials."""
+        """Whether a simulation has ever been ready for trials."""
         return self.logs.said_ready(name)
 
     def log_tail(self, name: str) -> str:
@@ -180,42 +173,34 @@ class NodeHost(ABC):
 
     @abstractmethod
     def signal(self, name: str, number: signal.Signals) -> None:
-        """Send a signal to a node; one that has ended is left alone."""
+        """Send a signal to a node, unless it has ended."""
 
     @abstractmethod
     def stop(self, names: Sequence[str], *, grace_s: float = 3.0) -> None:
-        """End nodes and forget them: politely, then after `grace_s` [s] by force."""
+        """End nodes and forget them: with SIGTERM, then after `grace_s` [s] by force."""
 
     @abstractmethod
     def close(self) -> None:
-        """End everything that still runs, and remove all that was made for the run but the dataset."""
+        """See `runtime.Host.close`."""
 
 
 def protocol_of(run: RunConfig, middleware: Middleware) -> str:
-    """What the router of a run speaks: TLS, which nobody else has the key to, unless the run is open or on Fast DDS."""
+    """Protocol of a run's router: TLS, for which others have no key, unless the run is open or on Fast DDS."""
     if run.open:
         return "tcp"
     return "udp" if middleware.is_fast_dds else "tls"
 
 
 def node_environment(connection: Connection) -> Mapping[str, str]:
-    """Environment variables of a node of a run.
-
-    Args:
-        connection: The way into the run's ROS graph.
-    """
+    """Environment variables of a node that joins a run over this connection."""
     return {**connection.environment(), **library_environment(connection.middleware)}
 
 
 def library_environment(middleware: Middleware) -> Mapping[str, str]:
-    """Environment variables that have to hold when a node imports its libraries.
-
-    Args:
-        middleware: What carries the messages of the run.
-    """
+    """Environment variables that have to be set before a node imports its libraries."""
     return {
         **middleware.environment(),
-        # One process per core is the parallelism here; threads of numerical libraries would only fight it.
+        # One simulation per core fills the machine; threads of numerical libraries would only slow it down.
         "OMP_NUM_THREADS": "1",
         "OPENBLAS_NUM_THREADS": "1",
     }

@@ -1,4 +1,4 @@
-"""Ports that a router listens at."""
+"""Ports and addresses at which a router listens."""
 
 from __future__ import annotations
 
@@ -11,18 +11,14 @@ from throwcollect.ros.endpoint import split_address
 
 LOOPBACK = "127.0.0.1"
 _ELSEWHERE = ("192.0.2.1", 9)
-"""An address for documentation (RFC 5737), which is nobody's."""
+"""An address that is reserved for documentation (RFC 5737), so no machine has it."""
 
 
 def reserve_port(run: RunConfig) -> socket.socket:
-    """A socket that keeps the port of a run's router until it is closed.
-
-    Args:
-        run: Says which: a port of the loopback interface, of which 0 takes a free one, or that at which other machines
-            join.
+    """Reserve the port of a run's router until the socket is closed: `run.listen`, or one of the loopback interface.
 
     Raises:
-        ConfigError: If the port is taken, or the address is none of this machine.
+        ConfigError: If the port is taken, or this machine does not have the address.
     """
     if run.listen is None:
         return _bind(LOOPBACK, run.router_port, "run.router_port", hint="--set run.router_port=0 takes a free one")
@@ -60,7 +56,7 @@ def reach_from_elsewhere(host: str) -> str:
         return host
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         try:
-            # Nothing is sent; the system only says from which address it would be.
+            # For a datagram socket this sends nothing; the system only chooses the address from which it would send.
             probe.connect(_ELSEWHERE)
         except OSError:
             return socket.gethostname()

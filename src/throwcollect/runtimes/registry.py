@@ -1,4 +1,4 @@
-"""Runtimes by name: members of the family ``runtimes``, which other packages may add to."""
+"""Finds runtimes by name: they are members of the family ``runtimes``, to which other packages may add some."""
 
 from __future__ import annotations
 
@@ -9,15 +9,15 @@ from throwcollect.runtimes.runtime import Runtime
 from throwcollect.wording import join_names
 
 AUTOMATIC = ("docker", "local")
-"""What ``auto`` tries, in this order."""
+"""The runtimes that ``auto`` tries, in this order."""
 
 
 def get_runtime(name: str) -> Runtime:
-    """The runtime of a name.
+    """Make the runtime of this name.
 
     Raises:
-        ConfigError: If there is none, such as when a run was started with a package that has gone since.
-        MissingExtraError: If it needs packages that are not installed.
+        ConfigError: If there is none, for example because the package that added it was removed.
+        MissingExtraError: If the runtime needs a package that is not installed.
     """
     if name not in names_of("runtimes"):
         problem = Problem(f"there is no runtime {name}", key="run.runtime")

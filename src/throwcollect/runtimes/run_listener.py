@@ -1,4 +1,4 @@
-"""Hears how far a run has come, for its launcher and for everybody who follows it."""
+"""Receives the progress reports of a run, for its launcher and for everybody who follows the run."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ from throwcollect.ros.msg import String
 from throwcollect.ros.names import make_own_name
 
 _SILENT_S = 8.0
-"""Reports come several times a second; after a silence like this the connection is made anew, should it be broken."""
+"""Reports come several times a second; after this silence the connection may be broken, so it is made anew."""
 
 
 class RunListener:
-    """A node that hears the coordinator, and moves along when the router gets another address.
+    """A node that receives the coordinator's reports, and reconnects when the router gets another address.
 
     Use it as a context manager. It has a ROS context of its own, so that a process may listen to several runs.
 
     Args:
-        on_progress: Called with every report, within `spin`.
-        name: Name of the node; one that no other node has, and hidden, by default.
-        on_connect: Called with the node whenever it is made anew.
+        on_progress: Is called with every report, within `spin`.
+        name: Name of the node; by default a unique and hidden one.
+        on_connect: Is called with the node whenever that is made anew.
     """
 
     def __init__(
@@ -59,7 +59,7 @@ class RunListener:
         """Wait for a report, or for the router.
 
         Args:
-            connection: The way into the run by now; None while its router has no address.
+            connection: The present way into the run; None while its router has no address.
             seconds: Longest time [s].
 
         Raises:
@@ -82,7 +82,7 @@ class RunListener:
         except ConfigError:
             raise
         except ThrowcollectError:
-            # It answered a moment ago, so it has just ended; the next attempt finds its successor.
+            # The router answered a moment ago, so it has just ended; the next attempt finds the next router.
             return
         self._node, self._connection = ros.Node(self._name, context=self._context), connection
         self._executor = ros.SingleThreadedExecutor(context=self._context)

@@ -1,6 +1,6 @@
-"""What a runtime is.
+"""The interface of runtimes, and the values that runs and runtimes exchange.
 
-A runtime says whether it can be had on this machine, and gives a run its host: what has the trials simulated, from the
+A runtime tells whether it can be used on this machine, and gives each run a host, which simulates the trials from the
 start of the run to its end. Hosts that start nodes derive from `nodes.NodeHost`. `registry` finds runtimes by name.
 """
 
@@ -18,7 +18,7 @@ from throwcollect.run_key import RunKey
 from throwcollect.wording import command
 
 if TYPE_CHECKING:
-    # Records of runs need what is below, and not what takes long to import.
+    # Records of runs import this module, and should not wait for these.
     from throwcollect.config.schema import Config
     from throwcollect.coordinator.progress import Progress
     from throwcollect.dataset.summary import Info
@@ -29,15 +29,15 @@ Status = Literal["starting", "running", "frozen", "restarting", "lost"]
 
 @dataclass(frozen=True)
 class NodeState:
-    """What is known of one node.
+    """The state of one node.
 
     Attributes:
-        name: Its name.
-        status: ``starting`` until a simulation is ready, ``running``, ``frozen``, ``restarting`` (it ended and waits
-            for its next start), or ``lost`` for good.
-        restarts: How often it was started again.
-        handle: Process or container id; None if it does not run.
-        last_end: How it ended last, in words; None if it never did.
+        name: Name of the node.
+        status: ``starting`` until a simulation is ready, ``running``, ``frozen``, ``restarting`` (the node ended and
+            waits for its next start), or ``lost`` for good.
+        restarts: Number of times that the node was started again.
+        handle: Process or container id; None if the node does not run.
+        last_end: How the node ended last, in words; None if it never did.
     """
 
     name: str
@@ -49,12 +49,12 @@ class NodeState:
 
 @dataclass(frozen=True)
 class HeldNode:
-    """A node of a run that a runtime holds.
+    """A node of a run, as its runtime describes it.
 
     Attributes:
         name: Name of the node.
-        status: The runtime's word for its state, such as ``running``, ``paused`` or ``exited``.
-        handle: What it is known by there.
+        status: The runtime's word for the state, such as ``running``, ``paused`` or ``exited``.
+        handle: Id of the node in the runtime.
     """
 
     name: str
@@ -64,13 +64,13 @@ class HeldNode:
 
 @dataclass(frozen=True)
 class HeldRun:
-    """A run of which a runtime holds something, whoever started it.
+    """A run of which a runtime holds something; any user of the engine may have started it.
 
     Attributes:
-        run_id: Its id.
+        run_id: Id of the run.
         source: Absolute path of the dataset's directory, or name of the volume that holds it.
-        version: Version of throwcollect that started it.
-        nodes: Its nodes, by name.
+        version: Version of throwcollect that started the run.
+        nodes: Nodes of the run, sorted by name.
     """
 
     run_id: str
@@ -81,17 +81,17 @@ class HeldRun:
 
 @dataclass(frozen=True)
 class Place:
-    """Where a run lies on this machine, and how its nodes talk.
+    """The directories of a run on this machine, and how its nodes communicate.
 
     Attributes:
         run: Id of the run.
-        directory: Directory of the dataset; if that is in a volume, of the files that it is made from.
+        directory: Directory of the dataset; if the dataset is in a volume, of the files from which it is made.
         volume: Name of the volume that holds the dataset; None if a directory does.
-        logs: Directory of its logs.
+        logs: Directory of the logs.
         simulations: Number of simulations at the start.
-        middleware: What carries the messages of its nodes.
-        key: What its router lets nobody in without.
-        collects: Whether it collects a dataset; if not, its simulations are there for clients, until it is stopped.
+        middleware: The middleware that carries the messages of the nodes.
+        key: The key that the router asks for.
+        collects: Whether the run collects a dataset; if not, its simulations serve clients until it is stopped.
     """
 
     run: str
@@ -105,23 +105,23 @@ class Place:
 
     @property
     def dataset(self) -> str:
-        """Where the dataset is, in words."""
+        """The place of the dataset, in words."""
         return str(self.directory) if self.volume is None else f"volume {self.volume}, {self.run}"
 
     @property
     def way_on(self) -> str | None:
-        """The command that goes on with the dataset once the run is over; None if there is none, as for a volume."""
+        """The command that goes on with the dataset once the run is over; None where no command can, as in a volume."""
         return command("resume", self.directory) if self.collects and not self.volume else None
 
 
 @dataclass(frozen=True)
 class Check:
-    """One finding about the machine.
+    """One finding of `doctor` about the machine.
 
     Attributes:
-        name: What was looked at.
+        name: Name of the check.
         status: `ok`, `note` (collections run, with a restriction), or `problem` (they do not).
-        finding: What was found and what follows from it.
+        finding: The finding, and what follows from it.
     """
 
     name: str
@@ -130,44 +130,44 @@ class Check:
 
 
 class Session(Protocol):
-    """A run, as its host sees it: whom to tell what goes on, and who asks for what."""
+    """The launcher, as the host of the run sees it: it takes reports, and tells when the user wants to stop."""
 
     def say(self, line: str) -> None:
-        """Tell whoever looks on what is good to know."""
+        """Show the user a line of information."""
 
     def warn(self, line: str) -> None:
-        """Tell whoever looks on what went wrong."""
+        """Show the user a warning."""
 
     def update(self, progress: Progress) -> None:
-        """Tell how far the collection has come."""
+        """Show the user a progress report."""
 
     def interruptions(self) -> int:
-        """How often the user has asked to stop: at first running trials are finished, then no more."""
+        """How often the user has asked to stop: the first time, running trials are still finished."""
 
     def event(self, event: RunEvent, *, simulations: int | None = None) -> None:
-        """Write down something that happened to the run."""
+        """Write an event of the run."""
 
     def take_over(self, states: Sequence[NodeState]) -> None:
-        """Take over nodes of which a launcher before this one has written."""
+        """Take over nodes whose events an earlier launcher has written."""
 
     def nodes(self, states: Sequence[NodeState], *, endpoint: str | None, simulations: int) -> None:
-        """Write down how the nodes are by now, where the router is, and how many simulations are wanted."""
+        """Write the states of the nodes, the endpoint of the router, and how many simulations there are to be."""
 
 
 class Host(Protocol):
-    """What has the trials of one run simulated.
+    """Simulates the trials of one run.
 
     Attributes:
-        cleared: Whether nothing of the run is left but the dataset, once it is closed.
+        cleared: Whether, after `close`, nothing of the run exists any more but its dataset.
     """
 
     cleared: bool
 
     def collect(self, session: Session) -> Info | None:
-        """Collect until every trial has ended, finish the dataset, and close; or keep simulations until told to stop.
+        """Collect until every trial has ended, finish the dataset, and close; a session goes on until an interruption.
 
         Returns:
-            What the dataset holds; None for a run that collects none.
+            The summary of the dataset; None for a run that collects none.
 
         Raises:
             WorkerError: If nodes cannot be started or kept alive.
@@ -176,14 +176,14 @@ class Host(Protocol):
         """
 
     def close(self) -> None:
-        """End everything that still runs, and remove all that was made for the run but the dataset."""
+        """End everything that still runs, and remove everything that was made for the run but the dataset."""
 
 
 class Runtime(ABC):
-    """A way to have trials simulated; by default, one of which nothing is left when its launcher has ended.
+    """A way to simulate trials; the defaults hold for one whose nodes end with their launcher.
 
     Attributes:
-        handle: What a node is known by, as a noun.
+        handle: The kind of id that its nodes have, as a noun.
         outlives_launcher: Whether nodes go on without the process that started them.
         has_volumes: Whether the dataset may be in the volume that ``containers.volume`` names.
         can_be_scaled: Whether the number of simulations can be changed while a run lives.
@@ -196,31 +196,19 @@ class Runtime(ABC):
 
     @abstractmethod
     def in_words(self, config: Config) -> str:
-        """Where trials are simulated, as in ``runtime: local processes``."""
+        """The runtime in words, as in ``runtime: local processes``."""
 
     @abstractmethod
     def host(self, place: Place, config: Config, *, warn: Callable[[str], None]) -> Host:
-        """What is to have the trials of a run simulated, or does so already; nothing is started yet.
-
-        Args:
-            place: The run.
-            config: Its configuration.
-            warn: Is told in one line when something keeps everybody waiting.
+        """Make the host of a run, which starts nothing yet; `warn` is told in one line of long waits.
 
         Raises:
             ConfigError: If the router's port is taken, or something that the configuration asks for is not there.
-            WorkerError: If there is no such runtime on this machine.
+            WorkerError: If this machine does not have the runtime.
         """
 
     def begin(self, config: Config, middleware: Middleware) -> None:
-        """Begin what takes long and can be begun as soon as the configuration is known, before there is a plan.
-
-        Its end is waited for by the host, and `close` ends what no host needed.
-
-        Args:
-            config: The configuration.
-            middleware: What this process can join.
-        """
+        """Begin whatever takes long and needs no plan, for a host to use; this process can join the middleware."""
         return
 
     def close(self) -> None:
@@ -228,25 +216,25 @@ class Runtime(ABC):
         return
 
     def is_absent(self) -> bool:
-        """Whether it can be seen at a glance that this machine does not have it."""
+        """Whether a quick look shows that this machine does not have the runtime."""
         return False
 
     def prepare(
         self, config: Config, middleware: Middleware, *, say: Callable[[str], None], warn: Callable[[str], None]
     ) -> Middleware:
-        """Make sure that a run can be had here, however long that takes.
+        """Make sure that this machine can do a run, even if that takes minutes.
 
         Args:
-            config: Its configuration.
-            middleware: What this process can join.
+            config: The configuration of the run.
+            middleware: The middleware that this process can join.
             say: Is told in one line before anything that takes long.
-            warn: Is told in one line of what may not be as it should.
+            warn: Is told in one line of what may be wrong.
 
         Returns:
-            What will carry the messages of its nodes.
+            The middleware that will carry the messages of the nodes.
 
         Raises:
-            WorkerError: If it cannot be had.
+            WorkerError: If the runtime cannot be used.
             ConfigError: If the configuration asks for something that is not there.
             MissingExtraError: If simulations run on this Python, and it lacks the physics engine.
         """
@@ -254,34 +242,34 @@ class Runtime(ABC):
         return middleware
 
     def check(self) -> Check | None:
-        """What `doctor` says of it; None if there is nothing to say."""
+        """Examine the runtime for `doctor`; None if there is nothing to report."""
         return None
 
     def simulations(self, config: Config) -> int:
-        """Number of simulations that a run begins with."""
+        """Number of simulations with which a run begins."""
         return config.run.simulations
 
     def find_held(self) -> list[HeldRun]:
-        """Runs of which there is something here; none if that cannot be found out quickly."""
+        """Find the runs of which the runtime holds something; none if it does not answer quickly."""
         return []
 
     def is_left(self, run: str) -> bool:
-        """Whether nodes of a run without a launcher are left here.
+        """Whether the runtime holds nodes of a run whose launcher is gone.
 
         Raises:
-            WorkerError: If that cannot be found out in time, and they may be.
+            WorkerError: If the runtime does not answer in time.
         """
         return False
 
     def remove(self, run: str, *, volumes: bool) -> list[str]:
-        """Remove what is left of a run here.
+        """Remove whatever the runtime holds of a run.
 
         Args:
-            run: Its id.
+            run: Id of the run.
             volumes: Whether a volume that holds the dataset is removed, too.
 
         Returns:
-            Names of what was removed.
+            Names of the containers, networks and volumes that were removed.
 
         Raises:
             WorkerError: If something could not be removed, after everything else was.

@@ -1,4 +1,4 @@
-"""Keeps the nodes of a roster alive, wherever they live, until the one that does the work has come to its end."""
+"""Keeps the nodes of a run alive, on any host, until the coordinator has come to its end."""
 
 from __future__ import annotations
 
@@ -17,21 +17,19 @@ from throwcollect.wording import format_count
 _FIRST_BACKOFF_S = 0.2
 _LONGEST_BACKOFF_S = 10.0
 _CLOSING_S = 7.0
-"""Time that a coordinator gets to write its files once the running trials have ended or were dropped."""
+"""Time for the coordinator to write its files once the running trials have ended or were dropped."""
 _FROZEN_S = 3.0
-"""Somebody may stop a node to look at it; after this time it counts as lost."""
+"""Somebody may stop a node to look at it; after this time the node counts as lost."""
 
 _RESTARTS_BEFORE_READY = 1
-"""A node that has never worked will hardly do so at the tenth attempt."""
+"""A simulation that was never ready is started again only this often, because further attempts rarely help."""
 
 
 class Supervisor:
-    """Keeps the nodes of one run alive; use it as a context manager, so that none is left behind.
+    """Keeps the nodes of one run alive; use it as a context manager, which closes the host and so ends all nodes.
 
     Args:
-        host: Where the nodes live; closed at the end.
-        run: How to run.
-        roster: The nodes that there are to be, in the order in which they are started; at most one is the main one.
+        roster: The nodes that the run is to have, in the order in which they are started; at most one is the main one.
     """
 
     def __init__(self, host: NodeHost, run: RunConfig, roster: Sequence[NodeSpec]) -> None:
@@ -56,10 +54,7 @@ class Supervisor:
         self.host.close()
 
     def start(self, *, found: Collection[str] = ()) -> None:
-        """Start all nodes.
-
-        Args:
-            found: Nodes that run already, of a launcher that died.
+        """Start all nodes, except those that were found running, as nodes of a launcher that died.
 
         Raises:
             WorkerError: If a node cannot be started.
@@ -70,7 +65,7 @@ class Supervisor:
                 self._start(name)
 
     def change(self, roster: Sequence[NodeSpec]) -> None:
-        """Have other nodes from now on: start those that are new, and end those that are no more.
+        """Change the roster: start the nodes that are new, and end those that are not in it any more.
 
         Raises:
             WorkerError: If a node cannot be started.
@@ -89,21 +84,21 @@ class Supervisor:
                 self._start(name)
 
     def poll(self) -> tuple[NodeExit | None, list[str]]:
-        """Look after the nodes: restart what died.
+        """Look after the nodes, and start again those that ended.
 
         Returns:
-            How the main node ended, None while it runs; and what happened to other nodes since the last call.
+            How the main node ended (None while it runs), and a line for each event of other nodes since the last call.
 
         Raises:
             WorkerError: If no expendable node was ready in time, or a vital one or all expendable ones are lost for
-                good; with the evidence.
+                good.
         """
         end = None
         news = self._end_frozen()
         self._ready |= {name for name in self._expendables if name not in self._ready and self.host.ready(name)}
         for node in self.host.exits():
             if node.name not in self._roster:
-                # It was taken over from a launcher that had already decided to end it.
+                # An earlier launcher, from which the node was taken over, had already removed it from the roster.
                 continue
             self._last_end[node.name] = node.reason
             is_main = self._roster[node.name].role is Role.MAIN
@@ -127,23 +122,23 @@ class Supervisor:
         return [self._state(name) for name in self._roster]
 
     def replace(self, hung: Iterable[str]) -> None:
-        """End nodes by force that do not answer any more, so that they are started again.
+        """Kill nodes that do not answer any more, so that they are started again.
 
         Args:
-            hung: Names of all of which that is known; each is ended once until it is missing here again.
+            hung: Names of all nodes that hang now; a node that was named in the last call is not killed once more.
         """
         known, self._hung = self._hung, frozenset(hung)
         for name in self._hung - known:
             self.host.signal(name, signal.SIGKILL)
 
     def drain(self, *, hurry: Callable[[], bool] = lambda: False) -> NodeExit | None:
-        """Let the main node finish what runs and close its files.
+        """Let the main node finish the running trials and close its files.
 
         Args:
-            hurry: Asked again and again whether to end at once.
+            hurry: Is asked again and again whether to end at once.
 
         Returns:
-            How it ended; None when it had to be ended by force, or was about to be started again.
+            How the main node ended; None if it had to be ended by force, or was about to be started again.
         """
         (main,) = self._list_names(Role.MAIN)
         if main in self._due:
@@ -159,7 +154,7 @@ class Supervisor:
         return None
 
     def dismiss(self) -> None:
-        """Ask nodes to end that the run can do without, and do not wait for it."""
+        """Ask the expendable nodes to end, and do not wait for that."""
         for name in self._expendables:
             self.host.signal(name, signal.SIGTERM)
 
@@ -187,7 +182,7 @@ class Supervisor:
         return NodeState(name, status, self._restarts.get(name, 0), handle, self._last_end.get(name))
 
     def _end_frozen(self) -> list[str]:
-        """End nodes by force that have been frozen for long."""
+        """Kill nodes that have been frozen for long; the result has a line for each of them."""
         now, news = time.monotonic(), []
         frozen = self.host.frozen()
         self._frozen_since = {name: self._frozen_since.get(name, now) for name in frozen}
@@ -200,7 +195,7 @@ class Supervisor:
         return news
 
     def _schedule_restart(self, node: NodeExit) -> bool:
-        """Whether a node that ended will be started again."""
+        """Plan the next start of a node that ended, or give the node up; whether it will be started again."""
         count = self._restarts.get(node.name, 0)
         worked = self._roster[node.name].role is not Role.EXPENDABLE or node.name in self._ready
         if count >= (self._run.restarts if worked else min(_RESTARTS_BEFORE_READY, self._run.restarts)):
@@ -212,6 +207,11 @@ class Supervisor:
         return True
 
     def _check_hope(self) -> None:
+        """Raise an error if the run cannot go on: see `poll`.
+
+        Raises:
+            WorkerError: If so.
+        """
         hint = "throwcollect logs shows what the nodes said"
         names = self._expendables
         vital = next((self._given_up[name] for name in self._list_names(Role.VITAL) if name in self._given_up), None)
@@ -226,7 +226,7 @@ class Supervisor:
                 hint=hint,
             )
         if not self._ready and not any(map(self.host.handle, names)):
-            # None of them runs yet: it is the engine that takes its time, and it has a patience of its own.
+            # No container of a simulation runs yet, so the engine is slow. The host has a time limit for the engine.
             self._start_deadline = time.monotonic() + self._run.start_timeout_s
         if names and not self._ready and time.monotonic() > self._start_deadline:
             raise WorkerError(
@@ -237,7 +237,7 @@ class Supervisor:
 
 
 def _killed(node: NodeExit) -> bool:
-    """Whether a node was ended from outside, and not by itself: its exit code is no number that it could return."""
+    """Whether a signal ended a node: no node itself returns such an exit code."""
     return node.code is not None and (node.code < 0 or node.code > Interrupted.exit_code)
 
 

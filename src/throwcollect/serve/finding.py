@@ -22,8 +22,7 @@ from pydantic import TypeAdapter
 
 from throwcollect.errors import DatasetError, WorkerError
 from throwcollect.files import open_log, write_secret
-from throwcollect.runs.lock_file import is_locked
-from throwcollect.runs.state_directory import state_directory
+from throwcollect.runs.state_directory import is_locked, state_directory
 
 _FILE = "serve.json"
 _LOCK = "serve.lock"

@@ -19,7 +19,7 @@ from throwcollect.runs.launcher import launch
 from throwcollect.runs.record import Record
 from throwcollect.runs.records import OpenRun, Records
 from throwcollect.runs.state_directory import STATE_VARIABLE
-from throwcollect.runtimes.docker import containers as docker_containers
+from throwcollect.runtimes.docker import clock as docker_clock
 from throwcollect.runtimes.docker import watch as docker_watch
 from throwcollect.runtimes.docker.options import NODE_LABEL, RUN_LABEL
 from throwcollect.runtimes.nodes import COORDINATOR
@@ -48,7 +48,7 @@ def engine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Engine]:
     monkeypatch.setenv("DOCKER_HOST", f"unix://{tmp_path}/engine.sock")
     monkeypatch.setenv(STATE_VARIABLE, str(tmp_path / "state"))
     monkeypatch.setattr(docker_watch, "_LOOK_EVERY_S", 0.1)
-    monkeypatch.setattr(docker_containers, "SILENCE_S", 1.0)
+    monkeypatch.setattr(docker_clock, "SILENCE_S", 1.0)
     with engine_at(tmp_path / "engine.sock") as engine:
         yield engine
 
@@ -111,7 +111,7 @@ def test_a_launcher_that_gives_up_says_that_containers_are_left(
 def test_a_launcher_that_gets_no_answer_at_all_leaves_the_record_of_what_was_there(
     engine: Engine, run: OpenRun, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(docker_containers, "SILENCE_S", 0.1)
+    monkeypatch.setattr(docker_clock, "SILENCE_S", 0.1)
     run.update(left=True)
     engine.withheld = "."
     with pytest.raises(WorkerError, match="no answer in time"):

@@ -15,6 +15,7 @@ from throwcollect.ros.middleware import Middleware
 from throwcollect.run_key import RunKey
 from throwcollect.runtimes.local import LocalNodes
 from throwcollect.runtimes.nodes import NodeExit, NodeSpec, Role
+from throwcollect.runtimes.ports import split_address
 from throwcollect.runtimes.runtime import Place
 
 
@@ -116,7 +117,7 @@ def test_a_busy_port_is_refused_with_a_way_out(tmp_path: Path) -> None:
 
 
 def test_the_port_is_kept_until_the_router_needs_it(runtime: LocalNodes) -> None:
-    host, port = runtime.router_address()
+    host, port = split_address(runtime.endpoint)
     with socket.socket() as other, pytest.raises(OSError, match="Address already in use"):
         other.bind((host, port))
     runtime.start(node(f"import socket; socket.create_server(('{host}', {port})); print('bound')", "router"))

@@ -39,7 +39,7 @@ Start = Callable[..., ForkedNode]
 def starting(server: NodeServer, log: Path) -> Start:
     def start(*arguments: str, core: int | None = None) -> ForkedNode:
         with log.open("ab") as file:
-            return server.start(arguments, log=file, core=core)
+            return server.start(arguments, log=file, core=core, environment={})
 
     return start
 

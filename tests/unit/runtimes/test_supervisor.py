@@ -53,7 +53,8 @@ class FakeRuntime(NodeHost):
         self.closed = False
         self._ends: list[NodeExit] = []
 
-    def router_address(self) -> tuple[str, int] | None:
+    @property
+    def endpoint(self) -> str | None:
         return None
 
     def start(self, node: NodeSpec) -> None:

@@ -1,4 +1,4 @@
-"""What is in a SIF, the file that Apptainer runs, and in an archive that one is made from."""
+"""Reads and checks what is in a SIF, the file that Apptainer runs, and in an archive from which one is made."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ from throwcollect.version import __version__
 from throwcollect.wording import command
 
 _MAGIC_AT = 32
-"""Before it stands the line by which a shell finds the program for such files."""
+"""The bytes before hold the line with which a shell finds the program for such files."""
 _MAGIC = b"SIF_MAGIC\0"
 _ENTRY_POINT = "throwcollect"
 
 
 @dataclass(frozen=True)
 class SifContents:
-    """Which throwcollect a SIF holds.
+    """The throwcollect in a SIF, according to the labels of the file.
 
     Attributes:
-        version: Its version; None if the file does not say it.
-        sources: Digest of its sources, as `image_sources.digest_sources` makes it; None if the file does not say it.
+        version: Version; None if the file does not tell it.
+        sources: Digest of the sources, see `image_sources.digest_sources`; None if the file does not tell it.
     """
 
     version: str | None
@@ -45,12 +45,12 @@ def is_sif(path: Path) -> bool:
 
 
 def read_contents(sif: Path) -> SifContents:
-    """Find out which throwcollect a SIF holds.
+    """Read the labels of a SIF.
 
     Raises:
         ConfigError: If there is no such file, or it is no SIF.
         WorkerError: If neither Apptainer nor Singularity is installed, or it cannot read the file.
-        DatasetError: If it may not be read.
+        DatasetError: If this user may not read the file.
     """
     try:
         if not is_sif(sif):
@@ -63,19 +63,19 @@ def read_contents(sif: Path) -> SifContents:
         raise unreadable(sif, error) from error
     printed = call(f"{sif}: what it holds cannot be read", "inspect", "--json", str(sif))
     labels = _labels_of(json.loads(printed))
-    told = {name: label if label != UNKNOWN else None for name, label in labels.items()}
-    return SifContents(told.get(VERSION_LABEL), told.get(SOURCES_LABEL))
+    known = {name: label for name, label in labels.items() if label != UNKNOWN}
+    return SifContents(known.get(VERSION_LABEL), known.get(SOURCES_LABEL))
 
 
 def check_sif(sif: Path) -> None:
-    """Make sure that a SIF holds the throwcollect that is installed here: another may collect other bytes.
+    """Make sure that a SIF holds the throwcollect that is installed here, because another may collect other bytes.
 
-    One that does not say what it holds is taken at its word.
+    A SIF without labels is accepted.
 
     Raises:
         ConfigError: If there is no such file, it is no SIF, or holds another version or other sources.
         WorkerError: If neither Apptainer nor Singularity is installed, or it cannot read the file.
-        DatasetError: If it may not be read.
+        DatasetError: If this user may not read the file.
     """
     contents = read_contents(sif)
     hint = f"{command('image', 'sif', '-o', sif)} makes it anew"
@@ -89,8 +89,8 @@ def check_archive(archive: Path) -> None:
     """Make sure that a file is an archive, as `docker save` writes it, with one image of throwcollect.
 
     Raises:
-        ConfigError: If it is not.
-        DatasetError: If it may not be read.
+        ConfigError: If the file is something else.
+        DatasetError: If this user may not read the file.
     """
     hint = "docker save throwcollect:TAG -o FILE writes one"
     try:
@@ -118,7 +118,7 @@ def _read_json(files: tarfile.TarFile, name: str) -> Any:
 
 
 def _labels_of(document: Any) -> dict[str, str]:
-    """Labels in what `inspect --json` prints; none if it has another form."""
+    """Find the labels in the output of `inspect --json`; empty if it has an unknown form."""
     for name in ("data", "attributes", "labels"):
         document = document.get(name) if isinstance(document, dict) else None
     return document if isinstance(document, dict) else {}

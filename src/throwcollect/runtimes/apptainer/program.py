@@ -1,4 +1,4 @@
-"""Apptainer, or Singularity, as a program of this machine."""
+"""Runs the program Apptainer or Singularity of this machine."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ _FATAL = "FATAL:"
 _EVIDENCE_LINES = 15
 _NO_PLACES: Mapping[str, Path] = MappingProxyType({})
 _PATIENCE_S = 10.0
-"""How long what it has started may take to end with it."""
+"""Time that Apptainer and the programs that it has started have to end after SIGTERM."""
 
 
 def find_program() -> str:
-    """Path of Apptainer, or else of Singularity.
+    """Find the path of Apptainer, or else of Singularity.
 
     Raises:
         WorkerError: If neither is installed.
@@ -37,22 +37,22 @@ def find_program() -> str:
 
 
 def call(what: str, *arguments: str, cwd: Path | None = None, places: Mapping[str, Path] = _NO_PLACES) -> str:
-    """What Apptainer prints.
+    """Run Apptainer, and return what it prints.
 
     Args:
-        what: What cannot be done if it fails, for the message.
-        arguments: Its arguments.
-        cwd: Where it runs; None is here.
-        places: Directories that it is to use unless the user has named others, by the end of the variable that names
-            them, such as ``TMPDIR``.
+        what: Beginning of the message if it fails.
+        arguments: Arguments of the program.
+        cwd: Working directory; None takes that of this process.
+        places: Directories for Apptainer by the end of the variable that names them, such as ``TMPDIR``; variables that
+            the user has set come first.
 
     Raises:
-        WorkerError: If it is not installed, or fails.
+        WorkerError: If Apptainer is not installed, or fails.
     """
     program = find_program()
     prefix = Path(program).name.upper()
     named = {f"{prefix}_{name}": str(path) for name, path in places.items()}
-    # It starts others, which have to end with it.
+    # Apptainer starts other programs. In a session of their own, `_end` can end all of them.
     process = subprocess.Popen(
         [program, "--nocolor", *arguments],
         stdin=subprocess.DEVNULL,

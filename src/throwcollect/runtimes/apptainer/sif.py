@@ -1,4 +1,4 @@
-"""Makes a SIF, the file that Apptainer runs: of an image that a Docker engine has, of an archive, or from a clone."""
+"""Makes a SIF, the file that Apptainer runs, from an image of a Docker engine, from an archive, or from a clone."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ from throwcollect.version import __version__
 
 _DEFINITION = "docker/throwcollect.def"
 _FAST_COMPRESSION = "-comp zstd -Xcompression-level 3"
-"""A quarter of the time that gzip takes, for the same size."""
+"""Takes a quarter of the time of gzip, for the same size."""
 _NO_SPACE = "no space left on device"
 _HINTS = {
     _NO_SPACE: "free 1.5 GB for temporary files, or let TMPDIR name another directory, and 200 MB for the file itself",
     "conveyor failed to get": "--base takes another base image: one of a registry, a SIF, a directory, or an archive",
 }
-"""What helps, by what Apptainer says in small letters."""
+"""Hints by words in the output of Apptainer, in small letters."""
 
 
 def make_sif(
@@ -43,24 +43,24 @@ def make_sif(
     wheelhouse: Path | None = None,
     say: Callable[[str], None],
 ) -> int:
-    """Make a SIF: by default of the image that belongs to these sources, and without an engine from the clone itself.
+    """Make a SIF, by default from the image of these sources, or without an engine from the clone itself.
 
     Args:
-        output: The file. One that is there is replaced when the new one is whole.
+        output: The file. An existing SIF is replaced when the new one is complete.
         image: Name of another image of the engine, which is pulled if the engine does not have it.
-        archive: An archive of an image, as `docker save` writes it, to be taken instead.
-        base: Base image, where one is built.
-        wheelhouse: Directory of wheels, where an image is built; None takes them from the package index.
-        say: Called with one line for each step.
+        archive: An archive of an image, as `docker save` writes it, which is used instead.
+        base: Base image, if one is built.
+        wheelhouse: Directory of wheels, if an image is built; None takes them from the package index.
+        say: Is called with one line for each step.
 
     Returns:
-        Its size [B].
+        Size of the file [B].
 
     Raises:
-        ConfigError: If something is named that does not fit, or there is nothing to make it of.
+        ConfigError: If an argument names a file of the wrong kind, or there are no sources from which to build.
         WorkerError: If neither Apptainer nor Singularity is installed, or a step fails.
-        DatasetError: If it cannot be written, or something cannot be read.
-        MissingExtraError: If an image of an engine is named, and the client of engines is not installed.
+        DatasetError: If a file cannot be written or read.
+        MissingExtraError: If an image of an engine is named, and the package that asks the engine is not installed.
     """
     find_program()
     with _replacing(output) as new, _working() as work:
@@ -68,7 +68,7 @@ def make_sif(
             check_archive(archive)
             _convert(archive, new, work, say)
         elif _is_engine_there(image, say):
-            from throwcollect.runtimes.docker.saved_image import save_image
+            from throwcollect.runtimes.docker.image import save_image
 
             saved = work / "image.tar"
             save_image(saved, image, base=base or DEFAULT_BASE, wheelhouse=wheelhouse, say=say)
@@ -79,7 +79,7 @@ def make_sif(
 
 
 def _is_engine_there(image: str | None, say: Callable[[str], None]) -> bool:
-    """Whether an engine answers; where an image of one is named, there has to be one."""
+    """Whether an engine answers; if an image is named, that no engine answers is an error."""
     try:
         with explain_missing():
             from throwcollect.runtimes.docker.engine import connect
@@ -124,7 +124,7 @@ def _build(new: Path, work: Path, base: str, wheelhouse: Path | None, say: Calla
 
 
 def _locate(base: str) -> tuple[str, str]:
-    """How Apptainer gets at a base image, and where it is: a SIF, a directory, an archive, or one of a registry."""
+    """Apptainer's word for the kind of a base image, and its place: a SIF, a directory, an archive, or a registry."""
     path = Path(base).absolute()
     if path.is_dir():
         return "localimage", str(path)
@@ -134,28 +134,28 @@ def _locate(base: str) -> tuple[str, str]:
 
 
 def _run(new: Path, work: Path, *arguments: str, cwd: Path | None = None) -> None:
-    # All that is kept meanwhile goes with this directory.
+    # All temporary files of Apptainer are removed together with this directory.
     places = {"TMPDIR": work, "CACHEDIR": work / "cache", "CONFIGDIR": work / "config"}
-    # The output is named before what it is made of.
+    # Apptainer wants the output before the source.
     *options, source = arguments
     options += ["--force", "--mksquashfs-args", _FAST_COMPRESSION]
     what = f"{new.with_suffix('')}: cannot be made"
     try:
         call(what, "build", *options, str(new), source, cwd=cwd, places=places)
     except WorkerError as error:
-        found = next((reason for reason in _HINTS if reason in str(error).lower()), None)
-        if found is None:
+        reason = next((reason for reason in _HINTS if reason in str(error).lower()), None)
+        if reason is None:
             raise
-        message = f"{what}: {found}" if found == _NO_SPACE else error.message
-        raise WorkerError(message, evidence=error.evidence, hint=_HINTS[found]) from error
+        message = f"{what}: {reason}" if reason == _NO_SPACE else error.message
+        raise WorkerError(message, evidence=error.evidence, hint=_HINTS[reason]) from error
 
 
 @contextmanager
 def _working() -> Iterator[Path]:
-    """A directory for what is needed meanwhile.
+    """Make a directory for temporary files, which is removed after the block.
 
     Raises:
-        ConfigError: If there is no place for it.
+        ConfigError: If it cannot be made.
     """
     try:
         directory = tempfile.TemporaryDirectory(prefix="throwcollect-sif-", ignore_cleanup_errors=True)
@@ -168,16 +168,16 @@ def _working() -> Iterator[Path]:
 
 @contextmanager
 def _replacing(output: Path) -> Iterator[Path]:
-    """Where to write a SIF that takes the place of another one, or of none, when the block ends well.
+    """Give a path for a new SIF, which takes the place of the output if the block ends without an error.
 
     Raises:
-        ConfigError: If something else is there.
-        DatasetError: If it cannot be written there.
+        ConfigError: If the output exists and is no SIF.
+        DatasetError: If the output cannot be written.
     """
     try:
         if output.is_dir() or (output.exists() and not is_sif(output)):
             raise ConfigError(f"{output}: is there and no SIF, so it is not replaced", hint="choose another name")
-        # A link stays, and what it leads to is replaced.
+        # If the output is a link, the file to which it leads is replaced.
         place = Path(os.path.realpath(output))
         new = place.with_name(f"{place.name}.new")
         new.unlink(missing_ok=True)

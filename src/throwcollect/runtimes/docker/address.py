@@ -1,4 +1,4 @@
-"""Where the Docker engine is looked for, and whether its socket is there; the client takes long to import."""
+"""The address of the Docker engine, and a check of its socket that spares the long import of the client."""
 
 from __future__ import annotations
 
@@ -12,37 +12,33 @@ _DEFAULT_HOST = "unix:///var/run/docker.sock"
 
 
 def engine_address() -> str:
-    """Where the engine is looked for: ``DOCKER_HOST``, or the usual socket."""
+    """Address of the engine: ``DOCKER_HOST``, or the usual socket."""
     return os.environ.get("DOCKER_HOST") or _DEFAULT_HOST
 
 
 def is_local() -> bool:
-    """Whether the engine is that of this machine, so that its containers can be reached from here."""
+    """Whether the engine runs on this machine, so that its containers can be reached from here."""
     return engine_address().startswith("unix:")
 
 
 def has_socket() -> bool:
-    """Whether the engine's socket is there; of an engine that is reached otherwise, whether it can be asked."""
+    """Whether the engine's socket exists; assumed of an engine that has no socket in the file system."""
     path = engine_address().removeprefix("unix://")
     return not path.startswith("/") or Path(path).exists()
 
 
 def check_socket() -> None:
-    """Raise what a client would raise that does not find the engine's socket.
+    """Raise the error of `engine.connect` if the engine's socket does not exist, without importing the client.
 
     Raises:
-        WorkerError: If the socket is not there.
+        WorkerError: If the socket does not exist.
     """
     if not has_socket():
         raise no_answer(os.strerror(errno.ENOENT))
 
 
 def no_answer(reason: str) -> WorkerError:
-    """The error that no engine answers.
-
-    Args:
-        reason: Why, in a few words.
-    """
+    """The error that no engine answers, for a reason in a few words."""
     return WorkerError(
         f"no Docker engine answers at {engine_address()}: {reason}",
         hint="start it, let DOCKER_HOST name another one, or use processes: --runtime local",

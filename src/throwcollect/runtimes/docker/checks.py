@@ -1,4 +1,4 @@
-"""Whether an engine and this machine have what a configuration asks for; looked at before anything is started."""
+"""Checks before the start that an engine and this machine have everything that a configuration asks for."""
 
 from __future__ import annotations
 
@@ -24,38 +24,27 @@ _NODES = {"router": ROUTER, "sim": "sim_0", "coordinator": COORDINATOR}
 
 
 def check(client: DockerClient, place: RunPlace, config: Config) -> str:
-    """Look for the image, the mounts, the networks, and the router's port.
-
-    Args:
-        client: Client of the engine.
-        place: The run.
-        config: Its configuration.
+    """Check the image, the mounts, the networks, and the router's port of a run.
 
     Returns:
-        Id of the image, which is the SHA-256 of all that it is made of.
+        Id of the image, which is a SHA-256 of its content.
 
     Raises:
         ConfigError: If a mount or a network is not there or must not be used, or the router's port is taken.
         WorkerError: If the engine does not answer, or does not have the image.
     """
     with engine_errors("the Docker engine cannot be asked"):
-        # The containers of a launcher that died hold the port already, and are taken over with it.
+        # If a launcher died, its router still has the port, and this run takes both over.
         begun = client.api.containers(all=True, filters={"label": f"{RUN_LABEL}={place.run_id}"})
-    found = _check(
-        client, image(config), {f"containers.{kind}": section_of(config, node) for kind, node in _NODES.items()}
-    )
+    sections = {f"containers.{kind}": section_of(config, node) for kind, node in _NODES.items()}
+    image_id = _check(client, image(config), sections)
     if config.run.router_port and not begun:
         reserve_port(config.run).close()
-    return found
+    return image_id
 
 
 def check_container(client: DockerClient, spec: ContainerSpec, component: str) -> None:
-    """Look for the image, the mounts and the networks of a container that the catalogue describes.
-
-    Args:
-        client: Client of the engine.
-        spec: What it is made from.
-        component: Name of its component.
+    """Check the image, the mounts and the networks of a container that the catalogue describes for a component.
 
     Raises:
         ConfigError: If a mount or a network is not there or must not be used.
@@ -71,16 +60,16 @@ def _check(
         networks = {each["Name"] for each in client.api.networks()}
         root = os.path.realpath(client.api.info()["DockerRootDir"])
         try:
-            found = str(client.images.get(name).id)
+            image_id = str(client.images.get(name).id)
         except ImageNotFound as error:
             hint = "throwcollect image build" if name == default_tag() else f"docker pull {name}"
             raise WorkerError(f"the Docker engine has no image {name}", hint=hint) from error
-    problems = [
-        each for key, section in sections.items() for each in _problems(key, section, networks, root, mounts=mounts)
-    ]
+    problems: list[Problem] = []
+    for key, section in sections.items():
+        problems += _problems(key, section, networks, root, mounts=mounts)
     if problems:
         raise ConfigError(problems)
-    return found
+    return image_id
 
 
 def _problems(
@@ -99,11 +88,11 @@ def _problems(
 
 
 def _wrong_mount(source: Path, root: str) -> str | None:
-    """Why a directory or file must not be mounted, wherever links lead; None if it may be.
+    """Why a directory or file, or the target of this link, must not be mounted; None if it may be.
 
     Args:
-        source: Its path as the configuration has it.
-        root: Directory in which the engine keeps everything.
+        source: Path in the configuration.
+        root: Directory in which the engine keeps all its files.
     """
     if not source.exists():
         return f"{source} does not exist on this machine"
@@ -119,10 +108,10 @@ def _wrong_mount(source: Path, root: str) -> str | None:
 
 
 def _wrong_device(device: Path) -> str | None:
-    """Why a device must not be handed over, wherever links lead; None if it may be."""
+    """Why a container must not get a device, or the target of this link; None if it may."""
     if not device.exists():
         return f"{device} does not exist on this machine"
     files = [device, *device.rglob("*")] if device.is_dir() else [device]
-    if all(is_allowed_device(str(each.resolve())) and not each.is_block_device() for each in files):
+    if all(is_allowed_device(str(file.resolve())) and not file.is_block_device() for file in files):
         return None
     return f"{device} is refused, as it leads to other devices; containers get {DEVICES}"

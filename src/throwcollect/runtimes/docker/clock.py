@@ -1,73 +1,67 @@
-"""How long a Docker engine has been silent."""
+"""Measures how long a Docker engine has been silent."""
 
 from __future__ import annotations
 
 import threading
 from collections.abc import Callable
 from contextlib import suppress
-from typing import Any
 
 from docker.client import DockerClient
 
+SILENCE_S = 120.0
+"""An engine that answers nothing for this long is given up; a busy one may let a request wait for half a minute."""
 _TICK_S = 0.5
-_TELL_S = 15.0
-"""A busy engine takes some seconds for an answer now and then, which nobody needs to know."""
+_WARN_S = 15.0
+"""The user is told of a longer silence; a busy engine often takes some seconds for an answer."""
 
 
 class EngineClock:
-    """Measures how long an engine has answered nothing of all that this process asks it.
+    """Measures how long an engine has not answered any request of this process.
 
-    Every answer counts, whoever asked and whatever it says, and so does everything that arrives on a stream. The time
-    is counted by a thread in small steps, so that time in which this process itself was stopped is not taken for
-    silence of the engine.
+    Every answer to a client that was attended counts, and so does everything that arrives on a stream. A thread counts
+    the time in small steps, so that time in which this process itself was stopped does not count as silence.
+
+    Attributes:
+        silent_s: Time since the engine last answered [s].
 
     Args:
         warn: Is told in one line when the engine has been silent for long, and when it answers again.
     """
 
     def __init__(self, warn: Callable[[str], None]) -> None:
+        self.silent_s = 0.0
         self._warn = warn
-        self._silent_s = 0.0
-        self._told = False
+        self._warned = False
         self._closed = threading.Event()
         threading.Thread(target=self._count, daemon=True).start()
 
     @property
-    def silent_s(self) -> float:
-        """Time since the engine last answered [s]."""
-        return self._silent_s
+    def given_up(self) -> bool:
+        """Whether the engine has been silent for so long that nobody waits for it any more."""
+        return self.silent_s >= SILENCE_S
 
     def attend(self, client: DockerClient) -> None:
         """Count every answer that a client gets."""
-        client.api.hooks["response"].append(self._note_answer)
-
-    def ignore(self, client: DockerClient) -> None:
-        """Count the answers that a client gets no more."""
-        with suppress(ValueError):
-            client.api.hooks["response"].remove(self._note_answer)
+        client.api.hooks["response"].append(lambda *_, **__: self.note_arrival())
 
     def note_arrival(self) -> None:
-        """Take note of something that arrived, such as a part of a stream."""
-        self._silent_s = 0.0
+        """Take note that something arrived, such as a part of a stream."""
+        self.silent_s = 0.0
 
     def close(self) -> None:
         """Stop counting."""
         self._closed.set()
 
-    def _note_answer(self, _response: Any, *_: Any, **__: Any) -> None:
-        self.note_arrival()
-
     def _count(self) -> None:
         while not self._closed.wait(_TICK_S):
-            self._silent_s += _TICK_S
-            if self._silent_s >= _TELL_S and not self._told:
-                self._told = True
-                self._tell(f"the Docker engine has not answered for {self._silent_s:.0f} s; waiting")
-            elif self._silent_s < _TELL_S and self._told:
-                self._told = False
-                self._tell("the Docker engine answers again")
-
-    def _tell(self, line: str) -> None:
-        # Whoever listened may have gone; the time must be counted all the same.
-        with suppress(OSError, ValueError):
-            self._warn(line)
+            self.silent_s += _TICK_S
+            if (self.silent_s >= _WARN_S) == self._warned:
+                continue
+            self._warned = not self._warned
+            # The terminal may be closed by now, but the time must still be counted.
+            with suppress(OSError, ValueError):
+                self._warn(
+                    f"the Docker engine has not answered for {self.silent_s:.0f} s; waiting"
+                    if self._warned
+                    else "the Docker engine answers again"
+                )

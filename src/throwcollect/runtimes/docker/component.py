@@ -1,4 +1,4 @@
-"""A container that is an instance of a component, and no node of a run; it may join one."""
+"""The host of a run that is one container: an instance of a component, which may join another run."""
 
 from __future__ import annotations
 
@@ -16,10 +16,11 @@ from throwcollect.errors import ConfigError, WorkerError
 from throwcollect.ros.connection import Connection
 from throwcollect.ros.middleware import RMW_VARIABLE
 from throwcollect.run_key import RunKey
+from throwcollect.runtimes.docker import clock
 from throwcollect.runtimes.docker.address import engine_address, is_local
 from throwcollect.runtimes.docker.checks import check_container
 from throwcollect.runtimes.docker.clock import EngineClock
-from throwcollect.runtimes.docker.containers import LOG_S, SILENCE_S, end_in_words
+from throwcollect.runtimes.docker.containers import LOG_S, end_in_words
 from throwcollect.runtimes.docker.engine import ENGINE_ERRORS, connect
 from throwcollect.runtimes.docker.node_container import NodeContainer
 from throwcollect.runtimes.docker.options import (
@@ -37,22 +38,22 @@ from throwcollect.runtimes.runtime import NodeState, Place, Session
 from throwcollect.wording import command
 
 CONTAINER = "container"
-"""Name of the only node of such an instance."""
+"""Name of the only node of such a run."""
 _POLL_S = 0.1
 _GRACE_S = 3
 _OVER_S = 3.0
-"""A run that ends cuts whoever has joined it off before it says so."""
+"""A container that has joined a run loses the router when the run ends, up to this time before the record tells it."""
 
 
 @dataclass(frozen=True)
 class Way:
-    """How a container gets into the ROS graph of a run.
+    """The way for a container into the ROS graph of a run.
 
     Attributes:
         run: Id of the run.
-        environment: Environment variables by which it joins.
+        environment: Environment variables with which the container joins.
         key: The run's key, as a mount.
-        network: Network of the engine that has the router; None for that of this machine.
+        network: The engine's network in which the router is; None if the container needs the network of this machine.
     """
 
     run: str
@@ -62,16 +63,10 @@ class Way:
 
 
 def find_way(run: str, runtime: str, connection: Connection, spec: ContainerSpec) -> Way:
-    """The way for a container into a run.
-
-    Args:
-        run: Id of the run.
-        runtime: Name of its runtime.
-        connection: The way for processes of this machine.
-        spec: What the container is made from.
+    """Find the way for a container into a run of a runtime, which processes of this machine join by `connection`.
 
     Raises:
-        ConfigError: If there is none.
+        ConfigError: If the container cannot join the run.
     """
     if connection.middleware.is_fast_dds:
         raise ConfigError(
@@ -102,18 +97,16 @@ def _environment(connection: Connection, endpoint: str) -> Mapping[str, str]:
 
 
 class ComponentContainer:
-    """Runs one container until it ends or is told to; see `runtime.Host` for what it offers.
+    """Runs one container until it ends or is told to; a `runtime.Host`.
 
     Args:
-        place: The instance.
-        component: Name of its component.
-        spec: What the container is made from.
-        way: How it joins a run; None if it does not.
-        goes_on: Asked again and again whether that run goes on.
-        warn: Is told in one line when the engine keeps everybody waiting.
+        place: The place of the run that consists of this container.
+        way: The way into a run that the container joins; None if it joins none.
+        goes_on: Is asked again and again whether that run goes on.
+        warn: Is told in one line when the engine is silent for long.
 
     Raises:
-        ConfigError: If something that the catalogue asks for is not there.
+        ConfigError: If the container needs something that is not there.
         WorkerError: If no engine answers, or it does not have the image.
     """
 
@@ -137,7 +130,7 @@ class ComponentContainer:
         with ExitStack() as undo:
             self._clock = EngineClock(warn)
             undo.callback(self._clock.close)
-            self._client: DockerClient = connect(timeout_s=SILENCE_S)
+            self._client: DockerClient = connect(timeout_s=clock.SILENCE_S)
             self._clock.attend(self._client)
             check_container(self._client, spec, component)
             undo.pop_all()
@@ -147,7 +140,7 @@ class ComponentContainer:
         """Run the container until it ends by itself, is told to, or the run that it has joined ends; then close.
 
         Raises:
-            WorkerError: If it cannot be started, ends with an error, or the engine does not answer any more.
+            WorkerError: If the container cannot be started or fails, or the engine does not answer any more.
         """
         try:
             self._watch = EngineWatch(self._client, self._place, self._clock)
@@ -163,14 +156,14 @@ class ComponentContainer:
             self.close()
 
     def close(self) -> None:
-        """End the container, and remove it; what an engine that is silent, or refuses, keeps is left there."""
+        """End the container, and remove it, unless the engine is silent or refuses."""
         self._container.renounce()
-        while not self._silent and self._watch is not None and not self._container.wait_begun(_POLL_S):
+        while not self._clock.given_up and self._watch is not None and not self._container.wait_begun(_POLL_S):
             pass
         handle = self._container.handle
         try:
             if handle is not None:
-                # It may be gone already.
+                # The container may be gone already.
                 with suppress(*ENGINE_ERRORS):
                     self._client.api.stop(handle, timeout=_GRACE_S)
                     self._container.wait_log(LOG_S)
@@ -183,17 +176,12 @@ class ComponentContainer:
                 self._watch.close()
             self._container.close()
             self._clock.close()
-            self._clock.ignore(self._client)
-
-    @property
-    def _silent(self) -> bool:
-        return self._clock.silent_s >= SILENCE_S
 
     @property
     def _networks(self) -> list[str]:
-        """Networks of the engine that it joins; none for that of this machine, or the engine's usual one."""
+        """Networks that the container joins; none means that of this machine, or the engine's default."""
         own = [self._way.network] if self._way is not None and self._way.network is not None else []
-        # Ports are published from a network with a way out alone, which that of a run may not have.
+        # The engine publishes ports only from a network with a way out, which the network of a run may not have.
         out = ["bridge"] if own and self._spec.section.ports and not self._spec.section.networks else []
         return [*out, *self._spec.section.networks, *own]
 
@@ -229,13 +217,13 @@ class ComponentContainer:
         return NodeState(CONTAINER, "frozen" if frozen else "running", 0, handle[:12], None)
 
     def _has_ended(self, session: Session) -> bool:
-        """Whether the container, or the run that it has joined, has come to an end that is no error.
+        """Whether the container has ended well, or the run that it has joined has ended.
 
         Raises:
-            WorkerError: If it ended with one, or could not be started.
+            WorkerError: If the container failed, or could not be started.
         """
         container = self._container
-        if self._silent:
+        if self._clock.given_up:
             raise WorkerError(
                 f"the Docker engine has not answered for {self._clock.silent_s:.0f} s",
                 hint=f"once it answers, {command('down', '--run', self._place.run_id)} ends the container",
@@ -245,7 +233,7 @@ class ComponentContainer:
         state = self._watch.state(container.handle) if self._watch is not None else None
         if state is not None and state.ended:
             container.wait_log(LOG_S)
-            # A container that has joined may fall with the run a moment before the record says that it ended.
+            # The end of the run may have made the container fail, but the record of the run tells its end a bit later.
             deadline = time.monotonic() + _OVER_S
             while state.code != 0 and self._way is not None and self._goes_on() and time.monotonic() < deadline:
                 time.sleep(_POLL_S)

@@ -1,4 +1,4 @@
-"""Nodes as containers of a Docker engine."""
+"""The host of runs whose nodes are containers of a Docker engine."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ from docker.types import IPAMConfig, IPAMPool
 from throwcollect.config.schema import Config
 from throwcollect.dataset.summary import Info
 from throwcollect.errors import Interrupted, WorkerError
+from throwcollect.runtimes.docker import clock
 from throwcollect.runtimes.docker.checks import check
 from throwcollect.runtimes.docker.clock import EngineClock
 from throwcollect.runtimes.docker.engine import ENGINE_ERRORS, connect, engine_errors
@@ -35,37 +36,33 @@ from throwcollect.runtimes.docker.options import (
 from throwcollect.runtimes.docker.volume import dataset_info, place_directory, place_key
 from throwcollect.runtimes.docker.watch import ContainerState, EngineWatch
 from throwcollect.runtimes.node_logs import NodeLogs
-from throwcollect.runtimes.nodes import ROUTER, NodeExit, NodeHost, NodeSpec
-from throwcollect.runtimes.ports import LOOPBACK
+from throwcollect.runtimes.nodes import ROUTER, NodeExit, NodeHost, NodeSpec, protocol_of
+from throwcollect.runtimes.ports import LOOPBACK, format_endpoint
 from throwcollect.runtimes.runtime import Place, Session
 from throwcollect.wording import command
 
-SILENCE_S = 120.0
-"""A busy engine may leave a request waiting for half a minute; one that answers nothing for so long is given up."""
-
 LOG_S = 2.0
-"""What a node printed last is in its file within this time after its end."""
+"""Time in which the last lines that a node printed arrive in its file."""
 
 _BEGIN_S = 30.0
-"""Nobody but the end of the run waits longer for a container that is being started."""
+"""Time to wait for the start of a container; only the end of a run waits longer."""
 _POLL_S = 0.2
 _ROUTER_HOST = -2
-"""Last address of a range that is not that of a broadcast."""
+"""Index of the last address of a range, except for that of broadcasts."""
 _AT_ONCE = 8
 _SIGNALLED = 128
 """Exit codes above this are those of a signal."""
 
 
 class DockerNodes(NodeHost):
-    """Runs nodes as containers that can do little but compute; see `nodes.NodeHost` for what it offers.
+    """Runs nodes as containers that can do little but compute; see `nodes.NodeHost`.
 
-    Everything that is made carries the run's name as a label, by which another process finds it again.
+    Containers, networks and volumes carry the run's id as a label, by which another process finds them again.
 
     Args:
-        place: The run; its name has to be unique on the engine.
-        config: Configuration of the run.
-        warn: Is told in one line when the engine keeps everybody waiting.
-        client: Client of the engine; None for that which ``DOCKER_HOST`` names.
+        place: The place of the run; its id has to be unique on the engine.
+        warn: Is told in one line when the engine is silent for long.
+        client: Client of the engine; None connects to the engine that ``DOCKER_HOST`` names.
 
     Raises:
         ConfigError: If something that the configuration asks for is not there, or taken.
@@ -94,24 +91,23 @@ class DockerNodes(NodeHost):
         with ExitStack() as undo:
             self._clock = EngineClock(warn)
             undo.callback(self._clock.close)
-            self._client = client or connect(timeout_s=SILENCE_S)
+            self._client = client or connect(timeout_s=clock.SILENCE_S)
             self._clock.attend(self._client)
-            undo.callback(self._clock.ignore, self._client)
             self._image_id = check(self._client, self._place, config)
             undo.pop_all()
 
     def collect(self, session: Session) -> Info | None:
         """See `runtime.Host.collect`."""
-        # It takes ROS along, so it is imported when it is known what ROS is to run on.
+        # This imports ROS, so it has to wait until the backend is chosen.
         from throwcollect.runtimes.node_collection import NodeCollection
 
         return NodeCollection(self, session).run_to_the_end()
 
     def open(self) -> tuple[str, ...]:
-        """Make the run's network and volumes unless they exist, begin to watch its containers, and take them over.
+        """Make the run's network and volumes if they do not exist, watch its containers, and take over existing ones.
 
         Returns:
-            Names of the nodes whose containers exist already; those that have ended are among the next `exits`.
+            Names of the nodes whose containers exist already; the next `exits` reports those that have ended.
 
         Raises:
             WorkerError: If the engine refuses.
@@ -124,12 +120,12 @@ class DockerNodes(NodeHost):
                     self._client.volumes.get(place.source)
                 except NotFound:
                     self._client.volumes.create(place.source, labels=place.labels())
-            # A run that has its network has its key, too, which its nodes go on using.
+            # If the network exists, the volume with the key exists, too, and nodes of an earlier launcher use both.
             if not self._client.networks.list(filters={"label": f"{RUN_LABEL}={place.run_id}"}):
-                with ThreadPoolExecutor(1) as beside:
-                    placed = beside.submit(place_key, self._client, place, self.config, self.place.key)
+                with ThreadPoolExecutor(1) as pool:
+                    placing = pool.submit(place_key, self._client, place, self.config, self.place.key)
                     self._create_network()
-                    placed.result()
+                    placing.result()
         self._watch = EngineWatch(self._client, place, self._clock)
         found = self._adopt()
         if place.in_volume and not found:
@@ -137,10 +133,10 @@ class DockerNodes(NodeHost):
         return found
 
     def _create_network(self) -> None:
-        """Make the run's network; on Fast DDS one in which the router can always have the same address.
+        """Make the run's network; on Fast DDS, the router has to be able to keep its address there.
 
-        Nodes on Fast DDS look up the address of their discovery server once. The engine gives containers addresses that
-        they may choose only in a network whose range was named, so it is asked for a free range first.
+        Nodes on Fast DDS look up the address of their discovery server only once. A container can choose its address
+        only in a network whose range was named, so a first network serves to find a free range.
         """
         place = self._place
         options = {"driver": "bridge", "internal": not published(self.config), "labels": place.labels()}
@@ -157,16 +153,16 @@ class DockerNodes(NodeHost):
             return None
         with engine_errors("the engine does not say which addresses the run's network has"):
             network = self._client.networks.get(self._place.network)
-        # The engine gives addresses from the beginning of the range.
+        # The engine gives addresses from the beginning of the range, so one at its end stays free.
         return str(ip_network(network.attrs["IPAM"]["Config"][0]["Subnet"])[_ROUTER_HOST])
 
     def _adopt(self) -> tuple[str, ...]:
-        """Make the containers of a launcher that died nodes of this one; their names."""
+        """Take over the containers of a launcher that died; the names of their nodes."""
         filters = {"label": [f"{RUN_LABEL}={self._place.run_id}", NODE_LABEL]}
         with engine_errors(f"the nodes of run {self._place.run_id} cannot be found"):
             for container in self._client.containers.list(all=True, filters=filters):
                 name = container.labels[NODE_LABEL]
-                # What was created and never started is replaced when the node is.
+                # `start` replaces a container that was created but never started.
                 if name not in self._nodes and container.status != "created":
                     self._opened.look(container.id)
                     self._nodes[name] = self._node(name)
@@ -174,7 +170,7 @@ class DockerNodes(NodeHost):
         return self.running()
 
     def info(self) -> Info:
-        """What the finished dataset holds.
+        """Read the summary of the finished dataset.
 
         Raises:
             WorkerError: If the engine does not answer.
@@ -182,17 +178,19 @@ class DockerNodes(NodeHost):
         """
         return dataset_info(self._client, self._place, self.config) if self._place.in_volume else super().info()
 
-    def router_address(self) -> tuple[str, int] | None:
-        """Where this machine reaches the router; None while there is no way to it."""
+    @property
+    def endpoint(self) -> str | None:
+        """See `NodeHost.endpoint`."""
         state = self._state(ROUTER)
         if state is None or state.ended:
             return None
+        protocol = protocol_of(self.config.run, self.place.middleware)
         if self.config.run.router_port:
-            return LOOPBACK, self.config.run.router_port
-        return (state.address, ROUTER_PORT) if state.address else None
+            return format_endpoint(protocol, LOOPBACK, self.config.run.router_port)
+        return format_endpoint(protocol, state.address, ROUTER_PORT) if state.address else None
 
     def start(self, node: NodeSpec) -> None:
-        """Begin to start a node; if it cannot be started, that is one of the next `exits`."""
+        """Begin to start a node; if it cannot be started, one of the next `exits` reports it."""
         options = node_options(
             node,
             place=self._place,
@@ -205,21 +203,21 @@ class DockerNodes(NodeHost):
         container.start(options, networks=section_of(self.config, node.name).networks)
 
     def handle(self, name: str) -> str | None:
-        """Short id of a running node's container; None if it does not run (yet)."""
+        """Short id of a running node's container; None if the container does not run (yet)."""
         node = self._nodes.get(name)
         return node.handle[:12] if node and node.handle else None
 
     def running(self) -> tuple[str, ...]:
-        """Names of the nodes whose end has not been reported yet."""
+        """See `NodeHost.running`."""
         return tuple(self._nodes)
 
     def exits(self) -> list[NodeExit]:
-        """Nodes that ended, or could not be started, since the last call.
+        """The nodes that ended, or could not be started, since the last call.
 
         Raises:
             WorkerError: If the engine does not answer any more.
         """
-        if self._silent:
+        if self._clock.given_up:
             raise self._silence()
         ends = [end for node in self._nodes.values() if (end := self._end_of(node)) is not None]
         for end in ends:
@@ -227,16 +225,16 @@ class DockerNodes(NodeHost):
         return ends
 
     def frozen(self) -> frozenset[str]:
-        """Nodes whose containers are paused."""
+        """Names of the nodes whose containers are paused."""
         return frozenset(name for name in self._nodes if (state := self._state(name)) and state.status == "paused")
 
     def ready(self, name: str) -> bool:
-        """Whether a simulation of this name has ever said that it is ready, or its health check does."""
+        """Whether a simulation has ever announced that it is ready, or passes its health check."""
         state = self._state(name)
         return (state is not None and state.healthy) or self.logs.said_ready(name)
 
     def signal(self, name: str, number: signal.Signals) -> None:
-        """Send a signal to a node, once it runs; one that has ended is left alone."""
+        """Send a signal to a node once it runs, unless it has ended."""
         if (node := self._nodes.get(name)) is None:
             return
         node.wait_begun(_BEGIN_S)
@@ -245,7 +243,7 @@ class DockerNodes(NodeHost):
                 self._client.api.kill(node.handle, int(number))
 
     def stop(self, names: Sequence[str], *, grace_s: float = 3.0) -> None:
-        """End nodes and remove their containers: politely, then after `grace_s` [s], in whole seconds, by force."""
+        """End nodes and remove their containers: with SIGTERM, then after `grace_s`, in whole seconds, by force."""
         nodes = [self._nodes.pop(name) for name in names if name in self._nodes]
         self._beginning += [node for node in nodes if not node.begun]
         with ThreadPoolExecutor(_AT_ONCE) as pool:
@@ -253,26 +251,25 @@ class DockerNodes(NodeHost):
                 pool.submit(self._end, node, math.ceil(grace_s))
 
     def close(self) -> None:
-        """End all nodes, the router last, and remove all that was made for the run but its volume.
+        """End all nodes, the router last, and remove everything that was made for the run but its volume.
 
-        What an engine that is silent, or refuses, keeps is left there; `cleared` tells.
+        `cleared` tells whether the engine has removed all containers, or is silent or refuses.
         """
-        if not self._silent:
+        if not self._clock.given_up:
             self.stop([name for name in self._nodes if name != ROUTER])
             self.stop([ROUTER])
-        while not self._silent and any(not node.wait_begun(_POLL_S) for node in self._beginning):
+        while not self._clock.given_up and any(not node.wait_begun(_POLL_S) for node in self._beginning):
             pass
-        if not self._silent:
+        if not self._clock.given_up:
             self._remove()
         if self._watch is not None:
             self._watch.close()
         self._clock.close()
-        self._clock.ignore(self._client)
         for node in self._nodes.values():
             node.close()
 
     def _remove(self) -> None:
-        # Somebody may have joined the network with a container of his own, and keeps it alive.
+        # The network cannot be removed while a container is in it that somebody else has added.
         with suppress(WorkerError):
             remove(self._client, self._place.run_id, volumes=False)
         filters = {"label": [f"{RUN_LABEL}={self._place.run_id}", NODE_LABEL]}
@@ -280,7 +277,7 @@ class DockerNodes(NodeHost):
             self.cleared = not self._client.api.containers(all=True, filters=filters)
 
     def _silence(self) -> WorkerError:
-        """The error that says that the engine is given up, what may be left on it, and how to go on."""
+        """The error that the engine is given up, with the containers that may be left on it, and how to go on."""
         place = self._place
         left = ", ".join(map(place.container, self._nodes)) or "none"
         hint = f"once it answers, {command('down', '--run', place.run_id)} ends them"
@@ -302,16 +299,12 @@ class DockerNodes(NodeHost):
             raise WorkerError(f"run {self._place.run_id} is not open on the Docker engine")
         return self._watch
 
-    @property
-    def _silent(self) -> bool:
-        return self._clock.silent_s >= SILENCE_S
-
     def _state(self, name: str) -> ContainerState | None:
         node = self._nodes.get(name)
         return self._opened.state(node.handle) if node else None
 
     def _end_of(self, node: NodeContainer) -> NodeExit | None:
-        """How a node ended, once its last words are in its log; None if it runs."""
+        """How a node ended, once its last lines are in its log; None before."""
         if node.failure is not None:
             return NodeExit(node.name, None, f"cannot be started: {node.failure}", self.log_tail(node.name))
         state = self._opened.state(node.handle)
@@ -337,15 +330,10 @@ class DockerNodes(NodeHost):
 
 
 def end_in_words(state: ContainerState, memory: str | None) -> str:
-    """How a container ended.
-
-    Args:
-        state: Its last state.
-        memory: Its memory limit; None if it had none.
-    """
+    """How a container with this memory limit ended."""
     if state.code is None:
         return "its container was removed"
-    # The kernel may have ended some other process of the container, and that did not end it.
+    # The engine also notes that the kernel has killed another process of the container, after which that went on.
     if state.out_of_memory and state.code == _SIGNALLED + signal.SIGKILL:
         return "ran out of memory" + (f" (limit {memory})" if memory else "")
     if state.code > _SIGNALLED and state.code != Interrupted.exit_code:

@@ -1,4 +1,4 @@
-"""The way to a Docker engine, and what it says when something is wrong."""
+"""Connects to a Docker engine, and translates its errors."""
 
 from __future__ import annotations
 
@@ -16,21 +16,18 @@ from urllib3.exceptions import TimeoutError as PoolTimeoutError
 from throwcollect.errors import WorkerError
 from throwcollect.runtimes.docker.address import no_answer
 
-# Connections that break in the middle of an answer or of a stream show as any of the last three.
+# A connection that breaks in the middle of an answer or of a stream leads to any of the last three.
 ENGINE_ERRORS = (DockerException, HTTPError, OSError, struct.error, json.JSONDecodeError)
-"""Whatever the client raises when the engine refuses, fails or is gone."""
+"""The errors that the client raises when the engine refuses, fails or is gone."""
 
 PATIENCE_S = 30.0
-"""How long a command waits for an answer of the engine, unless it knows better."""
+"""Time that a request waits for an answer of the engine by default."""
 
 _TIMEOUTS = (Timeout, PoolTimeoutError, TimeoutError)
 
 
 def connect(*, timeout_s: float | None = None) -> DockerClient:
-    """A client of the engine that ``DOCKER_HOST`` names.
-
-    Args:
-        timeout_s: How long to wait for each answer [s]; None for `PATIENCE_S`.
+    """Connect to the engine that ``DOCKER_HOST`` names; each request waits for `timeout_s` [s], or `PATIENCE_S`.
 
     Raises:
         WorkerError: If no engine answers.
@@ -42,24 +39,24 @@ def connect(*, timeout_s: float | None = None) -> DockerClient:
 
 
 def in_words(error: BaseException) -> str:
-    """What the engine, or else the system, said."""
+    """The reason that the engine, or else the operating system, gives for an error."""
     if isinstance(error, APIError):
         return str(error.explanation or error).strip()
     if timed_out(error):
         return "no answer in time"
-    for each in _causes(error):
-        if isinstance(each, OSError) and isinstance(each.strerror, str):
-            return each.strerror
+    for cause in _causes(error):
+        if isinstance(cause, OSError) and isinstance(cause.strerror, str):
+            return cause.strerror
     return str(error) or type(error).__name__
 
 
 def timed_out(error: BaseException) -> bool:
-    """Whether something failed because the engine did not answer in time, as opposed to refusing or being gone."""
-    return any(isinstance(each, _TIMEOUTS) for each in _causes(error))
+    """Whether the engine did not answer in time, as opposed to refusing or being gone."""
+    return any(isinstance(cause, _TIMEOUTS) for cause in _causes(error))
 
 
 def _causes(error: BaseException) -> Iterator[object]:
-    """An exception and all that led to it, each after what it wraps."""
+    """All causes of an exception, and the exception itself, each after the exceptions that it wraps."""
     cause: BaseException | None = error
     while cause is not None:
         yield from _inside(cause)
@@ -68,21 +65,17 @@ def _causes(error: BaseException) -> Iterator[object]:
 
 
 def _inside(error: BaseException) -> Iterator[object]:
-    """What an exception wraps as its arguments, at any depth."""
+    """The exceptions that an exception wraps as its arguments, at any depth."""
     for argument in error.args:
-        for each in argument if isinstance(argument, tuple) else (argument,):
-            yield each
-            if isinstance(each, BaseException):
-                yield from _inside(each)
+        for part in argument if isinstance(argument, tuple) else (argument,):
+            yield part
+            if isinstance(part, BaseException):
+                yield from _inside(part)
 
 
 @contextmanager
 def engine_errors(what: str, *, hint: str | None = None) -> Iterator[None]:
-    """Errors of the engine become ours.
-
-    Args:
-        what: What could not be done, for the message.
-        hint: One command or one edit that gets further.
+    """Replace errors of the engine in this block by ours, whose message begins with `what`.
 
     Raises:
         WorkerError: In the place of any of `ENGINE_ERRORS`.

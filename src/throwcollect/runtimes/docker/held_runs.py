@@ -1,4 +1,4 @@
-"""The runs that an engine holds, whoever started them, and how to remove what is left of one."""
+"""Finds the runs of which an engine holds containers or networks, and removes what is left of one."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _AT_ONCE = 8
 
 
 def find_held_runs(client: DockerClient) -> list[HeldRun]:
-    """All runs of which an engine holds containers or a network, by name.
+    """Find all runs of which an engine holds containers or a network, sorted by id.
 
     Raises:
         WorkerError: If the engine does not answer.
@@ -36,12 +36,12 @@ def find_held_runs(client: DockerClient) -> list[HeldRun]:
     with engine_errors("the Docker engine does not say what it holds"):
         containers = client.api.containers(all=True, filters=filters)
         networks = client.api.networks(filters=filters)
-    labels = {each["Labels"][RUN_LABEL]: each["Labels"] for each in (*networks, *containers)}
+    labels = {thing["Labels"][RUN_LABEL]: thing["Labels"] for thing in (*networks, *containers)}
     nodes: dict[str, list[HeldNode]] = {}
-    for each in containers:
-        if name := each["Labels"].get(NODE_LABEL):
-            found = HeldNode(name, each["State"], each["Id"][:12])
-            nodes.setdefault(each["Labels"][RUN_LABEL], []).append(found)
+    for container in containers:
+        if name := container["Labels"].get(NODE_LABEL):
+            node = HeldNode(name, container["State"], container["Id"][:12])
+            nodes.setdefault(container["Labels"][RUN_LABEL], []).append(node)
     return [
         HeldRun(
             run_id,
@@ -54,17 +54,12 @@ def find_held_runs(client: DockerClient) -> list[HeldRun]:
 
 
 def remove(client: DockerClient, run_id: str, *, volumes: bool) -> list[str]:
-    """Remove what an engine holds of a run, its key included; its containers are asked to end first.
+    """Remove everything that an engine holds of a run, its key included, but the volume only if `volumes` is true.
 
-    So are those that have joined it, which keep its network and its key from being removed.
-
-    Args:
-        client: Client of the engine.
-        run_id: Name of the run.
-        volumes: Whether to remove the volume that was made for the dataset, too, and the dataset with it.
+    Containers that have joined the run are ended, too, because its network and its key cannot be removed before.
 
     Returns:
-        Names of what was removed.
+        Names of the containers, networks and volumes that were removed.
 
     Raises:
         WorkerError: If something could not be removed, after everything else was.
@@ -92,14 +87,15 @@ def remove(client: DockerClient, run_id: str, *, volumes: bool) -> list[str]:
         containers = [*client.api.containers(all=True, filters=filters), *joined]
         networks = client.api.networks(filters=filters)
         found_volumes = client.api.volumes(filters=filters)["Volumes"] or []
-    # Containers first, side by side as each has some time to end: networks and volumes in use cannot be removed.
+    # Containers come first, because networks and volumes that are in use cannot be removed.
     with ThreadPoolExecutor(_AT_ONCE) as pool:
-        for each in containers:
-            pool.submit(attempt, each["Names"][0].lstrip("/"), partial(end, each))
-    for each in networks:
-        attempt(f"network {each['Name']}", partial(client.api.remove_network, each["Id"]))
-    for each in (each for each in found_volumes if volumes or KEY_LABEL in each["Labels"]):
-        attempt(f"volume {each['Name']}", partial(client.api.remove_volume, each["Name"]))
+        for container in containers:
+            pool.submit(attempt, container["Names"][0].lstrip("/"), partial(end, container))
+    for network in networks:
+        attempt(f"network {network['Name']}", partial(client.api.remove_network, network["Id"]))
+    for volume in found_volumes:
+        if volumes or KEY_LABEL in volume["Labels"]:
+            attempt(f"volume {volume['Name']}", partial(client.api.remove_volume, volume["Name"]))
     if failures:
         raise WorkerError(f"run {run_id}: not everything could be removed", evidence="\n".join(sorted(failures)))
     return sorted(removed)

@@ -1,4 +1,4 @@
-"""The image that containers are made from: built from a clone of the project, or pulled."""
+"""The image of containers: built from a clone of the project, pulled, or saved as a file."""
 
 from __future__ import annotations
 
@@ -6,7 +6,8 @@ import re
 import shlex
 import tempfile
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import closing
 from pathlib import Path
 from typing import IO
 
@@ -14,7 +15,8 @@ from docker.client import DockerClient
 from docker.errors import ImageNotFound
 
 from throwcollect.errors import ConfigError, WorkerError
-from throwcollect.runtimes.docker.engine import engine_errors
+from throwcollect.files import unwritable, write_all
+from throwcollect.runtimes.docker.engine import connect, engine_errors
 from throwcollect.runtimes.image_sources import (
     DEFAULT_BASE,
     DOCKERFILE,
@@ -32,9 +34,9 @@ from throwcollect.version import __version__
 
 _TARGET = "throwcollect"
 SOURCE_LABEL = "org.opencontainers.image.source"
-"""Label that tells where the sources come from; an image of a clone from nowhere else than this machine has none."""
+"""Label with the address of the sources; missing if the clone has no address that others can reach."""
 RMW_LABEL = "throwcollect.rmw"
-"""Label that tells which middleware genuine rclpy has in an image; an image without rclpy has none."""
+"""Label with the middleware of the genuine rclpy in an image; missing if the image has no rclpy."""
 _EVIDENCE_LINES = 15
 _STEP = re.compile(r"Step (\d+/\d+) : (.*)")
 _STEP_COLUMNS = 100
@@ -44,7 +46,7 @@ _MISSING_WHEEL = re.compile(r"No matching distribution found for (.*)")
 
 
 def default_tag() -> str:
-    """Tag of the image that belongs to this version."""
+    """Tag of the image of this version."""
     return f"throwcollect:{__version__}"
 
 
@@ -63,14 +65,14 @@ def build(
         tag: Name of the image.
         base: Base image, which is pulled if the engine does not have it.
         wheelhouse: Directory of wheels, as `docker/wheelhouse.py` fills it; None takes them from the package index.
-        say: Called with one line for each step.
+        say: Is called with one line for each step.
 
     Returns:
         Size of the image [B].
 
     Raises:
         ConfigError: If the package does not run from a clone, or the wheelhouse holds no wheels.
-        WorkerError: If the engine does not answer, the base image cannot be had, or a step fails.
+        WorkerError: If the engine does not answer, the base image cannot be pulled, or a step fails.
     """
     root = source_root()
     check_wheelhouse(root, wheelhouse)
@@ -97,13 +99,8 @@ def build(
 def ensure(client: DockerClient, tag: str, *, say: Callable[[str], None]) -> None:
     """Make sure that the engine has an image: the default one is built from a clone, any other is pulled.
 
-    Args:
-        client: Client of the engine.
-        tag: Name of the image.
-        say: Called with one line before anything that takes long.
-
     Raises:
-        WorkerError: If the image is missing and cannot be had.
+        WorkerError: If the image is missing and cannot be built or pulled.
     """
     if is_there(client, tag):
         return
@@ -125,31 +122,31 @@ def ensure(client: DockerClient, tag: str, *, say: Callable[[str], None]) -> Non
 
 
 def is_outdated(client: DockerClient, tag: str) -> bool:
-    """Whether the label of an image says that it was made from other sources than those of the clone.
-
-    Args:
-        client: Client of the engine.
-        tag: Name of the image, which the engine has.
+    """Whether an image that the engine has was made from other sources than those of this package's clone.
 
     Raises:
         WorkerError: If the engine does not answer.
     """
-    with engine_errors(f"the engine does not say what the image {tag} holds"):
-        return are_others(client.images.get(tag).labels.get(SOURCES_LABEL))
+    return are_others(_read_label(client, tag, SOURCES_LABEL))
 
 
 def rmw_of(client: DockerClient, tag: str) -> str | None:
-    """Middleware of the genuine rclpy in an image; None if it has no rclpy.
+    """Middleware of the genuine rclpy in an image of the engine; None if the image has no rclpy.
 
-    Args:
-        client: Client of the engine.
-        tag: Name of the image, which the engine has.
+    Raises:
+        WorkerError: If the engine does not answer.
+    """
+    return _read_label(client, tag, RMW_LABEL)
+
+
+def _read_label(client: DockerClient, tag: str, name: str) -> str | None:
+    """Read a label of an image that the engine has.
 
     Raises:
         WorkerError: If the engine does not answer.
     """
     with engine_errors(f"the engine does not say what the image {tag} holds"):
-        label = client.images.get(tag).labels.get(RMW_LABEL)
+        label = client.images.get(tag).labels.get(name)
     return label if isinstance(label, str) else None
 
 
@@ -165,6 +162,59 @@ def is_there(client: DockerClient, image: str) -> bool:
         except ImageNotFound:
             return False
         return True
+
+
+def save_image(
+    archive: Path, image: str | None, *, base: str, wheelhouse: Path | None, say: Callable[[str], None]
+) -> None:
+    """Write an image into an archive, as `docker save` does.
+
+    Args:
+        archive: The archive, which is made.
+        image: Name of the image, which is pulled if the engine does not have it. None takes the image of these sources,
+            which is built if the engine has none, or one of other sources.
+        base: Base image, if one is built.
+        wheelhouse: Directory of wheels, if an image is built; None takes them from the package index.
+        say: Is called with one line for each step.
+
+    Raises:
+        ConfigError: If the image has to be built, but the package does not run from a clone.
+        WorkerError: If no engine answers, or the image cannot be built or pulled.
+        DatasetError: If the archive cannot be written.
+    """
+    name = image or default_tag()
+    with closing(connect()) as client:
+        if image is not None:
+            ensure(client, image, say=say)
+            if is_outdated(client, image):
+                say(f"the image {image} was made from other sources than these; it is used, as it is named")
+        elif not is_there(client, name) or is_outdated(client, name):
+            say(f"the engine has no image {name} of these sources; building it, which takes minutes")
+            build(client, name, base=base, wheelhouse=wheelhouse, say=say)
+        say(f"saving {name}")
+        _save(client, name, archive)
+
+
+def _save(client: DockerClient, tag: str, archive: Path) -> None:
+    words = f"the engine does not hand out the image {tag}"
+    try:
+        with archive.open("wb", buffering=0) as file:
+            with engine_errors(words):
+                chunks = client.images.get(tag).save(named=True)
+            for chunk in _receive(chunks, words):
+                write_all(file.fileno(), chunk)
+    except OSError as error:
+        raise unwritable(archive, error) from error
+
+
+def _receive(chunks: Iterator[bytes], words: str) -> Iterator[bytes]:
+    """Receive chunks from the engine, so that its errors are not mistaken for errors of writing the chunks."""
+    while True:
+        with engine_errors(words):
+            chunk = next(chunks, None)
+        if chunk is None:
+            return
+        yield chunk
 
 
 def _run_steps(
@@ -196,8 +246,8 @@ def _run_steps(
                 say(f"step {step[1]}: {' '.join(step[2].split()):.{_STEP_COLUMNS}}")
             elif line.strip() and not _BOOKKEEPING.match(line):
                 printed.append(line.rstrip())
-            if found := _MISSING_WHEEL.search(line):
-                missing = found[1]
+            if match := _MISSING_WHEEL.search(line):
+                missing = match[1]
         if "error" in answer:
             raise _failure(tag, answer["error"].strip(), missing, wheelhouse, "\n".join(printed))
 

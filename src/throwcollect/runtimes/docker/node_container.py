@@ -1,4 +1,4 @@
-"""The container of one node, from its creation to the last line of its log."""
+"""Starts the container of one node, and copies its output into the log of the node."""
 
 from __future__ import annotations
 
@@ -18,25 +18,23 @@ from throwcollect.runtimes.docker.engine import ENGINE_ERRORS, in_words
 from throwcollect.runtimes.docker.options import LOG_LABEL
 
 _AT_ONCE = threading.BoundedSemaphore(8)
-"""More containers started at the same time were not up any sooner."""
+"""Starting more containers at the same time was measured to gain nothing."""
 
 _RETRY_S = 1.0
 _LIVELY = ("running", "paused", "restarting")
 
 
 class NodeContainer:
-    """A container that is started and whose output is copied by a thread of its own.
+    """A container, with a thread of its own that starts it and copies its output.
 
     Attributes:
         name: Name of the node.
         handle: Id of the container; None until it runs.
-        failure: Why it could not be started; None if it could.
+        failure: Reason why the container could not be started; None if there is none.
 
     Args:
-        client: Client of the engine.
-        name: Name of the node.
-        log: File to which its output is appended.
-        clock: Is told of all that it prints; it counts the client's answers by itself.
+        log: File to which the output of the container is appended.
+        clock: Is told of all output; it counts the client's answers by itself.
     """
 
     def __init__(self, client: DockerClient, name: str, log: Path, clock: EngineClock) -> None:
@@ -53,20 +51,20 @@ class NodeContainer:
 
     @property
     def begun(self) -> bool:
-        """Whether it has been started, or could not be."""
+        """Whether the start of the container has succeeded or failed."""
         return self._begun.is_set()
 
     @property
     def log_complete(self) -> bool:
-        """Whether all that it will ever print is in its file."""
+        """Whether the container has ended, and all its output is in the file."""
         return self._thread is not None and not self._thread.is_alive()
 
     def start(self, options: dict[str, Any], *, networks: Sequence[str]) -> None:
-        """Begin to start it; an ended container of its name is removed.
+        """Begin to start the container; an ended container of its name is removed.
 
         Args:
             options: Keywords for `containers.create`.
-            networks: Networks that it joins besides.
+            networks: Further networks that the container joins.
         """
         self._run_in_thread(lambda: self._live(options, networks))
 
@@ -78,20 +76,20 @@ class NodeContainer:
         self._run_in_thread(lambda: self._copy_log(container, offset))
 
     def wait_begun(self, timeout_s: float) -> bool:
-        """Wait until it runs or could not be started, at most so long [s]; whether either is so."""
+        """Wait for `begun`, at most this time [s]; whether it is so."""
         return self._begun.wait(timeout_s)
 
     def renounce(self) -> None:
-        """Let it end as soon as it runs, if it is still being started: nobody waits for it any more."""
+        """If the container is still being started, remove it as soon as it runs, because nobody waits for it."""
         self._unwanted.set()
 
     def wait_log(self, timeout_s: float) -> None:
-        """Wait until its output is in its file, at most so long [s]."""
+        """Wait for `log_complete`, at most this time [s]."""
         if self._thread is not None:
             self._thread.join(timeout_s)
 
     def close(self) -> None:
-        """Copy nothing more once the engine fails."""
+        """Stop to copy output at the next error of the engine."""
         self._closed.set()
 
     def _run_in_thread(self, work: Callable[[], None]) -> None:
@@ -99,15 +97,16 @@ class NodeContainer:
         self._thread.start()
 
     def _live(self, options: dict[str, Any], networks: Sequence[str]) -> None:
+        """Start the container, and copy its output until it has ended."""
         container = None
         try:
             with _AT_ONCE:
-                # It may have been asked to end while it waited for its turn.
+                # `renounce` may have been called while this thread waited.
                 if self._unwanted.is_set():
                     return
                 with suppress(NotFound):
                     self._client.api.remove_container(options["name"], v=True, force=True)
-                # A launcher that takes over copies the log on from here, so the place is kept with the container.
+                # A launcher that adopts the container has to know where in the file its output begins.
                 with open(open_log(self._log), "ab") as log:
                     offset = log.tell()
                 labels = {**options["labels"], LOG_LABEL: str(offset)}
@@ -131,11 +130,9 @@ class NodeContainer:
         self._copy_log(container, offset)
 
     def _copy_log(self, container: Container, offset: int) -> None:
-        """Append what it prints to its file until it has ended and all is there.
+        """Append the output of the container to the file until it has ended; `offset` is where in the file it begins.
 
-        Args:
-            container: The container.
-            offset: Where in the file its output begins; what is there already is not written again.
+        Output that is in the file already is not written again.
         """
         with open(open_log(self._log), "ab", buffering=0) as log:
             while not self._closed.is_set():
@@ -151,5 +148,5 @@ class NodeContainer:
                 except NotFound:
                     return
                 except ENGINE_ERRORS:
-                    # The engine may be back soon, with the container still running.
+                    # The engine may come back soon, and the container may still run.
                     self._closed.wait(_RETRY_S)

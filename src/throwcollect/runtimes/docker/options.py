@@ -1,4 +1,4 @@
-"""What the containers of a run are made with: names, labels, limits, mounts, environment."""
+"""The options with which the containers of a run are made: names, labels, limits, mounts, environment."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ VERSION_LABEL = "throwcollect.version"
 KEY_LABEL = "throwcollect.key"
 """Marks the volume that holds the key of a run."""
 JOINED_LABEL = "throwcollect.joined"
-"""Names the run that a container has joined which is no node of it; it ends with that."""
+"""Label with the id of the run that a component's container has joined, and with which it ends."""
 LOG_LABEL = "throwcollect.log-offset"
 """Size of a node's log file when this container began to write to it [bytes]."""
 
@@ -38,7 +38,7 @@ ROUTER_PORT = 7447
 
 DATA = "/data"
 KEY = RunKey(Path("/key"))
-"""The key of the run, as nodes see it."""
+"""The key of the run, as nodes in containers see it."""
 
 API_VERSION = "1.41"
 _PIDS = 512
@@ -48,11 +48,11 @@ _LOG_SIZE = {"max-size": "10m", "max-file": "2"}
 
 @dataclass(frozen=True)
 class RunPlace:
-    """A run and where its dataset lies.
+    """The names of everything that an engine holds of a run.
 
     Attributes:
-        run_id: Name of the run.
-        source: Absolute path of a directory of this machine, or name of a volume.
+        run_id: Id of the run.
+        source: Place of the dataset: absolute path of a directory of this machine, or name of a volume.
     """
 
     run_id: str
@@ -83,26 +83,22 @@ class RunPlace:
         return f"throwcollect-{self.run_id}-{node}"
 
     def labels(self, node: str | None = None) -> dict[str, str]:
-        """Labels of what is made for the run, or for one of its nodes."""
-        labels = {
-            RUN_LABEL: self.run_id,
-            DIRECTORY_LABEL: self.source,
-            VERSION_LABEL: __version__,
-        }
+        """Labels of everything that is made for the run, or for one of its nodes."""
+        labels = {RUN_LABEL: self.run_id, DIRECTORY_LABEL: self.source, VERSION_LABEL: __version__}
         return labels if node is None else {**labels, NODE_LABEL: node}
 
     def mount(self, *, read_only: bool) -> Mount:
-        """The dataset, or the volume that it lies in, for a container."""
+        """The mount of the dataset, or of the volume in which it lies."""
         kind = "volume" if self.in_volume else "bind"
         return Mount(target=DATA, source=self.source, type=kind, read_only=read_only)
 
     def key_mount(self, *, read_only: bool) -> Mount:
-        """The volume with the run's key, for a container."""
+        """The mount of the volume with the run's key."""
         return Mount(target=str(KEY.directory), source=self.key_volume, type="volume", read_only=read_only)
 
 
 def router_endpoint(config: Config, middleware: Middleware) -> str:
-    """Zenoh endpoint of the router: in the router itself, its name means its address in the run's network alone."""
+    """Zenoh endpoint of the router; by this name, the router listens only at its address in the run's network."""
     return f"{protocol_of(config.run, middleware)}/{ROUTER}:{ROUTER_PORT}"
 
 
@@ -112,23 +108,18 @@ def image(config: Config) -> str:
 
 
 def section_of(config: Config, name: str) -> NodeContainerConfig:
-    """What the configuration says of a node's container."""
+    """The section of the configuration for a node's container."""
     return config.containers.sim if name not in (ROUTER, COORDINATOR) else getattr(config.containers, name)
 
 
 def published(config: Config) -> bool:
-    """Whether anything is published to this machine, which a network without a way out does not allow."""
-    each = (config.containers.router, config.containers.sim, config.containers.coordinator)
-    return bool(config.run.router_port or any(node.ports for node in each))
+    """Whether a port is published to this machine, which is impossible from a network without a way out."""
+    sections = (config.containers.router, config.containers.sim, config.containers.coordinator)
+    return bool(config.run.router_port or any(section.ports for section in sections))
 
 
 def confine(place: RunPlace, image: str) -> dict[str, Any]:
-    """Keywords for `containers.create` that every container of a run gets: it can do little but compute.
-
-    Args:
-        place: The run.
-        image: The container's image.
-    """
+    """Keywords for `containers.create` that every container of a run gets, so that it can do little but compute."""
     return {
         "image": image,
         "labels": place.labels(),
@@ -156,18 +147,13 @@ def node_options(
 ) -> dict[str, Any]:
     """Keywords for `containers.create` that make the container of a node.
 
-    Args:
-        node: The node; the configuration may bind it to other cores.
-        place: The run.
-        config: Its configuration.
-        middleware: What carries the messages of its nodes.
-        image_id: Id of the image, for the dataset's provenance.
-        address: Its address in the run's network; None for any.
+    The configuration may bind the node to another core. The id of the image goes into the dataset's provenance; the
+    address is that in the run's network, None for any.
     """
     section = section_of(config, node.name)
     own = {
         **node_environment(Connection(router_endpoint(config, middleware), KEY, config.run.domain_id, middleware)),
-        # What nodes would say otherwise, a random id and /data, means nothing outside of the container.
+        # Nodes would write a random id and /data into the provenance, which mean nothing outside of the container.
         HOST_VARIABLE: socket.gethostname(),
         IMAGE_VARIABLE: image_id,
         DIRECTORY_VARIABLE: "" if place.in_volume else place.source,
@@ -197,25 +183,19 @@ def container_options(
     environment: Mapping[str, str],
     mounts: Sequence[Mount],
 ) -> dict[str, Any]:
-    """Keywords for `containers.create` that a container of a run gets, whatever it runs.
+    """Keywords for `containers.create` for a node or a component.
 
-    Args:
-        place: The run.
-        image: The container's image.
-        node: Name of the node that it is.
-        section: What the operator says of it.
-        environment: Environment variables that it needs.
-        mounts: Mounts that it needs.
+    Options of its section of the configuration, or of the catalogue, replace those of `confine`.
     """
     general = confine(place, image)
     options: dict[str, Any] = dict(section.options)
-    wanted = {key: str(value) for key, value in section.environment.items()}
+    chosen = {key: str(value) for key, value in section.environment.items()}
     return {
         **general,
         **options,
         "name": place.container(node),
         "labels": {**options.get("labels", {}), **place.labels(node)},
-        "environment": {**general["environment"], **environment, **wanted},
+        "environment": {**general["environment"], **environment, **chosen},
         "tmpfs": _with_tmpfs(general["tmpfs"], options.get("tmpfs", {})),
         "ulimits": [Ulimit(name=key, soft=value, hard=value) for key, value in options.get("ulimits", {}).items()],
         "mounts": [*mounts, *map(_bind, section.mounts)],
@@ -237,6 +217,6 @@ def _bind(mount: str) -> Mount:
     return Mount(target=target, source=source, type="bind", read_only=bool(mode))
 
 
-def _with_tmpfs(own: Mapping[str, str], wanted: Mapping[str, str]) -> dict[str, str]:
-    # The last of contradicting mount options wins.
-    return {**own, **{path: ",".join(filter(None, [own.get(path), options])) for path, options in wanted.items()}}
+def _with_tmpfs(own: Mapping[str, str], chosen: Mapping[str, str]) -> dict[str, str]:
+    # The kernel takes the last of mount options that contradict each other.
+    return {**own, **{path: ",".join(filter(None, [own.get(path), options])) for path, options in chosen.items()}}

@@ -1,6 +1,6 @@
-"""Docker as a runtime: whether it can be had, and what an engine holds of runs.
+"""The runtime ``docker``: whether an engine can be used, and which runs it holds.
 
-The client of the engine is imported when it is needed: most commands only ask whether there is an engine at all.
+The client of the engine is imported only when it is needed, because most commands only ask whether there is an engine.
 """
 
 from __future__ import annotations
@@ -22,34 +22,29 @@ if TYPE_CHECKING:
     from throwcollect.runtimes.docker.containers import DockerNodes
 
 _PROBE_S = 3.0
-"""Where processes will do as well, an engine that takes longer to answer is as good as none."""
+"""With ``run.runtime: auto``, an engine that takes longer to answer is not used."""
 _LOOK_S = 2.0
 
 
 class DockerRuntime(Runtime):
-    """Nodes as containers of a Docker engine, which go on without their launcher."""
+    """Nodes as containers of a Docker engine, which outlive their launcher."""
 
     handle = "container"
     outlives_launcher = True
     has_volumes = True
 
     def is_absent(self) -> bool:
-        """Whether there is neither a client nor an engine to ask."""
+        """Whether the client is not installed, or the engine has no socket."""
         return not is_installed("docker") or not has_socket()
 
     def in_words(self, config: Config) -> str:
-        """Where trials are simulated."""
+        """See `Runtime.in_words`."""
         from throwcollect.runtimes.docker.options import image
 
         return f"Docker containers of {image(config)}"
 
     def host(self, place: Place, config: Config, *, warn: Callable[[str], None]) -> DockerNodes:
-        """The containers of a run.
-
-        Raises:
-            ConfigError: If something that the configuration asks for is not there, or taken.
-            WorkerError: If no engine answers, or it does not have the image.
-        """
+        """Make the host of a run; see `Runtime.host`."""
         from throwcollect.runtimes.docker.containers import DockerNodes
 
         return DockerNodes(place, config, warn=warn)
@@ -57,18 +52,19 @@ class DockerRuntime(Runtime):
     def prepare(
         self, config: Config, middleware: Middleware, *, say: Callable[[str], None], warn: Callable[[str], None]
     ) -> Middleware:
-        """Have the image, and find out what carries the messages of containers; see `Runtime.prepare`."""
+        """Get the image, and find out the middleware of containers; see `Runtime.prepare`."""
         if is_installed("docker"):
             check_socket()
         from throwcollect.runtimes.docker.engine import connect
-        from throwcollect.runtimes.docker.image import ensure, is_outdated
+        from throwcollect.runtimes.docker.image import ensure, is_outdated, rmw_of
         from throwcollect.runtimes.docker.options import image
 
+        name = image(config)
         with closing(connect(timeout_s=None if config.run.runtime == "docker" else _PROBE_S)) as client:
-            ensure(client, image(config), say=say)
-            if is_outdated(client, image(config)):
-                _settle(client, config, warn)
-            return _middleware_of_image(client, config, middleware)
+            ensure(client, name, say=say)
+            if is_outdated(client, name):
+                _handle_outdated_image(client, name, config, warn)
+            return _choose_middleware(rmw_of(client, name), name, config, middleware)
 
     def check(self) -> Check:
         """Whether an engine answers, and has the image of these sources."""
@@ -94,7 +90,7 @@ class DockerRuntime(Runtime):
         return Check("docker", "ok", f"{found}, with the image {default_tag()}")
 
     def find_held(self) -> list[HeldRun]:
-        """Runs of which the engine holds something; none if there is no engine that answers quickly, or no client."""
+        """See `Runtime.find_held`; none if there is no client, or the engine does not answer quickly."""
         if self.is_absent():
             return []
         from throwcollect.runtimes.docker.engine import connect
@@ -106,7 +102,7 @@ class DockerRuntime(Runtime):
             return []
 
     def is_left(self, run: str) -> bool:
-        """Whether the engine holds containers of a run; one that is gone holds none that run.
+        """Whether the engine holds containers of a run; an engine that has ended has no running containers.
 
         Raises:
             WorkerError: If the engine does not answer in time.
@@ -129,18 +125,14 @@ class DockerRuntime(Runtime):
         return remove(connect(), run, volumes=volumes)
 
 
-def _middleware_of_image(client: DockerClient, config: Config, launcher: Middleware) -> Middleware:
-    """What carries the messages of containers: what their image has and the launcher can join.
+def _choose_middleware(rmw: str | None, image: str, config: Config, launcher: Middleware) -> Middleware:
+    """Choose the middleware of containers: the image has to have it, and the launcher has to be able to join it.
 
     Raises:
         ConfigError: If rclpy is asked for, and the image has none, or the launcher could not join its nodes.
     """
-    from throwcollect.runtimes.docker.image import rmw_of
-    from throwcollect.runtimes.docker.options import image
-
-    rmw = rmw_of(client, image(config))
     if rmw is None:
-        problem = f"the image {image(config)} has no rclpy"
+        problem = f"the image {image} has no rclpy"
     elif (found := Middleware("rclpy", rmw)).joining.backend == "embedded":
         return found if config.run.ros != "embedded" else Middleware()
     elif not is_local():
@@ -152,16 +144,14 @@ def _middleware_of_image(client: DockerClient, config: Config, launcher: Middlew
     return Middleware()
 
 
-def _settle(client: DockerClient, config: Config, warn: Callable[[str], None]) -> None:
-    """Decide about an image of other sources: it may collect other bytes than these, so it is used on demand only.
+def _handle_outdated_image(client: DockerClient, name: str, config: Config, warn: Callable[[str], None]) -> None:
+    """Use an image of other sources only if the user has named it, as it may collect other bytes; else build a new one.
 
     Raises:
-        WorkerError: If processes will do as well, or the image cannot be built anew.
+        WorkerError: If ``run.runtime: auto`` may use processes instead, or the image cannot be built.
     """
     from throwcollect.runtimes.docker.image import build
-    from throwcollect.runtimes.docker.options import image
 
-    name = image(config)
     finding = f"the image {name} was made from other sources than these"
     if config.containers.image is not None:
         warn(f"{finding}; it is used, as containers.image names it")

@@ -1,4 +1,4 @@
-"""Volumes of the engine: how a dataset or the key of a run gets into one, and what can be asked about a dataset."""
+"""Copies datasets and keys into volumes of the engine, and reads the summary of a dataset in a volume."""
 
 from __future__ import annotations
 
@@ -28,13 +28,7 @@ _INFO = TypeAdapter(Info)
 
 
 def place_directory(client: DockerClient, place: RunPlace, config: Config, directory: Path) -> None:
-    """Copy a prepared directory into the run's directory of the volume; the files belong to the caller there.
-
-    Args:
-        client: Client of the engine.
-        place: The run.
-        config: Its configuration.
-        directory: What to copy.
+    """Copy a prepared directory into the run's directory of the volume, where the files belong to this user.
 
     Raises:
         WorkerError: If it cannot be copied.
@@ -42,7 +36,7 @@ def place_directory(client: DockerClient, place: RunPlace, config: Config, direc
     with (
         engine_errors(f"{directory} cannot be copied into the volume {place.source}"),
         tempfile.SpooledTemporaryFile(_IN_MEMORY) as packed,
-        # The container is never started: the engine writes into the mounts of a stopped one, too.
+        # The container need not be started, because the engine also writes into the mounts of a stopped one.
         _single(client, place, config, ["--version"], place.mount(read_only=False)) as container,
     ):
         with tarfile.open(fileobj=packed, mode="w") as archive:
@@ -52,16 +46,10 @@ def place_directory(client: DockerClient, place: RunPlace, config: Config, direc
 
 
 def place_key(client: DockerClient, place: RunPlace, config: Config, key: RunKey) -> None:
-    """Make the volume with the run's key, whose files the caller's uid alone can read there.
+    """Make the volume with the run's key, whose files only this user can read there.
 
-    It goes the engine's way for files, so that the key is on no command line and in nothing that the engine tells of
+    The key is copied as files, so that it appears neither on a command line nor in the engine's description of
     containers.
-
-    Args:
-        client: Client of the engine.
-        place: The run.
-        config: Its configuration.
-        key: The key.
 
     Raises:
         WorkerError: If the engine refuses.
@@ -79,12 +67,7 @@ def place_key(client: DockerClient, place: RunPlace, config: Config, key: RunKey
 
 
 def dataset_info(client: DockerClient, place: RunPlace, config: Config) -> Info:
-    """Summary of the dataset in the volume, which a container prints.
-
-    Args:
-        client: Client of the engine.
-        place: The run.
-        config: Its configuration.
+    """Let a container print the summary of the dataset in the volume, and read it.
 
     Raises:
         WorkerError: If the engine cannot be asked.
@@ -119,7 +102,7 @@ def _let_caller_read(member: tarfile.TarInfo) -> tarfile.TarInfo:
 def _single(
     client: DockerClient, place: RunPlace, config: Config, command: list[str], mount: Mount
 ) -> Iterator[Container]:
-    """A container of the run that is no node of it, without a network; removed at the end."""
+    """Create a container without a network for a single command; it is removed after the block."""
     container = client.containers.create(
         **confine(place, image(config)), command=command, mounts=[mount], network_mode="none"
     )

@@ -1,4 +1,4 @@
-"""What an engine knows of the containers of one run, kept up to date by threads."""
+"""Follows the states of the containers of one run with threads."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from throwcollect.runtimes.docker.options import RUN_LABEL, RunPlace
 
 _EVENTS = ["start", "die", "oom", "destroy", "pause", "unpause", "health_status"]
 _LOOK_EVERY_S = 2.0
-"""Events come at once, but a stream that hangs or breaks brings none."""
+"""Events arrive at once, but none arrives on a stream that hangs or breaks, so the containers are also listed."""
 
 
 @dataclass(frozen=True)
@@ -25,11 +25,11 @@ class ContainerState:
     """A container as the engine last described it.
 
     Attributes:
-        status: The engine's word, such as ``running``, ``paused`` or ``exited``; ``removed`` when it is gone.
-        code: Exit code; None while it runs.
-        out_of_memory: Whether the kernel has ended a process of it for want of memory.
-        healthy: Whether its health check succeeded last.
-        address: Its address in the run's network; None if it has none.
+        status: The engine's word, such as ``running``, ``paused`` or ``exited``; ``removed`` if the container is gone.
+        code: Exit code; None while the container runs.
+        out_of_memory: Whether the kernel has killed a process of the container for lack of memory.
+        healthy: Whether the last health check succeeded.
+        address: Address in the run's network; None if the container has none.
     """
 
     status: str
@@ -40,21 +40,19 @@ class ContainerState:
 
     @property
     def ended(self) -> bool:
-        """Whether it will never run again."""
+        """Whether the container will never run again."""
         return self.status in ("exited", "dead", "removed")
 
 
 class EngineWatch:
-    """Follows the containers of one run by the engine's events, and by looking at all of them every few seconds.
+    """Follows the containers of one run by the engine's events, and by listing all of them every few seconds.
 
-    Events only say where to look: what is known is always what the engine says of a container when it is asked.
+    An event only tells which container to inspect; every state comes from an inspection.
 
     Attributes:
-        last_error: What the engine, or the system, said when it last refused to answer; empty if it never did.
+        last_error: The reason of the last error of the engine; empty if there was none.
 
     Args:
-        client: Client of the engine.
-        place: The run.
         clock: Is told of every event; it counts the client's answers by itself.
     """
 
@@ -65,7 +63,7 @@ class EngineWatch:
         self._network = place.network
         self._label = f"{RUN_LABEL}={place.run_id}"
         self._states: dict[str, ContainerState] = {}
-        # One look at a time, so that an old finding never replaces a newer one.
+        # Containers are inspected one after the other, so that an old state never replaces a newer one.
         self._looking = threading.Lock()
         self._closed = threading.Event()
         self._stream: Any = None
@@ -73,11 +71,11 @@ class EngineWatch:
             threading.Thread(target=target, daemon=True).start()
 
     def state(self, container: str | None) -> ContainerState | None:
-        """What is known of a container; None when nothing is."""
+        """The last state of a container; None if there is none."""
         return None if container is None else self._states.get(container)
 
     def look(self, container: str) -> None:
-        """Ask the engine for a container.
+        """Inspect a container.
 
         Raises:
             OSError: If the engine does not answer; in general, one of `ENGINE_ERRORS`.
@@ -112,7 +110,7 @@ class EngineWatch:
         while not self._closed.wait(_LOOK_EVERY_S):
             try:
                 listed = self._client.api.containers(all=True, filters={"label": self._label})
-                now = {each["Id"]: each["State"] for each in listed}
+                now = {container["Id"]: container["State"] for container in listed}
                 before = {key: state.status for key, state in self._states.copy().items() if state.status != "removed"}
                 for container in now.keys() | before.keys():
                     if now.get(container) != before.get(container):
@@ -121,8 +119,7 @@ class EngineWatch:
                 self._note(error)
 
     def _note(self, error: BaseException) -> None:
-        # That nothing comes in for a while says nothing beyond the silence, which the clock measures; and a stream
-        # without an event is none.
+        # A timeout is no error to report: a stream without events times out, and the clock measures real silence.
         if not timed_out(error):
             self.last_error = in_words(error)
 

@@ -32,8 +32,8 @@ def engine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Engine]:
     # Times are a hundredth or so of what they are.
     monkeypatch.setattr(docker_watch, "_LOOK_EVERY_S", 0.1)
     monkeypatch.setattr(docker_clock, "_TICK_S", 0.025)
-    monkeypatch.setattr(docker_clock, "_TELL_S", 0.3)
-    monkeypatch.setattr(module, "SILENCE_S", 1.0)
+    monkeypatch.setattr(docker_clock, "_WARN_S", 0.3)
+    monkeypatch.setattr(docker_clock, "SILENCE_S", 1.0)
     with engine_at(path) as engine:
         yield engine
 
@@ -175,10 +175,10 @@ def test_an_answer_that_does_not_come_in_time_is_said_in_our_words(
         docker_engine.connect(timeout_s=0.1)
     engine.answer_all()
     engine.released.clear()
-    monkeypatch.setattr(module, "SILENCE_S", 0.3)
+    monkeypatch.setattr(docker_clock, "SILENCE_S", 0.3)
     runtime = make()
     engine.withheld = "POST /containers/create"
-    monkeypatch.setattr(module, "SILENCE_S", 10.0)
+    monkeypatch.setattr(docker_clock, "SILENCE_S", 10.0)
     runtime.start(NodeSpec("sim_0", ("sim",), Role.EXPENDABLE))
     ends: list[NodeExit] = []
     until(lambda: ends.extend(runtime.exits()) or ends)

@@ -10,9 +10,8 @@ import pytest
 from docker.errors import APIError
 
 from throwcollect.errors import DatasetError, WorkerError
-from throwcollect.runtimes.docker import saved_image
-from throwcollect.runtimes.docker.image import default_tag
-from throwcollect.runtimes.docker.saved_image import save_image
+from throwcollect.runtimes.docker import image as saved_image
+from throwcollect.runtimes.docker.image import default_tag, save_image
 
 
 @pytest.fixture
