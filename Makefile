@@ -31,8 +31,7 @@ define find_libgomp
     { echo "libgomp.so.1 is missing, which simulating needs: sudo apt install libgomp1, then make again" >&2; exit 1; }
 endef
 
-# pip shows what it downloads, as this takes minutes. Nothing may be compiled: a Bullet of one's own computes other bytes.
-INSTALL := $(BIN)/python -m pip install --no-compile --disable-pip-version-check --only-binary=pybullet
+INSTALL := packaging/install.sh $(BIN)/python
 
 $(READY): pyproject.toml | $(VENV)/bin/python
 	$(find_libgomp)
@@ -57,11 +56,12 @@ ros: $(READY_DEV)
 $(READY_ROS): $(ROS_WHEELS)/made-from.sha256 | $(READY_DEV)
 	rm -rf $(ROS_VENV)
 	packaging/environment.sh $(ROS_VENV) $(BIN)/python
-	$(ROS_VENV)/bin/python -m pip install --quiet --no-compile --disable-pip-version-check --no-deps \
-	    $$(ls $(ROS_WHEELS)/*.whl | grep -v /numpy-)
+	packaging/install.sh $(ROS_VENV)/bin/python --quiet --no-deps $$(ls $(ROS_WHEELS)/*.whl | grep -v /numpy-)
 	$(ROS_VENV)/bin/python -c "import sysconfig; print('import site; site.addsitedir(\'' \
 	    + sysconfig.get_path('purelib', vars={'base': '$(CURDIR)/$(VENV)'}) + '\')')" > $@.pth
 	mv $@.pth "$$($(ROS_VENV)/bin/python -c "import sysconfig; print(sysconfig.get_path('purelib'))")/development.pth"
+	@# Without rclpy, tests would be skipped and nobody would notice.
+	$(ROS_VENV)/bin/python -c "import rclpy, control_msgs, simulation_interfaces"
 	touch $@
 
 # What a contributor runs in between, in less than a minute on two cores: the rules of the house, the API of nodes on the embedded

@@ -52,12 +52,12 @@ def environment(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPat
     for name in ("pyproject.toml", "LICENSE"):
         shutil.copy(ROOT / name, source)
     shutil.copytree(ROOT / "src", source / "src", ignore=shutil.ignore_patterns("*.egg-info", "__pycache__"))
-    pip = [sys.executable, "-m", "pip", "--disable-pip-version-check", "--quiet"]
-    subprocess.run([*pip, "wheel", "--no-deps", "--wheel-dir", directory, source], check=True)
+    uv = [sys.executable, "-m", "uv", "--quiet"]
+    subprocess.run([*uv, "build", "--wheel", "--out-dir", directory, source], check=True)
     (wheel,) = directory.glob("*.whl")
-    subprocess.run([python, "-m", "venv", "--without-pip", directory / "venv"], check=True)
-    into = ["--python", str(directory / "venv" / "bin" / "python")]
-    subprocess.run([*pip, *into, "install", "--no-compile", "--only-binary=:all:", wheel], check=True)
+    subprocess.run([*uv, "venv", "--python", python, directory / "venv"], check=True)
+    into = ["--python", directory / "venv" / "bin" / "python"]
+    subprocess.run([*uv, "pip", "install", *into, "--only-binary", ":all:", wheel], check=True)
     return directory / "venv" / "bin"
 
 
