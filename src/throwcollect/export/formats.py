@@ -43,11 +43,11 @@ _NEEDS = {"hdf5": ("h5py",), "mat": ("scipy",)}
 
 @dataclass(frozen=True)
 class Exported:
-    """What was exported.
+    """An export that was written.
 
     Attributes:
-        directory: Where to.
-        format: In which format.
+        directory: Its directory.
+        format: Its format.
         trials: Number of trials, each with a row of the table.
         episodes: Number of throws with time series.
         samples: Number of their samples.
@@ -99,5 +99,5 @@ def export(directory: StrPath, output: StrPath, *, to: str, rate_hz: int | None 
         samples=sum(entry.samples for entry in source.entries),
         rate_hz=source.rate_hz,
         size_bytes=size,
-        digest=source.digest,
+        digest=source.dataset.digest,
     )
