@@ -1,4 +1,4 @@
-"""The section of a report on a model of the dataset: targets, how they are missed, what adapting did."""
+"""The section of a report on a model of the dataset: targets, how they are missed, and what adapting changed."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import plotly.graph_objects as go
-from numpy.typing import NDArray
 
 from throwcollect.dataset.reader import Dataset
 from throwcollect.errors import ConfigError
@@ -21,15 +20,11 @@ from throwcollect.wording import command, format_count
 
 _TITLE = "How a model of it hits"
 _NOUNS = {"m": "distance", "rad": "angle"}
-"""What lies between a throw and its target, by unit."""
+"""Words for the difference between a throw and its target, by unit."""
 
 
 def show_model(directory: Path, dataset: Dataset) -> Section:
-    """Show what throwing at targets has shown of a model.
-
-    Args:
-        directory: Directory of the model.
-        dataset: The dataset that it was learned from.
+    """Show how a model of a dataset hits targets, from the directory of the model.
 
     Raises:
         ConfigError: If the model was learned from another dataset.
@@ -76,23 +71,15 @@ def show_model(directory: Path, dataset: Dataset) -> Section:
 
 
 def _draw_misses(model: Model, throws: Sequence[ThrowAtTarget]) -> go.Figure:
-    """Draw targets amid what the dataset reached, in the first two columns, and a line for each miss."""
-    count = len(model.targets)
-    targets = np.array([throw.target for throw in throws], np.float64).reshape(len(throws), count)
-    nowhere = [np.nan] * count
-    places = np.array([throw.place or nowhere for throw in throws], np.float64).reshape(len(throws), count)
-    ends, targets, places = (_take_two(points) for points in (model.learned.outputs, targets, places))
-    names = [*model.targets, ""]
-    return draw_miss_map(ends, targets, places, (names[0], names[1]))
-
-
-def _take_two(points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The first two columns; of points of one column, zeros beside it."""
-    return np.column_stack([points, np.zeros(len(points))])[:, :2]
+    """Draw targets amid the places that the dataset reached, and a line for each miss."""
+    shape, nowhere = (len(throws), len(model.targets)), [np.nan] * len(model.targets)
+    targets = np.array([throw.target for throw in throws], np.float64).reshape(shape)
+    places = np.array([throw.place or nowhere for throw in throws], np.float64).reshape(shape)
+    return draw_miss_map(model.learned.outputs, targets, places, model.targets)
 
 
 def _show_errors(key: str, title: str, score: Score, draw: Callable[[Score, int], go.Figure]) -> list[Panel]:
-    """A panel for each unit of misses."""
+    """Make a panel for each unit of misses."""
     units = [each.unit for each in score.trained[-1].errors.by_unit]
     return [
         Panel(key if number == 0 else f"{key}-{unit}", title, draw(score, number), picture=key)

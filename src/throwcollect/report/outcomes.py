@@ -18,7 +18,7 @@ class Style:
     """How an outcome is drawn.
 
     Attributes:
-        colour: In hex; told apart by people who confuse red and green, on white and on black.
+        colour: In hex; people who confuse red and green tell these colours apart, on white and on black.
         symbol: Marker, as plotly calls it.
     """
 
@@ -58,7 +58,7 @@ class Outcomes:
     """The outcomes of all trials.
 
     Attributes:
-        names: Those that occur; the success first, then always in the same order.
+        names: Outcomes that occur, in the same order in all reports, the success first.
         codes: Index into `names` of each trial, shape ``(n_trials,)``.
         success: Outcome of a trial that succeeded.
     """

@@ -7,11 +7,12 @@ from pathlib import Path
 
 from markupsafe import Markup
 
-from throwcollect.dataset.directory import JOURNAL
+from throwcollect.dataset.directory import CONFIG, JOURNAL
 from throwcollect.dataset.inspect import summary
 from throwcollect.dataset.journal import read_journal
 from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.summary import Info
+from throwcollect.files import read_text
 from throwcollect.members import load_object
 from throwcollect.report import figures
 from throwcollect.report.amounts import format_duration, format_share, format_size
@@ -20,7 +21,7 @@ from throwcollect.report.failures import Failure, group_failures
 from throwcollect.report.limits import KINDS, JointPeaks, summarise_peaks
 from throwcollect.report.model_section import show_model
 from throwcollect.report.outcomes import LANDED, Outcomes, in_words
-from throwcollect.report.provenance import config_text, provenance
+from throwcollect.report.provenance import provenance
 from throwcollect.report.swept_keys import Parameter, read_parameters
 from throwcollect.report.targets_section import show_targets
 from throwcollect.report.throughput import Throughput, measure_throughput
@@ -28,6 +29,7 @@ from throwcollect.robots.description import robot_of
 from throwcollect.tasks.task import task_of
 
 _MOST_FAILURES = 40
+_MOST_CONFIG_BYTES = 10_000_000
 _CODE = Markup("<code>{}</code>")
 
 
@@ -53,11 +55,7 @@ class Report:
 
 
 def report_dataset(dataset: Dataset, *, model: Path | None = None) -> Report:
-    """Gather what there is to say of a dataset.
-
-    Args:
-        dataset: The dataset.
-        model: Directory of a model that was learned from it; None for none.
+    """Make the report on a dataset, and on a model that was learned from it, if its directory is given.
 
     Raises:
         ConfigError: If the model was learned from another dataset.
@@ -88,28 +86,27 @@ def report_dataset(dataset: Dataset, *, model: Path | None = None) -> Report:
             _show_limits({kind: summarise_peaks(throws, kind) for kind in KINDS}, noun),
             *task.episodes,
             _show_throughput(measure_throughput(read_journal(dataset.directory / JOURNAL)), info),
-            _show_provenance(facts, config_text(dataset)),
+            _show_provenance(facts, read_text(dataset.directory / CONFIG, most_bytes=_MOST_CONFIG_BYTES)),
         ),
         noun=noun,
     )
 
 
 def _report_task(dataset: Dataset, outcomes: Outcomes) -> TaskReport:
-    """What the task adds; of one that adds nothing, how many trials there are and how many succeeded."""
+    """Make the part of the task; for a task without one, numbers of trials and of those that succeeded."""
     if path := task_of(dataset.config).report:
         added: TaskReport = load_object(path)(dataset, outcomes)
         return added
     trials = len(outcomes.codes)
     tiles = (
         Tile(f"{trials:,}", "trials planned"),
-        Tile(format_share(outcomes.succeeded, trials), f"{in_words(outcomes.success)}"),
+        Tile(format_share(outcomes.succeeded, trials), in_words(outcomes.success)),
     )
     by = robot_of(dataset.config).introduction
     return TaskReport(f"simulated {dataset.config.task.subject} by {by}", tiles, results=(), episodes=())
 
 
 def _show_parameters(parameters: tuple[Parameter, ...], outcomes: Outcomes) -> Section:
-    """The section on swept keys."""
     title, trials = "How the parameter space is covered", len(outcomes.codes)
     if not parameters:
         return Section("parameters", "Parameters", title, "Nothing was swept.")
@@ -143,7 +140,7 @@ def _show_outcomes(
     outcomes: Outcomes, parameters: tuple[Parameter, ...], failures: tuple[Failure, ...], noun: str
 ) -> Section:
     title, trials = f"How {noun}s end, and where failures lie", len(outcomes.codes)
-    # At the head of the page is a bar with the same numbers.
+    # The page shows the same numbers in a bar at its head.
     bars = Panel("all", title, figures.draw_outcome_bars(outcomes), picture="outcomes", on_page=False)
     blocks: list[Row | Table] = [(bars,)]
     failed = trials - outcomes.succeeded

@@ -1,4 +1,4 @@
-"""A picture of how far landings by two engines are apart."""
+"""A picture of the distances between landings by two engines."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from throwcollect.report.pictures import COLUMN_IN, DPI
 
 
 def write_deviations(deviations: Sequence[Sequence[float]], path: Path) -> None:
-    """Draw where throws land by one engine, seen from where they land by another one.
+    """Draw the landings by one engine relative to those by another one.
 
     Args:
-        deviations: Of each throw, along x and along y [m], shape ``(2, n_throws)``.
+        deviations: Differences of each throw's landings along x and along y [m], shape ``(2, n_throws)``.
         path: PNG file to write.
 
     Raises:
