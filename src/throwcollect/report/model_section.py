@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -55,7 +55,13 @@ def show_model(directory: Path, dataset: Dataset) -> Section:
             _draw_misses(model, score.throws),
             picture="targets",
         ),
-        *_show_errors("training", "Misses by number of throws learned from", score, _draw_training),
+        *_show_errors(
+            "training",
+            "Misses by number of throws learned from",
+            [(each.trained_on, each.errors) for each in score.trained],
+            x={"title": "throws learned from", "type": "log"},
+            y={"type": "log"},
+        ),
     ]
     rows: list[Row | Table] = [tuple(panels), _tabulate(score)]
     if score.adapted:
@@ -64,9 +70,14 @@ def show_model(directory: Path, dataset: Dataset) -> Section:
             f"Targets there after the last of them, misses {ARROWS} times as long",
             _draw_misses(model, score.adapted_throws),
         )
-        rows.append(
-            (*_show_errors("adapting", "In another world, by number of throws there", score, _draw_adapting), there)
+        errors = _show_errors(
+            "adapting",
+            "In another world, by number of throws there",
+            [(each.real_throws, each.errors) for each in score.adapted],
+            x={"title": "throws in the other world"},
+            y={"rangemode": "tozero"},
         )
+        rows.append((*errors, there))
     return Section("model", "Model", _TITLE, text, tuple(rows))
 
 
@@ -78,26 +89,14 @@ def _draw_misses(model: Model, throws: Sequence[ThrowAtTarget]) -> go.Figure:
     return draw_miss_map(model.learned.outputs, targets, places, model.targets)
 
 
-def _show_errors(key: str, title: str, score: Score, draw: Callable[[Score, int], go.Figure]) -> list[Panel]:
-    """Make a panel for each unit of misses."""
-    units = [each.unit for each in score.trained[-1].errors.by_unit]
-    return [
-        Panel(key if number == 0 else f"{key}-{unit}", title, draw(score, number), picture=key)
-        for number, unit in enumerate(units)
-    ]
-
-
-def _draw_training(score: Score, unit: int) -> go.Figure:
-    misses = [each.errors.by_unit[unit] for each in score.trained]
-    figure = _draw_errors([each.trained_on for each in score.trained], misses)
-    figure.update_xaxes(title="throws learned from", type="log").update_yaxes(type="log")
-    return figure
-
-
-def _draw_adapting(score: Score, unit: int) -> go.Figure:
-    misses = [each.errors.by_unit[unit] for each in score.adapted]
-    figure = _draw_errors([each.real_throws for each in score.adapted], misses)
-    return figure.update_xaxes(title="throws in the other world").update_yaxes(rangemode="tozero")
+def _show_errors(
+    key: str, title: str, errors: Sequence[tuple[int, Errors]], *, x: dict[str, str], y: dict[str, str]
+) -> Iterator[Panel]:
+    """Make a panel for each unit of misses by a number of throws; x and y are settings of its axes."""
+    throws = [count for count, _ in errors]
+    for number, misses in enumerate(zip(*(each.by_unit for _, each in errors), strict=True)):
+        figure = _draw_errors(throws, misses).update_xaxes(x).update_yaxes(y)
+        yield Panel(f"{key}-{misses[0].unit}" if number else key, title, figure, picture=key)
 
 
 def _draw_errors(numbers: Sequence[int], misses: Sequence[Misses]) -> go.Figure:

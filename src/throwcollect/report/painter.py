@@ -23,6 +23,12 @@ from matplotlib.ticker import AutoLocator, FuncFormatter, LogLocator, MaxNLocato
 
 from throwcollect.report.contents import Panel
 
+_COLUMN_IN, _BOTH_COLUMNS_IN = 3.5, 7.16
+"""Widths of pictures [in]: one column of a paper in two columns, and both."""
+_MOST_PX_IN_COLUMN = 405
+"""Panels that need to be wider than this on the page get both columns."""
+DPI = 300
+"""Pixels per inch, sharp in print."""
 _PX_PER_IN = 145
 """At this scale, a column of a paper is as wide as half a page in a browser."""
 _FRAME_PX = 100
@@ -72,20 +78,15 @@ _STYLE: dict[Any, Any] = {
 }
 
 
-def paint(panels: Sequence[Panel], path: Path, *, width_in: float, dpi: int) -> None:
-    """Paint panels into one PNG file, below one another.
-
-    Args:
-        panels: One, or small ones with one pair of axes each.
-        path: The file.
-        width_in: Its width [in]; its height follows from those of the figures.
-        dpi: Its pixels per inch.
+def paint(panels: Sequence[Panel], path: Path) -> None:
+    """Paint one panel, or small ones with one pair of axes each below one another, into a PNG file.
 
     Raises:
         OSError: If the file cannot be written.
     """
     with mpl.rc_context(_STYLE):
         heights = [panel.figure.layout.height - _FRAME_PX for panel in panels]
+        width_in = _BOTH_COLUMNS_IN if panels[0].width_px > _MOST_PX_IN_COLUMN else _COLUMN_IN
         size = width_in, (_FRAME_PX + sum(heights)) / _PX_PER_IN
         painted = Figure(figsize=size, layout="constrained")
         FigureCanvasAgg(painted)
@@ -95,7 +96,7 @@ def paint(panels: Sequence[Panel], path: Path, *, width_in: float, dpi: int) -> 
             _paint_cells(painted, panels[0].figure)
         _add_legend(painted, panels[0].figure.layout.legend)
         # The version of matplotlib is left out, so that equal figures give equal bytes.
-        painted.savefig(path, dpi=dpi, metadata={"Software": None})
+        painted.savefig(path, dpi=DPI, metadata={"Software": None})
 
 
 def _paint_stack(painted: Figure, panels: Sequence[Panel], heights: Sequence[float]) -> None:

@@ -7,9 +7,10 @@ from pathlib import Path
 
 from markupsafe import Markup
 
-from throwcollect.dataset.directory import CONFIG, JOURNAL
+from throwcollect.dataset.directory import CONFIG, JOURNAL, PROVENANCE
 from throwcollect.dataset.inspect import summary
 from throwcollect.dataset.journal import read_journal
+from throwcollect.dataset.provenance import read_provenance
 from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.summary import Info
 from throwcollect.files import read_text
@@ -21,11 +22,11 @@ from throwcollect.report.failures import Failure, group_failures
 from throwcollect.report.limits import KINDS, JointPeaks, summarise_peaks
 from throwcollect.report.model_section import show_model
 from throwcollect.report.outcomes import LANDED, Outcomes, in_words
-from throwcollect.report.provenance import provenance
 from throwcollect.report.swept_keys import Parameter, read_parameters
 from throwcollect.report.targets_section import show_targets
 from throwcollect.report.throughput import Throughput, measure_throughput
 from throwcollect.robots.description import robot_of
+from throwcollect.sweep.digest import config_digest
 from throwcollect.tasks.task import task_of
 
 _MOST_FAILURES = 40
@@ -65,7 +66,7 @@ def report_dataset(dataset: Dataset, *, model: Path | None = None) -> Report:
     outcomes = Outcomes.of(throws["outcome"].to_pylist(), success=dataset.config.task.success)
     parameters = read_parameters(dataset.config, throws, outcomes)
     reasons = zip(*(throws[name].to_pylist() for name in ("trial", "outcome", "reason")), strict=True)
-    facts = provenance(dataset, info)
+    facts = _list_facts(dataset, info)
     task, noun = _report_task(dataset, outcomes), dataset.config.task.noun
     finished = f", finished on {facts['finished'][:10]}" if "finished" in facts else ""
     return Report(
@@ -90,6 +91,18 @@ def report_dataset(dataset: Dataset, *, model: Path | None = None) -> Report:
         ),
         noun=noun,
     )
+
+
+def _list_facts(dataset: Dataset, info: Info) -> dict[str, str]:
+    """List facts on the origin of a dataset: digests first, then how it was collected, if that is known."""
+    collected = read_provenance(dataset.directory)
+    return {
+        "dataset digest": info.digest,
+        "configuration digest": config_digest(dataset.config),
+        "layout": dataset.layout,
+        "sampler": f"{dataset.config.sweep.sampler}, seed {dataset.config.seed}",
+        **(collected.facts() if collected else {"collected": f"unknown: it has no readable {PROVENANCE}"}),
+    }
 
 
 def _report_task(dataset: Dataset, outcomes: Outcomes) -> TaskReport:

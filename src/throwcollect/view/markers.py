@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from rclzenoh.interfaces import get_message
-from throwcollect.dataset.throws_table import Row
+from throwcollect.dataset.throws_table import Row, ball_state
 from throwcollect.episode.frames import WORLD
 from throwcollect.episode.topics import BALL
 from throwcollect.errors import ConfigError
@@ -117,15 +117,16 @@ def _path(namespace: str, throw: ShownThrow, stamp_ns: int, *, width: float, alp
 
 def _point(name: str, row: Row, stamp_ns: int) -> list[Any]:
     """A dot with a label; nothing if the throw has no such point."""
-    if row.get(f"{name}_x_m") is None:
+    state = ball_state(row, name)
+    if state is None:
         return []
-    x, y, z = (row[f"{name}_{axis}_m"] for axis in "xyz")
+    (x, y, z), speed = state.position, math.hypot(*state.velocity)
     marker = get_message("visualization_msgs/msg/Marker")
     text = {
-        "release": lambda: f"release {row['release_time_s']:.2f} s, {_norm(row, 'release'):.2f} m/s",
-        "apex": lambda: f"apex {z:.2f} m",
-        "landing": lambda: f"landing x {x:.2f} m, y {y:.2f} m, {_norm(row, 'landing'):.2f} m/s",
-    }[name]()
+        "release": f"release {state.time_s:.2f} s, {speed:.2f} m/s",
+        "apex": f"apex {z:.2f} m",
+        "landing": f"landing x {x:.2f} m, y {y:.2f} m, {speed:.2f} m/s",
+    }[name]
     dot = _marker(name, marker.SPHERE, _SUCCEEDED, (_POINT_M,) * 3, stamp_ns)
     label = _marker(name, marker.TEXT_VIEW_FACING, _LABEL, (0.0, 0.0, _TEXT_M), stamp_ns, number=1)
     label.text = text
@@ -133,10 +134,6 @@ def _point(name: str, row: Row, stamp_ns: int) -> list[Any]:
     # The label of the release is below its dot: a ball released on its way down has its apex there, too.
     _place(label, x, y, z + (-1.5 if name == "release" else 1.5) * _TEXT_M)
     return [dot, label]
-
-
-def _norm(row: Row, name: str) -> float:
-    return math.hypot(*(row[f"{name}_v{axis}_mps"] for axis in "xyz"))
 
 
 def _marker(namespace: str, kind: int, rgba: Rgba, scale: tuple[float, ...], stamp_ns: int, *, number: int = 0) -> Any:

@@ -11,7 +11,6 @@ import plotly.graph_objects as go
 from throwcollect.report.contents import Panel
 from throwcollect.report.figures import BLUE, NEUTRAL
 from throwcollect.report.painter import paint
-from throwcollect.report.pictures import COLUMN_IN, DPI
 
 
 def write_deviations(deviations: Sequence[Sequence[float]], path: Path) -> None:
@@ -31,4 +30,4 @@ def write_deviations(deviations: Sequence[Sequence[float]], path: Path) -> None:
     figure.update_xaxes(title="landing farther in x by [mm]")
     figure.update_yaxes(title="landing farther in y by [mm]")
     figure.update_layout(height=400, showlegend=False)
-    paint([Panel("deviations", "", figure)], path, width_in=COLUMN_IN, dpi=DPI)
+    paint([Panel("deviations", "", figure)], path)
