@@ -105,16 +105,10 @@ def split(
 def assign(
     everything: Source, *, fractions: str, cells: Sequence[str] = SQUARES, seed: int = 0
 ) -> dict[str, dict[int, Cell | None]]:
-    """Decide which trials each part of a split gets.
-
-    Args:
-        everything: All trials.
-        fractions: As for `split`.
-        cells: As for `split`.
-        seed: Seed of the choice.
+    """Decide which trials each part gets by the arguments of `split`.
 
     Returns:
-        The trials of each part and the cell that each is in; None for a trial that is in none.
+        The trials of each part, each with its cell; None for a trial that is in no cell.
 
     Raises:
         ConfigError: If fractions or cells are wrong, or a part gets no trial.

@@ -21,14 +21,10 @@ class Format(Protocol):
     """One format: a module of this room."""
 
     def write(self, source: Source, directory: Path) -> None:
-        """Write the data files of a source.
-
-        Args:
-            source: What to export.
-            directory: Where the files go; it exists and is empty.
+        """Write the data files of a source into a directory that exists and is empty.
 
         Raises:
-            DatasetError: If an episode is damaged, or what it would write is too large for the format.
+            DatasetError: If an episode is damaged, or a file would be too large for the format.
             OSError: If a file cannot be written.
         """
 

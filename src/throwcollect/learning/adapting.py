@@ -210,4 +210,5 @@ def _shift(begun: Correction, method: Method, found: Array) -> Correction:
 
 
 def _measure_distances(learned: LearnedMap, parameters: Array, context: Array, places: Array) -> Array:
-    return np.linalg.norm(learned.predict(parameters, context) - places, axis=1)
+    distances: Array = np.linalg.norm(learned.predict(parameters, context) - places, axis=1)
+    return distances

@@ -41,7 +41,7 @@ class AdaptationEntry(_Entry):
     """How the model was adapted.
 
     Attributes:
-        method: What the world is taken to differ by.
+        method: How the world is taken to differ.
         throws: Number of throws.
         scatter: Standard deviation that was taken for each measured coordinate, in the unit of the targets.
         before: Distances of the throws from where the model predicted them before it was adapted.
@@ -145,13 +145,7 @@ def read_model_file(directory: Path) -> ModelFile:
 
 
 def list_found(learned: LearnedMap, method: Method, deviations: Array) -> list[Found]:
-    """List the numbers that adaptation found, in their units.
-
-    Args:
-        learned: The adapted map.
-        method: What differs in its world.
-        deviations: As `Adaptation` has them.
-    """
+    """List the numbers that adaptation found, in their units: of the adapted map and of an `Adaptation`."""
     if method is Method.NONE:
         return []
     role = ROLES.get(method)

@@ -26,7 +26,7 @@ _APART = 1000
 
 
 class Simulates(Protocol):
-    """What simulates throws, as `Simulator` does."""
+    """The part of `Simulator` that scoring needs."""
 
     config: Config
 

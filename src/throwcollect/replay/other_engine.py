@@ -87,7 +87,7 @@ def simulate_with(directory: Path, engine: str, trials: Sequence[int]) -> Iterat
 
 
 def distributions(deviations: Sequence[Deviation]) -> list[Distribution]:
-    """How much each column differs, in the order of the table."""
+    """Sum up how much each column differs, in the order of the table."""
     found = []
     for column in dict.fromkeys(column for each in deviations for column in each.values):
         values = np.array([each.values[column] for each in deviations if column in each.values])

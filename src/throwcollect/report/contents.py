@@ -19,7 +19,7 @@ class Panel:
         text: Caption, as text.
         picture: Name of the picture for papers; panels of one name stand below one another in it. Empty for none.
         width_px: Width below which it scrolls [px]; at 0 it shrinks with the page instead.
-        small: Whether a third of the page is enough for it.
+        small: True if a third of the width of the page is enough.
         on_page: False if the page shows the same in another way, so that the panel is only a picture.
     """
 

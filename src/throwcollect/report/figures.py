@@ -88,11 +88,11 @@ def _matrix_axes(parameters: Sequence[Parameter]) -> dict[str, object]:
         shared |= {"type": "log", **parameter.ticks} if parameter.logarithmic else {}
         # Each column is labelled below its lowest panel; in the last column that is the one of the counts.
         lowest = _axis_name("y", count - 1 if index < count - 1 else count + index)
-        axes[_axis_key("x", index)] = {**shared, "domain": across, "anchor": lowest, "tickangle": 0}
+        axes[_axis_name("xaxis", index)] = {**shared, "domain": across, "anchor": lowest, "tickangle": 0}
         if index:
-            axes[_axis_key("y", index)] = {**shared, "domain": down, "anchor": "x"}
+            axes[_axis_name("yaxis", index)] = {**shared, "domain": down, "anchor": "x"}
         counts = {"domain": down, "anchor": _axis_name("x", index), "showticklabels": False, "showgrid": False}
-        axes[_axis_key("y", count + index)] = {**counts, "rangemode": "tozero"}
+        axes[_axis_name("yaxis", count + index)] = {**counts, "rangemode": "tozero"}
     return axes
 
 
@@ -104,13 +104,8 @@ def _matrix_range(parameter: Parameter) -> list[float]:
 
 
 def _axis_name(letter: str, index: int) -> str:
-    """Name of an axis in a trace."""
+    """Name of an axis: with ``x`` in a trace, with ``xaxis`` in a layout."""
     return letter if index == 0 else f"{letter}{index + 1}"
-
-
-def _axis_key(letter: str, index: int) -> str:
-    """Name of an axis in a layout."""
-    return f"{letter}axis" if index == 0 else f"{letter}axis{index + 1}"
 
 
 def draw_outcome_bars(outcomes: Outcomes) -> go.Figure:

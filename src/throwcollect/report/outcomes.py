@@ -87,7 +87,7 @@ class Outcomes:
         return self.counts.get(self.success, 0)
 
     def style_of(self, name: str) -> Style:
-        """How an outcome is drawn: the success of any task as a landing is."""
+        """How an outcome is drawn; the success of any task is drawn as a landing is."""
         return style_of(LANDED if name == self.success else name)
 
     def are(self, name: str) -> NDArray[np.bool_]:

@@ -40,11 +40,11 @@ class Report:
 
     Attributes:
         name: Name of the dataset.
-        lead: What it holds, in a sentence.
+        lead: Sentence on its trials.
         tiles: Key numbers.
         outcomes: Outcomes of all its trials.
         sections: In the order of the page; one that has nothing to show says so.
-        noun: What a trial is called.
+        noun: Word for a trial.
     """
 
     name: str

@@ -24,7 +24,7 @@ class Parameter:
     Attributes:
         key: Dotted key.
         unit: Of its values; empty when they have none.
-        logarithmic: Whether its logarithm was spread evenly.
+        logarithmic: True if its logarithm, not its value, was drawn evenly.
         values: Value of each trial, shape ``(n_trials,)``.
         edges: Of the bins, shape ``(n_bins + 1,)``; around each value if there are only a few.
         counts: Trials in each bin by outcome, shape ``(n_bins, n_outcomes)``.

@@ -55,18 +55,14 @@ class Camera:
         return float(1 - self.axes[2, 2] / (self.axes[1, 2] * _TANGENT)) / 2
 
     def faces(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """Find out which points are well in front of it, shape ``(n,)``; those are in world [m], shape ``(n, 3)``."""
+        """Find out which points, in world [m], shape ``(n, 3)``, are well in front of the camera, shape ``(n,)``."""
         distance: NDArray[np.float64] = (self.eye - points) @ self.axes[2]
         return distance > _NEAREST_M
 
     def project(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Find points in the picture.
+        """Find the places of points in the picture, which are in world [m] in front of the camera, shape ``(n, 3)``.
 
-        Args:
-            points: In world [m], shape ``(n, 3)``; all in front of the camera.
-
-        Returns:
-            Shares of its width from the left and of its height from the top, shape ``(n, 2)``.
+        Places are shares of its width from the left and of its height from the top, shape ``(n, 2)``.
         """
         seen = (points - self.eye) @ self.axes.T
         right, up = seen[:, 0] / (-seen[:, 2] * _TANGENT * self.aspect), seen[:, 1] / (-seen[:, 2] * _TANGENT)

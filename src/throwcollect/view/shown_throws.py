@@ -32,11 +32,7 @@ class ShownThrow:
 
 
 def choose_rows(dataset: Dataset, trials: Iterable[int] | None) -> list[Row]:
-    """Choose the rows of the table of throws that are shown.
-
-    Args:
-        dataset: The dataset.
-        trials: Numbers of the trials, in this order; None for all that have an episode.
+    """Choose the rows of the table of throws that are shown: some trials in their order, or all that have an episode.
 
     Raises:
         ConfigError: If there is no such trial.

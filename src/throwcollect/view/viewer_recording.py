@@ -40,14 +40,10 @@ _LATCHED_TYPES = {
 
 
 class ViewRecording:
-    """Writes the MCAP file.
+    """Writes the MCAP file of a dataset's configuration to a stream.
 
     Attributes:
         channels: Its channels.
-
-    Args:
-        stream: The file, opened for writing.
-        config: The configuration of the dataset.
     """
 
     def __init__(self, stream: IO[bytes], config: Config) -> None:
@@ -82,12 +78,7 @@ class ViewRecording:
         }
 
     def write(self, throws: Sequence[ShownThrow], samples: Callable[[ShownThrow], Samples], robot: DrawnRobot) -> None:
-        """Write throws with everything that viewers draw.
-
-        Args:
-            throws: The throws in order of time, at least one.
-            samples: Reads the samples of a throw.
-            robot: The robot.
+        """Write throws in order of time, at least one, with their samples and everything else that viewers draw.
 
         Raises:
             DatasetError: If an episode cannot be read.
