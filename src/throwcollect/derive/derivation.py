@@ -33,7 +33,7 @@ from throwcollect.wording import command
 
 _ROWS_AT_ONCE = 256
 _MOST_THREADS = 4
-"""Compressing and hashing run side by side; what stays with the interpreter keeps more of them from being of use."""
+"""Only compressing and hashing run side by side; the rest holds the interpreter's lock, so more threads do not help."""
 
 
 @dataclass(frozen=True)
@@ -73,7 +73,7 @@ def derive(sources: Sequence[Source], output: Path) -> Derived:
 
 
 def write(sources: Sequence[Source], directory: Path, *, name: str | None = None) -> Derived:
-    """Write such a dataset to a directory that is removed if that fails.
+    """Write a derived dataset to a directory that the caller removes if this fails.
 
     Args:
         sources: As for `derive`.
@@ -90,9 +90,9 @@ def write(sources: Sequence[Source], directory: Path, *, name: str | None = None
         raise ConfigError("no trial with an episode is left", expected="at least one")
     if name is not None:
         config = config.model_copy(update={"name": name})
-    # Every trial has been run before, so none is to be checked.
+    # Every trial has been run before, so the plan need not check any.
     plan = Plan(config, make_trials(config, points))
-    # The robot is the one that the sources were recorded with, so nothing of it has to be installed.
+    # The sources hold the description of their robot, so its package need not be installed.
     channels = Channels(config, sources[0].dataset.robot_description() or full_description(config))
     create(directory, plan, listed=points)
     with closing(DatasetWriter(directory, plan, channels=channels)) as writer:
@@ -102,7 +102,7 @@ def write(sources: Sequence[Source], directory: Path, *, name: str | None = None
             if table.later <= row.keys():
                 result = table.result(row)
             else:
-                # The row is one of an earlier version, which did not measure all of it.
+                # An earlier version wrote the row, and did not measure all columns.
                 result = judge_episode(plan.config_of(plan.trial(episode.header.trial)), episode)
             writer.append(episode, result)
         writer.finish(wall_s=time.monotonic() - began)
@@ -118,7 +118,7 @@ def write(sources: Sequence[Source], directory: Path, *, name: str | None = None
 
 
 def _episodes(sources: Sequence[Source], restamper: Restamper) -> Iterator[tuple[Episode, Row]]:
-    """Episodes under their new numbers, in order, each with its row in the table of its source."""
+    """Restamp episodes to their new numbers, in order, each with its row in the table of its source."""
     threads = min(_MOST_THREADS, os.cpu_count() or 1)
     pending: deque[tuple[Future[Episode], Row]] = deque()
     with ThreadPoolExecutor(threads) as pool:

@@ -1,4 +1,4 @@
-"""What a derived dataset says of where its trials come from."""
+"""The origins of the trials of a derived dataset: a table of them, and a section of the data card."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from throwcollect.sweep.parquet_file import encode_table
 
 
 def encode_sources(sources: Sequence[Source]) -> bytes:
-    """Parquet bytes of a table with one row a trial: the dataset, trial and episode that it was."""
+    """Encode a table in Parquet with one row a trial: the dataset, trial and episode that it comes from."""
     rows: list[dict[str, object]] = []
     for source in sources:
         dataset = source.dataset
@@ -32,7 +32,7 @@ def encode_sources(sources: Sequence[Source]) -> bytes:
 
 
 def sources_section(sources: Sequence[Source]) -> str:
-    """The part of the data card that names the datasets that the trials come from."""
+    """Write the section of the data card on the datasets that the trials come from."""
     lines = [
         "",
         "## Sources",

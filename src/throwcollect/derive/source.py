@@ -1,4 +1,4 @@
-"""Datasets that others are made from, and which of their trials are taken."""
+"""Datasets that others are made from, and the trials that are taken from them."""
 
 from __future__ import annotations
 
@@ -24,14 +24,9 @@ class Source:
     without_episode: Mapping[str, int]
 
 
-def source(dataset: Dataset, wanted: Collection[int] | None = None) -> Source:
-    """Take trials of a dataset that have an episode.
-
-    Args:
-        dataset: The dataset.
-        wanted: Numbers of trials; None for all.
-    """
-    numbers = range(len(dataset.throws)) if wanted is None else sorted(wanted)
+def source(dataset: Dataset, trials: Collection[int] | None = None) -> Source:
+    """Take the trials of a dataset that have an episode, of some trials or of all."""
+    numbers = range(len(dataset.throws)) if trials is None else sorted(trials)
     outcomes = dataset.throws["outcome"].to_pylist()
     has_episode = dataset.throws["shard"].is_valid().to_pylist()
     missing = Counter(outcomes[number] for number in numbers if not has_episode[number])

@@ -1,8 +1,8 @@
 """Splits a dataset into parts so that throws to the same place go to the same part.
 
-Space is cut into cells, such as squares of the ground. The hash of a cell and a seed decides on its part, so a cell
-stays in its part whatever other trials there are. A trial that is in no cell, because it did not land, is decided on by
-a hash over all that determines it but for its number.
+Space is cut into cells, such as squares of the ground. The hash of a cell and a seed decides to which part the cell
+goes, so it does not depend on other trials. A trial that is in no cell, because it did not land, goes to the part that
+a hash over everything that determines the trial, except its number, decides on.
 """
 
 from __future__ import annotations
@@ -105,29 +105,22 @@ def split(
 def assign(
     everything: Source, *, fractions: str, cells: Sequence[str] = SQUARES, seed: int = 0
 ) -> dict[str, dict[int, Cell | None]]:
-    """Decide which trials each part of a split gets.
-
-    Args:
-        everything: All trials.
-        fractions: As for `split`.
-        cells: As for `split`.
-        seed: Seed of the choice.
+    """Decide which trials each part gets by the arguments of `split`.
 
     Returns:
-        The trials of each part and the cell that each is in; None for a trial that is in none.
+        The trials of each part, each with its cell; None for a trial that is in no cell.
 
     Raises:
         ConfigError: If fractions or cells are wrong, or a part gets no trial.
     """
-    shares = _shares(fractions)
-    grid = _Grid(cells)
+    shares = _read_shares(fractions)
+    places = _find_cells(cells, everything.dataset.throws.take(everything.trials))
     config, points = list_of_trials([everything])
     contents = trial_digests(config, points, [0] * len(points.values))
-    places = grid.cells(everything.dataset.throws.take(everything.trials))
     members: dict[str, dict[int, Cell | None]] = {name: {} for name in shares}
     for trial, cell, digest in zip(everything.trials, places, contents, strict=True):
-        owner = _owner(f"trial {digest.tobytes().hex()}" if cell is None else f"cell {list(cell)}", shares, seed)
-        members[owner][trial] = cell
+        part = _choose_part(f"trial {digest.tobytes().hex()}" if cell is None else f"cell {list(cell)}", shares, seed)
+        members[part][trial] = cell
     if empty := [name for name, trials in members.items() if not trials]:
         raise ConfigError(
             [Problem(f"{', '.join(empty)} would get none of the {len(places)} trials", "--fractions")],
@@ -136,46 +129,34 @@ def assign(
     return members
 
 
-class _Grid:
-    """Cells of the space that some expressions span.
-
-    Args:
-        axes: Expressions and widths: ``landing_x_m=0.05``.
+def _find_cells(axes: Sequence[str], throws: pa.Table) -> list[Cell | None]:
+    """Find the cell of each row by expressions and widths; None for a row without a finite value on an axis.
 
     Raises:
-        ConfigError: If one of them is anything else.
+        ConfigError: If an axis is no expression with a width, or cannot be evaluated.
     """
-
-    def __init__(self, axes: Sequence[str]) -> None:
-        self._axes = []
-        for text in axes:
-            name, width = _pair(text, "--cells")
-            if not float(width) > 0:
-                raise ConfigError([Problem(f"the width of cells should be above 0, got {text!r}", "--cells")])
-            self._axes.append((Expression(name, place="--cells"), float(width)))
-
-    def cells(self, throws: pa.Table) -> list[Cell | None]:
-        """The cell of each row; None where an expression has no finite value.
-
-        Raises:
-            ConfigError: If an expression cannot be evaluated.
-        """
-        columns = [[_slot(value, width) for value in axis.numbers(throws)] for axis, width in self._axes]
-        return [None if None in cell else cell for cell in zip(*columns, strict=True)]
+    columns = []
+    for text in axes:
+        name, width = _read_pair(text, "--cells")
+        if not float(width) > 0:
+            raise ConfigError([Problem(f"the width of cells should be above 0, got {text!r}", "--cells")])
+        values = Expression(name, place="--cells").numbers(throws)
+        columns.append([_number_along(value, float(width)) for value in values])
+    return [None if None in cell else cell for cell in zip(*columns, strict=True)]
 
 
-def _slot(value: float | None, width: float) -> int | None:
+def _number_along(value: float | None, width: float) -> int | None:
     place = math.nan if value is None else value / width
     return math.floor(place) if math.isfinite(place) else None
 
 
-def _owner(thing: str, shares: Mapping[str, Fraction], seed: int) -> str:
-    place = Fraction(int.from_bytes(hashlib.sha256(f"{seed} {thing}".encode()).digest()[:8], "big"), _HASHES)
+def _choose_part(hashed: str, shares: Mapping[str, Fraction], seed: int) -> str:
+    place = Fraction(int.from_bytes(hashlib.sha256(f"{seed} {hashed}".encode()).digest()[:8], "big"), _HASHES)
     return next(name for name, end in zip(shares, accumulate(shares.values()), strict=True) if place < end)
 
 
-def _shares(text: str) -> dict[str, Fraction]:
-    pairs = [_pair(item, "--fractions") for item in text.split(",")]
+def _read_shares(text: str) -> dict[str, Fraction]:
+    pairs = [_read_pair(item, "--fractions") for item in text.split(",")]
     shares = dict(pairs)
     problem = None
     if len(shares) < len(pairs):
@@ -196,7 +177,7 @@ def _shares(text: str) -> dict[str, Fraction]:
     return shares
 
 
-def _pair(text: str, option: str) -> tuple[str, Fraction]:
+def _read_pair(text: str, option: str) -> tuple[str, Fraction]:
     name, _, number = text.rpartition("=")
     try:
         value = Fraction(number) if _NUMBER.fullmatch(number) else None

@@ -1,4 +1,4 @@
-"""Statistics of a dataset: of the columns of its table, and of its trajectories as people normalise them with."""
+"""Statistics of a dataset: of the columns of its table, and of its signals, by which people normalise them."""
 
 from __future__ import annotations
 
@@ -28,12 +28,12 @@ _BALL_GROUPS = {"ball_position_m": "ball_position", "ball_velocity_mps": "ball_l
 
 @dataclass(frozen=True)
 class ColumnStatistics:
-    """A column of numbers of the table of throws; of the rows that have one.
+    """Statistics of a column of the table of throws, over the rows that have a finite number.
 
     Attributes:
         count: Number of rows that have a number.
         nulls: Number of rows that have none.
-        min: Smallest number; None without numbers, like all that follow.
+        min: Smallest number; None without numbers, as are maximum, mean and deviation.
         max: Largest number.
         mean: Mean.
         std: Standard deviation, of the population.
@@ -51,7 +51,7 @@ class ColumnStatistics:
 
 @dataclass(frozen=True)
 class SignalStatistics:
-    """A recorded signal, over all samples of all episodes.
+    """Statistics of a recorded signal over all samples of all episodes.
 
     Attributes:
         min: Smallest value.
@@ -75,8 +75,8 @@ class Statistics:
         outcomes: Number of trials of each outcome, most frequent first.
         columns: Each column of numbers of the table of throws.
         episodes: Number of episodes.
-        samples: Number of samples that `signals` are over.
-        samples_not_finite: Number of samples left out as they hold a number that is not finite.
+        samples: Number of samples that the statistics of signals are over.
+        samples_not_finite: Number of samples that are left out, because a number in them is not finite.
         signals: Joints' positions [rad], velocities [rad/s] and torques [Nm], the ball's position [m] and velocity
             [m/s] in world: by group, such as ``position_rad``, then by joint or axis. Empty without samples.
     """
@@ -95,10 +95,7 @@ class Statistics:
 
 
 def statistics(directory: StrPath) -> Statistics:
-    """Statistics of a dataset; episodes are read one at a time.
-
-    Args:
-        directory: Its directory.
+    """Compute the statistics of the dataset in a directory; episodes are read one at a time.
 
     Raises:
         DatasetError: If the directory holds no finished dataset, or it is damaged.
@@ -107,7 +104,7 @@ def statistics(directory: StrPath) -> Statistics:
     dataset = Dataset.open(directory)
     moments, left_out = None, 0
     for episode in dataset.episodes():
-        rows = _table(episode.samples(dataset.joints))
+        rows = _stack_signals(episode.samples(dataset.joints))
         finite = rows[np.isfinite(rows).all(axis=1)]
         left_out += len(rows) - len(finite)
         if len(finite):
@@ -116,24 +113,24 @@ def statistics(directory: StrPath) -> Statistics:
     return Statistics(
         trials=len(dataset.throws),
         outcomes=count_outcomes(dataset.throws),
-        columns=dict(_columns(dataset.throws)),
+        columns=dict(_summarise_columns(dataset.throws)),
         episodes=len(dataset.recorded),
         samples=moments.count if moments else 0,
         samples_not_finite=left_out,
-        signals=_signals(moments, dataset.joints) if moments else {},
+        signals=_summarise_signals(moments, dataset.joints) if moments else {},
     )
 
 
-def _columns(throws: pa.Table) -> Iterator[tuple[str, ColumnStatistics]]:
+def _summarise_columns(throws: pa.Table) -> Iterator[tuple[str, ColumnStatistics]]:
     for field in throws.schema:
         if field.name in _PLACES or not (pa.types.is_floating(field.type) or pa.types.is_integer(field.type)):
             continue
         numbers = throws[field.name].drop_null().to_numpy().astype(np.float64)
         numbers = numbers[np.isfinite(numbers)]
-        yield field.name, _column(numbers, nulls=len(throws) - len(numbers))
+        yield field.name, _summarise_column(numbers, nulls=len(throws) - len(numbers))
 
 
-def _column(numbers: NDArray[np.float64], *, nulls: int) -> ColumnStatistics:
+def _summarise_column(numbers: NDArray[np.float64], *, nulls: int) -> ColumnStatistics:
     if not len(numbers):
         return ColumnStatistics(0, nulls, None, None, None, None, {})
     quantiles = np.quantile(numbers, QUANTILES).tolist()
@@ -148,18 +145,16 @@ def _column(numbers: NDArray[np.float64], *, nulls: int) -> ColumnStatistics:
     )
 
 
-def _table(samples: Samples) -> NDArray[np.float64]:
-    """All signals side by side, shape ``(n_samples, n_signals)``."""
+def _stack_signals(samples: Samples) -> NDArray[np.float64]:
+    """Stack all signals side by side, shape ``(n_samples, n_signals)``."""
     return np.hstack([getattr(samples, attribute) for attribute in (_JOINT_GROUPS | _BALL_GROUPS).values()])
 
 
-def _signals(moments: Moments, joints: tuple[str, ...]) -> dict[str, dict[str, SignalStatistics]]:
-    columns = (moments.minimum, moments.maximum, moments.mean, moments.std)
-    each = (_signal(*numbers) for numbers in zip(*(column.tolist() for column in columns), strict=True))
-    groups = {**dict.fromkeys(_JOINT_GROUPS, joints), **dict.fromkeys(_BALL_GROUPS, _AXES)}
-    return {group: dict(zip(names, islice(each, len(names)), strict=True)) for group, names in groups.items()}
-
-
-def _signal(low: float, high: float, mean: float, std: float) -> SignalStatistics:
+def _summarise_signals(moments: Moments, joints: tuple[str, ...]) -> dict[str, dict[str, SignalStatistics]]:
     # Rounding must not turn a constant into noise, because people divide by the deviation when they normalise.
-    return SignalStatistics(low, high, low, 0.0) if low == high else SignalStatistics(low, high, mean, std)
+    constant = moments.minimum == moments.maximum
+    mean, std = np.where(constant, moments.minimum, moments.mean), np.where(constant, 0.0, moments.std)
+    columns = (moments.minimum, moments.maximum, mean, std)
+    summaries = (SignalStatistics(*numbers) for numbers in zip(*(column.tolist() for column in columns), strict=True))
+    groups = {**dict.fromkeys(_JOINT_GROUPS, joints), **dict.fromkeys(_BALL_GROUPS, _AXES)}
+    return {group: dict(zip(names, islice(summaries, len(names)), strict=True)) for group, names in groups.items()}

@@ -1,4 +1,4 @@
-"""What several datasets have in common, and what varies between their trials."""
+"""Joins the plans of several datasets: the keys that they have in common, and those that vary between their trials."""
 
 from __future__ import annotations
 
@@ -20,10 +20,7 @@ _ABSENT = object()
 
 
 def list_of_trials(sources: Sequence[Source]) -> tuple[Config, Points]:
-    """A configuration whose trials are those of all sources, one after the other.
-
-    Args:
-        sources: At least one.
+    """Make a configuration whose trials are those of all sources, at least one, one after the other.
 
     Returns:
         The configuration of the first source, which takes its points from a file; and the points. Swept are the keys
@@ -47,7 +44,7 @@ def list_of_trials(sources: Sequence[Source]) -> tuple[Config, Points]:
         if obstacle is None:
             keys.append(key)
         else:
-            problems.append(Problem(f"{_differences(sources, values)}; {obstacle}", key))
+            problems.append(Problem(f"{_list_differences(sources, values)}; {obstacle}", key))
     if problems:
         raise ConfigError(problems, expected="datasets that differ only in what a sweep may vary")
     rows = [
@@ -62,10 +59,10 @@ def list_of_trials(sources: Sequence[Source]) -> tuple[Config, Points]:
 
 
 def _gather_targets(sources: Sequence[Source]) -> Targets | None:
-    """The targets of all trials; those of a source that has none, or lacks a column of others, are none."""
+    """Gather the targets of all trials; NaN in columns of targets that a source lacks."""
     task = sources[0].dataset.config.task
-    there = {name for source in sources for name in source.dataset.plan.trials.target_names}
-    names = tuple(each.name for each in task.target_columns if each.name in there)
+    present = {name for source in sources for name in source.dataset.plan.trials.target_names}
+    names = tuple(each.name for each in task.target_columns if each.name in present)
     if not names:
         return None
     trials = (source.dataset.plan.trial(number) for source in sources for number in source.trials)
@@ -76,9 +73,9 @@ def _collect_fixed_values(dataset: Dataset) -> dict[str, Any]:
     return {leaf.name: leaf.value for leaf in leaves(dataset.config) if leaf.key.determines_samples}
 
 
-def _differences(sources: Sequence[Source], values: Sequence[Any]) -> str:
-    said: dict[str, list[str]] = {}
+def _list_differences(sources: Sequence[Source], values: Sequence[Any]) -> str:
+    directories: dict[str, list[str]] = {}
     for source, value in zip(sources, values, strict=True):
         text = "absent" if value is _ABSENT else value_as_yaml(value)
-        said.setdefault(text, []).append(str(source.dataset.directory))
-    return ", ".join(f"{text} in {' and '.join(where)}" for text, where in said.items())
+        directories.setdefault(text, []).append(str(source.dataset.directory))
+    return ", ".join(f"{text} in {' and '.join(where)}" for text, where in directories.items())

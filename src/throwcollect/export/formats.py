@@ -21,14 +21,10 @@ class Format(Protocol):
     """One format: a module of this room."""
 
     def write(self, source: Source, directory: Path) -> None:
-        """Write the data files of a source.
-
-        Args:
-            source: What to export.
-            directory: Where the files go; it exists and is empty.
+        """Write the data files of a source into a directory that exists and is empty.
 
         Raises:
-            DatasetError: If an episode is damaged, or what it would write is too large for the format.
+            DatasetError: If an episode is damaged, or a file would be too large for the format.
             OSError: If a file cannot be written.
         """
 
@@ -43,11 +39,11 @@ _NEEDS = {"hdf5": ("h5py",), "mat": ("scipy",)}
 
 @dataclass(frozen=True)
 class Exported:
-    """What was exported.
+    """An export that was written.
 
     Attributes:
-        directory: Where to.
-        format: In which format.
+        directory: Its directory.
+        format: Its format.
         trials: Number of trials, each with a row of the table.
         episodes: Number of throws with time series.
         samples: Number of their samples.
@@ -99,5 +95,5 @@ def export(directory: StrPath, output: StrPath, *, to: str, rate_hz: int | None 
         samples=sum(entry.samples for entry in source.entries),
         rate_hz=source.rate_hz,
         size_bytes=size,
-        digest=source.digest,
+        digest=source.dataset.digest,
     )

@@ -12,8 +12,7 @@ import pyarrow as pa
 
 from throwcollect.export.npz import to_array
 from throwcollect.export.readme import Layout, tabulate_signals
-from throwcollect.export.signals import Signal
-from throwcollect.export.throw_source import Source, Throw
+from throwcollect.export.throw_source import Source, Throw, read_metadata
 from throwcollect.extras import lazily
 from throwcollect.files import write_all
 
@@ -21,7 +20,7 @@ h5py = lazily("h5py")
 
 ACTION = "command_position_rad"
 _BESIDE = ("time_s", "command_velocity_radps", "command_acceleration_radps2")
-"""Signals that are neither an observation nor an action, so they stand beside both."""
+"""Signals that are neither an observation nor an action, so they are stored next to both."""
 _COMPRESSION = {"compression": "gzip", "compression_opts": 1, "shuffle": True}
 _GYM = 2
 """robomimic's number for environments that are not of robosuite."""
@@ -60,7 +59,7 @@ def write(source: Source, directory: Path) -> None:
     """Write a dataset as one HDF5 file; see `formats.Format.write`."""
     config = source.dataset.config
     with _Output(directory / "throws.hdf5") as output, h5py.File(output, "w") as file:
-        file.attrs["digest_of_dataset"] = source.digest
+        file.attrs["digest_of_dataset"] = source.dataset.digest
         file.attrs["rate_hz"] = source.rate_hz
         data = file.create_group("data")
         data.attrs["total"] = sum(entry.samples for entry in source.entries)
@@ -75,7 +74,7 @@ def write(source: Source, directory: Path) -> None:
 
 
 class _Output(io.FileIO):
-    """A file that keeps write errors until `check` raises them: the HDF5 library crashes on errors within a write."""
+    """A file that keeps write errors until `check` raises them: the HDF5 library crashes if a write raises one."""
 
     def __init__(self, path: Path) -> None:
         super().__init__(path, "w+")
@@ -96,7 +95,7 @@ class _Output(io.FileIO):
             return size or 0
 
     def flush(self) -> None:
-        """Do nothing, as nothing is held back."""
+        """Do nothing, as `write` holds nothing back."""
 
     def check(self) -> None:
         """Raise the first write error so far.
@@ -109,7 +108,7 @@ class _Output(io.FileIO):
 
     def __exit__(self, kind: type[BaseException] | None, *rest: Any) -> None:
         super().__exit__(kind, *rest)
-        # HDF5 may have raised an error of its own by now; the one that was kept is its cause.
+        # HDF5 may have raised an error of its own by now, whose cause is the error that was kept.
         self.check()
 
 
@@ -117,21 +116,15 @@ def _add_throw(group: Any, throw: Throw, source: Source) -> None:
     group.attrs["num_samples"] = len(throw)
     group.attrs["trial"] = throw.trial
     group.attrs[source.dataset.config.task.success] = throw.succeeded
-    last = np.zeros(len(throw))
-    last[-1] = 1
-    group["dones"] = last.astype(np.int64)
-    group["rewards"] = last * throw.succeeded
+    group["dones"] = throw.done.astype(np.int64)
+    group["rewards"] = throw.done * throw.succeeded
     for signal in source.signals:
         name = signal.name if signal.name in _BESIDE else "actions" if signal.name == ACTION else f"obs/{signal.name}"
         stored = group.create_dataset(name, data=throw.signals[signal.name], **_COMPRESSION)
-        _describe(stored, signal)
-
-
-def _describe(stored: Any, signal: Signal) -> None:
-    stored.attrs["unit"] = signal.unit
-    stored.attrs["description"] = signal.description
-    if signal.components:
-        stored.attrs["components"] = list(signal.components)
+        stored.attrs["unit"] = signal.unit
+        stored.attrs["description"] = signal.description
+        if signal.components:
+            stored.attrs["components"] = list(signal.components)
 
 
 def _add_table(group: Any, table: pa.Table, text: Any) -> None:
@@ -141,5 +134,4 @@ def _add_table(group: Any, table: pa.Table, text: Any) -> None:
             field.name, data=values.astype(object) if values.dtype.kind == "U" else values,
             dtype=text if values.dtype.kind == "U" else None,
         )  # fmt: skip
-        for key, value in (field.metadata or {}).items():
-            stored.attrs[key.decode()] = value.decode()
+        stored.attrs.update(read_metadata(field))

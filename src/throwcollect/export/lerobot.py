@@ -54,12 +54,7 @@ class Feature:
 
 
 def list_features(moving: Sequence[str], targets: Sequence[TargetColumn]) -> dict[str, Feature]:
-    """Features by name, in the order of their columns.
-
-    Args:
-        moving: Joints that the task moves.
-        targets: Columns of targets.
-    """
+    """List features by name, in the order of their columns; `moving` are the joints that the task moves."""
     positions = tuple(f"{joint}.pos" for joint in moving)
     ball = ("ball.x", "ball.y", "ball.z", "ball.vx", "ball.vy", "ball.vz")
     goal = tuple(f"target.{each.word.replace(' ', '_')}" for each in targets)
@@ -124,7 +119,7 @@ dataset = LeRobotDataset("me/throws", root=".")
 
 def write(source: Source, directory: Path) -> None:
     """Write a dataset in LeRobot's format; see `formats.Format.write`."""
-    features = list_features(source.moving, source.targets)
+    features = list_features(source.dataset.moving_joints, source.targets)
     tasks: dict[str, int] = {}
     table = _number_episodes(source)
     (directory / THROWS).write_bytes(encode_table(table))
@@ -157,25 +152,22 @@ def write(source: Source, directory: Path) -> None:
 
 
 def _number_episodes(source: Source) -> pa.Table:
-    """The table of throws with the number of each trial's episode behind its own."""
+    """Add the number of each trial's episode to the table of throws, behind the number of the trial."""
     numbers = {entry.trial: number for number, entry in enumerate(source.entries)}
     field = pa.field(
         "episode_index", pa.int64(), metadata={"description": "Number of its episode; null if it has none."}
     )
     column = pa.array([numbers.get(trial) for trial in source.table["trial"].to_pylist()], pa.int64())
     table = source.table.add_column(1, field, column)
-    return table.replace_schema_metadata({"throwcollect.digest": source.digest})
+    return table.replace_schema_metadata({"throwcollect.digest": source.dataset.digest})
 
 
 def _compute_frames(
     throw: Throw, source: Source, features: dict[str, Feature], *, episode: int, first: int, task: int
 ) -> dict[str, Frames]:
-    """Values of each feature, in the types of the file, as numbers of shape ``(n_frames, n_components)``."""
-    count = len(throw)
-    moving = [source.joints.index(joint) for joint in source.moving]
-    signals = throw.signals
-    done = np.zeros(count)
-    done[-1] = 1
+    """Compute the values of each feature, as the file stores them, of shape ``(n_frames, n_components)``."""
+    count, signals, done = len(throw), throw.signals, throw.done
+    moving = [source.dataset.joints.index(joint) for joint in source.dataset.moving_joints]
     index = np.arange(count)
     values = {
         "observation.state": np.hstack(
@@ -195,7 +187,7 @@ def _compute_frames(
         "index": first + index,
         "task_index": np.full(count, task),
     }
-    # Statistics are those of the numbers as they are stored.
+    # Rounded to the types of the file, as statistics are those of the stored numbers.
     return {
         name: array.astype(features[name].dtype).astype(np.float64).reshape(count, -1) for name, array in values.items()
     }
@@ -207,7 +199,7 @@ def _tabulate_frames(frames: dict[str, Frames], features: dict[str, Feature], so
         flat = pa.array(frames[name].astype(feature.dtype).ravel())
         columns.append(flat if feature.names is None else pa.FixedSizeListArray.from_arrays(flat, len(feature.names)))
     schema = pa.schema([pa.field(name, feature.arrow_type) for name, feature in features.items()])
-    return pa.table(columns, schema.with_metadata({"throwcollect.digest": source.digest}))
+    return pa.table(columns, schema.with_metadata({"throwcollect.digest": source.dataset.digest}))
 
 
 def _describe_episode(
@@ -267,7 +259,7 @@ def _describe_dataset(source: Source, features: dict[str, Feature], *, frames: i
 
 
 def _say_task(source: Source, target: Mapping[str, float]) -> str:
-    """What the robot is to do, in words, such as ``Throw the ball to x 1.40 m, y -0.20 m``."""
+    """Say in words what the robot is to do, such as ``Throw the ball to x 1.40 m, y -0.20 m``."""
     task = source.dataset.config.task
     said = "Throw the ball" if task.throws else task.name.replace("_", " ").capitalize()
     goal = [f"{each.word} {target[each.name]:.2f} {unit_of(each.name)}" for each in source.targets]
@@ -275,13 +267,13 @@ def _say_task(source: Source, target: Mapping[str, float]) -> str:
 
 
 def _tell_goal(source: Source) -> str:
-    """What stands behind the ball in the state of the environment, as the end of a sentence."""
+    """Name the targets that follow the ball in the state of the environment, as the end of a sentence."""
     goal = [f"{each.word} [{unit_of(each.name)}]" for each in source.targets]
     return f"; then where it should end: {', '.join(goal)}, also in the text of the task" if goal else ""
 
 
 def _tabulate_tasks(tasks: Mapping[str, int]) -> pa.Table:
-    """One row for each task; its text is the index of the table, as pandas stores it."""
+    """Make a table with one row for each task, whose text is the index, as pandas stores it."""
     columns = [
         {"name": name, "field_name": name, "pandas_type": kind, "numpy_type": stored, "metadata": None}
         for name, kind, stored in (("task_index", "int64", "int64"), ("task", "unicode", "object"))

@@ -19,25 +19,17 @@ Statistics = dict[str, list[float] | list[int]]
 
 
 def summarise_episode(frames: Frames) -> Statistics:
-    """Statistics of one episode, its quantiles exact."""
-    quantiles = np.quantile(frames, list(QUANTILES.values()), axis=0)
-    return {
-        "min": frames.min(axis=0).tolist(),
-        "max": frames.max(axis=0).tolist(),
-        "mean": frames.mean(axis=0).tolist(),
-        "std": frames.std(axis=0).tolist(),
-        "count": [len(frames)],
-        **dict(zip(QUANTILES, quantiles.tolist(), strict=True)),
-    }
+    """Compute the statistics of one episode, with exact quantiles."""
+    return _list_statistics(Moments.of(frames), np.quantile(frames, list(QUANTILES.values()), axis=0))
 
 
 def summarise_all(moments: Moments, portions: Iterable[Frames]) -> Statistics:
-    """Statistics of all frames.
+    """Compute the statistics of all frames.
 
     Args:
         moments: Their moments.
-        portions: The frames themselves once more, in any portions. Quantiles come from histograms of 5000 bins over the
-            range of each component, so they are right to 1/5000 of it.
+        portions: The frames, in any portions. Quantiles come from histograms of 5000 bins over the range of each
+            component, so they are right to 1/5000 of it.
     """
     low, span = moments.minimum, moments.maximum - moments.minimum
     histogram = np.zeros((len(span), _BINS), np.int64)
@@ -47,18 +39,23 @@ def summarise_all(moments: Moments, portions: Iterable[Frames]) -> Statistics:
         bins = np.minimum(((frames - low) * scale).astype(np.int64), _BINS - 1)
         histogram += np.bincount((bins + rows).ravel(), minlength=histogram.size).reshape(histogram.shape)
     below = np.cumsum(histogram, axis=1)
-    quantiles = {}
-    for name, share in QUANTILES.items():
+    quantiles = []
+    for share in QUANTILES.values():
         target = share * moments.count
         index = (below < target).sum(axis=1)[:, np.newaxis]
         inside = np.take_along_axis(histogram, index, axis=1)[:, 0]
         before = np.take_along_axis(below, index, axis=1)[:, 0] - inside
-        quantiles[name] = (low + span * (index[:, 0] + (target - before) / inside) / _BINS).tolist()
+        quantiles.append(low + span * (index[:, 0] + (target - before) / inside) / _BINS)
+    return _list_statistics(moments, np.array(quantiles))
+
+
+def _list_statistics(moments: Moments, quantiles: Frames) -> Statistics:
+    """List moments, and quantiles of shape ``(n_quantiles, n_components)``, by the names that LeRobot gives them."""
     return {
         "min": moments.minimum.tolist(),
         "max": moments.maximum.tolist(),
         "mean": moments.mean.tolist(),
         "std": moments.std.tolist(),
         "count": [moments.count],
-        **quantiles,
+        **dict(zip(QUANTILES, quantiles.tolist(), strict=True)),
     }

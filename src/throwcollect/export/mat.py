@@ -1,7 +1,7 @@
 """MATLAB files in the structure of the throwing database of the Jožef Stefan Institute.
 
-That is ``robot_throws`` of github.com/abr-ijs/Throwing-trajectories-dataset: cells ``qPath`` and ``DMP``, the matrix
-``targets`` and the structure ``robot_data``, whose fields bear the same names here.
+The structure is ``robot_throws`` of github.com/abr-ijs/Throwing-trajectories-dataset: cells ``qPath`` and ``DMP``, the
+matrix ``targets`` and the structure ``robot_data``, with fields of the same names.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from throwcollect.config.task import TaskConfig
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.export.npz import to_array
 from throwcollect.export.readme import Layout, list_joints
-from throwcollect.export.throw_source import Entry, Source, Throw
+from throwcollect.export.throw_source import Entry, Source, Throw, read_metadata
 from throwcollect.extras import lazily
 from throwcollect.robots.quintic_curve import sample_quintic
 from throwcollect.robots.trajectory import JointTrajectory
@@ -28,7 +28,7 @@ from throwcollect.tasks.dmp import fit_dmp, kernels, roll_out
 scipy_io = lazily("scipy.io", extra="export")
 
 BASIS_FUNCTIONS = 25
-"""Number of basis functions of each joint in a DMP that is fitted."""
+"""Number of basis functions of each joint in a fitted DMP."""
 _FIT_POINTS = 501
 _LARGEST = 2**31 - 1
 """Size that a variable may have in a file of version 5 [bytes]."""
@@ -92,10 +92,8 @@ def write(source: Source, directory: Path) -> None:
             expected="another format",
         )
     columns = {_name_field(field.name): _to_column(source.table[field.name]) for field in source.table.schema}
-    units = {
-        _name_field(field.name): (field.metadata or {}).get(b"unit", b"").decode() for field in source.table.schema
-    }
-    _save(directory / "throws.mat", {"throws": columns, "units": units, "digest_of_dataset": source.digest})
+    units = {_name_field(field.name): read_metadata(field).get("unit", "") for field in source.table.schema}
+    _save(directory / "throws.mat", {"throws": columns, "units": units, "digest_of_dataset": source.dataset.digest})
     (directory / "trajectories").mkdir()
     landings = {
         row["trial"]: (row["landing_x_m"], row["landing_y_m"], row["hit_angle_rad"])
@@ -103,7 +101,10 @@ def write(source: Source, directory: Path) -> None:
     }
     for shard, entries in source.shards.items():
         path = directory / "trajectories" / f"{shard}.mat"
-        _save(path, {"robot_throws": _gather_throws(source, entries, landings), "digest_of_dataset": source.digest})
+        _save(
+            path,
+            {"robot_throws": _gather_throws(source, entries, landings), "digest_of_dataset": source.dataset.digest},
+        )
 
 
 def _save(path: Path, variables: Mapping[str, Any]) -> None:
@@ -146,28 +147,28 @@ def _gather_throws(
     source: Source, entries: Sequence[Entry], landings: Mapping[int, tuple[float | None, ...]]
 ) -> dict[str, Any]:
     plan = source.dataset.plan
-    moving = [source.joints.index(joint) for joint in source.moving]
+    moving = [source.dataset.joints.index(joint) for joint in source.dataset.moving_joints]
     paths, motions, targets, measured, balls = [], [], [], [], []
-    wanted: list[Mapping[str, float]] = []
+    goals: list[Mapping[str, float]] = []
     for throw in source.throws(entries):
         config = plan.config_of(plan.trial(throw.trial))
         paths.append(_sample_path(throw.trajectory, source.rate_hz))
         motions.append((throw.trajectory, config.task))
         targets.append(_measure_target(landings[throw.trial], config))
-        wanted.append(throw.target)
+        goals.append(throw.target)
         measured.append(
             _stack_signals(throw, "joint_position_rad", "joint_velocity_radps", "joint_effort_nm", of=moving)
         )
         balls.append(_stack_signals(throw, "ball_position_m", "ball_velocity_mps", of=[0, 1, 2]))
     return {
         "robot_data": {
-            "joints": _to_cell(source.moving),
+            "joints": _to_cell(source.dataset.moving_joints),
             "base": np.array([[0.0, 0.0, source.dataset.config.robot.base_height_m]]),
             "dt": 1 / source.rate_hz,
         },
         "qPath": _to_cell(paths),
         "targets": np.array(targets),
-        **_list_wanted(source, wanted),
+        **_list_goals(source, goals),
         "DMP": _to_cell(_describe_primitives(motions, source.rate_hz)),
         "trial": np.array([[float(entry.trial)] for entry in entries]),
         "measured": _to_cell(measured),
@@ -175,12 +176,12 @@ def _gather_throws(
     }
 
 
-def _list_wanted(source: Source, wanted: Sequence[Mapping[str, float]]) -> dict[str, Any]:
-    """Fields of the targets of throws; none if they have none."""
+def _list_goals(source: Source, goals: Sequence[Mapping[str, float]]) -> dict[str, Any]:
+    """List the fields with the targets that throws were aimed at; none if they were aimed at none."""
     if not source.targets:
         return {}
     names = [each.name for each in source.targets]
-    return {"wanted": np.array([[each[name] for name in names] for each in wanted]), "wanted_names": _to_cell(names)}
+    return {"wanted": np.array([[each[name] for name in names] for each in goals]), "wanted_names": _to_cell(names)}
 
 
 def _sample_path(trajectory: JointTrajectory, rate_hz: int) -> NDArray[np.float64]:
@@ -199,7 +200,7 @@ def _measure_target(landing: tuple[float | None, ...], config: Config) -> tuple[
 
 
 def _describe_primitives(motions: Sequence[tuple[JointTrajectory, TaskConfig]], rate_hz: int) -> list[dict[str, Any]]:
-    """Fields of the DMPs of throws: those of their configurations, or else ones fitted to the commanded motions."""
+    """Describe the DMPs of throws: those of their configurations, else ones fitted to the commanded motions."""
     to_fit = [motion for motion, task in motions if not isinstance(task.trajectory, DynamicMovementPrimitive)]
     fitted = iter(_fit_primitives(to_fit))
     return [
@@ -211,12 +212,12 @@ def _describe_primitives(motions: Sequence[tuple[JointTrajectory, TaskConfig]], 
 
 
 def _fit_primitives(motions: Sequence[JointTrajectory]) -> list[DynamicMovementPrimitive]:
-    """Fit a DMP to each motion, all by one decomposition, as they have the same phases when each lasts 1."""
+    """Fit a DMP to each motion, all by one decomposition: stretched to a duration of 1, they have the same phases."""
     if not motions:
         return []
     shares = np.linspace(0, 1, _FIT_POINTS)
     sampled = [sample_quintic(motion, shares * motion.times[-1]) for motion in motions]
-    # A motion that lasts T is played in 1: its derivatives grow by T and T squared.
+    # A motion of duration T is stretched to 1, so its derivatives are multiplied by T and T squared.
     positions, velocities, accelerations = (
         np.hstack([each[order] * motion.times[-1] ** order for each, motion in zip(sampled, motions, strict=True)])
         for order in range(3)

@@ -17,7 +17,7 @@ from throwcollect.export.readme import Layout, tabulate_signals
 from throwcollect.export.throw_source import Entry, Source
 
 _EPOCH = (1980, 1, 1, 0, 0, 0)
-"""A fixed date for the members of archives: the same data are the same bytes."""
+"""A fixed date for the members of archives, so that the same data give the same bytes."""
 
 
 def describe(source: Source) -> Layout:
@@ -46,7 +46,7 @@ def write(source: Source, directory: Path) -> None:
     """Write a dataset as NumPy archives; see `formats.Format.write`."""
     columns = {field.name: to_array(source.table[field.name]) for field in source.table.schema}
     with _open_archive(directory / "throws.npz") as archive:
-        for name, values in {**columns, "digest_of_dataset": np.array(source.digest)}.items():
+        for name, values in {**columns, "digest_of_dataset": np.array(source.dataset.digest)}.items():
             _add(archive, name, values)
     (directory / "trajectories").mkdir()
     for shard, entries in source.shards.items():
@@ -54,7 +54,7 @@ def write(source: Source, directory: Path) -> None:
 
 
 def to_array(column: pa.ChunkedArray) -> NDArray[Any]:
-    """A column of the table of throws; what is null is NaN, -1 or an empty string."""
+    """Make an array of a column of the table of throws; a null becomes NaN, -1 or an empty string."""
     if pa.types.is_string(column.type):
         return np.array(column.fill_null("").to_pylist(), dtype=np.str_)
     missing = -1 if pa.types.is_integer(column.type) else np.nan
@@ -67,14 +67,14 @@ def _write_shard(source: Source, entries: tuple[Entry, ...], path: Path) -> None
     names: Mapping[str, NDArray[Any]] = {
         "trial": np.array([entry.trial for entry in entries]),
         "offsets": offsets,
-        "joints": np.array(source.joints),
-        "moving_joints": np.array(source.moving),
-        "digest_of_dataset": np.array(source.digest),
+        "joints": np.array(source.dataset.joints),
+        "moving_joints": np.array(source.dataset.moving_joints),
+        "digest_of_dataset": np.array(source.dataset.digest),
     }
-    # A member of an archive has to be written in one go, so each signal first gets a file of its own.
-    beside = {signal.name: path.with_name(f"{path.stem}.{signal.name}.npy") for signal in source.signals}
+    # A member of an archive has to be written in one go, so each signal is first written to a file of its own.
+    unpacked = {signal.name: path.with_name(f"{path.stem}.{signal.name}.npy") for signal in source.signals}
     with ExitStack() as stack:
-        files = {name: stack.enter_context(file.open("wb")) for name, file in beside.items()}
+        files = {name: stack.enter_context(file.open("wb")) for name, file in unpacked.items()}
         for signal in source.signals:
             shape = (int(offsets[-1]), *signal.shape)
             header = {"descr": "<f8", "fortran_order": False, "shape": shape}
@@ -85,10 +85,10 @@ def _write_shard(source: Source, entries: tuple[Entry, ...], path: Path) -> None
     with _open_archive(path) as archive:
         for name, values in names.items():
             _add(archive, name, values)
-        for name, unpacked in beside.items():
-            with unpacked.open("rb") as array, archive.open(_make_member(name), "w", force_zip64=True) as packed:
+        for name, file_of_signal in unpacked.items():
+            with file_of_signal.open("rb") as array, archive.open(_make_member(name), "w", force_zip64=True) as packed:
                 shutil.copyfileobj(array, packed)
-            unpacked.unlink()
+            file_of_signal.unlink()
 
 
 def _open_archive(path: Path) -> zipfile.ZipFile:

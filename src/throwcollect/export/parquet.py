@@ -15,7 +15,7 @@ from throwcollect.sweep.parquet_file import encode_table
 
 _TRAJECTORIES = "trajectories"
 _ROWS_PER_GROUP = 30_000
-"""Large enough for columns to compress, small enough to read a single throw and to hold in memory."""
+"""Rows of a row group: enough for columns to compress, few enough to be read for one throw and held in memory."""
 
 
 def describe(source: Source) -> Layout:
@@ -49,7 +49,7 @@ samples = pd.read_parquet("{_TRAJECTORIES}", filters=[("trial", "==", {source.en
 
 def write(source: Source, directory: Path) -> None:
     """Write a dataset as Parquet; see `formats.Format.write`."""
-    facts = {"throwcollect.digest": source.digest}
+    facts = {"throwcollect.digest": source.dataset.digest}
     table = source.table.replace_schema_metadata(facts)
     (directory / THROWS).write_bytes(encode_table(table))
     schema = _make_schema(source).with_metadata(facts)
@@ -78,6 +78,6 @@ def _make_schema(source: Source) -> pa.Schema:
 def _make_batch(throw: Throw, source: Source, schema: pa.Schema) -> pa.RecordBatch:
     columns = [np.full(len(throw), throw.trial)]
     for signal in source.signals:
-        # A transposed copy at once, as columns of the recorded messages lie far apart.
+        # One transposed copy is faster than columns one by one, whose numbers lie far apart in the recorded messages.
         columns += list(np.ascontiguousarray(throw.signals[signal.name].T.reshape(-1, len(throw))))
     return pa.record_batch(columns, schema)

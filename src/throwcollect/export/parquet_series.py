@@ -13,13 +13,10 @@ MEGABYTES_PER_FILE = 100
 
 
 class ParquetSeries:
-    """Writes tables of one schema, each as a row group, until it is closed.
+    """Writes tables of one schema into a directory, each as a row group, until it is closed.
 
     Attributes:
         paths: Files so far.
-
-    Args:
-        directory: Where they go.
     """
 
     def __init__(self, directory: Path) -> None:

@@ -13,7 +13,7 @@ from throwcollect.config.target import is_target
 from throwcollect.dataset.bag import to_yaml
 from throwcollect.dataset.data_card import outcome_lines
 from throwcollect.dataset.directory import CONFIG
-from throwcollect.export.throw_source import Source
+from throwcollect.export.throw_source import Source, read_metadata
 from throwcollect.robots.description import robot_of
 from throwcollect.version import __version__
 
@@ -40,12 +40,7 @@ class Layout:
 
 
 def render_card(source: Source, layout: Layout) -> str:
-    """Text of the README.md of an export.
-
-    Args:
-        source: What was exported.
-        layout: How.
-    """
+    """Write the text of the README.md of an export."""
     config = source.dataset.config
     lines = [
         *(_render_front_matter(config, layout.hub) if layout.hub else []),
@@ -53,7 +48,7 @@ def render_card(source: Source, layout: Layout) -> str:
         "",
         f"{len(source.table)} simulated {config.task.subject} by {robot_of(config).introduction}; "
         f"{len(source.entries)} of them have time series, at {source.rate_hz} Hz. "
-        f"Exported by throwcollect {__version__} from the dataset with the digest `{source.digest}`.",
+        f"Exported by throwcollect {__version__} from the dataset with the digest `{source.dataset.digest}`.",
         "",
         *outcome_lines(source.table),
         "",
@@ -109,9 +104,8 @@ def _explain_rate(source: Source) -> str:
 
 
 def _explain_targets(source: Source) -> list[str]:
-    """What there is of targets, if the dataset has some."""
-    there = [name for name in source.table.column_names if is_target(name)]
-    if not there:
+    """Say which throws have targets, if the dataset has some."""
+    if not any(is_target(name) for name in source.table.column_names):
         return []
     if not source.targets:
         return ["Not every throw has a target, so targets are in the table of all trials alone."]
@@ -136,8 +130,8 @@ def tabulate_signals(source: Source, *, columns: bool = False) -> list[str]:
 
 def list_joints(source: Source, *, everything: bool = False) -> list[str]:
     """List the joints in the order of the data, in one line."""
-    said = f"The joints that move are {_quote(source.moving)}, in this order"
-    return [f"{said}; all joints are {_quote(source.joints)}." if everything else f"{said}."]
+    said = f"The joints that move are {_quote(source.dataset.moving_joints)}, in this order"
+    return [f"{said}; all joints are {_quote(source.dataset.joints)}." if everything else f"{said}."]
 
 
 def _quote(names: Sequence[str]) -> str:
@@ -147,7 +141,6 @@ def _quote(names: Sequence[str]) -> str:
 def _list_columns(table: pa.Table) -> list[str]:
     rows = []
     for field in table.schema:
-        metadata = field.metadata or {}
-        unit, description = (metadata.get(key, b"").decode() for key in (b"unit", b"description"))
-        rows.append(f"| `{field.name}` | {unit} | {description} |")
+        metadata = {"unit": "", "description": "", **read_metadata(field)}
+        rows.append(f"| `{field.name}` | {metadata['unit']} | {metadata['description']} |")
     return ["| column | unit | |", "|---|---|---|", *rows, ""]

@@ -13,26 +13,26 @@ interpolate = lazily("scipy.interpolate", extra="export")
 
 
 def count_resampled(samples: int, *, recorded_hz: int, rate_hz: int) -> int:
-    """Number of samples that `resample` gives for a number of recorded ones."""
+    """Number of samples that `resample` gives for so many recorded ones."""
     return (samples - 1) * rate_hz // recorded_hz + 1
 
 
 def resample(samples: Samples, *, recorded_hz: int, rate_hz: int) -> Samples:
-    """Samples at a lower rate, from the first one on to the last that still lies within the record.
+    """Compute samples at a lower rate, from the first recorded one to the last instant within the record.
 
-    If the rate divides the recorded one these are every n-th sample as it was recorded. Otherwise positions of joints
-    and ball lie on the cubic through positions and velocities of both neighbours; all else is linear between them, the
-    ball's orientation normalised. Nothing is filtered.
+    If the rate divides the recorded one, these are every n-th recorded sample. Otherwise positions of joints and ball
+    lie on the cubic through positions and velocities of both neighbours; all else is linear between them, and the
+    ball's orientation is normalised. Nothing is filtered.
 
     Args:
         samples: As recorded, at least one.
         recorded_hz: Their rate.
-        rate_hz: Rate to give; at most `recorded_hz`.
+        rate_hz: The lower rate, or the same.
     """
     if recorded_hz % rate_hz == 0:
         return samples[:: recorded_hz // rate_hz]
     count = count_resampled(len(samples), recorded_hz=recorded_hz, rate_hz=rate_hz)
-    # In units of the recorded spacing, so that instants which are samples are hit exactly.
+    # In units of the recorded spacing, so that instants of recorded samples are hit exactly.
     places = np.arange(count) * recorded_hz / rate_hz
     orientation = _linear(_without_flips(samples.ball_orientation_xyzw), places)
     return Samples(
@@ -65,7 +65,7 @@ def _cubic(
 
 
 def _without_flips(quaternions: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The same orientations, each as that of its two quaternions which is near the one before."""
+    """Choose, of the two quaternions of each orientation, the one that is near the quaternion before."""
     turns = np.sum(quaternions[1:] * quaternions[:-1], axis=1) < 0
     signs = np.where(np.cumsum(turns) % 2, -1.0, 1.0)
     return np.vstack([quaternions[:1], quaternions[1:] * signs[:, np.newaxis]])

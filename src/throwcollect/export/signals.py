@@ -13,11 +13,7 @@ _ASCII = str.maketrans({"²": "^2", "³": "^3"})
 
 
 def unit_of(column: str) -> str:
-    """Unit of a column of numbers in ASCII, such as ``m/s^2``; ``1`` for counts, shares and ratios.
-
-    Args:
-        column: Name of a column or a dotted configuration key.
-    """
+    """Unit of a column of numbers or of a dotted key in ASCII, such as ``m/s^2``; ``1`` for counts and shares."""
     return unit_of_key(column).translate(_ASCII) or "1"
 
 
@@ -61,7 +57,7 @@ def list_signals(joints: Sequence[str], moving: Sequence[str], targets: Sequence
     Args:
         joints: All joints of the robot.
         moving: Joints that the task moves.
-        targets: Columns of targets, which are the same in all samples of a throw.
+        targets: Columns of targets, whose values are the same in all samples of a throw.
     """
     every = f"{len(joints)} joints"
     return (

@@ -22,6 +22,7 @@ from throwcollect.tasks.task import task_of
 from throwcollect.units import NS_PER_S
 
 _PLACES = ("shard", "chunk_offset")
+"""Columns that say where a recording lies in the dataset, which means nothing in an export."""
 
 Signals = Mapping[str, NDArray[np.float64]]
 
@@ -32,8 +33,8 @@ class Entry:
 
     Attributes:
         trial: Number of its trial.
-        samples: Number of samples to give.
-        succeeded: Whether it is one that succeeded.
+        samples: Number of samples in the export.
+        succeeded: Whether it succeeded.
     """
 
     trial: int
@@ -47,10 +48,10 @@ class Throw:
 
     Attributes:
         trial: Number of its trial.
-        succeeded: Whether it is one that succeeded.
+        succeeded: Whether it succeeded.
         signals: Each signal of the source by name, ``(n_samples, ...)``.
         trajectory: The trajectory that the controllers were sent.
-        target: Where it should end, by column of targets; those of the source.
+        target: Where it should end, by column of targets of the source.
     """
 
     trial: int
@@ -62,6 +63,13 @@ class Throw:
     def __len__(self) -> int:
         return len(self.signals["time_s"])
 
+    @property
+    def done(self) -> NDArray[np.float64]:
+        """1 in its last sample and 0 in all others, shape ``(n_samples,)``; times `succeeded`, its rewards."""
+        done = np.zeros(len(self))
+        done[-1] = 1
+        return done
+
 
 @dataclass(frozen=True)
 class Source:
@@ -69,21 +77,16 @@ class Source:
 
     Attributes:
         dataset: The dataset.
-        digest: Its digest.
-        rate_hz: Samples per second to give.
-        joints: All joints of the robot, in the order of the samples.
-        moving: Joints that the task moves, in the order of the trajectories.
-        targets: Columns of targets that each of its throws has; a policy that is conditioned on them needs them all.
+        rate_hz: Samples per second in the export.
+        targets: Columns of targets that all of its throws have: a policy cannot be conditioned on a target that some
+            throws lack.
         signals: Quantities of each throw over time.
         shards: Throws of each recording, by the name of its file without ending; all in order of trials.
         table: One row a trial, with ``description`` and ``unit`` in the metadata of each column.
     """
 
     dataset: Dataset
-    digest: str
     rate_hz: int
-    joints: tuple[str, ...]
-    moving: tuple[str, ...]
     targets: tuple[TargetColumn, ...]
     signals: tuple[Signal, ...]
     shards: Mapping[str, tuple[Entry, ...]]
@@ -95,11 +98,11 @@ class Source:
 
         Args:
             directory: Its directory.
-            rate_hz: Samples per second to give; the recorded ones when None.
+            rate_hz: Samples per second in the export; None for the recorded ones.
 
         Raises:
             DatasetError: If the directory holds no finished dataset, or one without episodes.
-            ConfigError: If the rate is not one to give.
+            ConfigError: If the rate is below 1 or above the recorded one.
         """
         dataset = Dataset.open(directory)
         recorded_hz = dataset.config.record.rate_hz
@@ -111,17 +114,12 @@ class Source:
         if not len(dataset.recorded):
             raise DatasetError(f"{directory}: none of its {len(dataset.throws)} trials has an episode to export")
         rate_hz = rate_hz or recorded_hz
-        joints = dataset.joints
-        moving = dataset.moving_joints
         targets = _list_targets(dataset)
         return cls(
             dataset,
-            dataset.digest,
             rate_hz,
-            joints,
-            moving,
             targets,
-            list_signals(joints, moving, targets),
+            list_signals(dataset.joints, dataset.moving_joints, targets),
             _list_entries(dataset, rate_hz),
             add_units(dataset.throws),
         )
@@ -132,42 +130,39 @@ class Source:
         return tuple(entry for entries in self.shards.values() for entry in entries)
 
     def throws(self, entries: Iterable[Entry]) -> Iterator[Throw]:
-        """Throws with their time series; one at a time is in memory.
+        """Read throws with their time series, one at a time, as all of them may not fit into memory.
 
         Raises:
             DatasetError: If an episode is damaged, or not where the table says.
         """
-        for entry in entries:
-            yield self._throw(entry.trial, succeeded=entry.succeeded)
-
-    def _throw(self, trial: int, *, succeeded: bool) -> Throw:
         dataset = self.dataset
-        episode = dataset.episode(trial)
-        try:
-            recorded = episode.samples(self.joints)
-        except DatasetError as error:
-            raise DatasetError(f"{dataset.directory}: trial {trial}: {error}") from error
-        samples = resample(recorded, recorded_hz=dataset.config.record.rate_hz, rate_hz=self.rate_hz)
-        planned = dataset.plan.trial(trial)
-        trajectory = task_of(dataset.plan.config_of(planned)).trajectory()
-        signals = _compute_signals(samples, trajectory, episode.header.start_ns)
-        target = {each.name: planned.target[each.name] for each in self.targets}
-        signals |= {name: np.full((len(samples), 1), value) for name, value in target.items()}
-        return Throw(trial, succeeded, signals, trajectory, target)
+        for entry in entries:
+            episode = dataset.episode(entry.trial)
+            try:
+                recorded = episode.samples(dataset.joints)
+            except DatasetError as error:
+                raise DatasetError(f"{dataset.directory}: trial {entry.trial}: {error}") from error
+            samples = resample(recorded, recorded_hz=dataset.config.record.rate_hz, rate_hz=self.rate_hz)
+            planned = dataset.plan.trial(entry.trial)
+            trajectory = task_of(dataset.plan.config_of(planned)).trajectory()
+            signals = _compute_signals(samples, trajectory, episode.header.start_ns)
+            target = {column.name: planned.target[column.name] for column in self.targets}
+            signals |= {name: np.full((len(samples), 1), value) for name, value in target.items()}
+            yield Throw(entry.trial, entry.succeeded, signals, trajectory, target)
 
 
 def _list_entries(dataset: Dataset, rate_hz: int) -> dict[str, tuple[Entry, ...]]:
-    found: dict[str, list[Entry]] = {}
+    shards: dict[str, list[Entry]] = {}
     for row in dataset.throws.select(["trial", "outcome", "shard", "samples"]).to_pylist():
         if row["shard"] is not None:
             count = count_resampled(row["samples"], recorded_hz=dataset.config.record.rate_hz, rate_hz=rate_hz)
             entry = Entry(row["trial"], count, row["outcome"] == dataset.config.task.success)
-            found.setdefault(Path(row["shard"]).stem, []).append(entry)
-    return {shard: tuple(entries) for shard, entries in found.items()}
+            shards.setdefault(Path(row["shard"]).stem, []).append(entry)
+    return {shard: tuple(entries) for shard, entries in shards.items()}
 
 
 def _list_targets(dataset: Dataset) -> tuple[TargetColumn, ...]:
-    """The columns of targets of which no throw with an episode lacks one, in the order of the task."""
+    """List the columns of targets that every throw with an episode has, in the order of the task."""
     throws = dataset.recorded.throws
     columns = [each for each in dataset.config.task.target_columns if each.name in throws.column_names]
     return tuple(each for each in columns if not throws[each.name].null_count)
@@ -192,13 +187,17 @@ def _compute_signals(samples: Samples, trajectory: JointTrajectory, start_ns: in
 
 
 def add_units(throws: pa.Table) -> pa.Table:
-    """The table of throws without the places of the recordings, and with the unit of each number."""
+    """Leave the places of the recordings out of the table of throws, and add the unit of each number."""
     table = throws.drop_columns(list(_PLACES))
     fields = [
-        field if pa.types.is_string(field.type) else field.with_metadata(_with_unit(field)) for field in table.schema
+        field
+        if pa.types.is_string(field.type)
+        else field.with_metadata({**(field.metadata or {}), b"unit": unit_of(field.name).encode()})
+        for field in table.schema
     ]
     return table.cast(pa.schema(fields))
 
 
-def _with_unit(field: pa.Field) -> dict[bytes, bytes]:
-    return {**(field.metadata or {}), b"unit": unit_of(field.name).encode()}
+def read_metadata(field: pa.Field) -> dict[str, str]:
+    """Metadata of a column of the table, such as its ``unit`` and ``description``."""
+    return {key.decode(): value.decode() for key, value in (field.metadata or {}).items()}

@@ -1,1 +1,1 @@
-"""What is learned from a dataset: where throws land, how to aim at a place, and how another robot differs."""
+"""Models that are learned from a dataset: where throws land, how to aim, and how another world differs."""

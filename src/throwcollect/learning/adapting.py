@@ -2,66 +2,64 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 
 import numpy as np
-from numpy.typing import NDArray
 
+from throwcollect.learning.arrays import Array
 from throwcollect.learning.learned_map import Correction, LearnedMap, Role
 from throwcollect.reproducible_math import matmul, solve
 
-Array = NDArray[np.float64]
-
 _OFFSET = 0.1
-"""What the place where a trial ends is expected to be off by [m or rad], as a standard deviation."""
+"""Standard deviation that is expected of the offset [m or rad] before any throw."""
 _SMALL_OFFSET = 0.02
-"""The same where something else explains most of the difference."""
+"""The same where biases or latents explain most of the difference."""
 _BIAS = 0.2
-"""What a parameter is expected to be off by, scaled: a tenth of its range."""
+"""Standard deviation that is expected of a bias, scaled: a tenth of the parameter's range."""
 _LATENT = 0.6
-"""Standard deviation of a latent, scaled: about that of numbers that are spread evenly over the range."""
+"""Standard deviation that is expected of a latent, scaled: about that of numbers spread evenly over the range."""
 _MOST_PARTS = 10
-"""So many maps are adapted to parts of the throws at most, to predict the others."""
+"""At most so many maps are adapted to parts of the throws, to predict the other throws."""
 _STEPS = 30
 _LOOKS = 4
-"""What the nearest throws say is looked up in so many steps; later, others would be nearest again and again."""
+"""Residuals of the nearest throws are looked up in so many steps: later, the nearest ones might alternate for ever."""
 _SMALL_STEP = 1e-5
-"""After a step that is smaller [scaled, or m or rad], nothing would change that anybody could measure."""
+"""The search ends after a step that is smaller [scaled, or m or rad]: nobody could measure the difference."""
 _THROWS_FOR_BIAS = 3
 _CLEARLY = 3.0
-"""Misses that get smaller by so much are no accident: in squares, by those of so many standard deviations."""
+"""Adapting helps if the sum of squared misses falls by more than the square of so many standard deviations."""
 
 
 class Method(str, Enum):
-    """What a world is taken to differ by."""
+    """How a world is taken to differ from the one of the map."""
 
     NONE = "none"
-    """Nothing."""
+    """It does not differ."""
     OFFSET = "offset"
-    """All trials end elsewhere, by the same distance."""
+    """All trials end elsewhere, by the same offset."""
     BIAS = "bias"
-    """The robot does not do what it is told: parameters are shifted, and the end, too."""
+    """The robot does not do what it is told: all parameters have a bias, and ends an offset."""
     LATENT = "latent"
-    """What the dataset varied from trial to trial: the latents have other values, and the end is shifted."""
+    """The latents, which the dataset varied from trial to trial, have other values, and ends an offset."""
 
 
 ROLES = {Method.BIAS: Role.PARAMETER, Method.LATENT: Role.LATENT}
-"""Which inputs differ, beside the place where trials end."""
+"""Inputs that differ, apart from the offset."""
 
 
 @dataclass(frozen=True, eq=False)
 class Adaptation:
-    """What a few throws said of a world.
+    """How a world differs, found by a few throws in it.
 
     Attributes:
-        method: What the world is taken to differ by.
-        correction: The difference.
+        method: How the world is taken to differ.
+        correction: The correction of the map for this world.
         deviations: Standard deviations of the numbers that were found: of the biases or latents, scaled, then of the
             offset; shape ``(n_found,)``.
-        before: Distance of each throw from where the map had it, shape ``(n_throws,)``.
-        after: The same by a map that was adapted to other throws: up to ten throws, to all others, else to nine tenths
-            of them; empty for a single throw.
+        before: Distance of each throw from the prediction of the map, shape ``(n_throws,)``.
+        after: Distance of each throw from the prediction of a map that was adapted to other throws: to all others if
+            there are up to ten throws, else to nine tenths of them; empty for a single throw.
     """
 
     method: Method
@@ -86,31 +84,34 @@ def adapt(
     The difference is the most probable one, by what is expected before any throw, and by the throws.
 
     Args:
-        learned: The map, corrected or not: its latents are where the search begins.
+        learned: The map, corrected or not; the search begins with its latents.
         parameters: Scaled parameters of the throws, shape ``(n_throws, n_parameters)``.
         context: Scaled context of the throws, shape ``(n_throws, n_context)``.
         places: Where they ended, shape ``(n_throws, n_targets)``.
-        method: What the world may differ by; None to choose by the number of throws, and by whether it helps.
+        method: How the world may differ; None to choose by the number of throws, and by whether the method helps.
         scatter: Standard deviation of each measured coordinate from its prediction [m or rad]: of repeated throws, and
             of the map.
         latents_count: Whether latents have an effect that is worth knowing.
     """
     throws = (parameters, context, places)
-    before = _distances(learned, *throws)
+    before = _measure_distances(learned, *throws)
     chosen = method or _choose(len(places), latents_count=latents_count)
+    if chosen is Method.NONE:
+        return leave_as_it_is(learned, before)
     found, deviations = _find(learned, chosen, throws, scatter)
     after = np.empty(0)
     if len(places) > 1:
         after = _predict_by_others(learned, chosen, throws, scatter, found)
     helps = float((before**2).sum() - (after**2).sum()) > (_CLEARLY * scatter) ** 2
     if method is None and not helps:
-        return Adaptation(Method.NONE, learned.correction, np.empty(0), before, before if len(after) else after)
+        return leave_as_it_is(learned, before)
     return Adaptation(chosen, _shift(learned.correction, chosen, found), deviations, before, after)
 
 
-def adapt_by_nothing(learned: LearnedMap) -> Adaptation:
-    """Leave a map as it is, as there are no throws."""
-    return Adaptation(Method.NONE, learned.correction, np.empty(0), np.empty(0), np.empty(0))
+def leave_as_it_is(learned: LearnedMap, distances: Array) -> Adaptation:
+    """Make the adaptation that changes nothing; distances of throws from predictions have shape ``(n_throws,)``."""
+    after = distances if len(distances) > 1 else np.empty(0)
+    return Adaptation(Method.NONE, learned.correction, np.empty(0), distances, after)
 
 
 def _choose(throws: int, *, latents_count: bool) -> Method:
@@ -122,9 +123,9 @@ def _choose(throws: int, *, latents_count: bool) -> Method:
 def _predict_by_others(
     learned: LearnedMap, method: Method, throws: tuple[Array, Array, Array], scatter: float, begun: Array
 ) -> Array:
-    """Distance of each throw from where a map has it that was adapted to others, shape ``(n_throws,)``.
+    """Measure the distance of each throw from the prediction of a map that was adapted to others, ``(n_throws,)``.
 
-    What all throws say is where the search begins: others say nearly the same.
+    The search begins with `begun`, the difference by all throws, as that by most of them is nearly the same.
     """
     parts = np.arange(len(throws[2])) % _MOST_PARTS
     distances = np.empty(len(parts))
@@ -132,22 +133,20 @@ def _predict_by_others(
         held, others = parts == part, parts != part
         found, _ = _find(learned, method, (throws[0][others], throws[1][others], throws[2][others]), scatter, begun)
         world = learned.correct(_shift(learned.correction, method, found))
-        distances[held] = _distances(world, throws[0][held], throws[1][held], throws[2][held])
+        distances[held] = _measure_distances(world, throws[0][held], throws[1][held], throws[2][held])
     return distances
 
 
 def _find(
     learned: LearnedMap, method: Method, throws: tuple[Array, Array, Array], scatter: float, begun: Array | None = None
 ) -> tuple[Array, Array]:
-    """The most probable difference, as `_shift` takes it, and standard deviations of its numbers."""
-    if method is Method.NONE:
-        return np.empty(0), np.empty(0)
+    """Find the most probable difference, as `_shift` takes it, and standard deviations of its numbers."""
     parameters, context, places = throws
     targets = places.shape[1]
     role = ROLES.get(method)
     columns = learned.columns_of(role) if role else slice(0, 0)
     width = columns.stop - columns.start
-    # How far each number is believed to go before any throw was seen: the prior of the least squares below.
+    # The standard deviation that is expected of each number before any throw: the prior of the least squares below.
     spread = np.full(width + targets, _SMALL_OFFSET if width else _OFFSET)
     spread[:width] = _BIAS if method is Method.BIAS else _LATENT
     low, high = _ends(learned, method, len(spread))
@@ -176,7 +175,7 @@ def _find(
 
 
 def _ends(learned: LearnedMap, method: Method, count: int) -> tuple[Array, Array]:
-    """Between which numbers a difference lies: latents stay inside of what was collected."""
+    """Bounds of a difference: latents stay inside of the ranges of the dataset."""
     low, high = np.full(count, -np.inf), np.full(count, np.inf)
     if method is Method.LATENT:
         latents = learned.correction.latents
@@ -185,33 +184,31 @@ def _ends(learned: LearnedMap, method: Method, count: int) -> tuple[Array, Array
 
 
 def _step_inside(normal: Array, right: Array, found: Array, low: Array, high: Array) -> Array:
-    """Go to where the normal equations lead; what would leave its range stays at its end, and the others know it."""
+    """Solve the normal equations; a number that would leave its bounds is held there, and the others adjust."""
     held = np.full(len(found), np.nan)
     while True:
         free = np.isnan(held)
         reduced = np.where(free[:, np.newaxis] & free, normal, np.eye(len(found)))
         pull = right - matmul(normal, np.where(free, 0.0, held)[:, np.newaxis])[:, 0]
-        wanted = found + np.where(free, solve(reduced, np.where(free, pull, 0.0)[:, np.newaxis])[:, 0], held)
-        end = np.clip(wanted, low, high)
-        leaving = free & (end != wanted)
+        unbounded = found + np.where(free, solve(reduced, np.where(free, pull, 0.0)[:, np.newaxis])[:, 0], held)
+        bounded = np.clip(unbounded, low, high)
+        leaving = free & (bounded != unbounded)
         if not leaving.any():
-            return end
-        held[leaving] = (end - found)[leaving]
+            return bounded
+        held[leaving] = (bounded - found)[leaving]
 
 
 def _shift(begun: Correction, method: Method, found: Array) -> Correction:
-    """A correction, with a difference added: biases or latents, then offsets; nothing for `Method.NONE`."""
-    if method is Method.NONE:
-        return begun
+    """Add a difference to a correction: biases or latents, then offsets."""
     width = len(found) - len(begun.offset)
-    offset = begun.offset + found[width:]
+    shifted = replace(begun, offset=begun.offset + found[width:])
     if method is Method.BIAS:
-        return Correction(begun.bias + found[:width], begun.latents, offset)
+        return replace(shifted, bias=begun.bias + found[:width])
     if method is Method.LATENT:
-        return Correction(begun.bias, np.clip(begun.latents + found[:width], -1.0, 1.0), offset)
-    return Correction(begun.bias, begun.latents, offset)
+        return replace(shifted, latents=np.clip(begun.latents + found[:width], -1.0, 1.0))
+    return shifted
 
 
-def _distances(learned: LearnedMap, parameters: Array, context: Array, places: Array) -> Array:
-    distances: Array = np.sqrt(((learned.predict(parameters, context) - places) ** 2).sum(axis=1))
+def _measure_distances(learned: LearnedMap, parameters: Array, context: Array, places: Array) -> Array:
+    distances: Array = np.linalg.norm(learned.predict(parameters, context) - places, axis=1)
     return distances

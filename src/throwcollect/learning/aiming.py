@@ -8,37 +8,36 @@ from enum import Enum
 import numpy as np
 from numpy.typing import NDArray
 
+from throwcollect.learning.arrays import Array
 from throwcollect.learning.learned_map import LearnedMap, Role
 from throwcollect.reproducible_math import matmul, solve
 
-Array = NDArray[np.float64]
-
 REACH = 0.05
-"""A target that no throw came as near to as this is out of reach, in the unit of the targets [m or rad]."""
+"""A target is out of reach if all throws ended farther from it than this [m or rad], ..."""
 TOLERANCE = 0.01
-"""So is one that the best parameters are predicted to miss by more [m or rad]."""
+"""... or if the best parameters are predicted to miss it by more than this [m or rad]."""
 _STARTS = 8
-"""Number of throws, those that ended nearest to a target, from each of which a way to it is looked for."""
+"""Number of throws, those that ended nearest to a target, from whose parameters the search begins."""
 _MANY_STARTS = 48
-"""The same where the ways are chosen among."""
+"""The same number for choices other than the nearest: these need more candidates to choose from."""
 _STEPS = 25
 _SMALL_STEP = 1e-9
-"""After a step that is smaller, scaled, nothing would change any more."""
+"""The search ends after a scaled step that is smaller."""
 _DAMPING = 1e-4
-"""Error [m or rad], by scaled input, that a step may leave in order to be smaller."""
+"""Damping of the steps: how much miss [m or rad] a step may leave for each scaled unit that it is shorter by."""
 _CLOSE = 1e-4
-"""Ways whose predicted misses [m or rad] are below this are equally good."""
+"""Candidates whose predicted misses [m or rad] are below this count as equally good."""
 
 
 class Choice(str, Enum):
-    """Which parameters are taken where several lead to a target."""
+    """Which parameters aiming takes if several lead to a target."""
 
     NEAREST = "nearest"
-    """Those nearest to a throw of the dataset: the prediction is best there."""
+    """Those nearest to a throw of the dataset, where the prediction is best."""
     LEAST_EFFORT = "least-effort"
     """Those with the smallest predicted torque, as a share of its limit."""
     LEAST_SENSITIVE = "least-sensitive"
-    """Those where errors of the parameters matter least."""
+    """Those at which errors of the parameters move the end of the trial least."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,14 +47,12 @@ class Aims:
     Attributes:
         parameters: Scaled, shape ``(n, n_parameters)``.
         predicted: Where the trials should end, shape ``(n, n_targets)``.
-        nearest: Distance of each target from the nearest throw, as it would have ended in this world, ``(n,)``.
-        nearest_place: Where that throw would have ended, shape ``(n, n_targets)``.
-        reachable: Whether a target can be reached, shape ``(n,)``.
+        nearest_place: Where the throw nearest to each target would have ended in this world, shape ``(n, n_targets)``.
+        reachable: Whether each target can be reached, shape ``(n,)``.
     """
 
     parameters: Array
     predicted: Array
-    nearest: Array
     nearest_place: Array
     reachable: NDArray[np.bool_]
 
@@ -63,48 +60,47 @@ class Aims:
 def aim(learned: LearnedMap, targets: Array, context: Array, choice: Choice = Choice.NEAREST) -> Aims:
     """Find parameters for targets.
 
-    From each of the throws that ended nearest to a target, Gauss-Newton steps lead to it: the shortest ones that the
-    learned map allows, inside of the ranges of the dataset.
+    From the parameters of each throw that ended near a target, the shortest Gauss-Newton steps lead to the target,
+    inside of the ranges of the dataset.
 
     Args:
         learned: The map of the world that is aimed in.
         targets: Shape ``(n, n_targets)``.
         context: Scaled, shape ``(n, n_context)``.
-        choice: Which of several ways is taken.
+        choice: Which of several candidates is taken.
     """
     rows = [_aim_at(learned, target, given, choice) for target, given in zip(targets, context, strict=True)]
     parameters, predicted, nearest = (np.array(column) for column in zip(*rows, strict=True))
-    away = np.sqrt(((nearest - targets) ** 2).sum(axis=1))
-    missed = np.sqrt(((predicted - targets) ** 2).sum(axis=1))
-    return Aims(parameters, predicted, away, nearest, (away <= REACH) & (missed <= TOLERANCE))
+    away, missed = (np.linalg.norm(places - targets, axis=1) for places in (nearest, predicted))
+    return Aims(parameters, predicted, nearest, (away <= REACH) & (missed <= TOLERANCE))
 
 
 def _aim_at(learned: LearnedMap, target: Array, context: Array, choice: Choice) -> tuple[Array, Array, Array]:
-    """Parameters for one target, where they should lead, and where the nearest throw would have ended."""
+    """Find parameters for one target; also their predicted place, and where the nearest throw would have ended."""
     landings = learned.carry_over(context)
     squares = ((landings - target) ** 2).sum(axis=1)
     starts = np.argsort(squares, kind="stable")[: _STARTS if choice is Choice.NEAREST else _MANY_STARTS]
     begun = np.clip(learned.inputs[starts][:, learned.columns_of(Role.PARAMETER)], -1.0, 1.0)
-    given = np.repeat(context[np.newaxis], len(starts), axis=0)
+    given = np.tile(context, (len(starts), 1))
     shift = learned.residuals[starts] + learned.correction.offset
     parameters = _walk(learned, begun, given, target - shift)
     inputs = learned.in_world(parameters, given)
     predicted = learned.forward.predict(inputs) + shift
-    missed = np.sqrt(((predicted - target) ** 2).sum(axis=1))
-    worth = _judge(learned, choice, inputs, parameters - begun)
-    best = int(np.lexsort((worth, np.maximum(missed, _CLOSE)))[0])
+    missed = np.linalg.norm(predicted - target, axis=1)
+    costs = _weigh(learned, choice, inputs, parameters - begun)
+    best = int(np.lexsort((costs, np.maximum(missed, _CLOSE)))[0])
     return parameters[best], predicted[best], landings[starts[0]]
 
 
 def _walk(learned: LearnedMap, parameters: Array, context: Array, goals: Array) -> Array:
-    """Walk from parameters to where the polynomial has the goals, inside of the ranges."""
+    """Step from parameters to ones for which the polynomial predicts the goals, inside of the ranges."""
     columns = learned.columns_of(Role.PARAMETER)
     for _ in range(_STEPS):
         inputs = learned.in_world(parameters, context)
         missing = goals - learned.forward.predict(inputs)
         slopes = learned.forward.slopes(inputs, columns)
         step = _step(slopes, missing)
-        # What would leave its range stays where it is, and the others make up for it.
+        # A parameter that would leave its range stays, and the others make up for it.
         stuck = np.abs(np.clip(parameters + step, -1.0, 1.0) - parameters) < 1e-12
         step = _step(np.where(stuck[:, np.newaxis], 0.0, slopes), missing)
         before, parameters = parameters, np.clip(parameters + step, -1.0, 1.0)
@@ -114,14 +110,14 @@ def _walk(learned: LearnedMap, parameters: Array, context: Array, goals: Array) 
 
 
 def _step(slopes: Array, missing: Array) -> Array:
-    """The shortest step that makes up for what is missing, shape ``(n, n_parameters)``."""
+    """The shortest step of the parameters that closes the distance to the goals, shape ``(n, n_parameters)``."""
     transposed = np.swapaxes(slopes, 1, 2)
     squares = matmul(slopes, transposed) + _DAMPING**2 * np.eye(slopes.shape[1])
     return matmul(transposed, solve(squares, missing[..., np.newaxis]))[..., 0]
 
 
-def _judge(learned: LearnedMap, choice: Choice, inputs: Array, steps: Array) -> Array:
-    """How much speaks against each way."""
+def _weigh(learned: LearnedMap, choice: Choice, inputs: Array, steps: Array) -> Array:
+    """Find the cost of each candidate by a choice, shape ``(n,)``."""
     if choice is Choice.LEAST_EFFORT:
         return learned.effort.predict(inputs)[:, 0]
     if choice is Choice.LEAST_SENSITIVE:

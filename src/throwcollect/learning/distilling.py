@@ -1,64 +1,65 @@
-"""Distils the way from a target to parameters into one polynomial, which a robot's controller can evaluate."""
+"""Distils aiming, from a target to parameters, into one polynomial, which a robot's controller can evaluate."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from throwcollect.learning.arrays import Array, Vector
 from throwcollect.learning.learned_map import LearnedMap, Role
 from throwcollect.learning.polynomial import SAMPLES_PER_TERM, Polynomial, fit_polynomial, list_exponents, list_terms
 from throwcollect.reproducible_math import matmul, solve
 
-Array = NDArray[np.float64]
-
 _DEGREE = 4
-"""Degree of the polynomial, where there are throws enough: more terms hit no better."""
+"""Degree of the polynomial, if there are enough throws: higher degrees hit no better."""
 _MOST_THROWS = 1000
-"""Ends of so many throws, the first ones, are targets to learn from."""
+"""The places where so many throws end, the first ones, are the targets to learn from."""
 _STEPS = 10
 _TO_THE_MIDDLE = 0.005
-"""Miss [m or rad] that is as bad as one parameter at an end of its range: of many ways, one amid ranges is taken."""
+"""Miss [m or rad] that costs as much as one parameter at an end of its range: of the many parameters that lead to a
+target, those in the middle of their ranges are preferred."""
 _SMALL = 1e-12
-"""Keeps terms small that the targets say nothing about."""
+"""Ridge that keeps coefficients small where the targets do not determine them."""
 
 
 @dataclass(frozen=True, eq=False)
 class DistilledMap:
-    """From a target to parameters, by a polynomial alone.
+    """A polynomial from targets to parameters.
 
     Attributes:
         low: Smallest values of the targets that it was learned from, in their units, shape ``(n_targets,)``.
-        high: Largest ones.
+        high: Largest values, shape ``(n_targets,)``.
         polynomial: Scaled targets (-1 is the smallest value, 1 the largest) and scaled context to scaled parameters.
     """
 
-    low: Array
-    high: Array
+    low: Vector
+    high: Vector
     polynomial: Polynomial
 
+    def has_shape(self, targets: int, context: int, parameters: int) -> bool:
+        """Whether ranges and polynomial belong to so many targets, keys that are given, and parameters."""
+        return (
+            len(self.low) == len(self.high) == targets
+            and bool((self.low < self.high).all())
+            and self.polynomial.has_shape(targets + context, parameters)
+        )
+
     def aim(self, targets: Array, context: Array) -> Array:
-        """Parameters for targets, at the ends of their ranges if they are beyond.
+        """Scaled parameters for targets, clipped to their ranges, shape ``(n, n_parameters)``.
 
         Args:
             targets: Shape ``(n, n_targets)``.
             context: Scaled, shape ``(n, n_context)``.
-
-        Returns:
-            Scaled, shape ``(n, n_parameters)``.
         """
         return np.clip(self.polynomial.predict(_inputs(targets, context, self.low, self.high)), -1.0, 1.0)
 
 
 def distil(learned: LearnedMap) -> DistilledMap:
-    """Find the polynomial whose parameters lead to their targets, as the map has it.
+    """Find the polynomial whose parameters lead to their targets, as the map predicts it.
 
-    Not the parameters of the throws are learned, as several ways lead to one target, and their mean to none: the misses
-    that the map predicts are made small, by Gauss-Newton steps for all coefficients together.
-
-    Args:
-        learned: The map of the world that is aimed in.
+    The polynomial is not fitted to the parameters of the throws: different parameters lead to one target, and their
+    mean to none. Instead, Gauss-Newton steps for all coefficients together make the misses small that the map predicts.
     """
     parameters, context = (
         learned.inputs[:_MOST_THROWS, learned.columns_of(role)] for role in (Role.PARAMETER, Role.CONTEXT)
@@ -71,9 +72,9 @@ def distil(learned: LearnedMap) -> DistilledMap:
         if len(more := list_exponents(inputs.shape[1], degree)) * SAMPLES_PER_TERM <= len(inputs):
             exponents = more
     terms = np.ascontiguousarray(list_terms(inputs, exponents))
-    begun = fit_polynomial(inputs, parameters, 1).coefficients
+    linear = fit_polynomial(inputs, parameters, 1).coefficients
     coefficients = np.zeros((len(exponents), parameters.shape[1]))
-    coefficients[: len(begun)] = begun
+    coefficients[: len(linear)] = linear
     squares = matmul(np.ascontiguousarray(terms.T), terms)
     best, least = coefficients, np.inf
     for _ in range(_STEPS):
@@ -87,7 +88,7 @@ def distil(learned: LearnedMap) -> DistilledMap:
 
 
 def _step(learned: LearnedMap, terms: Array, squares: Array, raw: Array, context: Array, missing: Array) -> Array:
-    """Change of the coefficients that makes up for what is missing, shape ``(n_terms, n_parameters)``."""
+    """The Gauss-Newton step of the coefficients, shape ``(n_terms, n_parameters)``."""
     clipped = np.clip(raw, -1.0, 1.0)
     slopes = learned.forward.slopes(learned.in_world(clipped, context), learned.columns_of(Role.PARAMETER))
     slopes = slopes * (clipped == raw)[:, np.newaxis]

@@ -15,33 +15,33 @@ from throwcollect.config.schema import Config
 from throwcollect.config.values import leaves
 from throwcollect.dataset.reader import Dataset
 from throwcollect.errors import ConfigError, DatasetError
+from throwcollect.learning.arrays import Array
 from throwcollect.learning.learned_map import Axis, Kind, LearnedMap, Role, no_correction, scale_values
 from throwcollect.learning.polynomial import Validation, cross_validate, fit_polynomial
 from throwcollect.wording import format_count, join_names
 
-Array = NDArray[np.float64]
-
 MOST_PARAMETERS = 20
-_EFFORT = "effort_peak_share"
+EFFORT = "effort_peak_share"
+"""Column of the largest share of a joint's torque limit."""
 _THROWS_PER_PARAMETER = 3
 _EFFORT_DEGREE = 2
 _FOLDS = 5
 _CELL = 0.05
-"""Width of the cells [m or rad] whose throws are in one fold."""
+"""Width of the cells of targets [m or rad]."""
 _WORTH_KNOWING = 2.0
-"""Latents are worth knowing if predictions are so many times worse without them."""
+"""Latents are worth knowing if predictions without them are so many times worse."""
 
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """What was learned.
+    """A map that was learned, and how well it predicts.
 
     Attributes:
         learned: The map.
         trials: Numbers of the trials that it was learned from, shape ``(n,)``.
         ignored: Number of the dataset's throws that did not succeed.
         validation: How polynomials of several degrees predict throws that they were not fitted to.
-        without_latents: Median of the same error with the latents left out; None if there are none.
+        without_latents: Median of that error when latents are no inputs; None if there are no latents.
     """
 
     learned: LearnedMap
@@ -94,7 +94,7 @@ def fit_map(
     outputs = np.column_stack([_numbers(throws, column, dataset) for column in columns])
     values = np.column_stack([_numbers(throws, axis.key, dataset) for axis in axes])
     trials: NDArray[np.int64] = throws["trial"].to_numpy()
-    fit = fit_throws(kind, axes, columns, values, outputs, _numbers(throws, _EFFORT, dataset))
+    fit = fit_throws(kind, axes, columns, values, outputs, _numbers(throws, EFFORT, dataset))
     return replace(fit, trials=trials, ignored=len(dataset) - len(throws))
 
 
@@ -112,11 +112,11 @@ def fit_throws(
         efforts: Largest shares of a joint's torque limit, shape ``(n,)``.
     """
     inputs, folds = scale_values(axes, values), _folds(outputs)
-    # Latents come last; they matter little beside one another, so terms of two of them are left out.
+    # Latents come last. Products of two latents have little effect, so such terms are left out.
     minor = sum(axis.role is Role.LATENT for axis in axes)
     validation = cross_validate(inputs, outputs, folds, minor=minor)
     known = [axis.role is not Role.LATENT for axis in axes]
-    # What the error would be without latents tells whether they are worth knowing.
+    # The error without latents tells whether they are worth knowing.
     blind = None if all(known) else float(np.median(cross_validate(inputs[:, known], outputs, folds).best))
     forward = fit_polynomial(inputs, outputs, validation.degree, minor=minor)
     effort = fit_polynomial(inputs, efforts[:, np.newaxis], min(_EFFORT_DEGREE, validation.degree))
@@ -125,19 +125,20 @@ def fit_throws(
     return Fit(learned, np.arange(len(inputs)), 0, validation, blind)
 
 
-def enough_throws(throws: int, parameters: int) -> bool:
-    """Whether so many throws are enough for a model of so many parameters."""
-    return throws >= _least_throws(parameters)
-
-
-def _least_throws(parameters: int) -> int:
+def count_needed_throws(parameters: int) -> int:
+    """How many throws a model of so many parameters takes at least."""
     return _THROWS_PER_PARAMETER * (parameters + 1)
+
+
+def number_cells(places: Array) -> NDArray[np.int64]:
+    """Numbers of the cell of 5 cm or 0.05 rad that each place lies in, shape ``(n, n_targets)`` as the places."""
+    return np.floor(places / _CELL).astype(np.int64)
 
 
 def _find_axes(
     dataset: Dataset, throws: pa.Table, parameters: Sequence[str], context: Sequence[str]
 ) -> tuple[Axis, ...]:
-    """The swept keys as inputs: parameters, context, latents.
+    """List the swept keys as inputs: parameters, context, latents.
 
     Raises:
         ConfigError: If a key was not swept, or has one value alone.
@@ -151,8 +152,8 @@ def _find_axes(
     for key in swept:
         ends = pc.min_max(throws[key]).as_py()
         low, high = ends["min"], ends["max"]
-        role = _role(dataset.config, key, parameters, context)
-        # A key that has one value says nothing, and would divide by zero when it is scaled.
+        role = _choose_role(dataset.config, key, parameters, context)
+        # Nothing can be learned of a key with one value, and scaling would divide by zero.
         if low == high and low is not None:
             if key in parameters:
                 raise ConfigError(f"{key} has the value {low:g} in all throws", expected="a key that varies")
@@ -161,7 +162,7 @@ def _find_axes(
     return tuple(sorted(axes, key=lambda axis: list(Role).index(axis.role)))
 
 
-def _role(config: Config, key: str, parameters: Sequence[str], context: Sequence[str]) -> Role:
+def _choose_role(config: Config, key: str, parameters: Sequence[str], context: Sequence[str]) -> Role:
     if key in context or (not context and key in config.task.given):
         return Role.CONTEXT
     chosen = key in parameters if parameters else key.startswith("task.")
@@ -169,7 +170,7 @@ def _role(config: Config, key: str, parameters: Sequence[str], context: Sequence
 
 
 def _check_amount(dataset: Dataset, throws: pa.Table, axes: tuple[Axis, ...]) -> None:
-    """Refuse what cannot be learned.
+    """Refuse a dataset that no model can be learned from.
 
     Raises:
         ConfigError: If no parameter varies, too many do, or too few throws succeeded.
@@ -185,16 +186,16 @@ def _check_amount(dataset: Dataset, throws: pa.Table, axes: tuple[Axis, ...]) ->
             expected=f"at most {MOST_PARAMETERS}",
             hint="choose some of them by --parameters; the others count as unknown",
         )
-    if not enough_throws(len(throws), len(chosen)):
+    if len(throws) < (needed := count_needed_throws(len(chosen))):
         raise ConfigError(
             f"{dataset.directory}: {format_count(len(throws), dataset.config.task.noun)} of {len(dataset)} "
             f"{dataset.config.task.success}",
-            expected=f"at least {_least_throws(len(chosen))} for {format_count(len(chosen), 'parameter')}",
+            expected=f"at least {needed} for {format_count(len(chosen), 'parameter')}",
         )
 
 
 def _numbers(throws: pa.Table, column: str, dataset: Dataset) -> Array:
-    """A column as finite numbers.
+    """Read a column of finite numbers.
 
     Raises:
         ConfigError: If there is no such column of numbers.
@@ -212,8 +213,7 @@ def _numbers(throws: pa.Table, column: str, dataset: Dataset) -> Array:
 
 
 def _folds(outputs: Array) -> NDArray[np.int64]:
-    """Number of the fold of each throw; those that ended in one cell are in one fold."""
-    cells = np.floor(outputs / _CELL).astype(np.int64)
-    # By a hash, so that a throw stays in its fold when others join, and on every processor.
-    numbers = [hashlib.sha256(cell.tobytes()).digest()[0] % _FOLDS for cell in cells]
+    """Number of the fold of each throw; throws that ended in one cell are in one fold."""
+    # By a hash of the cell, so that a throw stays in its fold when the dataset grows.
+    numbers = [hashlib.sha256(cell.tobytes()).digest()[0] % _FOLDS for cell in number_cells(outputs)]
     return np.array(numbers, np.int64)

@@ -7,35 +7,34 @@ from enum import Enum
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
+from pydantic import FiniteFloat
 
+from throwcollect.learning.arrays import Array, Vector
 from throwcollect.learning.polynomial import Polynomial
 from throwcollect.units import unit_of_name
 
-Array = NDArray[np.float64]
-
 _NEIGHBOURS = 8
-"""Number of throws near a point whose distance from the polynomial corrects it there."""
+"""Number of nearest throws whose residuals correct the polynomial at a point."""
 
 
 class Kind(str, Enum):
     """How a prediction is made."""
 
     LOCAL = "local"
-    """By what the nearest throws did, and the polynomial's difference from there."""
+    """By the polynomial, corrected by the residuals of the nearest throws."""
     POLYNOMIAL = "polynomial"
-    """By the polynomial alone: it can be written down."""
+    """By the polynomial alone, which can be written down as a formula."""
 
 
 class Role(str, Enum):
-    """What a swept key is to whoever aims."""
+    """How aiming treats a swept key."""
 
     PARAMETER = "parameter"
-    """It is chosen: a number of the task."""
+    """Aiming chooses its value; a number of the task."""
     CONTEXT = "context"
-    """It is given with the target, as the height of the plane to land on."""
+    """Its value is given with the target, such as the height of the plane to land on."""
     LATENT = "latent"
-    """It belongs to the world, and nobody knows it but by throwing there."""
+    """It belongs to the world; only throws there tell its value."""
 
 
 @dataclass(frozen=True)
@@ -44,17 +43,17 @@ class Axis:
 
     Attributes:
         key: Dotted key.
-        role: What it is to whoever aims.
+        role: How aiming treats it.
         minimum: Smallest value in the dataset, in the key's unit.
         maximum: Largest value.
-        nominal: Value of the configuration, which holds for the world as long as nothing else is known.
+        nominal: Value in the configuration; the world is taken to have it until adapting finds another one.
     """
 
     key: str
     role: Role
-    minimum: float
-    maximum: float
-    nominal: float
+    minimum: FiniteFloat
+    maximum: FiniteFloat
+    nominal: FiniteFloat
 
     @property
     def unit(self) -> str:
@@ -67,14 +66,14 @@ class Correction:
     """How a world differs from the one of the dataset. Without a difference, all numbers but the latents are 0.
 
     Attributes:
-        bias: What parameters have to be shifted by to be those of the dataset's world, scaled, ``(n_parameters,)``.
+        bias: Is added to parameters of this world to get those of the dataset's world, scaled, ``(n_parameters,)``.
         latents: Values of the latents in this world, scaled, ``(n_latents,)``.
-        offset: What is added to where a trial ends, in the units of the targets, ``(n_targets,)``.
+        offset: Is added to the place where a trial ends, in the units of the targets, ``(n_targets,)``.
     """
 
-    bias: Array
-    latents: Array
-    offset: Array
+    bias: Vector
+    latents: Vector
+    offset: Vector
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,7 +89,7 @@ class LearnedMap:
         forward: The polynomial: all inputs to targets.
         effort: The polynomial of the largest share of a joint's torque limit.
         values: Inputs of the throws that it was learned from, in the units of their keys, shape ``(n, n_axes)``.
-        outputs: Where those ended, shape ``(n, n_targets)``.
+        outputs: Places where those throws ended, shape ``(n, n_targets)``.
         efforts: Their largest shares of a joint's torque limit, shape ``(n,)``.
         correction: How the world differs from the dataset's.
     """
@@ -107,12 +106,12 @@ class LearnedMap:
 
     @cached_property
     def inputs(self) -> Array:
-        """The same inputs, scaled."""
+        """`values`, scaled."""
         return scale_values(self.axes, self.values)
 
     @cached_property
     def residuals(self) -> Array:
-        """What the polynomial leaves of the throws of the dataset, ``(n, n_targets)``; 0 where it stands for itself."""
+        """Outputs minus the polynomial's predictions, ``(n, n_targets)``; 0 if predictions are the polynomial alone."""
         if self.kind is Kind.POLYNOMIAL:
             return np.zeros_like(self.outputs)
         return self.outputs - self.forward.predict(self.inputs)
@@ -122,9 +121,9 @@ class LearnedMap:
         return tuple(axis for axis in self.axes if axis.role is role)
 
     def columns_of(self, role: Role) -> slice:
-        """Where the inputs of a role stand."""
-        before = [axis.role for axis in self.axes].index(role) if self.axes_of(role) else 0
-        return slice(before, before + len(self.axes_of(role)))
+        """The columns of inputs that belong to a role; an empty slice if none does."""
+        columns = [number for number, axis in enumerate(self.axes) if axis.role is role]
+        return slice(columns[0], columns[-1] + 1) if columns else slice(0, 0)
 
     def scale(self, role: Role, values: Array) -> Array:
         """Scale values of the axes of a role, shape ``(n, n_axes of the role)``."""
@@ -136,7 +135,7 @@ class LearnedMap:
         return low + (inputs + 1.0) / 2.0 * (high - low)
 
     def in_world(self, parameters: Array, context: Array) -> Array:
-        """All inputs of trials in the corrected world.
+        """Inputs for which the polynomial predicts trials of the corrected world.
 
         Args:
             parameters: Scaled, shape ``(n, n_parameters)``.
@@ -145,54 +144,45 @@ class LearnedMap:
         Returns:
             Shape ``(n, n_axes)``.
         """
-        latents = np.repeat(self.correction.latents[np.newaxis], len(parameters), axis=0)
+        latents = np.tile(self.correction.latents, (len(parameters), 1))
         return np.hstack([parameters + self.correction.bias, context, latents])
 
     def predict(self, parameters: Array, context: Array) -> Array:
-        """Where trials end in the corrected world.
+        """Where trials end in the corrected world, in the units of the targets, shape ``(n, n_targets)``.
 
         Args:
             parameters: Scaled, shape ``(n, n_parameters)``.
             context: Scaled, shape ``(n, n_context)``.
-
-        Returns:
-            In the units of the targets, shape ``(n, n_targets)``.
         """
         inputs = self.in_world(parameters, context)
         return self.forward.predict(inputs) + self.predict_residuals(inputs) + self.correction.offset
 
     def carry_over(self, context: Array) -> Array:
-        """Where the throws of the dataset would have ended in the corrected world.
+        """Where the throws of the dataset would have ended in the corrected world, shape ``(n, n_targets)``.
 
         Args:
-            context: Scaled, the same for all, shape ``(n_context,)``.
-
-        Returns:
-            Shape ``(n, n_targets)``.
+            context: Scaled, the same for all throws, shape ``(n_context,)``.
         """
         parameters = self.inputs[:, self.columns_of(Role.PARAMETER)]
-        moved = self.in_world(parameters, np.repeat(context[np.newaxis], len(parameters), axis=0))
+        moved = self.in_world(parameters, np.tile(context, (len(parameters), 1)))
         return self.residuals + self.forward.predict(moved) + self.correction.offset
 
     def correct(self, correction: Correction) -> LearnedMap:
-        """The map of another world, which has the same throws: what they say is not worked out again."""
+        """The map of another world, learned from the same throws."""
         other = replace(self, correction=correction)
+        # The throws are the same, so what was computed of them is, too.
         vars(other).update(inputs=self.inputs, residuals=self.residuals)
         return other
 
     def predict_residuals(self, inputs: Array) -> Array:
-        """What the nearest throws say beside the polynomial.
+        """Means of the residuals of the nearest throws, weighted by closeness, shape ``(n, n_targets)``.
 
         Args:
             inputs: All inputs, scaled, shape ``(n, n_axes)``.
-
-        Returns:
-            In the units of the targets, shape ``(n, n_targets)``.
         """
         if self.kind is Kind.POLYNOMIAL:
             return np.zeros((len(inputs), len(self.targets)))
-        residuals = self.residuals
-        found = np.empty((len(inputs), len(self.targets)))
+        predicted = np.empty((len(inputs), len(self.targets)))
         for row, place in enumerate(inputs):
             squares = ((self.inputs - place) ** 2).sum(axis=1)
             # The nearest of all, found among the few that are as near as the last of them.
@@ -200,8 +190,8 @@ class LearnedMap:
             few = np.flatnonzero(squares <= np.partition(squares, last)[last])
             near = few[np.argsort(squares[few], kind="stable")][:_NEIGHBOURS]
             weights = 1.0 / (squares[near] + 1e-12)
-            found[row] = (weights[:, np.newaxis] * residuals[near]).sum(axis=0) / weights.sum()
-        return found
+            predicted[row] = (weights[:, np.newaxis] * self.residuals[near]).sum(axis=0) / weights.sum()
+        return predicted
 
 
 def no_correction(axes: tuple[Axis, ...], targets: tuple[str, ...]) -> Correction:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from enum import Enum
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,20 +17,12 @@ from throwcollect.extras import require
 from throwcollect.files import StrPath
 from throwcollect.learning.adapting import Method, adapt
 from throwcollect.learning.aiming import Choice, aim
+from throwcollect.learning.arrays import Array
 from throwcollect.learning.distilling import distil
 from throwcollect.learning.fitting import Fit, fit_map
 from throwcollect.learning.learned_map import Kind, LearnedMap, Role
 from throwcollect.learning.model_directory import read_model, write_model
-from throwcollect.learning.model_file import (
-    AdaptationEntry,
-    AxisEntry,
-    CorrectionEntry,
-    DistilledEntry,
-    ModelFile,
-    PolynomialEntry,
-    TrainedOn,
-    list_found,
-)
+from throwcollect.learning.model_file import AdaptationEntry, ModelFile, TrainedOn, list_found
 from throwcollect.learning.score import Score, pool_scores
 from throwcollect.learning.scoring import Simulates, leave_out_correction, score_model
 from throwcollect.version import __version__
@@ -38,7 +30,7 @@ from throwcollect.version import __version__
 if TYPE_CHECKING:
     from throwcollect.dataset.reader import Dataset
 
-Array = NDArray[np.float64]
+_Word = TypeVar("_Word", bound=Enum)
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,10 +38,10 @@ class Aim:
     """How to reach a target.
 
     Attributes:
-        target: Where to: the targets of the model, then what is given with them.
-        parameters: Values by dotted key, as `Simulator.throw` takes them; those that are given with the target, too.
+        target: Values of the model's targets, then of the keys that are given with them.
+        parameters: Values by dotted key, as `Simulator.throw` takes them, also of the keys that are given.
         predicted: Where the trial should end, shape ``(n_targets,)``.
-        reachable: Whether throws have come near enough, and the prediction does.
+        reachable: Whether throws of the dataset came near enough, and the prediction does.
         nearest: Where the nearest throw of the dataset ended, shape ``(n_targets,)``.
     """
 
@@ -64,11 +56,11 @@ class Aim:
 class Model:
     """Where throws with given parameters end, and which parameters lead to a target.
 
-    A model is a pure function of the dataset and of what was asked for, byte for byte.
+    A model is a pure function of the dataset and of the arguments of `fit`, byte for byte.
 
     Attributes:
-        file: All that it is but for the throws that it was learned from.
-        learned: The map itself, with these throws.
+        file: All of the model but the throws that it was learned from.
+        learned: The map, with these throws.
         trials: Numbers of their trials, shape ``(n,)``.
         config: YAML of the dataset's configuration.
     """
@@ -85,12 +77,12 @@ class Model:
 
     @property
     def given(self) -> tuple[str, ...]:
-        """Keys whose values are given with a target, behind it."""
+        """Keys whose values are given behind a target."""
         return tuple(axis.key for axis in self.learned.axes_of(Role.CONTEXT))
 
     @property
     def latents(self) -> tuple[str, ...]:
-        """Keys of the world, whose values nobody knows but by throwing."""
+        """Keys of the world, whose values only throws tell."""
         return tuple(axis.key for axis in self.learned.axes_of(Role.LATENT))
 
     @property
@@ -99,13 +91,10 @@ class Model:
         return self.learned.targets
 
     def predict(self, points: Sequence[Mapping[str, float]]) -> Array:
-        """Where throws should end.
+        """Where throws should end, in the units of the targets, shape ``(n_points, n_targets)``.
 
         Args:
-            points: Values by key, of all `parameters` and all `given` each.
-
-        Returns:
-            In the units of the targets, shape ``(n_points, n_targets)``.
+            points: For each throw, values by key of all `parameters` and all `given`.
 
         Raises:
             ConfigError: If a key is missing or unknown, or a value is not finite.
@@ -117,8 +106,8 @@ class Model:
         """Find parameters for targets, inside of the ranges of the dataset.
 
         Args:
-            targets: Where to, each of them `targets` and then `given`, such as ``[(1.4, -0.2)]``.
-            choose: Which of several ways is taken: ``nearest``, ``least-effort`` or ``least-sensitive``.
+            targets: Values of `targets` and then of `given` for each, such as ``[(1.4, -0.2)]``.
+            choose: Which of several parameters are taken: ``nearest``, ``least-effort`` or ``least-sensitive``.
 
         Raises:
             ConfigError: If a target has another number of values, or one is not finite, or there is no such choice.
@@ -126,25 +115,19 @@ class Model:
         names = (*self.targets, *self.given)
         rows = np.array([self._check_target(target, names) for target in targets], np.float64).reshape(-1, len(names))
         ends, values = rows[:, : len(self.targets)], rows[:, len(self.targets) :]
-        try:
-            choice = Choice(choose)
-        except ValueError:
-            raise ConfigError(
-                f"choose: {choose!r}", expected=f"one of {', '.join(each.value for each in Choice)}"
-            ) from None
         context = self.learned.scale(Role.CONTEXT, values)
-        found = aim(self.learned, ends, context, choice)
+        found = aim(self.learned, ends, context, _read_word(Choice, "choose", choose))
         chosen = self.learned.unscale(Role.PARAMETER, found.parameters)
         inside = np.all(np.abs(context) <= 1.0, axis=1).tolist()
         return [
             Aim(
                 row,
-                dict(zip((*self.parameters, *self.given), (*chosen[at].tolist(), *values[at].tolist()), strict=True)),
-                found.predicted[at],
-                bool(found.reachable[at]) and inside[at],
-                found.nearest_place[at],
+                dict(zip((*self.parameters, *self.given), (*chosen[n].tolist(), *values[n].tolist()), strict=True)),
+                found.predicted[n],
+                bool(found.reachable[n]) and inside[n],
+                found.nearest_place[n],
             )
-            for at, row in enumerate(rows)
+            for n, row in enumerate(rows)
         ]
 
     def score(
@@ -179,11 +162,23 @@ class Model:
             if number < least:
                 raise ConfigError(f"{name}: got {number}", expected=f"{least} or more")
         _check_scatter(scatter)
-        error, counts = self.file.trained_on.error, self.file.trained_on.latents_count
-        score = partial(score_model, self.learned, simulator, count=targets, world=world, scatter=scatter)
         distilled = None if self.file.distilled is None else distil(leave_out_correction(self.learned))
-        score = partial(score, error=error, latents_count=counts, distilled=distilled, processes=processes)
-        return pool_scores([score(seed=each) for each in range(seed, seed + seeds)])
+        scores = [
+            score_model(
+                self.learned,
+                simulator,
+                count=targets,
+                seed=each,
+                world=world,
+                scatter=scatter,
+                error=self.file.trained_on.error,
+                latents_count=self.file.trained_on.latents_count,
+                distilled=distilled,
+                processes=processes,
+            )
+            for each in range(seed, seed + seeds)
+        ]
+        return pool_scores(scores)
 
     def adapt(
         self,
@@ -193,12 +188,12 @@ class Model:
         method: str | None = None,
         scatter: float = 0.0,
     ) -> Model:
-        """Make the model of another world, of a few throws in it; if this one was distilled, that one is, too.
+        """Make the model of another world from a few throws there; it is distilled if this model was.
 
         Args:
-            points: What was thrown: values by key, of all `parameters` and all `given` each.
+            points: For each throw, values by key of all `parameters` and all `given`.
             places: Where these throws ended, each as many numbers as `targets`.
-            method: What the world may differ by: ``offset``, ``bias``, ``latent`` or ``none``; None to choose.
+            method: How the world may differ: ``offset``, ``bias``, ``latent`` or ``none``; None to choose.
             scatter: Standard deviation of what is measured, in the unit of the targets.
 
         Raises:
@@ -212,24 +207,19 @@ class Model:
                 f"{len(parameters)} throws and {len(measured)} places", expected="one place for each throw"
             )
         _check_scatter(scatter)
-        try:
-            wanted = None if method is None else Method(method)
-        except ValueError:
-            raise ConfigError(
-                f"method: {method!r}", expected=f"one of {', '.join(each.value for each in Method)}"
-            ) from None
-        if wanted is Method.LATENT and not self.latents:
+        chosen = None if method is None else _read_word(Method, "method", method)
+        if chosen is Method.LATENT and not self.latents:
             raise ConfigError(
                 "method: the dataset has no latents", expected="a dataset whose sweep varies the world", hint="try bias"
             )
-        # A throw lands where it does by its own scatter, and is predicted with the error of the model.
+        # A measured place differs from its prediction by the scatter of the throw, and by the error of the model.
         deviation = float(np.hypot(scatter, self.file.trained_on.error))
         adapted = adapt(
             self.learned,
             parameters,
             context,
             measured,
-            method=wanted,
+            method=chosen,
             scatter=deviation,
             latents_count=self.file.trained_on.latents_count,
         )
@@ -244,7 +234,7 @@ class Model:
         )
         file = self.file.model_copy(
             update={
-                "correction": CorrectionEntry.of(adapted.correction),
+                "correction": adapted.correction,
                 "adaptation": entry,
                 "version": __version__,
                 "distilled": None,
@@ -254,20 +244,16 @@ class Model:
         return world if self.file.distilled is None else world.distil()
 
     def distil(self) -> Model:
-        """Add the way from a target to parameters as one polynomial, which `save` writes into ``model.onnx``, too.
+        """Add one polynomial from targets to parameters, which `save` writes into ``model.onnx``, too.
 
         Raises:
             MissingExtraError: If the package ``onnx`` is not installed.
         """
         require("onnx")
-        entry = DistilledEntry.of(distil(self.learned))
-        return replace(self, file=self.file.model_copy(update={"distilled": entry}))
+        return replace(self, file=self.file.model_copy(update={"distilled": distil(self.learned)}))
 
     def save(self, directory: StrPath) -> None:
-        """Write the model.
-
-        Args:
-            directory: A directory that is new or empty.
+        """Write the model into a directory that is new or empty.
 
         Raises:
             ConfigError: If there is something already.
@@ -277,7 +263,7 @@ class Model:
         write_model(Path(directory), self.file, self.learned, self.trials, self.config)
 
     def _inputs(self, points: Sequence[Mapping[str, float]]) -> tuple[Array, Array]:
-        """Scaled parameters and context of points.
+        """Read scaled parameters and context of points.
 
         Raises:
             ConfigError: If a key is missing or unknown, or a value is not finite.
@@ -296,13 +282,12 @@ class Model:
                 f"throw {number}: {names[column]} is {values[number, column]}", expected="a finite number"
             )
         split = len(self.parameters)
-        return self.learned.scale(Role.PARAMETER, values[:, :split]), self.learned.scale(
-            Role.CONTEXT, values[:, split:]
-        )
+        parameters = self.learned.scale(Role.PARAMETER, values[:, :split])
+        return parameters, self.learned.scale(Role.CONTEXT, values[:, split:])
 
     @staticmethod
     def _check_target(values: Sequence[float], names: Sequence[str]) -> list[float]:
-        """The numbers of a target.
+        """Read the numbers of a target.
 
         Raises:
             ConfigError: If there are not as many as names, or one is not finite.
@@ -326,10 +311,10 @@ def fit(
 
     Args:
         dataset: The dataset.
-        kind: ``local``: by the nearest throws, and the difference that a polynomial predicts from there; or
-            ``polynomial``: by the polynomial alone.
+        kind: ``local``: predict by a polynomial, corrected by the nearest throws; or ``polynomial``: by the polynomial
+            alone.
         targets: Columns that say where a trial ended; those of the task by default.
-        parameters: Swept keys that aiming chooses; all of the task by default. Others belong to the world.
+        parameters: Swept keys that aiming chooses; all of the task by default. The others belong to the world.
         given: Swept keys whose values are given with a target; those that the task names by default.
         where: A condition on throws, as `Dataset.select` takes it.
 
@@ -337,20 +322,14 @@ def fit(
         ConfigError: If there is no such kind, nothing to aim at, a key was not swept, or too few throws succeeded.
         DatasetError: If the dataset is damaged.
     """
-    try:
-        chosen = Kind(kind)
-    except ValueError:
-        raise ConfigError(f"kind: {kind!r}", expected=f"one of {', '.join(each.value for each in Kind)}") from None
+    chosen = _read_word(Kind, "kind", kind)
     throws = dataset if where is None else dataset.select(where)
     found = fit_map(throws, kind=chosen, targets=targets, parameters=parameters, context=given)
     return Model(_describe(found, dataset, where), found.learned, found.trials, dump_yaml(dataset.config))
 
 
 def load_model(directory: StrPath) -> Model:
-    """Read a model.
-
-    Args:
-        directory: Its directory.
+    """Read a model from its directory.
 
     Raises:
         DatasetError: If there is none, or it is damaged.
@@ -363,11 +342,11 @@ def _describe(found: Fit, dataset: Dataset, where: str | None) -> ModelFile:
     return ModelFile(
         version=__version__,
         kind=learned.kind,
-        axes=[AxisEntry(**vars(axis)) for axis in learned.axes],
-        targets=list(learned.targets),
-        forward=PolynomialEntry.of(learned.forward),
-        effort=PolynomialEntry.of(learned.effort),
-        correction=CorrectionEntry.of(learned.correction),
+        axes=learned.axes,
+        targets=learned.targets,
+        forward=learned.forward,
+        effort=learned.effort,
+        correction=learned.correction,
         trained_on=TrainedOn(
             name=dataset.config.name,
             robot=dataset.config.robot.name,
@@ -385,8 +364,20 @@ def _describe(found: Fit, dataset: Dataset, where: str | None) -> ModelFile:
     )
 
 
+def _read_word(words: type[_Word], name: str, text: str) -> _Word:
+    """Find the member of an enumeration that a word of the caller stands for.
+
+    Raises:
+        ConfigError: If there is no such member.
+    """
+    try:
+        return words(text)
+    except ValueError:
+        raise ConfigError(f"{name}: {text!r}", expected=f"one of {', '.join(each.value for each in words)}") from None
+
+
 def _check_scatter(scatter: float) -> None:
-    """Refuse what is no standard deviation.
+    """Refuse a number that is no standard deviation.
 
     Raises:
         ConfigError: If it is negative, or not finite.

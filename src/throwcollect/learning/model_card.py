@@ -1,4 +1,4 @@
-"""The card of a model: what it maps, how well it hits, what it was not tested on, and how a robot's program uses it."""
+"""The card of a model: its axes and errors, how it hits, what it was not tested on, how a robot's program uses it."""
 
 from __future__ import annotations
 
@@ -40,18 +40,12 @@ keys = [axis["key"] for axis in json.load(open("model.json"))["axes"] if axis["r
 session = onnxruntime.InferenceSession("model.onnx")
 parameters = dict(zip(keys, session.run(None, {"target": [target]})[0][0].tolist()))
 """
-"""The same with ``model.onnx``."""
+"""Does the same with ``model.onnx``."""
 
 
 def describe_model(file: ModelFile, score: Score | None) -> str:
-    """README.md of a model.
-
-    Args:
-        file: All of the model but its throws.
-        score: What throwing at targets has shown; None if nobody has.
-    """
+    """README.md of a model; its score is None if nobody has thrown with it."""
     trained = file.trained_on
-    axes = [axis.to_axis() for axis in file.axes]
     lines = [
         f"# A model of {trained.name}",
         "",
@@ -63,7 +57,7 @@ def describe_model(file: ModelFile, score: Score | None) -> str:
         "",
         "| key | it is | from | to | configured | unit |",
         "|---|---|---|---|---|---|",
-        *map(_describe_axis, axes),
+        *map(_describe_axis, file.axes),
         "",
         "Parameters are chosen when aiming, context is given with the target, latents belong to the world. Nothing is "
         "extrapolated beyond the ranges.",

@@ -1,4 +1,4 @@
-"""The directory of a model: what was learned, the throws that it was learned from, and a card for people."""
+"""The directory of a model: its JSON file, the throws that it was learned from, and a card for people."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from pydantic import ValidationError
 
 from throwcollect.errors import DatasetError
 from throwcollect.files import new_directory, read_text, write_file
+from throwcollect.learning.fitting import EFFORT
 from throwcollect.learning.learned_map import LearnedMap
 from throwcollect.learning.model_card import describe_model
 from throwcollect.learning.model_file import MODEL, ModelFile, read_model_file
@@ -20,19 +21,18 @@ from throwcollect.learning.score import Score
 from throwcollect.sweep.parquet_file import encode_table, read_parquet
 
 POINTS = "points.parquet"
-"""Parameters, ends and efforts of the throws: aiming begins at them, and they are what is reached."""
+"""Parameters, ends and efforts of the throws, at which aiming begins."""
 CONFIG = "config.yaml"
 SCORE = "score.json"
 CARD = "README.md"
-_EFFORT = "effort_peak_share"
 _MOST_BYTES = 10_000_000
 
 
 def write_model(directory: Path, file: ModelFile, learned: LearnedMap, trials: NDArray[np.int64], config: str) -> None:
-    """Write a model into a directory of its own.
+    """Write a model into a directory that is new or empty.
 
     Args:
-        directory: A directory that is new or empty.
+        directory: The directory.
         file: All of the model but its throws.
         learned: The map, with its throws.
         trials: Numbers of their trials, shape ``(n,)``.
@@ -46,10 +46,10 @@ def write_model(directory: Path, file: ModelFile, learned: LearnedMap, trials: N
     columns: dict[str, NDArray[Any]] = {"trial": trials}
     columns |= {axis.key: learned.values[:, number] for number, axis in enumerate(learned.axes)}
     columns |= {target: learned.outputs[:, number] for number, target in enumerate(learned.targets)}
-    onnx = None if file.distilled is None else encode_onnx(learned, file.distilled.to_map())
+    onnx = None if file.distilled is None else encode_onnx(learned, file.distilled)
     with new_directory(directory) as beside:
         write_file(beside / MODEL, (file.model_dump_json(indent=1) + "\n").encode())
-        write_file(beside / POINTS, encode_table(pa.table({**columns, _EFFORT: learned.efforts})))
+        write_file(beside / POINTS, encode_table(pa.table({**columns, EFFORT: learned.efforts})))
         write_file(beside / CONFIG, config.encode())
         write_file(beside / CARD, describe_model(file, None).encode())
         if onnx is not None:
@@ -58,9 +58,6 @@ def write_model(directory: Path, file: ModelFile, learned: LearnedMap, trials: N
 
 def read_model(directory: Path) -> tuple[ModelFile, LearnedMap, NDArray[np.int64], str]:
     """Read a model.
-
-    Args:
-        directory: Its directory.
 
     Returns:
         All of it but its throws; the map; numbers of the trials; YAML of the dataset's configuration.
@@ -71,7 +68,7 @@ def read_model(directory: Path) -> tuple[ModelFile, LearnedMap, NDArray[np.int64
     file = read_model_file(directory)
     path = directory / POINTS
     table = read_parquet(path)
-    names = ["trial", *(axis.key for axis in file.axes), *file.targets, _EFFORT]
+    names = ["trial", *(axis.key for axis in file.axes), *file.targets, EFFORT]
     if table.column_names != names or not all(
         pa.types.is_floating(field.type) or (field.name == "trial" and pa.types.is_integer(field.type))
         for field in table.schema
@@ -82,24 +79,20 @@ def read_model(directory: Path) -> tuple[ModelFile, LearnedMap, NDArray[np.int64
         raise DatasetError("has rows without finite numbers, or no rows", path=path)
     learned = LearnedMap(
         file.kind,
-        tuple(axis.to_axis() for axis in file.axes),
-        tuple(file.targets),
-        file.forward.to_polynomial(),
-        file.effort.to_polynomial(),
+        file.axes,
+        file.targets,
+        file.forward,
+        file.effort,
         np.column_stack([columns[axis.key] for axis in file.axes]),
         np.column_stack([columns[target] for target in file.targets]),
-        columns[_EFFORT],
-        file.correction.to_correction(),
+        columns[EFFORT],
+        file.correction,
     )
     return file, learned, columns["trial"], read_text(directory / CONFIG, most_bytes=_MOST_BYTES)
 
 
 def write_score(directory: Path, score: Score) -> None:
-    """Put a score into the directory of a model, in place of an earlier one, and into its card.
-
-    Args:
-        directory: Directory of the model.
-        score: The score.
+    """Write a score into the directory of a model, in place of an earlier one, and into the model's card.
 
     Raises:
         DatasetError: If there is no model, or the score cannot be written.
@@ -110,10 +103,7 @@ def write_score(directory: Path, score: Score) -> None:
 
 
 def read_score(directory: Path) -> Score | None:
-    """Read the score of a model; None if it has none.
-
-    Args:
-        directory: Directory of the model.
+    """Read the score of a model from its directory; None if it has none.
 
     Raises:
         DatasetError: If it cannot be read, or is no score.

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Literal
 
-import numpy as np
-from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError, model_validator
 
 from throwcollect.errors import DatasetError
 from throwcollect.files import read_text
 from throwcollect.learning.adapting import ROLES, Method
+from throwcollect.learning.arrays import Array
 from throwcollect.learning.distilling import DistilledMap
 from throwcollect.learning.learned_map import Axis, Correction, Kind, LearnedMap, Role
 from throwcollect.learning.polynomial import Polynomial
@@ -24,100 +23,13 @@ class _Entry(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
-class AxisEntry(_Entry):
-    """An input of the map; see `Axis`."""
-
-    key: str
-    role: Role
-    minimum: FiniteFloat
-    maximum: FiniteFloat
-    nominal: FiniteFloat
-
-    def to_axis(self) -> Axis:
-        """Make the axis."""
-        return Axis(self.key, self.role, self.minimum, self.maximum, self.nominal)
-
-
-class PolynomialEntry(_Entry):
-    """A polynomial of scaled inputs: a row of exponents and one of coefficients for each term."""
-
-    exponents: list[list[Annotated[int, Field(ge=0, le=10)]]]
-    coefficients: list[list[FiniteFloat]]
-
-    @classmethod
-    def of(cls, polynomial: Polynomial) -> PolynomialEntry:
-        """Take down a polynomial."""
-        return cls(exponents=polynomial.exponents.tolist(), coefficients=polynomial.coefficients.tolist())
-
-    def to_polynomial(self) -> Polynomial:
-        """Make the polynomial."""
-        return Polynomial(np.array(self.exponents, np.int64), np.array(self.coefficients, np.float64))
-
-    def has_shape(self, inputs: int, outputs: int) -> bool:
-        """Whether all rows belong to so many inputs and outputs."""
-        return (
-            0 < len(self.exponents) == len(self.coefficients)
-            and all(len(row) == inputs for row in self.exponents)
-            and all(len(row) == outputs for row in self.coefficients)
-        )
-
-
-class CorrectionEntry(_Entry):
-    """How the world differs from the dataset's; see `Correction`."""
-
-    bias: list[FiniteFloat]
-    latents: list[FiniteFloat]
-    offset: list[FiniteFloat]
-
-    @classmethod
-    def of(cls, correction: Correction) -> CorrectionEntry:
-        """Take down a correction."""
-        return cls(
-            bias=correction.bias.tolist(), latents=correction.latents.tolist(), offset=correction.offset.tolist()
-        )
-
-    def to_correction(self) -> Correction:
-        """Make the correction."""
-        arrays: list[NDArray[np.float64]] = [
-            np.array(each, np.float64) for each in (self.bias, self.latents, self.offset)
-        ]
-        return Correction(*arrays)
-
-
-class DistilledEntry(_Entry):
-    """The way from a target to parameters as one polynomial; see `DistilledMap`."""
-
-    low: list[FiniteFloat]
-    high: list[FiniteFloat]
-    polynomial: PolynomialEntry
-
-    @classmethod
-    def of(cls, distilled: DistilledMap) -> DistilledEntry:
-        """Take down what was distilled."""
-        polynomial = PolynomialEntry.of(distilled.polynomial)
-        return cls(low=distilled.low.tolist(), high=distilled.high.tolist(), polynomial=polynomial)
-
-    def to_map(self) -> DistilledMap:
-        """Make the map."""
-        low, high = np.array(self.low, np.float64), np.array(self.high, np.float64)
-        return DistilledMap(low, high, self.polynomial.to_polynomial())
-
-    def has_shape(self, targets: int, context: int, parameters: int) -> bool:
-        """Whether all numbers belong to so many targets, keys that are given, and parameters."""
-        return (
-            len(self.low) == len(self.high) == targets
-            and all(low < high for low, high in zip(self.low, self.high, strict=True))
-            and self.polynomial.has_shape(targets + context, parameters)
-        )
-
-
 class Found(_Entry):
     """A number that adaptation found.
 
     Attributes:
-        name: A key, whose value in this world it is, or that differs by it; or a target, which is moved by it.
+        name: A latent, which has `value` in this world; or a parameter or a target, to which `value` is added.
         value: In the unit of the name.
-        deviation: Its standard deviation.
+        deviation: Standard deviation of `value`.
     """
 
     name: str
@@ -129,12 +41,13 @@ class AdaptationEntry(_Entry):
     """How the model was adapted.
 
     Attributes:
-        method: What the world is taken to differ by.
+        method: How the world is taken to differ.
         throws: Number of throws.
         scatter: Standard deviation that was taken for each measured coordinate, in the unit of the targets.
-        before: Distances of the throws from where they had been predicted.
-        after: The same, each by a model that was adapted to all others; empty for a single throw.
-        found: What was found.
+        before: Distances of the throws from where the model predicted them before it was adapted.
+        after: The same distances, each from the prediction of a model that was adapted to the other throws; empty for a
+            single throw.
+        found: The numbers that were found.
     """
 
     method: Method
@@ -146,7 +59,7 @@ class AdaptationEntry(_Entry):
 
 
 class TrainedOn(_Entry):
-    """What the model was learned from.
+    """The dataset and the throws that the model was learned from.
 
     Attributes:
         name: Name of the collection.
@@ -158,7 +71,7 @@ class TrainedOn(_Entry):
         ignored: Number of throws that did not succeed.
         selection: The condition on throws; None for all.
         folds_error: By degree: median distance of throws from their prediction by polynomials fitted to others.
-        without_latents: The same for the chosen degree without latents; None if there are none.
+        without_latents: The same distance when latents are no inputs; None if there are no latents.
         latents_count: Whether latents have an effect that is worth knowing.
     """
 
@@ -181,46 +94,41 @@ class TrainedOn(_Entry):
 
 
 class ModelFile(_Entry):
-    """The whole file. Its numbers and its order are a pure function of the dataset and of what was asked for."""
+    """The whole file: a pure function of the dataset and of the arguments of `fit`, `adapt` and `distil`."""
 
     format: Literal["1"] = "1"
     version: str
     kind: Kind
-    axes: list[AxisEntry] = Field(min_length=1)
-    targets: list[str] = Field(min_length=1)
-    forward: PolynomialEntry
-    effort: PolynomialEntry
-    correction: CorrectionEntry
+    axes: tuple[Axis, ...] = Field(min_length=1)
+    targets: tuple[str, ...] = Field(min_length=1)
+    forward: Polynomial
+    effort: Polynomial
+    correction: Correction
     trained_on: TrainedOn
     adaptation: AdaptationEntry | None
-    distilled: DistilledEntry | None = None
+    distilled: DistilledMap | None = None
 
     @model_validator(mode="after")
     def _fits_together(self) -> ModelFile:
         inputs, targets = len(self.axes), len(self.targets)
         roles = [axis.role for axis in self.axes]
+        parameters, context, latents = (roles.count(role) for role in Role)
         if not (
             self.forward.has_shape(inputs, targets)
             and self.effort.has_shape(inputs, 1)
-            and len(self.correction.bias) == roles.count(Role.PARAMETER) > 0
-            and len(self.correction.latents) == roles.count(Role.LATENT)
+            and len(self.correction.bias) == parameters > 0
+            and len(self.correction.latents) == latents
             and len(self.correction.offset) == targets
             and roles == sorted(roles, key=list(Role).index)
             and all(axis.minimum < axis.maximum for axis in self.axes)
-            and (
-                self.distilled is None
-                or self.distilled.has_shape(targets, roles.count(Role.CONTEXT), roles.count(Role.PARAMETER))
-            )
+            and (self.distilled is None or self.distilled.has_shape(targets, context, parameters))
         ):
             raise ValueError("axes, targets, polynomials and correction do not belong together")
         return self
 
 
 def read_model_file(directory: Path) -> ModelFile:
-    """Read ``model.json``.
-
-    Args:
-        directory: Directory of the model.
+    """Read ``model.json`` from the directory of a model.
 
     Raises:
         DatasetError: If it cannot be read, or is no such file.
@@ -236,14 +144,8 @@ def read_model_file(directory: Path) -> ModelFile:
         ) from error
 
 
-def list_found(learned: LearnedMap, method: Method, deviations: NDArray[np.float64]) -> list[Found]:
-    """List the numbers that adaptation found, in their units.
-
-    Args:
-        learned: The adapted map.
-        method: What differs in its world.
-        deviations: As `Adaptation` has them.
-    """
+def list_found(learned: LearnedMap, method: Method, deviations: Array) -> list[Found]:
+    """List the numbers that adaptation found, in their units: of the adapted map and of an `Adaptation`."""
     if method is Method.NONE:
         return []
     role = ROLES.get(method)

@@ -1,4 +1,4 @@
-"""``model.onnx``: from a target to parameters, in the units of their keys, for programs without Python."""
+"""``model.onnx``: a graph from a target to parameters, in the units of their keys, for programs without Python."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ def encode_onnx(learned: LearnedMap, distilled: DistilledMap) -> bytes:
     Parameters stay inside of their ranges.
 
     Args:
-        learned: The map that was distilled.
-        distilled: What came of it.
+        learned: The map that was distilled; its axes have the ranges of parameters and context.
+        distilled: The polynomial.
 
     Raises:
         MissingExtraError: If the package ``onnx`` is not installed.

@@ -9,9 +9,8 @@ from itertools import combinations_with_replacement
 import numpy as np
 from numpy.typing import NDArray
 
+from throwcollect.learning.arrays import Array, Exponents, Matrix
 from throwcollect.reproducible_math import matmul, solve
-
-Array = NDArray[np.float64]
 
 DEGREES = (1, 2, 3, 4)
 """Degrees that are tried."""
@@ -32,49 +31,47 @@ class Polynomial:
         coefficients: Of each term for each output, shape ``(n_terms, n_outputs)``.
     """
 
-    exponents: NDArray[np.int64]
-    coefficients: Array
+    exponents: Exponents
+    coefficients: Matrix
 
     @property
     def degree(self) -> int:
         """Highest sum of the exponents of a term."""
         return int(self.exponents.sum(axis=1).max())
 
+    def has_shape(self, inputs: int, outputs: int) -> bool:
+        """Whether exponents and coefficients belong to so many inputs and outputs, and there is a term."""
+        terms = len(self.exponents)
+        return terms > 0 and self.exponents.shape == (terms, inputs) and self.coefficients.shape == (terms, outputs)
+
     def predict(self, inputs: Array) -> Array:
-        """Values of the outputs.
-
-        Args:
-            inputs: Shape ``(n, n_inputs)``.
-
-        Returns:
-            Shape ``(n, n_outputs)``.
-        """
+        """Values of the outputs, shape ``(n, n_outputs)``, for inputs of shape ``(n, n_inputs)``."""
         return matmul(list_terms(inputs, self.exponents), self.coefficients)
 
     def slopes(self, inputs: Array, columns: slice) -> Array:
-        """Change of each output with some of the inputs.
+        """Derivatives of the outputs by some of the inputs, at least one.
 
         Args:
-            inputs: Shape ``(n, n_inputs)``.
-            columns: Which inputs.
+            inputs: Where they are wanted, shape ``(n, n_inputs)``.
+            columns: Inputs to derive by.
 
         Returns:
-            Shape ``(n, n_outputs, n_columns)``; there is at least one column.
+            Shape ``(n, n_outputs, n_columns)``.
         """
-        found = []
-        for each in range(inputs.shape[1])[columns]:
-            with_it = self.exponents[:, each] > 0
+        slopes = []
+        for column in range(inputs.shape[1])[columns]:
+            with_it = self.exponents[:, column] > 0
             lowered = self.exponents[with_it]
-            factors = lowered[:, each : each + 1] * self.coefficients[with_it]
-            lowered[:, each] -= 1
+            factors = lowered[:, column : column + 1] * self.coefficients[with_it]
+            lowered[:, column] -= 1
             zero = np.zeros((len(inputs), self.coefficients.shape[1]))
-            found.append(matmul(list_terms(inputs, lowered), factors) if len(lowered) else zero)
-        return np.stack(found, axis=-1)
+            slopes.append(matmul(list_terms(inputs, lowered), factors) if len(lowered) else zero)
+        return np.stack(slopes, axis=-1)
 
 
 @dataclass(frozen=True, eq=False)
 class Validation:
-    """How well polynomials predict samples that they were not fitted to.
+    """How well polynomials of several degrees predict samples that they were not fitted to.
 
     Attributes:
         errors: By degree: distance of each sample from its prediction, shape ``(n,)``.
@@ -121,14 +118,14 @@ def cross_validate(inputs: Array, outputs: Array, folds: NDArray[np.int64], *, m
         exponents = list_exponents(inputs.shape[1], degree, minor=minor)
         if degree > 1 and len(exponents) * SAMPLES_PER_TERM > len(inputs):
             break
-        parts = [_Sums.of(inputs[folds == each], outputs[folds == each], exponents) for each in numbers]
-        away = np.empty(len(inputs))
-        for number, left_out in zip(numbers, parts, strict=True):
+        parts = [_Sums.of(inputs[folds == fold], outputs[folds == fold], exponents) for fold in numbers]
+        distances = np.empty(len(inputs))
+        for fold, left_out in zip(numbers, parts, strict=True):
             others = _Sums.add([part for part in parts if part is not left_out])
-            held = folds == number
+            held = folds == fold
             missed = _solve(exponents, others).predict(inputs[held]) - outputs[held]
-            away[held] = np.sqrt((missed**2).sum(axis=1))
-        errors[degree] = away
+            distances[held] = np.linalg.norm(missed, axis=1)
+        errors[degree] = distances
     return Validation(errors)
 
 
@@ -138,22 +135,22 @@ def list_exponents(inputs: int, degree: int, *, minor: int = 0) -> NDArray[np.in
     Args:
         inputs: Number of inputs.
         degree: Highest sum of the exponents of a term.
-        minor: Number of inputs, the last ones, that change how the others act, and matter little beside one another:
-            a term above the second degree has one of them at most, and that once. All terms of 15 inputs up to the
-            third degree would take more samples than there are.
+        minor: Number of inputs, the last ones, that mostly change how the others act: terms above the second degree
+            have at most one of them, once. With all terms, 15 inputs and the third degree would take more samples than
+            datasets have.
     """
     rows = [
-        [chosen.count(each) for each in range(inputs)]
+        [chosen.count(column) for column in range(inputs)]
         for total in range(degree + 1)
         for chosen in combinations_with_replacement(range(inputs), total)
-        if total <= _ALL_TERMS or sum(each >= inputs - minor for each in chosen) <= 1
+        if total <= _ALL_TERMS or sum(column >= inputs - minor for column in chosen) <= 1
     ]
     return np.array(rows, np.int64)
 
 
 @dataclass(frozen=True, eq=False)
 class _Sums:
-    """What least squares has to know of samples; that of several groups is the sum of theirs."""
+    """The sums that least squares needs of samples; those of several groups of samples add up."""
 
     samples: int
     squares: Array
@@ -186,7 +183,7 @@ def list_terms(inputs: Array, exponents: NDArray[np.int64]) -> Array:
         powers.append(powers[-1] * powers[1])
     table = np.stack(powers)
     terms = np.ones((len(exponents), len(inputs)))
-    for each in range(inputs.shape[1]):
-        with_it = np.flatnonzero(exponents[:, each])
-        terms[with_it] *= table[exponents[with_it, each], each]
+    for column in range(inputs.shape[1]):
+        with_it = np.flatnonzero(exponents[:, column])
+        terms[with_it] *= table[exponents[with_it, column], column]
     return terms.T

@@ -1,4 +1,4 @@
-"""What throwing at targets in simulation has shown of a model."""
+"""How a model hits: results of throwing at targets in simulation."""
 
 from __future__ import annotations
 
@@ -6,16 +6,14 @@ from collections.abc import Sequence
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, FiniteFloat
 
 from throwcollect.learning.adapting import Method
+from throwcollect.learning.arrays import Array
 from throwcollect.units import unit_of_name
 
-Array = NDArray[np.float64]
-
 SHOWN_AS = {"m": (100.0, " cm"), "rad": (180.0 / np.pi, "°")}
-"""By unit of targets: what their misses are multiplied by where people read them, and the unit there."""
+"""By unit of targets: the factor and the unit by which people read their misses."""
 
 
 class _Entry(BaseModel):
@@ -27,9 +25,9 @@ class Misses(_Entry):
 
     Attributes:
         unit: The unit.
-        median: Median; None if half of the throws did not succeed, and likewise below.
-        share90: What nine of ten throws stay below.
-        largest: Largest.
+        median: Median; None if half of the throws did not succeed, as a throw that did not counts as farther than all.
+        share90: Nine of ten throws miss by less; None likewise.
+        largest: Largest; None likewise.
     """
 
     unit: str = "m"
@@ -39,11 +37,11 @@ class Misses(_Entry):
 
 
 class Errors(Misses):
-    """The same over all targets; the fields of `Misses` are those of the first unit, metres where a target has them.
+    """Misses over all targets; the fields of `Misses` are those of the first unit, metres if a target has them.
 
     Attributes:
         throws: Number of throws.
-        missed: Number of those that did not succeed, or were refused; they count as farther than all others.
+        missed: Number of throws that did not succeed, or were refused.
         others: Misses over the targets of each further unit.
     """
 
@@ -61,7 +59,7 @@ class Errors(Misses):
         """Sum up how far throws ended from their targets.
 
         Args:
-            away: Differences, NaN where a throw did not succeed; shape ``(n, n_targets)``, at least one throw.
+            away: Ends minus targets of at least one throw, NaN if it did not succeed; shape ``(n, n_targets)``.
             targets: Names of the targets, which tell their units.
         """
         units = np.array([unit_of_name(target) for target in targets])
@@ -71,7 +69,7 @@ class Errors(Misses):
 
     @classmethod
     def middle(cls, some: Sequence[Errors]) -> Errors:
-        """Sum up those of several seeds: each number is the median of theirs; there is at least one."""
+        """Sum up the errors of several seeds, at least one: each number is the median of theirs."""
         first, *others = (_take_middle(each) for each in zip(*(each.by_unit for each in some), strict=True))
         throws, missed = sum(each.throws for each in some), sum(each.missed for each in some)
         return cls(throws=throws, missed=missed, **vars(first), others=others)
@@ -92,7 +90,7 @@ def tell_miss(miss: float | None, unit: str) -> str:
 
 
 def tell_misses(errors: Errors) -> tuple[str, str, str]:
-    """Median, what nine of ten throws stay below, and largest, in words, each for all units."""
+    """Median, share90 and largest in words, each for all units."""
     median, share90, largest = (
         ", ".join(dict.fromkeys(tell_miss(getattr(each, name), each.unit) for each in errors.by_unit))
         for name in ("median", "share90", "largest")
@@ -112,7 +110,7 @@ def tell_scatter(scatter: float, targets: Sequence[str]) -> str:
 
 
 def _sum_up(away: Array, unit: str) -> Misses:
-    distances = np.sqrt((away**2).sum(axis=1))
+    distances = np.linalg.norm(away, axis=1)
     ordered = np.sort(np.where(np.isfinite(distances), distances, np.inf))
     places = (len(ordered) - 1) // 2, int(np.ceil(0.9 * len(ordered))) - 1, len(ordered) - 1
     median, share90, largest = (float(ordered[place]) if np.isfinite(ordered[place]) else None for place in places)
@@ -128,8 +126,8 @@ def _take_middle(some: Sequence[Misses]) -> Misses:
 
 def _find_median(values: Sequence[float | None]) -> float | None:
     """The median; None counts as larger than all numbers."""
-    found = float(np.median([np.inf if value is None else value for value in values]))
-    return found if np.isfinite(found) else None
+    median = float(np.median([np.inf if value is None else value for value in values]))
+    return median if np.isfinite(median) else None
 
 
 class Trained(_Entry):
@@ -149,7 +147,7 @@ class Adapted(_Entry):
 
     Attributes:
         real_throws: Number of these throws.
-        method: What the world was taken to differ by.
+        method: How the world was taken to differ.
         errors: By how much the targets are missed.
     """
 
@@ -162,7 +160,7 @@ class ThrowAtTarget(_Entry):
     """A throw at a target.
 
     Attributes:
-        target: Where to.
+        target: Where it should end.
         place: Where it ended; None if it did not succeed.
     """
 
@@ -171,14 +169,14 @@ class ThrowAtTarget(_Entry):
 
 
 class Score(_Entry):
-    """All of it; every number is one "in simulation".
+    """All results of a model; every number is one "in simulation".
 
     Attributes:
         targets: Number of targets of each seed.
         seed: The first seed of their choice.
-        seeds: Number of seeds; numbers are medians of theirs.
+        seeds: Number of seeds; all misses are medians over them.
         trained: By the number of throws that a model was learned from; the model itself comes last.
-        distilled: How the map hits that is distilled from all of these throws; None if the model has none.
+        distilled: How the distilled map hits; None if the model was not distilled.
         throws: Throws of the model itself.
         scatter: Noise on what was measured of throws in the other world, in the unit of the targets.
         adapted: By the number of throws in the other world; empty if there was none.
@@ -198,11 +196,7 @@ class Score(_Entry):
 
 
 def pool_scores(scores: Sequence[Score]) -> Score:
-    """Put the scores of several seeds together.
-
-    Args:
-        scores: One for each seed, at least one.
-    """
+    """Put the scores of several seeds together, at least one."""
     first = scores[0]
     sizes = [each.trained_on for each in first.trained]
     numbers = sorted({each.real_throws for score in scores for each in score.adapted})
@@ -224,7 +218,7 @@ def pool_scores(scores: Sequence[Score]) -> Score:
 
 
 def _pool_adapted(some: Sequence[Adapted]) -> Adapted:
-    """What most seeds took the world to differ by, and their errors."""
+    """The method that most seeds chose, and the errors of all."""
     methods = [each.method for each in some]
     method = max(methods, key=methods.count)
     return Adapted(real_throws=some[0].real_throws, method=method, errors=Errors.middle([each.errors for each in some]))

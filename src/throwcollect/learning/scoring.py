@@ -6,30 +6,27 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from throwcollect.config.schema import Config
 from throwcollect.dataset.throw import Throw
-from throwcollect.learning.adapting import Adaptation, adapt, adapt_by_nothing
-from throwcollect.learning.aiming import Choice, aim
+from throwcollect.learning.adapting import Adaptation, adapt, leave_as_it_is
+from throwcollect.learning.aiming import aim
+from throwcollect.learning.arrays import Array
 from throwcollect.learning.distilling import DistilledMap
-from throwcollect.learning.fitting import enough_throws, fit_throws
+from throwcollect.learning.fitting import count_needed_throws, fit_throws, number_cells
 from throwcollect.learning.learned_map import LearnedMap, Role, no_correction
 from throwcollect.learning.score import Adapted, Errors, Score, ThrowAtTarget, Trained
 
-Array = NDArray[np.float64]
-
 SIZES = (30, 100, 300, 1000, 3000, 10_000)
-"""Numbers of throws that models are learned from, to see how many it takes."""
+"""Numbers of throws that models are learned from, to show how many throws a model takes."""
 REAL_THROWS = (0, 1, 3, 5, 10)
 """Numbers of throws in another world that a model is adapted by."""
-_CELL = 0.05
 _APART = 1000
-"""Seeds of throws to adapt by are so far from those of targets that no seed's throws are the targets of another."""
+"""Distance from the seed of targets to that of throws to adapt by, which must not be another seed's targets."""
 
 
 class Simulates(Protocol):
-    """What throws; `Simulator` is one."""
+    """The part of `Simulator` that scoring needs."""
 
     config: Config
 
@@ -58,14 +55,14 @@ def score_model(
     """Throw at targets, in the world of the dataset and in another one.
 
     Args:
-        learned: The map; of one that was adapted already, the throws in the other world begin with that, and those in
-            the world of the dataset leave it out.
+        learned: The map. If it was adapted already, adapting to the other world begins with its correction, and the
+            throws in the world of the dataset leave the correction out.
         simulator: Simulates the world of the dataset.
         count: Number of targets.
         seed: Seed of their choice, of the throws that smaller models are learned from, and of the noise.
         world: Simulates the other world; None for none.
         scatter: Standard deviation of noise on what is measured of throws in the other world.
-        error: What the map itself is off by, as a standard deviation.
+        error: Standard deviation of throws from the predictions of the map.
         latents_count: Whether latents have an effect that is worth knowing.
         distilled: The map that is distilled for the world of the dataset; None for none.
         processes: How many processes simulate.
@@ -73,13 +70,14 @@ def score_model(
     context = _nominal_context(learned)
     plain = leave_out_correction(learned)
     targets = draw_targets(plain.carry_over(context), count, seed)
-    given = np.repeat(context[np.newaxis], count, axis=0)
-    sizes = [*(size for size in SIZES if size < len(learned.values)), len(learned.values)]
-    maps = {size: smaller for size in sizes if (smaller := _learn_from(plain, size, seed)) is not None}
-    ways = [aim(each, targets, given, Choice.NEAREST).parameters for each in maps.values()]
+    given = np.tile(context, (count, 1))
+    needed = count_needed_throws(len(learned.axes_of(Role.PARAMETER)))
+    maps = {size: _learn_from(plain, size, seed) for size in SIZES if needed <= size < len(learned.values)}
+    maps[len(learned.values)] = plain
+    lists = [aim(each, targets, given).parameters for each in maps.values()]
     if distilled is not None:
-        ways.append(distilled.aim(targets, given))
-    places = _throw(learned, ways, given, simulator, processes)
+        lists.append(distilled.aim(targets, given))
+    places = _throw(learned, lists, given, simulator, processes)
     errors = [Errors.of(each - targets, learned.targets) for each in places]
     adapted: list[Adapted] = []
     adapted_throws: list[ThrowAtTarget] = []
@@ -101,7 +99,7 @@ def score_model(
 
 
 def leave_out_correction(learned: LearnedMap) -> LearnedMap:
-    """The map of the dataset's own world."""
+    """Make the map of the dataset's own world."""
     return learned.correct(no_correction(learned.axes, learned.targets))
 
 
@@ -118,13 +116,13 @@ def _adapt_step_by_step(
     """Throw in another world, and adapt a map by more and more throws; the keys are their numbers, from 0."""
     context = _nominal_context(learned)
     tries = spread_first(draw_targets(learned.carry_over(context), REAL_THROWS[-1], seed + _APART))
-    given = np.repeat(context[np.newaxis], len(tries), axis=0)
-    parameters = aim(learned, tries, given, Choice.NEAREST).parameters
+    given = np.tile(context, (len(tries), 1))
+    parameters = aim(learned, tries, given).parameters
     [places] = _throw(learned, [parameters], given, world, processes)
     landed = np.isfinite(places).all(axis=1)
     noise = scatter * np.random.default_rng((seed, 1)).standard_normal(places.shape)
     parameters, given, measured = parameters[landed], given[landed], (places + noise)[landed]
-    found = {0: adapt_by_nothing(learned)}
+    found = {0: leave_as_it_is(learned, np.empty(0))}
     for number in sorted({min(number, len(measured)) for number in REAL_THROWS} - {0}):
         found[number] = adapt(
             learned,
@@ -145,14 +143,14 @@ def _throw_there(
     Returns:
         How each of them hits, and the throws of the last one; both empty if no target can be reached.
     """
-    given = np.repeat(_nominal_context(learned)[np.newaxis], len(targets), axis=0)
+    given = np.tile(_nominal_context(learned), (len(targets), 1))
     worlds = [learned.correct(each.correction) for each in adaptations.values()]
     reachable = aim(worlds[-1], targets, given).reachable
     targets, given = targets[reachable], given[reachable]
     if not len(targets):
         return [], []
-    ways = [aim(each, targets, given, Choice.NEAREST).parameters for each in worlds]
-    found = _throw(learned, ways, given, world, processes)
+    lists = [aim(each, targets, given).parameters for each in worlds]
+    found = _throw(learned, lists, given, world, processes)
     adapted = [
         Adapted(real_throws=number, method=each.method, errors=Errors.of(places - targets, learned.targets))
         for (number, each), places in zip(adaptations.items(), found, strict=True)
@@ -161,9 +159,9 @@ def _throw_there(
 
 
 def draw_targets(landings: Array, count: int, seed: int) -> Array:
-    """Draw targets evenly over what throws have reached.
+    """Draw targets evenly over the places that throws have reached.
 
-    A cell of 5 cm is drawn among those in which a throw ended, a throw in it, and a point between that throw and the
+    For each target, a cell is drawn in which a throw ended, a throw in the cell, and a point between this throw and the
     ones nearest to it.
 
     Args:
@@ -175,8 +173,7 @@ def draw_targets(landings: Array, count: int, seed: int) -> Array:
         Shape ``(count, n_targets)``.
     """
     randomness = np.random.default_rng(seed)
-    cells = np.floor(landings / _CELL).astype(np.int64)
-    _, members = np.unique(cells, axis=0, return_inverse=True)
+    _, members = np.unique(number_cells(landings), axis=0, return_inverse=True)
     members = members.reshape(-1)
     targets = np.empty((count, landings.shape[1]))
     for number in range(count):
@@ -189,10 +186,9 @@ def draw_targets(landings: Array, count: int, seed: int) -> Array:
 
 
 def spread_first(targets: Array) -> Array:
-    """Order targets so that the first few of them are spread: a few throws tell most of a world then.
+    """Order targets so that the first few of them are spread, as a few throws there tell most of a world.
 
-    The one that is nearest to the middle comes first, as it stands for all; then always the one that is farthest from
-    all before.
+    The target nearest to the middle comes first, as it stands for all; then always the one farthest from all before.
 
     Args:
         targets: Shape ``(n, n_targets)``.
@@ -205,18 +201,14 @@ def spread_first(targets: Array) -> Array:
 
 
 def _nominal_context(learned: LearnedMap) -> Array:
-    """Scaled values of the configuration for what is given with targets, shape ``(n_context,)``."""
+    """Scaled context that the configuration has, shape ``(n_context,)``."""
     nominal = np.array([[axis.nominal for axis in learned.axes_of(Role.CONTEXT)]], np.float64)
     inside: Array = np.clip(learned.scale(Role.CONTEXT, nominal)[0], -1.0, 1.0)
     return inside
 
 
-def _learn_from(learned: LearnedMap, size: int, seed: int) -> LearnedMap | None:
-    """The map that some throws of the dataset give, drawn at random; None if they are too few."""
-    if size == len(learned.inputs):
-        return learned
-    if not enough_throws(size, len(learned.axes_of(Role.PARAMETER))):
-        return None
+def _learn_from(learned: LearnedMap, size: int, seed: int) -> LearnedMap:
+    """Learn a map from some throws of the dataset, drawn at random."""
     drawn = np.sort(np.random.default_rng((seed, 2)).permutation(len(learned.inputs))[:size])
     fit = fit_throws(
         learned.kind,
@@ -229,14 +221,12 @@ def _learn_from(learned: LearnedMap, size: int, seed: int) -> LearnedMap | None:
     return fit.learned
 
 
-def _throw(learned: LearnedMap, ways: Sequence[Array], given: Array, world: Simulates, processes: int) -> list[Array]:
-    """Throw with some lists of parameters.
-
-    All throws are simulated together, as processes take a while to begin.
+def _throw(learned: LearnedMap, lists: Sequence[Array], given: Array, world: Simulates, processes: int) -> list[Array]:
+    """Throw with some lists of parameters, all at once, as processes take a while to begin.
 
     Args:
         learned: Its axes are those of the parameters.
-        ways: Scaled parameters, each of shape ``(n, n_parameters)``.
+        lists: Scaled parameters, each of shape ``(n, n_parameters)``.
         given: Scaled context of each of these lists, shape ``(n, n_context)``.
         world: Simulates the throws.
         processes: How many processes simulate.
@@ -245,8 +235,8 @@ def _throw(learned: LearnedMap, ways: Sequence[Array], given: Array, world: Simu
         For each list, where the throws ended, shape ``(n, n_targets)``, with NaN where one did not succeed.
     """
     keys = [axis.key for axis in (*learned.axes_of(Role.PARAMETER), *learned.axes_of(Role.CONTEXT))]
-    parameters = learned.unscale(Role.PARAMETER, np.concatenate(ways))
-    values = np.hstack([parameters, np.tile(learned.unscale(Role.CONTEXT, given), (len(ways), 1))])
+    parameters = learned.unscale(Role.PARAMETER, np.concatenate(lists))
+    values = np.hstack([parameters, np.tile(learned.unscale(Role.CONTEXT, given), (len(lists), 1))])
     points = [dict(zip(keys, row, strict=True)) for row in values.tolist()]
     thrown = [number for number, point in enumerate(points) if world.find_refusal(point) is None]
     places = np.full((len(points), len(learned.targets)), np.nan)
@@ -254,7 +244,7 @@ def _throw(learned: LearnedMap, ways: Sequence[Array], given: Array, world: Simu
     for number, throw in zip(thrown, throws, strict=True):
         if throw.outcome == world.config.task.success:
             places[number] = [throw.row[column] for column in learned.targets]
-    return np.split(places, len(ways))
+    return np.split(places, len(lists))
 
 
 def _list_throws(targets: Array, places: Array) -> list[ThrowAtTarget]:

@@ -15,11 +15,7 @@ from throwcollect.trial.choice import choose_trials
 
 
 def select_trials(dataset: Dataset, *, sample: int | None) -> list[int]:
-    """Trials that have an episode, in order; of these, if asked for, a random choice that is always the same.
-
-    Args:
-        dataset: The dataset.
-        sample: How many; None for all.
+    """List the trials that have an episode, in order; or so many of them, always the same random choice.
 
     Raises:
         DatasetError: If no trial has an episode.
@@ -31,18 +27,15 @@ def select_trials(dataset: Dataset, *, sample: int | None) -> list[int]:
 
 
 def replay_throws(directory: Path, trials: Sequence[int]) -> Iterator[Comparison]:
-    """Simulate stored throws again, on all cores, and compare them.
+    """Simulate stored throws again, on all cores, and compare them, in the given order.
 
     Args:
         directory: Directory of the dataset.
         trials: Trials that have an episode.
 
-    Yields:
-        One comparison for each, in the given order.
-
     Raises:
         DatasetError: If an episode is damaged.
-        MissingExtraError: If what simulates is not installed.
+        MissingExtraError: If a library for simulating is not installed.
         WorkerError: If the physics engine does not start.
     """
     require_engine(Dataset.open(directory).config.sim.engine)
@@ -50,19 +43,11 @@ def replay_throws(directory: Path, trials: Sequence[int]) -> Iterator[Comparison
     yield from work_side_by_side(trials, _begin, (directory,), processes=count_cores(), doing="simulates")
 
 
-class _Kept:
-    """What a process keeps from one trial to the next."""
-
-    def __init__(self, directory: Path) -> None:
-        from throwcollect.replay.throw import Replayer
-
-        self.dataset = Dataset.open(directory)
-        self.replayer = Replayer(self.dataset.config)
-
-    def replay(self, trial: int) -> Comparison:
-        """Simulate a trial again, and compare."""
-        return compare(self.dataset.episode(trial), self.replayer.run(self.dataset.plan.trial(trial)))
-
-
 def _begin(directory: Path) -> Callable[[int], Comparison]:
-    return _Kept(directory).replay
+    """Open dataset and simulation in a process, which keeps both from one trial to the next."""
+    # Datasets are verified without the extra `collect`, too, which this import takes.
+    from throwcollect.replay.throw import Replayer
+
+    dataset = Dataset.open(directory)
+    replayer = Replayer(dataset.config)
+    return lambda trial: compare(dataset.episode(trial), replayer.run(dataset.plan.trial(trial)))

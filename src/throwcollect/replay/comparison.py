@@ -1,4 +1,4 @@
-"""Says in what two episodes of one trial differ."""
+"""Finds the differences between two episodes of one trial."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from throwcollect.episode.record import EpisodeHeader, Samples
 
 @dataclass(frozen=True)
 class Comparison:
-    """A stored throw beside the same one, simulated again.
+    """How a stored throw differs from the same throw, simulated again.
 
     Attributes:
         trial: Number of the trial.
         stored: Digest of the stored episode.
         again: Digest of the new one.
-        differences: In what they differ, a sentence each; empty if they are the same bit for bit.
+        differences: A sentence for each difference; empty if the episodes are the same bit for bit.
     """
 
     trial: int

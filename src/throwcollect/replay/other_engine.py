@@ -1,4 +1,4 @@
-"""Simulates stored throws with another physics engine, and tells how much depends on the engine."""
+"""Simulates stored throws with another physics engine, and measures how much depends on the engine."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 
-from throwcollect.config.schema import Config
 from throwcollect.config.values import with_values
 from throwcollect.dataset.judging import judge_episode
 from throwcollect.dataset.reader import Dataset
@@ -21,19 +20,19 @@ from throwcollect.replay.throw import Replayer
 from throwcollect.side_by_side import count_cores, work_side_by_side
 
 LANDING = ("landing_x_m", "landing_y_m")
-"""Columns of where a throw landed."""
+"""Columns with the place where a throw landed."""
 
 
 @dataclass(frozen=True)
 class Deviation:
-    """A throw by another engine beside the stored one.
+    """How a throw by another engine differs from the stored one.
 
     Attributes:
         trial: Number of the trial.
         stored: Its outcome in the dataset.
         again: Its outcome by the other engine.
-        values: By column of the table of throws, what the other engine's value is above the stored one, in the unit of
-            the column; columns that both throws have a number in.
+        values: The other engine's value minus the stored one, in the unit of the column, for each column of the table
+            of throws in which both throws have a number.
     """
 
     trial: int
@@ -48,7 +47,7 @@ class Distribution:
 
     Attributes:
         column: Its name.
-        throws: In how many throws it could be compared.
+        throws: Number of throws in which it could be compared.
         mean: Mean difference, with its sign.
         rms: Root mean square.
         median: Median of the absolute differences.
@@ -64,20 +63,17 @@ class Distribution:
 
 
 def simulate_with(directory: Path, engine: str, trials: Sequence[int]) -> Iterator[Deviation]:
-    """Simulate stored throws with another engine, on all cores.
+    """Simulate stored throws with another engine, on all cores; deviations come in the given order.
 
     Args:
         directory: Directory of the dataset.
         engine: Name of the engine.
         trials: Trials that have an episode.
 
-    Yields:
-        One deviation for each, in the given order.
-
     Raises:
         ConfigError: If there is no such engine, or the dataset was computed by it.
         DatasetError: If the dataset cannot be read.
-        MissingExtraError: If what simulates is not installed.
+        MissingExtraError: If a library for simulating is not installed.
         WorkerError: If the physics engine does not start.
     """
     own = Dataset.open(directory).config.sim.engine
@@ -91,7 +87,7 @@ def simulate_with(directory: Path, engine: str, trials: Sequence[int]) -> Iterat
 
 
 def distributions(deviations: Sequence[Deviation]) -> list[Distribution]:
-    """How much each column differs, in the order of the table."""
+    """Sum up how much each column differs, in the order of the table."""
     found = []
     for column in dict.fromkeys(column for each in deviations for column in each.values):
         values = np.array([each.values[column] for each in deviations if column in each.values])
@@ -103,24 +99,21 @@ def distributions(deviations: Sequence[Deviation]) -> list[Distribution]:
     return found
 
 
-class _Kept:
-    """What a process keeps from one trial to the next."""
+def _begin(directory: Path, engine: str) -> Callable[[int], Deviation]:
+    """Open dataset and simulation in a process, which keeps both from one trial to the next."""
+    dataset = Dataset.open(directory)
+    plan, own = dataset.plan, dataset.config
+    config = own.model_copy(update={"sim": own.sim.model_copy(update={"engine": engine})})
+    table = ThrowsTable(plan.keys, config, plan.trials.target_names)
+    replayer = Replayer(config)
+    rows = {row["trial"]: row for row in dataset.throws.to_pylist()}
 
-    def __init__(self, directory: Path, engine: str) -> None:
-        self.dataset = Dataset.open(directory)
-        config = self.dataset.config
-        self.config: Config = config.model_copy(update={"sim": config.sim.model_copy(update={"engine": engine})})
-        plan = self.dataset.plan
-        self.table = ThrowsTable(plan.keys, self.config, plan.trials.target_names)
-        self.replayer = Replayer(self.config)
-        self.stored = {row["trial"]: row for row in self.dataset.throws.to_pylist()}
-
-    def simulate(self, number: int) -> Deviation:
+    def simulate(number: int) -> Deviation:
         """Simulate a trial, and compare its row with the stored one."""
-        trial = self.dataset.plan.trial(number)
-        result = judge_episode(with_values(self.config, trial.values), self.replayer.run(trial))
-        stored, again = self.stored[number], self.table.row(trial, result, None)
-        # Counts and times come as they are; names, and what only one of both has, cannot be compared.
+        trial = plan.trial(number)
+        result = judge_episode(with_values(config, trial.values), replayer.run(trial))
+        stored, again = rows[number], table.row(trial, result, None)
+        # Columns of text, and numbers that only one of both rows has, cannot be compared.
         compared = [
             column
             for column in again
@@ -130,6 +123,4 @@ class _Kept:
         values = {column: float(again[column]) - float(stored[column]) for column in compared}
         return Deviation(number, stored["outcome"], again["outcome"], values)
 
-
-def _begin(directory: Path, engine: str) -> Callable[[int], Deviation]:
-    return _Kept(directory, engine).simulate
+    return simulate

@@ -1,4 +1,4 @@
-"""Simulates one trial in this process, by the controllers and the physics of a simulation node, without the graph."""
+"""Simulates one trial in this process with the controllers and the physics of a simulation node, without ROS 2."""
 
 from __future__ import annotations
 
@@ -30,11 +30,11 @@ class Replayer:
         self._simulation.world.close()
 
     def run(self, trial: Trial) -> Episode:
-        """The episode of a trial; see `delivery`."""
+        """Simulate a trial for its episode alone; see `delivery`."""
         return self.delivery(trial).episode
 
     def delivery(self, trial: Trial) -> Delivery:
-        """The episode of a trial, what came of it, and what it was simulated with.
+        """Simulate a trial: its episode, its result, and the conditions that it was simulated under.
 
         Args:
             trial: A trial of the collection, whether its plan has it or not.

@@ -1,4 +1,4 @@
-"""All checks of a finished dataset in one call: files, physics, what the plan refuses, and throws simulated again."""
+"""All checks of a finished dataset in one call: files, physics, refusals of the plan, and throws simulated again."""
 
 from __future__ import annotations
 
@@ -26,7 +26,8 @@ def verify_dataset(
 ) -> list[Finding]:
     """Check a finished dataset: its files against each other, its episodes against physics, its plan against the robot.
 
-    Without the extra ``collect``, what takes the robot's model is left out; `dataset.verify.find_unchecked` names it.
+    Checks that take the robot's model are left out without the extra ``collect``; `dataset.verify.find_unchecked` names
+    them.
 
     Args:
         directory: Its directory.
@@ -34,10 +35,10 @@ def verify_dataset(
             for none.
         processes: How many processes may check the recordings of a large dataset; more than one import the program that
             calls this, as those of `multiprocessing` do.
-        say: Is told how far the check of a large dataset has come.
+        say: Called with the progress of the check of a large dataset.
 
     Returns:
-        What is wrong, file by file; empty when nothing is.
+        The problems, file by file; empty if there are none.
 
     Raises:
         DatasetError: If the directory holds no finished dataset.
@@ -45,7 +46,7 @@ def verify_dataset(
         WorkerError: If the physics engine does not start.
     """
     if replay is not None:
-        # What is wrong with a dataset that cannot be opened is told below.
+        # If the dataset cannot be opened, `verify` below reports why.
         with suppress(DatasetError):
             require_engine(Dataset.open(Path(directory)).config.sim.engine)
         require("pinocchio")
@@ -56,13 +57,13 @@ def verify_dataset(
 
 
 def _replay_findings(directory: Path, count: int) -> Iterator[Finding]:
-    """Throws that do not come out of the simulation as they are stored."""
+    """Find throws that do not come out of the simulation as they are stored."""
     try:
         dataset = Dataset.open(directory)
         shards = dataset.throws["shard"].to_pylist()
         for comparison in replay_throws(directory, select_trials(dataset, sample=count)):
             if comparison.differences:
-                told = "; ".join(comparison.differences)
-                yield Finding(shards[comparison.trial], f"trial {comparison.trial}", f"comes out otherwise: {told}")
+                problem = f"comes out otherwise: {'; '.join(comparison.differences)}"
+                yield Finding(shards[comparison.trial], f"trial {comparison.trial}", problem)
     except DatasetError as error:
         yield Finding("", "", f"cannot be replayed: {error}")

@@ -1,4 +1,4 @@
-"""What a report is made of, before it becomes a page or pictures."""
+"""The parts of a report, before they become a page or pictures."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ class Panel:
         figure: The figure, with its height.
         text: Caption, as text.
         picture: Name of the picture for papers; panels of one name stand below one another in it. Empty for none.
-        width_px: Width below which it scrolls [px]; 0: it shrinks with the page.
-        small: Whether a third of the page is enough for it.
-        on_page: False if the page shows the same in another way, so that only the picture is drawn.
+        width_px: Width below which it scrolls [px]; at 0 it shrinks with the page instead.
+        small: True if a third of the width of the page is enough.
+        on_page: False if the page shows the same in another way, so that the panel is only a picture.
     """
 
     key: str
@@ -50,12 +50,7 @@ class Table:
 
 @dataclass(frozen=True)
 class Listing:
-    """A file that unfolds at a click.
-
-    Attributes:
-        name: Name of the file.
-        text: Its contents.
-    """
+    """Name and text of a file, which unfolds at a click."""
 
     name: str
     text: str
@@ -73,7 +68,7 @@ class Section:
         key: Its name in links.
         short: Its name in the table of contents.
         title: Its subject, as text.
-        text: What it comes to, as text; `markupsafe.Markup` for HTML.
+        text: Its summary, as text; `markupsafe.Markup` for HTML.
         blocks: Below one another; a string is a paragraph.
     """
 
@@ -91,12 +86,7 @@ class Section:
 
 @dataclass(frozen=True)
 class Tile:
-    """A key number of the dataset.
-
-    Attributes:
-        value: The number with its unit.
-        label: What it is.
-    """
+    """A key number of the dataset, with its unit, and the label below it."""
 
     value: str
     label: str
@@ -104,13 +94,13 @@ class Tile:
 
 @dataclass(frozen=True)
 class TaskReport:
-    """What a task adds to the report on a dataset of its trials.
+    """The part of a report that the task of its trials adds.
 
     Attributes:
-        subject: What the trials are, after their number in a sentence.
+        subject: Words for the trials that follow their number in a sentence.
         tiles: Key numbers.
-        results: What came of the trials; these sections open the page.
-        episodes: Single episodes looked at closely; these follow the sections on parameters, outcomes and limits.
+        results: Sections on the results of the trials, which open the page.
+        episodes: Sections on single episodes, which follow those on parameters, outcomes and limits.
     """
 
     subject: str

@@ -1,4 +1,4 @@
-"""Why throws did not land, with reasons that differ only in their numbers taken as one."""
+"""Groups trials that failed by their reasons; reasons that differ only in numbers are one."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ _EXAMPLES = 5
 
 @dataclass(frozen=True)
 class Failure:
-    """Trials with one outcome and, but for numbers, one reason.
+    """A group of trials with the same outcome and, but for numbers, the same reason.
 
     Attributes:
         outcome: Their outcome.
-        pattern: Their reason, with ``#`` in place of numbers if these differ between the trials.
+        pattern: Their reason; if its numbers differ between the trials, with ``#`` in place of numbers.
         count: Number of trials.
         examples: Numbers of the first of these trials.
     """
@@ -28,11 +28,7 @@ class Failure:
 
 
 def group_failures(rows: Iterable[tuple[int, str, str | None]]) -> tuple[Failure, ...]:
-    """Group trials by outcome and reason, most frequent first.
-
-    Args:
-        rows: Trial, outcome and reason; those without a reason did not fail.
-    """
+    """Group trial, outcome and reason of each row, most frequent groups first; trials without a reason did not fail."""
     groups: dict[tuple[str, str], list[tuple[int, str]]] = {}
     for trial, outcome, reason in rows:
         if reason is not None:
@@ -40,6 +36,6 @@ def group_failures(rows: Iterable[tuple[int, str, str | None]]) -> tuple[Failure
     failures = []
     for (outcome, pattern), members in groups.items():
         trials, reasons = zip(*members, strict=True)
-        said = pattern if len(set(reasons)) > 1 else reasons[0]
-        failures.append(Failure(outcome, said, len(trials), trials[:_EXAMPLES]))
+        reason = pattern if len(set(reasons)) > 1 else reasons[0]
+        failures.append(Failure(outcome, reason, len(trials), trials[:_EXAMPLES]))
     return tuple(sorted(failures, key=lambda failure: (-failure.count, failure.outcome, failure.pattern)))

@@ -27,18 +27,13 @@ MOMENT_LINE = {"color": NEUTRAL, "width": 1.5, "dash": "dot"}
 MOST_KEYS = 8
 """Swept keys in a matrix of pairs."""
 _MOST_MATRIX_POINTS = 8000
-"""Points in all panels of the matrix together, which a browser draws and redraws with ease."""
+"""Points in all panels of the matrix together; a browser redraws more of them slowly."""
 _CELL_PX = 128
 _CELL_GAP = 0.012
 
 
 def draw_parameter_matrix(parameters: Sequence[Parameter], outcomes: Outcomes) -> go.Figure:
-    """Draw each pair of swept keys below the diagonal, and on it how often each value occurs.
-
-    Args:
-        parameters: At most `MOST_KEYS`.
-        outcomes: Outcomes of the trials.
-    """
+    """Draw each pair of at most `MOST_KEYS` swept keys below the diagonal, and on it how often each value occurs."""
     count = len(parameters)
     chosen = choose_points(len(outcomes.codes), count_matrix_points(parameters))
     figure = go.Figure()
@@ -76,7 +71,7 @@ def draw_parameter_matrix(parameters: Sequence[Parameter], outcomes: Outcomes) -
 
 
 def count_matrix_points(parameters: Sequence[Parameter]) -> int:
-    """How many trials are drawn in each panel of the matrix, at most."""
+    """Count the trials that each panel of the matrix shows at most."""
     return _MOST_MATRIX_POINTS // max(len(parameters) * (len(parameters) - 1) // 2, 4)
 
 
@@ -93,11 +88,11 @@ def _matrix_axes(parameters: Sequence[Parameter]) -> dict[str, object]:
         shared |= {"type": "log", **parameter.ticks} if parameter.logarithmic else {}
         # Each column is labelled below its lowest panel; in the last column that is the one of the counts.
         lowest = _axis_name("y", count - 1 if index < count - 1 else count + index)
-        axes[_axis_key("x", index)] = {**shared, "domain": across, "anchor": lowest, "tickangle": 0}
+        axes[_axis_name("xaxis", index)] = {**shared, "domain": across, "anchor": lowest, "tickangle": 0}
         if index:
-            axes[_axis_key("y", index)] = {**shared, "domain": down, "anchor": "x"}
+            axes[_axis_name("yaxis", index)] = {**shared, "domain": down, "anchor": "x"}
         counts = {"domain": down, "anchor": _axis_name("x", index), "showticklabels": False, "showgrid": False}
-        axes[_axis_key("y", count + index)] = {**counts, "rangemode": "tozero"}
+        axes[_axis_name("yaxis", count + index)] = {**counts, "rangemode": "tozero"}
     return axes
 
 
@@ -109,13 +104,8 @@ def _matrix_range(parameter: Parameter) -> list[float]:
 
 
 def _axis_name(letter: str, index: int) -> str:
-    """Name of an axis in a trace."""
+    """Name of an axis: with ``x`` in a trace, with ``xaxis`` in a layout."""
     return letter if index == 0 else f"{letter}{index + 1}"
-
-
-def _axis_key(letter: str, index: int) -> str:
-    """Name of an axis in a layout."""
-    return f"{letter}axis" if index == 0 else f"{letter}axis{index + 1}"
 
 
 def draw_outcome_bars(outcomes: Outcomes) -> go.Figure:
@@ -183,12 +173,7 @@ def draw_limit_boxes(peaks: Sequence[JointPeaks]) -> go.Figure:
 
 
 def draw_throughput(throughput: Throughput, noun: str) -> go.Figure:
-    """Draw trials a second over the time spent collecting.
-
-    Args:
-        throughput: What was measured.
-        noun: What a trial is called.
-    """
+    """Draw trials a second over the time of collecting; `noun` is the word for a trial."""
     total_s = throughput.edges_s[-1]
     unit, seconds = ("h", 3600) if total_s > 7200 else ("min", 60) if total_s > 120 else ("s", 1)
     edges = throughput.edges_s / seconds
@@ -224,5 +209,5 @@ def place_bars(edges: NDArray[np.float64]) -> dict[str, Any]:
 
 
 def single_precision(values: NDArray[np.float64]) -> NDArray[np.float32]:
-    """Values in single precision: half the size of the page, and no visible difference."""
+    """Round values to single precision, which halves the page and makes no visible difference."""
     return values.astype(np.float32)

@@ -19,7 +19,7 @@ class JointPeaks:
     Attributes:
         joint: The joint.
         count: In how many trials it was this joint.
-        quartiles: Lowest, first quartile, median, third quartile and highest of its peaks over the limit [-].
+        quartiles: Lowest, first quartile, median, third quartile and highest of its peaks, divided by the limit [-].
         reached: In how many of them the limit was reached or passed.
     """
 
@@ -30,18 +30,13 @@ class JointPeaks:
 
 
 def summarise_peaks(throws: pa.Table, kind: str) -> tuple[JointPeaks, ...]:
-    """Summarise the peaks of one kind by joint; the joint that came closest to its limit comes first.
-
-    Args:
-        throws: Table of throws.
-        kind: One of `KINDS`.
-    """
+    """Summarise the peaks of one of `KINDS` by joint; the joint that came closest to its limit comes first."""
     shares = read_numbers(throws, f"{kind}_peak_share")
     joints = np.array(throws[f"{kind}_peak_joint"].to_pylist(), dtype=object)
     measured = np.isfinite(shares)
-    found = []
+    peaks = []
     for joint in sorted({str(name) for name in joints[measured]}):
         own = shares[measured & (joints == joint)]
         low, first, median, third, high = np.percentile(own, [0, 25, 50, 75, 100]).tolist()
-        found.append(JointPeaks(joint, len(own), (low, first, median, third, high), int((own >= 1).sum())))
-    return tuple(sorted(found, key=lambda each: (-each.quartiles[-1], each.joint)))
+        peaks.append(JointPeaks(joint, len(own), (low, first, median, third, high), int((own >= 1).sum())))
+    return tuple(sorted(peaks, key=lambda each: (-each.quartiles[-1], each.joint)))

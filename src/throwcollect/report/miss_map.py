@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import plotly.graph_objects as go
 from numpy.typing import NDArray
@@ -9,15 +11,15 @@ from numpy.typing import NDArray
 from throwcollect.report.figures import BLUE, LEGEND_ABOVE, LIMIT_LINE, NEUTRAL
 
 ARROWS = 10
-"""Misses are drawn so many times as long, unless they are large."""
+"""Misses are drawn so many times as long, unless they are large, so that they are seen."""
 
 
 def choose_scale(targets: NDArray[np.float64], places: NDArray[np.float64]) -> int:
-    """How many times as long misses are drawn, so that the longest one stays about as short as the targets are apart.
+    """Choose how many times as long misses are drawn: the longest must not exceed the distance of the targets.
 
     Args:
-        targets: Shape ``(n_targets, 2)``, at least one.
-        places: Where the trials at these targets ended, NaN where they did not, shape ``(n_targets, 2)``.
+        targets: At least one, shape ``(n_targets, n_columns)``.
+        places: Where the trials at these targets ended, NaN for one without an end, in the same shape.
     """
     hit = np.isfinite(places).all(axis=1)
     longest = float(np.abs(places[hit] - targets[hit]).max(initial=0.0))
@@ -28,20 +30,21 @@ def draw_miss_map(
     ends: NDArray[np.float64],
     targets: NDArray[np.float64],
     places: NDArray[np.float64],
-    axes: tuple[str, str],
+    titles: Sequence[str],
     *,
     times: int = ARROWS,
 ) -> go.Figure:
-    """Draw targets amid where other trials ended, and a line for each miss.
+    """Draw targets amid the ends of other trials, and a line for each miss, in the first two columns.
 
     Args:
-        ends: Where trials ended, shape ``(n, 2)``.
-        targets: Shape ``(n_targets, 2)``.
-        places: Where the trials at these targets ended, NaN where they did not, shape ``(n_targets, 2)``.
-        axes: Titles of both axes.
+        ends: Where trials ended, shape ``(n, n_columns)``.
+        targets: Shape ``(n_targets, n_columns)``.
+        places: Where the trials at these targets ended, NaN for one without an end, shape ``(n_targets, n_columns)``.
+        titles: Titles of the columns.
         times: How many times as long misses are drawn.
     """
     figure = go.Figure()
+    ends, targets, places = map(_take_two, (ends, targets, places))
     if len(ends):
         grey = {"color": NEUTRAL, "size": 3, "opacity": 0.5, "symbol": "circle"}
         figure.add_scatter(x=ends[:, 0], y=ends[:, 1], mode="markers", marker=grey, name="throws of the dataset")
@@ -53,14 +56,17 @@ def draw_miss_map(
     if hit.any():
         tips = targets[hit] + times * (places[hit] - targets[hit])
         x, y = (
-            [
-                each
-                for pair in zip(targets[hit, axis].tolist(), tips[:, axis].tolist(), strict=True)
-                for each in (*pair, None)
-            ]
-            for axis in (0, 1)
+            # None divides the lines from each other.
+            [end for line in zip(starts.tolist(), ends.tolist(), strict=True) for end in (*line, None)]
+            for starts, ends in zip(targets[hit].T, tips.T, strict=True)
         )
         line = {"color": LIMIT_LINE["color"], "width": 1.5}
         figure.add_scatter(x=x, y=y, mode="lines", line=line, name=f"misses × {times}" if times > 1 else "misses")
-    figure.update_xaxes(title=axes[0]).update_yaxes(title=axes[1], scaleanchor="x")
+    first, second = [*titles, ""][:2]
+    figure.update_xaxes(title=first).update_yaxes(title=second, scaleanchor="x")
     return figure.update_layout(height=420, legend=LEGEND_ABOVE)
+
+
+def _take_two(points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The first two columns; if there is only one, a column of zeros after it."""
+    return np.column_stack([points, np.zeros(len(points))])[:, :2]

@@ -1,13 +1,12 @@
-"""The section of a report on a model of the dataset: targets, how they are missed, what adapting did."""
+"""The section of a report on a model of the dataset: targets, how they are missed, and what adapting changed."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
 import plotly.graph_objects as go
-from numpy.typing import NDArray
 
 from throwcollect.dataset.reader import Dataset
 from throwcollect.errors import ConfigError
@@ -21,15 +20,11 @@ from throwcollect.wording import command, format_count
 
 _TITLE = "How a model of it hits"
 _NOUNS = {"m": "distance", "rad": "angle"}
-"""What lies between a throw and its target, by unit."""
+"""Words for the difference between a throw and its target, by unit."""
 
 
 def show_model(directory: Path, dataset: Dataset) -> Section:
-    """Show what throwing at targets has shown of a model.
-
-    Args:
-        directory: Directory of the model.
-        dataset: The dataset that it was learned from.
+    """Show how a model of a dataset hits targets, from the directory of the model.
 
     Raises:
         ConfigError: If the model was learned from another dataset.
@@ -60,7 +55,13 @@ def show_model(directory: Path, dataset: Dataset) -> Section:
             _draw_misses(model, score.throws),
             picture="targets",
         ),
-        *_show_errors("training", "Misses by number of throws learned from", score, _draw_training),
+        *_show_errors(
+            "training",
+            "Misses by number of throws learned from",
+            [(each.trained_on, each.errors) for each in score.trained],
+            x={"title": "throws learned from", "type": "log"},
+            y={"type": "log"},
+        ),
     ]
     rows: list[Row | Table] = [tuple(panels), _tabulate(score)]
     if score.adapted:
@@ -69,48 +70,33 @@ def show_model(directory: Path, dataset: Dataset) -> Section:
             f"Targets there after the last of them, misses {ARROWS} times as long",
             _draw_misses(model, score.adapted_throws),
         )
-        rows.append(
-            (*_show_errors("adapting", "In another world, by number of throws there", score, _draw_adapting), there)
+        errors = _show_errors(
+            "adapting",
+            "In another world, by number of throws there",
+            [(each.real_throws, each.errors) for each in score.adapted],
+            x={"title": "throws in the other world"},
+            y={"rangemode": "tozero"},
         )
+        rows.append((*errors, there))
     return Section("model", "Model", _TITLE, text, tuple(rows))
 
 
 def _draw_misses(model: Model, throws: Sequence[ThrowAtTarget]) -> go.Figure:
-    """Draw targets amid what the dataset reached, in the first two columns, and a line for each miss."""
-    count = len(model.targets)
-    targets = np.array([throw.target for throw in throws], np.float64).reshape(len(throws), count)
-    nowhere = [np.nan] * count
-    places = np.array([throw.place or nowhere for throw in throws], np.float64).reshape(len(throws), count)
-    ends, targets, places = (_take_two(points) for points in (model.learned.outputs, targets, places))
-    names = [*model.targets, ""]
-    return draw_miss_map(ends, targets, places, (names[0], names[1]))
+    """Draw targets amid the places that the dataset reached, and a line for each miss."""
+    shape, nowhere = (len(throws), len(model.targets)), [np.nan] * len(model.targets)
+    targets = np.array([throw.target for throw in throws], np.float64).reshape(shape)
+    places = np.array([throw.place or nowhere for throw in throws], np.float64).reshape(shape)
+    return draw_miss_map(model.learned.outputs, targets, places, model.targets)
 
 
-def _take_two(points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The first two columns; of points of one column, zeros beside it."""
-    return np.column_stack([points, np.zeros(len(points))])[:, :2]
-
-
-def _show_errors(key: str, title: str, score: Score, draw: Callable[[Score, int], go.Figure]) -> list[Panel]:
-    """A panel for each unit of misses."""
-    units = [each.unit for each in score.trained[-1].errors.by_unit]
-    return [
-        Panel(key if number == 0 else f"{key}-{unit}", title, draw(score, number), picture=key)
-        for number, unit in enumerate(units)
-    ]
-
-
-def _draw_training(score: Score, unit: int) -> go.Figure:
-    misses = [each.errors.by_unit[unit] for each in score.trained]
-    figure = _draw_errors([each.trained_on for each in score.trained], misses)
-    figure.update_xaxes(title="throws learned from", type="log").update_yaxes(type="log")
-    return figure
-
-
-def _draw_adapting(score: Score, unit: int) -> go.Figure:
-    misses = [each.errors.by_unit[unit] for each in score.adapted]
-    figure = _draw_errors([each.real_throws for each in score.adapted], misses)
-    return figure.update_xaxes(title="throws in the other world").update_yaxes(rangemode="tozero")
+def _show_errors(
+    key: str, title: str, errors: Sequence[tuple[int, Errors]], *, x: dict[str, str], y: dict[str, str]
+) -> Iterator[Panel]:
+    """Make a panel for each unit of misses by a number of throws; x and y are settings of its axes."""
+    throws = [count for count, _ in errors]
+    for number, misses in enumerate(zip(*(each.by_unit for _, each in errors), strict=True)):
+        figure = _draw_errors(throws, misses).update_xaxes(x).update_yaxes(y)
+        yield Panel(f"{key}-{misses[0].unit}" if number else key, title, figure, picture=key)
 
 
 def _draw_errors(numbers: Sequence[int], misses: Sequence[Misses]) -> go.Figure:

@@ -18,7 +18,7 @@ class Style:
     """How an outcome is drawn.
 
     Attributes:
-        colour: In hex; told apart by people who confuse red and green, on white and on black.
+        colour: In hex; people who confuse red and green tell these colours apart, on white and on black.
         symbol: Marker, as plotly calls it.
     """
 
@@ -58,7 +58,7 @@ class Outcomes:
     """The outcomes of all trials.
 
     Attributes:
-        names: Those that occur; the success first, then always in the same order.
+        names: Outcomes that occur, in the same order in all reports, the success first.
         codes: Index into `names` of each trial, shape ``(n_trials,)``.
         success: Outcome of a trial that succeeded.
     """
@@ -87,7 +87,7 @@ class Outcomes:
         return self.counts.get(self.success, 0)
 
     def style_of(self, name: str) -> Style:
-        """How an outcome is drawn: the success of any task as a landing is."""
+        """How an outcome is drawn; the success of any task is drawn as a landing is."""
         return style_of(LANDED if name == self.success else name)
 
     def are(self, name: str) -> NDArray[np.bool_]:

@@ -1,4 +1,4 @@
-"""The page: a report in the templates of this room, with everything that it needs inside."""
+"""The page: a report in the templates of this room, which loads nothing from elsewhere."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from throwcollect.version import __version__
 
 def render_page(report: Report) -> str:
     """HTML of a report; equal reports give equal pages."""
-    # Whatever a dataset says is escaped, but for what is marked as HTML.
+    # All texts of a dataset are escaped; only `Markup` is HTML.
     templates = Environment(
         loader=PackageLoader("throwcollect.report"),
         autoescape=True,
@@ -24,7 +24,7 @@ def render_page(report: Report) -> str:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    # What plotly leaves in a figure besides numbers, texts and dictionaries are sequences.
+    # Apart from numbers, texts and dictionaries, plotly leaves only sequences in a figure.
     templates.policies["json.dumps_kwargs"] = {"separators": (",", ":"), "allow_nan": False, "default": list}
     templates.filters |= {"specify": _specify, "in_words": in_words, "share": format_share}
     page = templates.get_template("page.html")

@@ -23,12 +23,18 @@ from matplotlib.ticker import AutoLocator, FuncFormatter, LogLocator, MaxNLocato
 
 from throwcollect.report.contents import Panel
 
+_COLUMN_IN, _BOTH_COLUMNS_IN = 3.5, 7.16
+"""Widths of pictures [in]: one column of a paper in two columns, and both."""
+_MOST_PX_IN_COLUMN = 405
+"""Panels that need to be wider than this on the page get both columns."""
+DPI = 300
+"""Pixels per inch, sharp in print."""
 _PX_PER_IN = 145
-"""At this scale a column of a paper is as wide as half a page in a browser."""
+"""At this scale, a column of a paper is as wide as half a page in a browser."""
 _FRAME_PX = 100
-"""What labels below and a legend above take of the height of a figure; in a stack of figures this is needed once."""
+"""Height of the labels below and the legend above a figure; a stack of figures has them once."""
 _PT = 72 / _PX_PER_IN
-"""Points of a printer in one pixel."""
+"""Printer's points in one pixel."""
 _SMALLEST_TEXT_PT = 5
 _COLOURS = "viridis"
 _DASHES = {None: "-", "dash": "--", "dot": ":"}
@@ -67,25 +73,20 @@ _STYLE: dict[Any, Any] = {
     "legend.handletextpad": 0.4,
     "grid.linewidth": 0.4,
     "grid.color": "#dddddd",
-    # A dollar sign in a name is no formula.
+    # Names may have dollar signs, which would begin a formula.
     "text.parse_math": False,
 }
 
 
-def paint(panels: Sequence[Panel], path: Path, *, width_in: float, dpi: int) -> None:
-    """Paint panels into one PNG file, below one another.
-
-    Args:
-        panels: One, or small ones with one pair of axes each.
-        path: The file.
-        width_in: Its width [in]; its height follows from those of the figures.
-        dpi: Its pixels per inch.
+def paint(panels: Sequence[Panel], path: Path) -> None:
+    """Paint one panel, or small ones with one pair of axes each below one another, into a PNG file.
 
     Raises:
         OSError: If the file cannot be written.
     """
     with mpl.rc_context(_STYLE):
         heights = [panel.figure.layout.height - _FRAME_PX for panel in panels]
+        width_in = _BOTH_COLUMNS_IN if panels[0].width_px > _MOST_PX_IN_COLUMN else _COLUMN_IN
         size = width_in, (_FRAME_PX + sum(heights)) / _PX_PER_IN
         painted = Figure(figsize=size, layout="constrained")
         FigureCanvasAgg(painted)
@@ -94,12 +95,12 @@ def paint(panels: Sequence[Panel], path: Path, *, width_in: float, dpi: int) -> 
         else:
             _paint_cells(painted, panels[0].figure)
         _add_legend(painted, panels[0].figure.layout.legend)
-        # Without the version of matplotlib: equal figures, equal bytes.
-        painted.savefig(path, dpi=dpi, metadata={"Software": None})
+        # The version of matplotlib is left out, so that equal figures give equal bytes.
+        painted.savefig(path, dpi=DPI, metadata={"Software": None})
 
 
 def _paint_stack(painted: Figure, panels: Sequence[Panel], heights: Sequence[float]) -> None:
-    """Paint figures below one another, which share their x axis and have their titles above."""
+    """Paint figures below one another, which share their x axis; each has its title above."""
     rows = painted.subplots(len(panels), sharex=True, squeeze=False, height_ratios=heights)[:, 0]
     for axes, panel in zip(rows, panels, strict=True):
         _paint_axes(axes, panel.figure, "x", "y")
@@ -125,14 +126,7 @@ def _paint_cells(painted: Figure, figure: go.Figure) -> None:
 
 
 def _paint_axes(axes: Axes, figure: go.Figure, x: str, y: str) -> None:
-    """Paint what a figure has on one pair of axes.
-
-    Args:
-        axes: Where to paint.
-        figure: The figure.
-        x: Name of its x axis, such as ``x2``.
-        y: Name of its y axis.
-    """
+    """Paint traces and lines of a figure on one pair of its axes, which have names such as ``x2``."""
     for trace in figure.data:
         if (trace.xaxis or "x", trace.yaxis or "y") == (x, y):
             _PAINTERS[trace.type](axes, trace)
@@ -273,7 +267,7 @@ def _add_colour_bar(axes: Axes, colours: Any, title: str) -> Any:
 
 
 def _add_legend(painted: Figure, legend: Any) -> None:
-    """Name all lines and markers, if there are several: a picture has no text beside it that explains its colours."""
+    """Name all lines and markers if there are several: a picture has no text that explains its colours."""
     named: dict[str, Artist] = {}
     for axes in painted.axes:
         handles, names = axes.get_legend_handles_labels()

@@ -1,4 +1,4 @@
-"""Columns of a table as points to plot, and fewer of them where more would show nothing new."""
+"""Columns of a table as points to plot, and a choice of them if there are more than a plot can show."""
 
 from __future__ import annotations
 
@@ -11,17 +11,12 @@ MOST_POINTS = 5000
 
 
 def read_numbers(throws: pa.Table, name: str) -> NDArray[np.float64]:
-    """A column of numbers, nan where there is none, shape ``(n_trials,)``."""
+    """Read a column of numbers, nan for nulls, shape ``(n_trials,)``."""
     return np.asarray(throws[name].to_numpy(), dtype=np.float64)
 
 
 def choose_points(count: int, most: int = MOST_POINTS) -> NDArray[np.intp]:
-    """Indices of the points to draw, in order: all, or as many as allowed, always the same ones.
-
-    Args:
-        count: Number of points.
-        most: How many to draw.
-    """
+    """Choose indices of points to draw, in order: all, or `most` of them, always the same random choice."""
     if count <= most:
         return np.arange(count)
     # Every n-th point of a Sobol sequence or a grid lies on a lattice, which would look like a pattern in the data.

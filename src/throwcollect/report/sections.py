@@ -7,11 +7,13 @@ from pathlib import Path
 
 from markupsafe import Markup
 
-from throwcollect.dataset.directory import JOURNAL
+from throwcollect.dataset.directory import CONFIG, JOURNAL, PROVENANCE
 from throwcollect.dataset.inspect import summary
 from throwcollect.dataset.journal import read_journal
+from throwcollect.dataset.provenance import read_provenance
 from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.summary import Info
+from throwcollect.files import read_text
 from throwcollect.members import load_object
 from throwcollect.report import figures
 from throwcollect.report.amounts import format_duration, format_share, format_size
@@ -20,14 +22,15 @@ from throwcollect.report.failures import Failure, group_failures
 from throwcollect.report.limits import KINDS, JointPeaks, summarise_peaks
 from throwcollect.report.model_section import show_model
 from throwcollect.report.outcomes import LANDED, Outcomes, in_words
-from throwcollect.report.provenance import config_text, provenance
 from throwcollect.report.swept_keys import Parameter, read_parameters
 from throwcollect.report.targets_section import show_targets
 from throwcollect.report.throughput import Throughput, measure_throughput
 from throwcollect.robots.description import robot_of
+from throwcollect.sweep.digest import config_digest
 from throwcollect.tasks.task import task_of
 
 _MOST_FAILURES = 40
+_MOST_CONFIG_BYTES = 10_000_000
 _CODE = Markup("<code>{}</code>")
 
 
@@ -37,11 +40,11 @@ class Report:
 
     Attributes:
         name: Name of the dataset.
-        lead: What it holds, in a sentence.
+        lead: Sentence on its trials.
         tiles: Key numbers.
         outcomes: Outcomes of all its trials.
         sections: In the order of the page; one that has nothing to show says so.
-        noun: What a trial is called.
+        noun: Word for a trial.
     """
 
     name: str
@@ -53,11 +56,7 @@ class Report:
 
 
 def report_dataset(dataset: Dataset, *, model: Path | None = None) -> Report:
-    """Gather what there is to say of a dataset.
-
-    Args:
-        dataset: The dataset.
-        model: Directory of a model that was learned from it; None for none.
+    """Make the report on a dataset, and on a model that was learned from it, if its directory is given.
 
     Raises:
         ConfigError: If the model was learned from another dataset.
@@ -67,7 +66,7 @@ def report_dataset(dataset: Dataset, *, model: Path | None = None) -> Report:
     outcomes = Outcomes.of(throws["outcome"].to_pylist(), success=dataset.config.task.success)
     parameters = read_parameters(dataset.config, throws, outcomes)
     reasons = zip(*(throws[name].to_pylist() for name in ("trial", "outcome", "reason")), strict=True)
-    facts = provenance(dataset, info)
+    facts = _list_facts(dataset, info)
     task, noun = _report_task(dataset, outcomes), dataset.config.task.noun
     finished = f", finished on {facts['finished'][:10]}" if "finished" in facts else ""
     return Report(
@@ -88,28 +87,39 @@ def report_dataset(dataset: Dataset, *, model: Path | None = None) -> Report:
             _show_limits({kind: summarise_peaks(throws, kind) for kind in KINDS}, noun),
             *task.episodes,
             _show_throughput(measure_throughput(read_journal(dataset.directory / JOURNAL)), info),
-            _show_provenance(facts, config_text(dataset)),
+            _show_provenance(facts, read_text(dataset.directory / CONFIG, most_bytes=_MOST_CONFIG_BYTES)),
         ),
         noun=noun,
     )
 
 
+def _list_facts(dataset: Dataset, info: Info) -> dict[str, str]:
+    """List facts on the origin of a dataset: digests first, then how it was collected, if that is known."""
+    collected = read_provenance(dataset.directory)
+    return {
+        "dataset digest": info.digest,
+        "configuration digest": config_digest(dataset.config),
+        "layout": dataset.layout,
+        "sampler": f"{dataset.config.sweep.sampler}, seed {dataset.config.seed}",
+        **(collected.facts() if collected else {"collected": f"unknown: it has no readable {PROVENANCE}"}),
+    }
+
+
 def _report_task(dataset: Dataset, outcomes: Outcomes) -> TaskReport:
-    """What the task adds; of one that adds nothing, how many trials there are and how many succeeded."""
+    """Make the part of the task; for a task without one, numbers of trials and of those that succeeded."""
     if path := task_of(dataset.config).report:
         added: TaskReport = load_object(path)(dataset, outcomes)
         return added
     trials = len(outcomes.codes)
     tiles = (
         Tile(f"{trials:,}", "trials planned"),
-        Tile(format_share(outcomes.succeeded, trials), f"{in_words(outcomes.success)}"),
+        Tile(format_share(outcomes.succeeded, trials), in_words(outcomes.success)),
     )
     by = robot_of(dataset.config).introduction
     return TaskReport(f"simulated {dataset.config.task.subject} by {by}", tiles, results=(), episodes=())
 
 
 def _show_parameters(parameters: tuple[Parameter, ...], outcomes: Outcomes) -> Section:
-    """The section on swept keys."""
     title, trials = "How the parameter space is covered", len(outcomes.codes)
     if not parameters:
         return Section("parameters", "Parameters", title, "Nothing was swept.")
@@ -143,7 +153,7 @@ def _show_outcomes(
     outcomes: Outcomes, parameters: tuple[Parameter, ...], failures: tuple[Failure, ...], noun: str
 ) -> Section:
     title, trials = f"How {noun}s end, and where failures lie", len(outcomes.codes)
-    # At the head of the page is a bar with the same numbers.
+    # The page shows the same numbers in a bar at its head.
     bars = Panel("all", title, figures.draw_outcome_bars(outcomes), picture="outcomes", on_page=False)
     blocks: list[Row | Table] = [(bars,)]
     failed = trials - outcomes.succeeded

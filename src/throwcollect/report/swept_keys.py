@@ -24,7 +24,7 @@ class Parameter:
     Attributes:
         key: Dotted key.
         unit: Of its values; empty when they have none.
-        logarithmic: Whether its logarithm was spread evenly.
+        logarithmic: True if its logarithm, not its value, was drawn evenly.
         values: Value of each trial, shape ``(n_trials,)``.
         edges: Of the bins, shape ``(n_bins + 1,)``; around each value if there are only a few.
         counts: Trials in each bin by outcome, shape ``(n_bins, n_outcomes)``.
@@ -41,7 +41,7 @@ class Parameter:
 
     @property
     def ticks(self) -> dict[str, list[Any]]:
-        """Ticks of a logarithmic axis, as plotly has them; mostly it spans too little for powers of ten."""
+        """Ticks of a logarithmic axis for plotly, whose own are powers of ten, of which most ranges have none."""
         values = [float(f"{value:.2g}") for value in np.geomspace(self.edges[0], self.edges[-1], 3)]
         return {"tickvals": values, "ticktext": [f"{value:g}" for value in values]}
 
@@ -53,13 +53,7 @@ class Parameter:
 
 
 def read_parameters(config: Config, throws: pa.Table, outcomes: Outcomes) -> tuple[Parameter, ...]:
-    """Read all swept keys, in the order of the table.
-
-    Args:
-        config: Configuration of the dataset.
-        throws: Its throws.
-        outcomes: Their outcomes.
-    """
+    """Read all swept keys of a table of throws, in its order."""
     return tuple(
         _read_parameter(config, key, read_numbers(throws, key), outcomes) for key in throws.column_names if "." in key
     )
@@ -75,7 +69,7 @@ def _read_parameter(config: Config, key: str, values: NDArray[np.float64], outco
         bins = np.searchsorted(steps, values)
     else:
         low, high = (swept.min, swept.max) if isinstance(swept, Range) else (distinct[0], distinct[-1])
-        # A value outside of the range it was drawn from would be lost otherwise.
+        # Bins have to hold all values, of which some may lie outside of the range of the sweep.
         low, high = min(low, float(distinct[0])), max(high, float(distinct[-1]))
         edges = np.geomspace(low, high, _BINS + 1) if logarithmic else np.linspace(low, high, _BINS + 1)
         bins = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, _BINS - 1)
@@ -85,7 +79,7 @@ def _read_parameter(config: Config, key: str, values: NDArray[np.float64], outco
 
 
 def _surround(steps: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Edges half-way between values, and as far beyond the first and the last."""
+    """Place edges half-way between values, and as far beyond the first and the last."""
     if len(steps) == 1:
         half = abs(steps[0]) / 2 or 0.5
         return np.array([steps[0] - half, steps[0] + half])

@@ -21,49 +21,43 @@ _TITLE = "How targets are missed"
 
 
 def show_targets(dataset: Dataset) -> tuple[Section, ...]:
-    """Show the targets of trials; nothing if they have none.
-
-    Args:
-        dataset: The dataset.
-    """
+    """Show the targets of trials; nothing if they have none."""
     targets = read_targets(dataset.throws)
     if targets is None:
         return ()
-    found = summarise_misses(dataset.config, dataset.throws)
-    wanted = int((~np.isnan(targets.values)).any(axis=1).sum())
+    misses = summarise_misses(dataset.config, dataset.throws)
+    targeted = int((~np.isnan(targets.values)).any(axis=1).sum())
     said = [
         f"{name}: median {_format(name, each.median)}, 9 of 10 below {_format(name, each.share90)}"
-        for name, each in found.items()
+        for name, each in misses.items()
         if each.measured
     ]
-    text = f"{wanted:,} of {format_count(len(dataset.throws), dataset.config.task.noun)} should end at a target. "
+    text = f"{targeted:,} of {format_count(len(dataset.throws), dataset.config.task.noun)} should end at a target. "
     text += f"{'; '.join(said)}, in simulation." if said else "None of them ended anywhere."
     panels = [
         _show_map(dataset, targets),
         *(
             Panel(name, f"Share of misses below a distance: {name}", _draw_share(dataset, name), picture=name)
-            for name, each in found.items()
+            for name, each in misses.items()
             if each.measured
         ),
     ]
-    return (Section("misses", "Targets", _TITLE, text, (tuple(panels), _tabulate(found))),)
+    return (Section("misses", "Targets", _TITLE, text, (tuple(panels), _tabulate(misses))),)
 
 
 def _show_map(dataset: Dataset, targets: Targets) -> Panel:
-    """Show the first two columns of targets; beside one that is alone, zeros."""
-    declared = {each.name: each for each in dataset.config.task.target_columns}
+    """Show the first two columns of targets."""
+    declared = {column.name: column for column in dataset.config.task.target_columns}
     throws, shown = dataset.throws, targets.names[:2]
-    beside = [np.zeros(len(throws))] * (2 - len(shown))
-    wanted = np.column_stack([*(targets.values[:, targets.names.index(name)] for name in shown), *beside])
+    nowhere = np.full(len(throws), np.nan)
     sources = [declared[name].of for name in shown]
-    fixed = np.full(len(throws), np.nan)
-    ended = [read_numbers(throws, name) if name in throws.column_names else fixed for name in sources]
+    ends = [read_numbers(throws, name) if name in throws.column_names else nowhere for name in sources]
     chosen = choose_points(len(throws))
-    wanted, places = wanted[chosen], np.column_stack([*ended, *beside])[chosen]
-    aimed = ~np.isnan(wanted).any(axis=1)
-    first, second = [*(f"{declared[name].word} [{unit_of_name(name)}]" for name in shown), ""][:2]
-    times = choose_scale(wanted[aimed], places[aimed]) if aimed.any() else 1
-    figure = draw_miss_map(places[~aimed], wanted[aimed], places[aimed], (first, second), times=times)
+    goals, places = targets.values[chosen, : len(shown)], np.column_stack(ends)[chosen]
+    aimed = ~np.isnan(goals).any(axis=1)
+    titles = [f"{declared[name].word} [{unit_of_name(name)}]" for name in shown]
+    times = choose_scale(goals[aimed], places[aimed]) if aimed.any() else 1
+    figure = draw_miss_map(places[~aimed], goals[aimed], places[aimed], titles, times=times)
     title = f"Targets, and misses drawn {times} times as long" if times > 1 else "Targets and misses"
     return Panel("map", title, figure, picture="targets_and_misses")
 
@@ -85,7 +79,7 @@ def _draw_share(dataset: Dataset, miss: str) -> go.Figure:
     return figure.update_layout(height=420, showlegend=False)
 
 
-def _tabulate(found: dict[str, MissSummary]) -> Table:
+def _tabulate(misses: dict[str, MissSummary]) -> Table:
     rows = tuple(
         (
             name,
@@ -93,7 +87,7 @@ def _tabulate(found: dict[str, MissSummary]) -> Table:
             f"{each.measured:,}",
             *(_format(name, value) for value in (each.median, each.share90, each.largest)),
         )
-        for name, each in found.items()
+        for name, each in misses.items()
     )
     head = ("", "with a target", "measured", "median", "9 of 10 below", "largest")
     return Table(head=head, rows=rows, number_columns=(1, 2, 3, 4, 5))
@@ -105,6 +99,6 @@ def _format(miss: str, value: float | None) -> str:
 
 
 def _scale(miss: str) -> tuple[float, str]:
-    """By what a distance is multiplied to be read with ease, and its unit then."""
+    """The factor that makes a distance easy to read, and the unit that it has then."""
     unit = unit_of_name(miss)
     return {"m": (100.0, "cm"), "rad": (1000.0, "mrad")}.get(unit, (1.0, unit))

@@ -15,9 +15,7 @@ _BINS = 40
 
 @dataclass(frozen=True)
 class Throughput:
-    """Episodes that came in, over the time spent collecting; pauses are left out.
-
-    All times are since the first event.
+    """Episodes that came in over the time of collecting, without pauses. All times are since the first event.
 
     Attributes:
         edges_s: Edges of intervals of time [s], shape ``(n + 1,)``.
@@ -37,20 +35,13 @@ class Throughput:
 
 
 def measure_throughput(events: Iterable[Entry]) -> Throughput | None:
-    """Measure throughput over time.
-
-    Args:
-        events: Entries of a journal, in order.
-
-    Returns:
-        None if no episode came in, or all at one instant.
-    """
+    """Measure throughput from the entries of a journal, in order; None if no episode came in, or all at one instant."""
     times: dict[str, list[float]] = {kind: [] for kind in ("commit", "opened", "fail", "lost")}
     elapsed = 0.0
     last: float | None = None
     for event in events:
         if last is not None and event.event != "opened":
-            # Clocks are set back now and then.
+            # A clock may have been set back between two entries.
             elapsed += max(event.time_s - last, 0.0)
         last = event.time_s
         if event.event in times:

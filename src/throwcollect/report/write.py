@@ -1,7 +1,8 @@
-"""Writes a report."""
+"""Writes a report to files."""
 
 from __future__ import annotations
 
+from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,12 +14,7 @@ from throwcollect.files import new_directory, write_file
 
 @dataclass(frozen=True)
 class Written:
-    """Files of a report.
-
-    Attributes:
-        page: The page.
-        pictures: PNG files; none if they were not asked for.
-    """
+    """Files of a report: the page, and the PNG files of its pictures, if there are any."""
 
     page: Path
     pictures: tuple[Path, ...]
@@ -46,13 +42,14 @@ def write_report(directory: Path, page: Path, *, pictures: Path | None = None, m
         raise ConfigError(
             f"{page}: exists", expected="a file that is new", hint="choose another --output, or remove it"
         )
-    if pictures is None:
-        write_file(page, render_page(report_dataset(Dataset.open(directory), model=model)).encode())
-        return Written(page, ())
-    with new_directory(pictures) as beside:
-        from throwcollect.report.pictures import write_pictures
-
+    written: tuple[Path, ...] = ()
+    with ExitStack() as stack:
+        # Entered before the dataset is read, so that a directory that cannot be used is reported at once.
+        unfinished = stack.enter_context(new_directory(pictures)) if pictures else None
         report = report_dataset(Dataset.open(directory), model=model)
-        names = [path.name for path in write_pictures(report.sections, beside)]
+        if pictures and unfinished:
+            from throwcollect.report.pictures import write_pictures
+
+            written = tuple(pictures / path.name for path in write_pictures(report.sections, unfinished))
         write_file(page, render_page(report).encode())
-    return Written(page, tuple(pictures / name for name in names))
+    return Written(page, written)

@@ -1,1 +1,1 @@
-"""A dataset made ready for Foxglove, Rerun and RViz: frames, meshes and markers beside what was recorded."""
+"""A dataset made ready for Foxglove, Rerun and RViz, with frames, meshes and markers; animated pictures."""

@@ -18,12 +18,10 @@ from throwcollect.episode.record import Samples
 from throwcollect.errors import ConfigError
 from throwcollect.extras import lazily, require
 from throwcollect.files import write_file
-from throwcollect.robots.description import full_description, robot_of
-from throwcollect.tools.tool import tool_of
 from throwcollect.units import NS_PER_S
 from throwcollect.view.camera import Camera, camera_on
-from throwcollect.view.chosen import choose_rows
-from throwcollect.view.robot import BALL_RGBA, read_drawn_robot
+from throwcollect.view.robot import BALL_RGBA, draw_robot_of
+from throwcollect.view.shown_throws import choose_rows
 
 images = lazily("PIL.Image")
 drawing = lazily("PIL.ImageDraw")
@@ -31,7 +29,7 @@ drawing = lazily("PIL.ImageDraw")
 _FORMATS = MappingProxyType({".webp": "WEBP", ".gif": "GIF"})
 _WIDTH, _HEIGHT = 640, 400
 _FINER = 1.5
-"""Pictures are drawn so many times as large and then made smaller, as the renderer does not smooth edges."""
+"""Pictures are drawn so many times as large and then made smaller, because the renderer does not smooth edges."""
 _FRAME_MS = 50
 _LAST_FRAME_MS = 1200
 _LIGHT = (2.0, -5.0, 8.0)
@@ -44,13 +42,13 @@ _HELD, _FLOWN, _LANDED = (150, 156, 164), (255, 115, 0), (200, 30, 30)
 
 @dataclass(frozen=True)
 class Animation:
-    """What has been written.
+    """An animated picture that was written.
 
     Attributes:
         file: The file.
         trial: Number of the trial.
         pictures: Number of pictures.
-        duration_s: How long they take to watch [s], without the time for which the last one stands.
+        duration_s: How long they take to watch [s], without the time for which the last one is shown.
         size_bytes: Size of the file.
     """
 
@@ -68,7 +66,7 @@ def render(directory: Path, output: Path, *, trial: int | None = None, slow: flo
         directory: The dataset.
         output: File to write, ``.webp`` or ``.gif``; one that is there is replaced.
         trial: Number of the trial; None for the first one that has an episode.
-        slow: How many times slower than it was it is shown.
+        slow: How many times slower than in simulation it is shown.
 
     Raises:
         ConfigError: If there is no such format or trial, or the robot's files cannot be read.
@@ -99,7 +97,7 @@ def render(directory: Path, output: Path, *, trial: int | None = None, slow: flo
 
 def _draw_all(config: Config, joints: tuple[str, ...], samples: Samples, row: dict[str, Any], slow: float) -> list[Any]:
     """Draw the pictures of a throw, one every `_FRAME_MS`, and its last sample."""
-    robot = read_drawn_robot(full_description(config), tool_of(config.tool).link, robot_of(config).share())
+    robot = draw_robot_of(config)
     urdf = robot.urdf.replace("package://", f"{robot.share}/")
     times_s = (samples.stamps_ns - samples.stamps_ns[0]) / NS_PER_S
     shown = [*np.searchsorted(times_s, np.arange(0, times_s[-1], _FRAME_MS / 1000 / slow)), len(samples) - 1]
@@ -138,11 +136,11 @@ def _place(renderer: Renderer, joints: tuple[str, ...], samples: Samples, number
 
 
 class _Ground:
-    """The ground with lines every half metre, and what is drawn on it and above it, but for robot and ball.
+    """The ground with lines every half metre, and everything that is drawn on it but robot and ball.
 
     Args:
-        camera: Who sees it.
-        middle: What it is around in world [m], shape ``(2,)``.
+        camera: The camera that sees it.
+        middle: Its middle in world [m], shape ``(2,)``.
     """
 
     def __init__(self, camera: Camera, middle: NDArray[np.float64]) -> None:
@@ -168,7 +166,7 @@ class _Ground:
         return self._empty.copy()
 
     def trace(self, picture: Any, path: NDArray[np.float64], color: tuple[int, int, int]) -> None:
-        """Draw the path of the ball, whose centres have the shape ``(n, 3)``."""
+        """Draw a path of the ball's centre in world [m], shape ``(n, 3)``."""
         if len(path) > 1:
             drawing.Draw(picture).line(self._pixels(path), fill=color, width=3, joint="curve")
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 _OUTWARD = np.array([0.32, -1.0, 0.22])
-"""From what is seen to the camera, in world: a little in front of the robot, and a little above."""
+"""Direction from the throw to the camera in world: a little in front of the robot, and a little above."""
 _TANGENT = 0.24
 """Tangent of half the vertical angle of view: small, so that lines hardly converge."""
 _NEAR_M, _FAR_M = 0.1, 100.0
@@ -37,7 +37,7 @@ class Camera:
         matrix = np.eye(4)
         matrix[:3, :3] = self.axes
         matrix[:3, 3] = -self.axes @ self.eye
-        return [float(number) for number in matrix.T.ravel()]
+        return matrix.T.ravel().tolist()
 
     @property
     def projection(self) -> list[float]:
@@ -47,7 +47,7 @@ class Camera:
         matrix[2, 2] = (_FAR_M + _NEAR_M) / (_NEAR_M - _FAR_M)
         matrix[2, 3] = 2 * _FAR_M * _NEAR_M / (_NEAR_M - _FAR_M)
         matrix[3, 2] = -1
-        return [float(number) for number in matrix.T.ravel()]
+        return matrix.T.ravel().tolist()
 
     @property
     def horizon(self) -> float:
@@ -55,18 +55,14 @@ class Camera:
         return float(1 - self.axes[2, 2] / (self.axes[1, 2] * _TANGENT)) / 2
 
     def faces(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """Find out which points are well in front of it, shape ``(n,)``; those are in world [m], shape ``(n, 3)``."""
+        """Find out which points, in world [m], shape ``(n, 3)``, are well in front of the camera, shape ``(n,)``."""
         distance: NDArray[np.float64] = (self.eye - points) @ self.axes[2]
         return distance > _NEAREST_M
 
     def project(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Find points in the picture.
+        """Find the places of points in the picture, which are in world [m] in front of the camera, shape ``(n, 3)``.
 
-        Args:
-            points: In world [m], shape ``(n, 3)``; all in front of the camera.
-
-        Returns:
-            Shares of its width from the left and of its height from the top, shape ``(n, 2)``.
+        Places are shares of its width from the left and of its height from the top, shape ``(n, 2)``.
         """
         seen = (points - self.eye) @ self.axes.T
         right, up = seen[:, 0] / (-seen[:, 2] * _TANGENT * self.aspect), seen[:, 1] / (-seen[:, 2] * _TANGENT)
@@ -74,7 +70,7 @@ class Camera:
 
 
 def camera_on(points: NDArray[np.float64], aspect: float) -> Camera:
-    """The camera that has all points in its picture, and is as near as that allows.
+    """Place the camera so that it has all points in its picture and is as near as that allows.
 
     Args:
         points: In world [m], shape ``(n, 3)``.

@@ -1,4 +1,4 @@
-"""A layout for Foxglove and Lichtblick: the scene, the ball, the joints against their limits, and what came of it."""
+"""A layout for Foxglove and Lichtblick: the scene, plots of the ball and of joints in their limits, and results."""
 
 from __future__ import annotations
 
@@ -18,14 +18,7 @@ _SPEED = 0.2
 
 
 def layout(joints: Sequence[str]) -> bytes:
-    """The layout, as it is imported from a file.
-
-    Args:
-        joints: Names of the joints whose limits are plotted.
-
-    Returns:
-        JSON text.
-    """
+    """JSON text of the layout, as applications import it; joints are those whose limits are plotted."""
     shares = [_series(f"/view/limits.position[{index}]", joint) for index, joint in enumerate(joints)]
     height = _series("/ball/odometry.pose.pose.position.z", "height [m]")
     panels = {
@@ -84,7 +77,7 @@ def _scene() -> dict[str, Any]:
             "/view/throw": {"visible": True, "showOutlines": False},
             "/view/throws": {"visible": True, "showOutlines": False},
             "/view/path": {"visible": False},
-            # This is the same robot, but with paths of meshes, which do not lie there on every machine.
+            # The same robot, but with paths of meshes, which not every machine has.
             "/robot_description": {"visible": False},
         },
         "layers": layers,

@@ -11,13 +11,13 @@ from typing import Any
 import numpy as np
 
 from rclzenoh.interfaces import get_message
-from throwcollect.dataset.throws_table import Row
+from throwcollect.dataset.throws_table import Row, ball_state
 from throwcollect.episode.frames import WORLD
 from throwcollect.episode.topics import BALL
 from throwcollect.errors import ConfigError
 from throwcollect.units import NS_PER_S
 from throwcollect.view.robot import BALL_RGBA, DrawnRobot, Rgba
-from throwcollect.view.viewed import ViewedThrow
+from throwcollect.view.shown_throws import ShownThrow
 
 _HELD: Rgba = (0.6, 0.6, 0.6, 0.8)
 _SUCCEEDED: Rgba = (0.0, 0.75, 0.35, 1.0)
@@ -29,18 +29,13 @@ _OTHERS_ALPHA = 0.25
 _POINT_M, _TEXT_M, _LINE_M, _THIN_LINE_M, _PLANE_M = 0.035, 0.07, 0.012, 0.005, 0.002
 _MARGIN_M = 0.5
 _POINTS_PER_S = 100
-"""Points of a path in a second of it: more could not be told apart by eye."""
+"""Points of a path for each second of it: the eye could not tell more apart."""
 
 
 def robot_markers(robot: DrawnRobot, stamp_ns: int) -> Any:
-    """The robot's shapes in the frames of its links, each mesh inside as ``data:`` URL, so that nothing is to be found.
+    """A visualization_msgs/MarkerArray with the robot's shapes in the frames of its links.
 
-    Args:
-        robot: The robot.
-        stamp_ns: Stamp of the markers [ns].
-
-    Returns:
-        A visualization_msgs/MarkerArray.
+    Meshes are ``data:`` URLs, so that viewers need no files.
 
     Raises:
         ConfigError: If a mesh cannot be read.
@@ -60,15 +55,8 @@ def robot_markers(robot: DrawnRobot, stamp_ns: int) -> Any:
     return array(markers=markers)
 
 
-def throw_markers(throw: ViewedThrow) -> Any:
-    """Markers of the throw that is shown; they take the place of those of the throw before.
-
-    Args:
-        throw: The throw.
-
-    Returns:
-        A visualization_msgs/MarkerArray.
-    """
+def throw_markers(throw: ShownThrow) -> Any:
+    """A visualization_msgs/MarkerArray of the throw that is shown, which replaces that of the throw before."""
     array, marker = (get_message(f"visualization_msgs/msg/{name}") for name in ("MarkerArray", "Marker"))
     stamp = throw.start_ns
     ball = _marker("ball", marker.SPHERE, BALL_RGBA, (2 * throw.config.ball.radius_m,) * 3, stamp)
@@ -80,15 +68,8 @@ def throw_markers(throw: ViewedThrow) -> Any:
     return array(markers=markers)
 
 
-def all_markers(throws: Sequence[ViewedThrow]) -> Any:
-    """Thin paths of all throws, and the landing plane of the first below them.
-
-    Args:
-        throws: The throws, at least one.
-
-    Returns:
-        A visualization_msgs/MarkerArray.
-    """
+def all_markers(throws: Sequence[ShownThrow]) -> Any:
+    """A visualization_msgs/MarkerArray with thin paths of all throws, and the landing plane of the first."""
     array, marker = (get_message(f"visualization_msgs/msg/{name}") for name in ("MarkerArray", "Marker"))
     stamp = throws[0].start_ns
     corners = np.concatenate([np.zeros((1, 2)), *(throw.path[:, :2] for throw in throws)])
@@ -100,15 +81,8 @@ def all_markers(throws: Sequence[ViewedThrow]) -> Any:
     return array(markers=[plane, *thin])
 
 
-def path_cloud(throw: ViewedThrow) -> Any:
-    """A throw's path as points, for viewers that draw no markers.
-
-    Args:
-        throw: The throw.
-
-    Returns:
-        A sensor_msgs/PointCloud2.
-    """
+def path_cloud(throw: ShownThrow) -> Any:
+    """A sensor_msgs/PointCloud2 with a throw's path, for viewers that draw no markers."""
     field = get_message("sensor_msgs/msg/PointField")
     data = throw.path.astype("<f4")
     fields = [field(name=name, offset=4 * axis, datatype=field.FLOAT32, count=1) for axis, name in enumerate("xyz")]
@@ -124,7 +98,7 @@ def path_cloud(throw: ViewedThrow) -> Any:
     )
 
 
-def _path(namespace: str, throw: ViewedThrow, stamp_ns: int, *, width: float, alpha: float) -> Any:
+def _path(namespace: str, throw: ShownThrow, stamp_ns: int, *, width: float, alpha: float) -> Any:
     """A line, grey while the ball was held, with the colour of the outcome from its release on."""
     point, color = get_message("geometry_msgs/msg/Point"), get_message("std_msgs/msg/ColorRGBA")
     rate, released, last = throw.config.record.rate_hz, throw.row.get("release_time_s"), len(throw.path) - 1
@@ -143,26 +117,23 @@ def _path(namespace: str, throw: ViewedThrow, stamp_ns: int, *, width: float, al
 
 def _point(name: str, row: Row, stamp_ns: int) -> list[Any]:
     """A dot with a label; nothing if the throw has no such point."""
-    if row.get(f"{name}_x_m") is None:
+    state = ball_state(row, name)
+    if state is None:
         return []
-    x, y, z = (row[f"{name}_{axis}_m"] for axis in "xyz")
+    (x, y, z), speed = state.position, math.hypot(*state.velocity)
     marker = get_message("visualization_msgs/msg/Marker")
     text = {
-        "release": lambda: f"release {row['release_time_s']:.2f} s, {_norm(row, 'release'):.2f} m/s",
-        "apex": lambda: f"apex {z:.2f} m",
-        "landing": lambda: f"landing x {x:.2f} m, y {y:.2f} m, {_norm(row, 'landing'):.2f} m/s",
-    }[name]()
+        "release": f"release {state.time_s:.2f} s, {speed:.2f} m/s",
+        "apex": f"apex {z:.2f} m",
+        "landing": f"landing x {x:.2f} m, y {y:.2f} m, {speed:.2f} m/s",
+    }[name]
     dot = _marker(name, marker.SPHERE, _SUCCEEDED, (_POINT_M,) * 3, stamp_ns)
     label = _marker(name, marker.TEXT_VIEW_FACING, _LABEL, (0.0, 0.0, _TEXT_M), stamp_ns, number=1)
     label.text = text
     _place(dot, x, y, z)
-    # A throw released on its way down is highest where it is released.
+    # The label of the release is below its dot: a ball released on its way down has its apex there, too.
     _place(label, x, y, z + (-1.5 if name == "release" else 1.5) * _TEXT_M)
     return [dot, label]
-
-
-def _norm(row: Row, name: str) -> float:
-    return math.hypot(*(row[f"{name}_v{axis}_mps"] for axis in "xyz"))
 
 
 def _marker(namespace: str, kind: int, rgba: Rgba, scale: tuple[float, ...], stamp_ns: int, *, number: int = 0) -> Any:
@@ -183,9 +154,13 @@ def _place(marker: Any, x: float, y: float, z: float) -> None:
 
 
 def _header(stamp_ns: int) -> Any:
+    return get_message("std_msgs/msg/Header")(stamp=make_stamp(stamp_ns), frame_id=WORLD)
+
+
+def make_stamp(stamp_ns: int) -> Any:
+    """A builtin_interfaces/Time."""
     sec, nanosec = divmod(stamp_ns, NS_PER_S)
-    stamp = get_message("builtin_interfaces/msg/Time")(sec=sec, nanosec=nanosec)
-    return get_message("std_msgs/msg/Header")(stamp=stamp, frame_id=WORLD)
+    return get_message("builtin_interfaces/msg/Time")(sec=sec, nanosec=nanosec)
 
 
 def _data_url(path: Path) -> str:

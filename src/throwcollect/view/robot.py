@@ -1,4 +1,4 @@
-"""What viewers draw of robot and ball: URDF texts without collision shapes, their shapes, and the files of meshes."""
+"""Robot and ball as viewers draw them: URDF texts without collision shapes, their shapes, and the files of meshes."""
 
 from __future__ import annotations
 
@@ -9,11 +9,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from throwcollect.config.schema import BallConfig
+from throwcollect.config.schema import BallConfig, Config
 from throwcollect.episode.topics import BALL
 from throwcollect.errors import DatasetError
 from throwcollect.extras import lazily
-from throwcollect.files import unwritable
+from throwcollect.robots.description import full_description, robot_of
+from throwcollect.tools.tool import tool_of
 
 transform = lazily("scipy.spatial.transform")
 
@@ -56,7 +57,7 @@ class DrawnRobot:
 
     Attributes:
         urdf: URDF text without collision shapes; meshes are ``package://`` URLs.
-        shapes: The same shapes.
+        shapes: The shapes in it.
         share: Directory that the paths of meshes are relative to.
     """
 
@@ -70,35 +71,39 @@ class DrawnRobot:
         return sorted({shape.mesh for shape in self.shapes if shape.mesh})
 
     def copy_package(self, directory: Path) -> None:
-        """Put the meshes into a directory, with a ``package.xml`` by which they are found.
+        """Put the meshes into a directory, with a ``package.xml`` by which viewers find them.
 
         Raises:
-            DatasetError: If a file cannot be copied.
+            OSError: If a file cannot be copied.
         """
         for mesh in self.meshes:
             target = directory / mesh
-            try:
-                target.parent.mkdir(parents=True, exist_ok=True)
-                shutil.copyfile(self.share / mesh, target)
-            except OSError as error:
-                raise unwritable(target, error) from error
+            target.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(self.share / mesh, target)
         for package in sorted({mesh.split("/", 1)[0] for mesh in self.meshes}):
             path = Path(package, "package.xml")
             source = self.share / path
-            try:
-                text = source.read_text(encoding="utf-8") if source.exists() else "<package><name></name></package>\n"
-                # Foxglove searches for the name that a package gives itself, which in URLs is that of its directory.
-                renamed = re.sub(r"<name>[^<]*</name>", f"<name>{package}</name>", text, count=1)
-                (directory / path).write_text(renamed, encoding="utf-8")
-            except OSError as error:
-                raise unwritable(directory / path, error) from error
+            text = source.read_text(encoding="utf-8") if source.exists() else "<package><name></name></package>\n"
+            # URLs of meshes have the name of the directory, but Foxglove searches for the name in `package.xml`.
+            renamed = re.sub(r"<name>[^<]*</name>", f"<name>{package}</name>", text, count=1)
+            (directory / path).write_text(renamed, encoding="utf-8")
+
+
+def draw_robot_of(config: Config) -> DrawnRobot:
+    """Read the robot with its tool as viewers draw it.
+
+    Raises:
+        ConfigError: If the robot's files cannot be read.
+        DatasetError: If its description cannot be drawn.
+    """
+    return read_drawn_robot(full_description(config), tool_of(config.tool).link, robot_of(config).share())
 
 
 def read_drawn_robot(description: str, tool: str, share: Path) -> DrawnRobot:
-    """Read the robot as viewers draw it.
+    """Read a URDF text as viewers draw it.
 
     Args:
-        description: URDF text of the robot, as in the dataset.
+        description: URDF text of the robot.
         tool: Name of the tool's link, which has a colour of its own.
         share: Directory that ``package://`` paths are relative to.
 
@@ -139,7 +144,7 @@ def _material(name: str, rgba: Rgba) -> ElementTree.Element:
 
 
 def _color(material: ElementTree.Element) -> dict[str, Rgba]:
-    """The colour that a material's name stands for, if it says so."""
+    """The name of a material and the colour that it defines, if it defines one."""
     color = material.find("color")
     if color is None:
         return {}

@@ -1,4 +1,4 @@
-"""Topics with one message a sample: those of the dataset that move the scene, and what is plotted beside it."""
+"""Topics with one message a sample: how they are encoded, and those that are only plotted."""
 
 from __future__ import annotations
 
@@ -35,12 +35,7 @@ def ball_speed() -> Topic:
 
 
 def range_shares(robot: Robot, joints: tuple[str, ...]) -> Topic:
-    """``/view/limits``: sensor_msgs/JointState whose positions are -1 at the lower limit and 1 at the upper one.
-
-    Args:
-        robot: The robot.
-        joints: Names of some of its joints.
-    """
+    """``/view/limits``: sensor_msgs/JointState whose positions are -1 at the lower limit and 1 at the upper one."""
     kind = "sensor_msgs/msg/JointState"
     columns = [robot.joints.index(joint) for joint in joints]
     message = get_message(kind)(name=list(joints), position=np.zeros(len(joints)))

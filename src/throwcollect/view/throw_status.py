@@ -1,31 +1,25 @@
-"""What the table of throws says of the throw that is shown."""
+"""The row of the table of throws as a message, for the throw that is shown."""
 
 from __future__ import annotations
 
 from typing import Any
 
 from rclzenoh.interfaces import get_message
-from throwcollect.units import NS_PER_S
-from throwcollect.view.viewed import ViewedThrow
+from throwcollect.view.markers import make_stamp
+from throwcollect.view.shown_throws import ShownThrow
 
 NAME = "throw"
 HARDWARE = "throwcollect"
-"""Hardware of the status; by it and `NAME` a viewer chooses what it shows."""
+"""Hardware of the status. By this and `NAME` a layout names the status that a panel shows."""
 
 
-def throw_facts(throw: ViewedThrow) -> Any:
-    """The row of a throw in the table of throws, without the columns that are null.
+def throw_facts(throw: ShownThrow) -> Any:
+    """A diagnostic_msgs/DiagnosticArray with the row of a throw, but for columns that are null.
 
-    Args:
-        throw: The throw.
-
-    Returns:
-        A diagnostic_msgs/DiagnosticArray with one status: OK if the trial succeeded, else a warning.
+    Its only status is OK if the trial succeeded, else a warning.
     """
     row = throw.row
     status, pair = (get_message(f"diagnostic_msgs/msg/{name}") for name in ("DiagnosticStatus", "KeyValue"))
-    sec, nanosec = divmod(throw.start_ns, NS_PER_S)
-    stamp = get_message("builtin_interfaces/msg/Time")(sec=sec, nanosec=nanosec)
     shown = status(
         level=status.OK if row["outcome"] == throw.config.task.success else status.WARN,
         name=NAME,
@@ -33,7 +27,7 @@ def throw_facts(throw: ViewedThrow) -> Any:
         message=": ".join(part for part in (f"trial {row['trial']} {row['outcome']}", row["reason"]) if part),
         values=[pair(key=key, value=_text(value)) for key, value in row.items() if value is not None],
     )
-    header = get_message("std_msgs/msg/Header")(stamp=stamp)
+    header = get_message("std_msgs/msg/Header")(stamp=make_stamp(throw.start_ns))
     return get_message("diagnostic_msgs/msg/DiagnosticArray")(header=header, status=[shown])
 
 

@@ -7,19 +7,15 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from throwcollect.dataset.bag import FileSummary, bag_information, to_yaml
+from throwcollect.dataset.bag import bag_information, to_yaml
 from throwcollect.dataset.directory import METADATA
 from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.throws_table import Row
-from throwcollect.episode.channels import Channel
 from throwcollect.episode.record import Samples
 from throwcollect.files import new_directory, unwritable
-from throwcollect.robots.description import full_description, robot_of
-from throwcollect.tools.tool import tool_of
-from throwcollect.view.chosen import choose_rows
 from throwcollect.view.foxglove import layout
-from throwcollect.view.robot import read_drawn_robot
-from throwcollect.view.viewed import ViewedThrow
+from throwcollect.view.robot import draw_robot_of
+from throwcollect.view.shown_throws import ShownThrow, choose_rows
 from throwcollect.view.viewer_recording import ViewRecording
 
 RECORDING = "throws.mcap"
@@ -31,7 +27,7 @@ _PAUSE_NS = 1_000_000_000
 
 @dataclass(frozen=True)
 class View:
-    """What has been written.
+    """A directory for viewers that was written.
 
     Attributes:
         recording: The MCAP file.
@@ -40,7 +36,7 @@ class View:
         messages: Number of messages.
         duration_s: How long they take to watch at real speed [s].
         recording_bytes: Size of the MCAP file.
-        mesh_bytes: Size of the meshes beside it.
+        mesh_bytes: Size of the meshes.
     """
 
     recording: Path
@@ -62,10 +58,7 @@ def view(directory: Path, output: Path, trials: Iterable[int] | None = None) -> 
     Args:
         directory: The dataset.
         output: Directory to write; must not exist, or be empty.
-        trials: Numbers of the trials to show, in this order; None: all that have an episode.
-
-    Returns:
-        What has been written.
+        trials: Numbers of the trials to show, in this order; None for all that have an episode.
 
     Raises:
         ConfigError: If there is something at `output`, or the robot's files cannot be read.
@@ -74,7 +67,7 @@ def view(directory: Path, output: Path, trials: Iterable[int] | None = None) -> 
     dataset = Dataset.open(directory)
     throws = _schedule(dataset, choose_rows(dataset, trials))
     config = dataset.config
-    robot = read_drawn_robot(full_description(config), tool_of(config.tool).link, robot_of(config).share())
+    robot = draw_robot_of(config)
     with new_directory(output) as beside:
         path = beside / RECORDING
         try:
@@ -82,10 +75,11 @@ def view(directory: Path, output: Path, trials: Iterable[int] | None = None) -> 
                 recording = ViewRecording(stream, config)
                 recording.write(throws, lambda throw: _samples(dataset, throw.row), robot)
                 summary = recording.finish(RECORDING)
-            (beside / METADATA).write_text(_metadata(summary, recording.channels), encoding="utf-8")
+            information = {"rosbag2_bagfile_information": bag_information([summary], recording.channels, {})}
+            (beside / METADATA).write_text(to_yaml(information), encoding="utf-8")
             (beside / LAYOUT).write_bytes(layout(tuple(config.task.end)))
             robot.copy_package(beside)
-            sizes = {mesh: (beside / mesh).stat().st_size for mesh in robot.meshes}
+            mesh_bytes = sum((beside / mesh).stat().st_size for mesh in robot.meshes)
             recording_bytes = path.stat().st_size
         except OSError as error:
             raise unwritable(output, error) from error
@@ -96,24 +90,20 @@ def view(directory: Path, output: Path, trials: Iterable[int] | None = None) -> 
         messages=summary.messages,
         duration_s=(summary.end_ns - summary.start_ns) / 1e9,
         recording_bytes=recording_bytes,
-        mesh_bytes=sum(sizes.values()),
+        mesh_bytes=mesh_bytes,
     )
 
 
-def _schedule(dataset: Dataset, rows: Iterable[Row]) -> list[ViewedThrow]:
-    """Throws one after another, whatever lies between them in the dataset."""
+def _schedule(dataset: Dataset, rows: Iterable[Row]) -> list[ShownThrow]:
+    """Schedule throws one after another with a pause, whatever time lies between them in the dataset."""
     throws, start = [], _FIRST_NS
     for row in rows:
         samples = _samples(dataset, row)
         config = dataset.plan.config_of(dataset.plan.trial(row["trial"]))
-        throws.append(ViewedThrow(row, config, start, samples.ball_position.copy()))
+        throws.append(ShownThrow(row, config, start, samples.ball_position.copy()))
         start += int(samples.stamps_ns[-1] - samples.stamps_ns[0]) + _PAUSE_NS
     return throws
 
 
 def _samples(dataset: Dataset, row: Row) -> Samples:
     return dataset.episode(row["trial"]).samples(dataset.joints)
-
-
-def _metadata(summary: FileSummary, channels: tuple[Channel, ...]) -> str:
-    return to_yaml({"rosbag2_bagfile_information": bag_information([summary], channels, {})})

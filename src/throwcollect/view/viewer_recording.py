@@ -1,4 +1,4 @@
-"""The MCAP file that viewers open: throws one after another, with everything that is drawn around them."""
+"""The MCAP file that viewers open: throws one after another, with robot, markers and facts."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ from throwcollect.robots.description import full_description, robot_of
 from throwcollect.view.markers import all_markers, path_cloud, robot_markers, throw_markers
 from throwcollect.view.robot import DrawnRobot, ball_urdf
 from throwcollect.view.sampled import ball_speed, encode_samples, range_shares
+from throwcollect.view.shown_throws import ShownThrow
 from throwcollect.view.throw_status import throw_facts
-from throwcollect.view.viewed import ViewedThrow
 
 _SAMPLED = Qos("volatile", 100)
 _LATCHED = Qos("transient_local", 1)
@@ -39,14 +39,10 @@ _LATCHED_TYPES = {
 
 
 class ViewRecording:
-    """Writes the file.
+    """Writes the MCAP file of a dataset's configuration to a stream.
 
     Attributes:
         channels: Its channels.
-
-    Args:
-        stream: The file, opened for writing.
-        config: The configuration of the dataset.
     """
 
     def __init__(self, stream: IO[bytes], config: Config) -> None:
@@ -80,15 +76,8 @@ class ViewRecording:
             for channel in channels
         }
 
-    def write(
-        self, throws: Sequence[ViewedThrow], samples: Callable[[ViewedThrow], Samples], robot: DrawnRobot
-    ) -> None:
-        """Write throws and what is drawn around them.
-
-        Args:
-            throws: The throws in order of time, at least one.
-            samples: Reads the samples of a throw.
-            robot: The robot.
+    def write(self, throws: Sequence[ShownThrow], samples: Callable[[ShownThrow], Samples], robot: DrawnRobot) -> None:
+        """Write throws in order of time, at least one, with their samples and everything else that viewers draw.
 
         Raises:
             DatasetError: If an episode cannot be read.
@@ -112,14 +101,7 @@ class ViewRecording:
             self._put_samples(samples(throw), throw.start_ns)
 
     def finish(self, name: str) -> FileSummary:
-        """Write the end of the file.
-
-        Args:
-            name: Name of the file.
-
-        Returns:
-            What a bag's metadata say of it.
-        """
+        """Write the end of the file, and sum up for a bag's metadata what it holds under its name."""
         self._writer.finish()  # type: ignore[no-untyped-call]
         return FileSummary(name, *self._times, dict(sorted(self._counts.items())))
 

@@ -61,7 +61,7 @@ def test_the_file_is_the_same_bytes_each_time_and_gives_what_the_map_gives(tmp_p
     model = load_model(tmp_path / "one")
     assert model.file.distilled is not None
     context = model.learned.scale(Role.CONTEXT, np.array([[0.1]]))
-    scaled = model.file.distilled.to_map().aim(np.array([[1.2, -0.2]]), context)
+    scaled = model.file.distilled.aim(np.array([[1.2, -0.2]]), context)
     wanted = model.learned.unscale(Role.PARAMETER, scaled)[0]
     assert ONNX_PROGRAM.rstrip() in (tmp_path / "one" / "README.md").read_text()
     script = f"target = [1.2, -0.2, 0.1]\n{ONNX_PROGRAM}\nprint(json.dumps(parameters))"

@@ -21,7 +21,9 @@ def red_pixels(figures: list[go.Figure], path: Path) -> np.ndarray:
     panels = [
         Panel(f"panel-{number}", "title", figure, small=len(figures) > 1) for number, figure in enumerate(figures)
     ]
-    paint(panels, path, width_in=3.5, dpi=100)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("throwcollect.report.painter.DPI", 100)
+        paint(panels, path)
     return np.asarray(np.abs(image.imread(path)[..., :3] - RED).max(axis=2) < 0.05)
 
 
@@ -86,9 +88,4 @@ def test_every_outcome_has_a_marker_of_its_own() -> None:
 
 def test_a_trace_that_the_painter_does_not_know_is_an_error(tmp_path: Path) -> None:
     with pytest.raises(KeyError, match="violin"):
-        paint(
-            [Panel("panel", "title", go.Figure(go.Violin(y=[1, 2])).update_layout(height=400))],
-            tmp_path / "a.png",
-            width_in=3.5,
-            dpi=100,
-        )
+        paint([Panel("panel", "title", go.Figure(go.Violin(y=[1, 2])).update_layout(height=400))], tmp_path / "a.png")

@@ -50,7 +50,7 @@ def test_datasets_with_little_in_them(
         collection.refuse(trial, "too fast")
     trials = [trial.number for trial in collection.plan.trials if trial.number not in refused]
     directory = collection.collect(tmp_path / "dataset", trials, lost=lost)
-    monkeypatch.setattr("throwcollect.report.pictures.DPI", 50)
+    monkeypatch.setattr("throwcollect.report.painter.DPI", 50)
     written = write_report(directory, tmp_path / "page.html", pictures=tmp_path / "pictures")
     page = Page(written.page.read_text(encoding="utf-8"))
     assert [attributes["id"] for attributes in page.named("section")] == SECTIONS

@@ -9,7 +9,7 @@ import numpy as np
 
 from throwcollect.learning.learned_map import Axis, Correction, Kind, LearnedMap, Role
 from throwcollect.learning.model_directory import write_model
-from throwcollect.learning.model_file import AxisEntry, CorrectionEntry, ModelFile, PolynomialEntry, TrainedOn
+from throwcollect.learning.model_file import ModelFile, TrainedOn
 from throwcollect.learning.polynomial import Polynomial
 
 KEYS = ("task.a", "task.b")
@@ -28,11 +28,11 @@ def make_model(directory: Path, throws: int = 400) -> None:
     file = ModelFile(
         version="0",
         kind=Kind.LOCAL,
-        axes=[AxisEntry(**vars(axis)) for axis in axes],
-        targets=list(TARGETS),
-        forward=PolynomialEntry.of(straight),
-        effort=PolynomialEntry.of(flat),
-        correction=CorrectionEntry.of(none),
+        axes=axes,
+        targets=TARGETS,
+        forward=straight,
+        effort=flat,
+        correction=none,
         trained_on=TrainedOn(
             **trained,
             throws=throws,

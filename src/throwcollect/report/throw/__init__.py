@@ -1,1 +1,1 @@
-"""What a report says of throws in particular."""
+"""The part of a report that is on throws in particular."""

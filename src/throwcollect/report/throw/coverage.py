@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 import pyarrow as pa
@@ -41,13 +42,13 @@ class Coverage:
         axes: One to three dimensions.
         counts: Throws in each cell, of one dimension for each axis.
         throws: Number of throws that landed, in a cell or not.
-        asked: Whether the cells are those of the configuration; else they lie between the lowest and highest values.
+        configured: Whether the cells are those of the configuration; else they span the values of the throws.
     """
 
     axes: tuple[Axis, ...]
     counts: NDArray[np.intp]
     throws: int
-    asked: bool
+    configured: bool
 
     @property
     def hit(self) -> int:
@@ -57,28 +58,22 @@ class Coverage:
     @property
     def pairs(self) -> tuple[tuple[Axis, Axis, NDArray[np.intp]], ...]:
         """Each pair of axes, and the throws over both, shape ``(n_first, n_second)``, summed over the third."""
-        count = len(self.axes)
+        numbers = set(range(len(self.axes)))
         return tuple(
-            (
-                self.axes[first],
-                self.axes[second],
-                self.counts.sum(axis=tuple(other for other in range(count) if other not in (first, second))),
-            )
-            for first in range(count)
-            for second in range(first + 1, count)
+            (self.axes[first], self.axes[second], self.counts.sum(axis=tuple(numbers - {first, second})))
+            for first, second in combinations(sorted(numbers), 2)
         )
 
 
 def count_throws(landings: Landings, throws: pa.Table, *, target: TargetConfig | None) -> Coverage | None:
-    """Count throws in the cells of a configuration's targets, or of what was reached if it has none.
+    """Count throws that landed in the cells of the configuration's targets; None if none landed.
+
+    Without targets, the cells span the values of the throws.
 
     Args:
         landings: Throws that landed.
         throws: Table of all throws.
-        target: Targets of the configuration.
-
-    Returns:
-        None if nothing landed.
+        target: Targets of the configuration; None if it has none.
     """
     if not len(landings):
         return None
@@ -99,7 +94,7 @@ def count_throws(landings: Landings, throws: pa.Table, *, target: TargetConfig |
 
 
 def _choose_edges(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Edges of cells whose width is a round number, so that it can be quoted."""
+    """Choose edges of cells whose width is a round number, which people can quote."""
     low, high = float(values.min()), float(values.max())
     width = _round_up((high - low) / _BINS) or 0.1
     first, last = np.floor(low / width), np.floor(high / width) + 1
@@ -108,7 +103,7 @@ def _choose_edges(values: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _round_up(width: float) -> float:
-    """The next of 1, 2 and 5 times a power of ten; 0 for what is too small to tell values apart."""
+    """Round up to 1, 2 or 5 times a power of ten; to 0 if the width is too small to tell values apart."""
     if width < 1e-9:
         return 0.0
     power = 10.0 ** np.floor(np.log10(width))

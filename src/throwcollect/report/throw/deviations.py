@@ -1,4 +1,4 @@
-"""A picture of how far landings by two engines are apart."""
+"""A picture of the distances between landings by two engines."""
 
 from __future__ import annotations
 
@@ -11,14 +11,13 @@ import plotly.graph_objects as go
 from throwcollect.report.contents import Panel
 from throwcollect.report.figures import BLUE, NEUTRAL
 from throwcollect.report.painter import paint
-from throwcollect.report.pictures import COLUMN_IN, DPI
 
 
 def write_deviations(deviations: Sequence[Sequence[float]], path: Path) -> None:
-    """Draw where throws land by one engine, seen from where they land by another one.
+    """Draw the landings by one engine relative to those by another one.
 
     Args:
-        deviations: Of each throw, along x and along y [m], shape ``(2, n_throws)``.
+        deviations: Differences of each throw's landings along x and along y [m], shape ``(2, n_throws)``.
         path: PNG file to write.
 
     Raises:
@@ -31,4 +30,4 @@ def write_deviations(deviations: Sequence[Sequence[float]], path: Path) -> None:
     figure.update_xaxes(title="landing farther in x by [mm]")
     figure.update_yaxes(title="landing farther in y by [mm]")
     figure.update_layout(height=400, showlegend=False)
-    paint([Panel("deviations", "", figure)], path, width_in=COLUMN_IN, dpi=DPI)
+    paint([Panel("deviations", "", figure)], path)

@@ -1,4 +1,4 @@
-"""What a report takes from recordings: departures from ballistic motion, and a few throws to look at."""
+"""The recordings that a report reads: departures from ballistic motion, and a few throws to look at."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from throwcollect.tasks.throw.flight import flight_residual, release_of
 from throwcollect.units import NS_PER_S
 
 MOST_RESIDUALS = 2000
-"""Episodes whose flight is computed again, some 15 s of work; `verify` computes them all."""
+"""Most episodes whose flight is computed again, which takes some 15 s; `verify` computes those of all."""
 _MOST_LANDED = 6
 _MOST_OTHERS = 3
 
@@ -31,9 +31,9 @@ class Residuals:
 
     Attributes:
         episodes: Number of episodes in the dataset.
-        checked: Number of those that were compared, chosen at random if not all.
-        distance_m: Largest distance of each flight that could be compared [m], shape ``(n,)``; nan where a sample is
-            not a number.
+        checked: Number of episodes that were compared; if not all, they were chosen at random.
+        distance_m: Largest distance of each flight that could be compared [m], shape ``(n,)``; nan if a sample is not a
+            number.
     """
 
     episodes: int
@@ -42,7 +42,7 @@ class Residuals:
 
     @property
     def finite_m(self) -> NDArray[np.float64]:
-        """Those distances that are numbers [m]."""
+        """The distances that are numbers [m]."""
         return self.distance_m[np.isfinite(self.distance_m)]
 
 
@@ -84,7 +84,7 @@ class JointMotion:
     release_s: float | None
 
     def span(self, column: int) -> tuple[float, float]:
-        """Range of positions to show of a joint [°], at least 6°, so that joints at rest look at rest."""
+        """Range of positions to show of a joint [°]: at least 6°, so that a joint at rest looks at rest."""
         both = np.degrees(np.concatenate([self.commanded[:, column], self.measured[:, column]]))
         both = both[np.isfinite(both)]
         low, high = (float(both.min()), float(both.max())) if len(both) else (0.0, 0.0)
@@ -99,26 +99,20 @@ def measure_residuals(dataset: Dataset) -> Residuals:
         DatasetError: If an episode is not where the table says, or is damaged.
     """
     trials = _find_recorded(dataset)
-    # A regular choice would be a lattice in the parameters of a Sobol sequence or a grid.
+    # At random, as every n-th point of a Sobol sequence or a grid would lie on a lattice of its parameters.
     chosen = np.sort(np.random.default_rng(0).permutation(trials)[:MOST_RESIDUALS])
-    found = []
+    distances = []
     for trial in chosen.tolist():
         episode = dataset.episode(trial)
         config = dataset.plan.config_of(dataset.plan.trial(trial))
         distance = flight_residual(episode.samples(), episode.header, config=config)
         if distance is not None:
-            found.append(distance)
-    return Residuals(len(trials), len(chosen), np.array(found))
+            distances.append(distance)
+    return Residuals(len(trials), len(chosen), np.array(distances))
 
 
 def choose_examples(dataset: Dataset, landed: Landings, outcomes: Outcomes) -> tuple[int, ...]:
-    """Choose trials to look at: some that landed, from the nearest to the farthest, and one of some other outcomes.
-
-    Args:
-        dataset: The dataset.
-        landed: Throws that landed.
-        outcomes: Outcomes of all its trials.
-    """
+    """Choose trials to look at: some that landed, from the nearest to the farthest, and one of some other outcomes."""
     recorded = set(_find_recorded(dataset).tolist())
     by_distance = landed.trial[np.argsort(landed.distance_m, kind="stable")].tolist()
     usable = [trial for trial in by_distance if trial in recorded]

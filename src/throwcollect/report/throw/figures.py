@@ -28,8 +28,9 @@ _SCALE = "Viridis"
 _SHADES = ("#3b528b", "#2c728e", "#21908d", "#27ad81", "#5dc863", "#aadc32")
 """Colours of paths that landed, from the nearest to the farthest."""
 _MOST_SVG_POINTS = 1500
-"""Above this a plot is left to WebGL."""
+"""Plots of more points are drawn by WebGL, which is faster."""
 _FLOOR_M = 1e-17
+"""Residuals are drawn as at least this, as 0 has no place on a logarithmic axis."""
 
 
 def draw_landing_map(landings: Landings, outcomes: Outcomes) -> go.Figure:
@@ -65,15 +66,15 @@ def draw_release_map(landings: Landings, outcomes: Outcomes) -> go.Figure:
 def _draw_coloured(
     landings: Landings, outcomes: Outcomes, *, columns: tuple[str, str, str], hover: str, scale_title: str
 ) -> go.Figure:
-    """Draw points with one colour scale, and a marker of its own for each outcome."""
+    """Draw points in one colour scale, each outcome with its own marker."""
     shown = landings[choose_points(len(landings))]
     x, y, colour = (getattr(shown, name) for name in columns)
     kind = go.Scattergl if len(shown) > _MOST_SVG_POINTS else go.Scatter
     size = 8 if len(shown) <= 300 else 6 if len(shown) <= 1500 else 4
     figure = go.Figure()
-    there = [(code, name) for code, name in enumerate(outcomes.names) if (shown.code == code).any()]
-    # Throws that landed come last, on top: they are what the colours are about.
-    for code, name in reversed(there):
+    present = [(code, name) for code, name in enumerate(outcomes.names) if (shown.code == code).any()]
+    # Throws that landed are drawn last, on top of the others, as the colours are for them.
+    for code, name in reversed(present):
         own, style = shown.code == code, style_of(name)
         outline = {"size": 1.4 * size, "line": {"color": style.colour, "width": size / 5}} if name != LANDED else {}
         figure.add_trace(
@@ -93,8 +94,8 @@ def _draw_coloured(
                 hovertemplate=f"trial %{{customdata}}<br>{hover}<extra>{in_words(name)}</extra>",
             )
         )
-    # The legend has markers of its own, as those of the points have no single colour.
-    for _, name in there:
+    # The legend has other markers than the points, which have no single colour.
+    for _, name in present:
         style = style_of(name)
         look = {"symbol": style.symbol, "color": NEUTRAL}
         if name != LANDED:

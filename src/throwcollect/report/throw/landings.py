@@ -14,7 +14,7 @@ from throwcollect.report.points import read_numbers
 
 @dataclass(frozen=True)
 class Landings:
-    """All throws whose ball crossed the landing plane, whatever their outcome; each array of shape ``(n,)``.
+    """All throws whose ball crossed the landing plane, of any outcome; each array has the shape ``(n,)``.
 
     Attributes:
         trial: Number of the trial.
@@ -51,7 +51,7 @@ class Landings:
 def read_landings(throws: pa.Table, outcomes: Outcomes) -> Landings:
     """Read the landings of a table of throws."""
     x, y = read_numbers(throws, "landing_x_m"), read_numbers(throws, "landing_y_m")
-    everything = Landings(
+    landings = Landings(
         trial=np.asarray(throws["trial"].to_numpy()),
         x_m=x,
         y_m=y,
@@ -61,4 +61,4 @@ def read_landings(throws: pa.Table, outcomes: Outcomes) -> Landings:
         elevation_rad=read_numbers(throws, "release_elevation_rad"),
         code=outcomes.codes,
     )
-    return everything[np.isfinite(x + y)]
+    return landings[np.isfinite(x + y)]

@@ -1,4 +1,4 @@
-"""What the task of throwing adds to a report: landings, releases, targets, single throws and their physics."""
+"""The sections that the task of throwing adds to a report: landings, releases, single throws and their physics."""
 
 from __future__ import annotations
 
@@ -30,11 +30,7 @@ from throwcollect.tasks.throw.flight import BALLISTIC_TOLERANCE_M
 
 
 def report_throws(dataset: Dataset, outcomes: Outcomes) -> TaskReport:
-    """What a dataset of throws says that one of another task would not.
-
-    Args:
-        dataset: The dataset.
-        outcomes: Outcomes of all its trials.
+    """Make the part of a report that only datasets of throws have.
 
     Raises:
         DatasetError: If an episode is damaged, or not where the table says.
@@ -63,7 +59,7 @@ def report_throws(dataset: Dataset, outcomes: Outcomes) -> TaskReport:
 
 
 def _choose_middle(paths: Sequence[BallPath]) -> int:
-    """Of the trials that landed the one in the middle; the first of all if none did."""
+    """Choose, of the trials that landed, the one in the middle; the first of all if none landed."""
     landed = [path.trial for path in paths if path.outcome == LANDED]
     return landed[len(landed) // 2] if landed else paths[0].trial
 
@@ -100,7 +96,7 @@ def _show_targets(coverage: Coverage | None) -> Iterator[Panel]:
         return
     text = f"{coverage.hit:,} of {coverage.counts.size:,} cells have a throw that landed, "
     text += f"at most {coverage.counts.max():,}"
-    if coverage.asked:
+    if coverage.configured:
         text += f"; {coverage.throws - int(coverage.counts.sum()):,} landed in no cell"
     if len(coverage.axes) == 1:
         figure = figures.draw_coverage_bars(coverage.axes[0], coverage.counts)
@@ -109,7 +105,7 @@ def _show_targets(coverage: Coverage | None) -> Iterator[Panel]:
         names = [axis.label.partition(" [")[0].removesuffix(" below the horizontal") for axis in (first, second)]
         yield Panel(
             key=f"cells-{number}",
-            title=f"{'Targets:' if coverage.asked else 'Throws by'} {names[0]} and {names[1]}",
+            title=f"{'Targets:' if coverage.configured else 'Throws by'} {names[0]} and {names[1]}",
             figure=figures.draw_coverage_map(first, second, counts),
             text="" if number else f"{text}.",
             picture="" if number else "target_coverage",
@@ -169,15 +165,15 @@ def _show_physics(residuals: Residuals) -> Section:
     title = "Whether flights obey physics"
     if not len(residuals.finite_m):
         return Section("physics", "Physics", title, "No flight was long enough to compare it with ballistic motion.")
-    which = "All episodes"
+    compared = "All episodes"
     if residuals.checked < residuals.episodes:
-        which = f"{residuals.checked:,} of {residuals.episodes:,} episodes, chosen at random,"
+        compared = f"{residuals.checked:,} of {residuals.episodes:,} episodes, chosen at random,"
     exact = int((residuals.distance_m == 0).sum())
     text = (
-        f"{which} were compared, sample by sample, with ballistic motion from their release: the largest distance is "
-        f"{residuals.finite_m.max():.1e} m{f', {exact:,} agree to the last bit' if exact else ''}. "
+        f"{compared} were compared, sample by sample, with ballistic motion from their release: the largest distance "
+        f"is {residuals.finite_m.max():.1e} m{f', {exact:,} agree to the last bit' if exact else ''}. "
     )
-    # A distance that is not a number is no agreement either.
+    # NaN counts as a departure, too.
     above = int((~(residuals.distance_m <= BALLISTIC_TOLERANCE_M)).sum())
     if above:
         text += Markup("<b>{:,} depart by more than the tolerance</b>; ").format(above)

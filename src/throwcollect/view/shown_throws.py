@@ -1,20 +1,38 @@
-"""Which throws of a dataset are shown."""
+"""The throws of a dataset that are shown, and when."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import dataclass
 
+import numpy as np
+from numpy.typing import NDArray
+
+from throwcollect.config.schema import Config
 from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.throws_table import Row
 from throwcollect.errors import ConfigError, DatasetError
 
 
-def choose_rows(dataset: Dataset, trials: Iterable[int] | None) -> list[Row]:
-    """Find the rows of the table of throws that are shown.
+@dataclass(frozen=True)
+class ShownThrow:
+    """A throw and when it is shown.
 
-    Args:
-        dataset: The dataset.
-        trials: Numbers of the trials, in this order; None: all that have an episode.
+    Attributes:
+        row: Its row of the table of throws.
+        config: The configuration of its trial.
+        start_ns: Stamp of its first sample in the file that viewers open [ns].
+        path: Ball centre in world [m], shape ``(n_samples, 3)``.
+    """
+
+    row: Row
+    config: Config
+    start_ns: int
+    path: NDArray[np.float64]
+
+
+def choose_rows(dataset: Dataset, trials: Iterable[int] | None) -> list[Row]:
+    """Choose the rows of the table of throws that are shown: some trials in their order, or all that have an episode.
 
     Raises:
         ConfigError: If there is no such trial.
