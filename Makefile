@@ -89,8 +89,10 @@ define twice
 $(1) -o cache_dir=.pytest_cache/$@ || $(1) -o cache_dir=.pytest_cache/$@ --last-failed --last-failed-no-failures none
 endef
 
+# Some tests wait, for clients that never read or for a pause, so there is one worker more than the machine has cores.
+WORKERS = $$(( $$(nproc) + 1 ))
 test-units:
-	$(call twice,$(BIN)/python -m pytest -n logical tests/unit tests/install tests/rclzenoh tests/contract tests/physics)
+	$(call twice,$(BIN)/python -m pytest -n $(WORKERS) tests/unit tests/install tests/rclzenoh tests/contract tests/physics)
 
 # On Fast DDS, nodes at times do not find each other on a busy machine. A run starts them again; so do its tests.
 test-ros: ros

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# Makes a fresh Debian machine ready for the tests that need a Docker engine: engine, base image, wheelhouse, image.
+# Makes a fresh Debian machine ready for the tests that need a Docker engine: engine, base image, Compose, wheelhouse, image.
 # What is there already is left as it is, so running it again takes seconds. `PYTHON` names one that has throwcollect
-# installed from this clone, and pip.
+# installed from this clone, and pip; `AFTER` the process that installs it, which the last two steps wait for.
 #
 # Where no engine can be had, it says why on standard output and in build/engine-unavailable, and succeeds: the tests
 # that need one are then skipped, with that reason.
@@ -78,6 +78,7 @@ if ! docker image inspect "$base" > /dev/null 2>&1; then
 fi
 need docker-compose docker-compose
 .ci/compose.sh || echo "no Compose v2 for the tests"
+[ -z "${AFTER:-}" ] || tail --pid="$AFTER" -f /dev/null
 "$python" docker/wheelhouse.py --ros "$wheelhouse"
 "$python" -m throwcollect image build --base "$base" --wheelhouse "$wheelhouse" 2> build/image.log \
     || { tail -n 25 build/image.log; exit 1; }

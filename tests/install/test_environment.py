@@ -197,9 +197,31 @@ def test_make_uses_it_before_anything_else(target: str, tmp_path: Path) -> None:
     )
     first, *others = said.stdout.splitlines()
     assert first == "packaging/environment.sh .venv python3.12"
-    (install,) = [line for line in others if "pip install" in line and " -e " in line]
-    assert "--only-binary=pybullet" in install
-    assert "--quiet" not in install
+    (install,) = [line for line in others if " -e " in line]
+    assert install.startswith("packaging/install.sh .venv/bin/python -e ")
+
+
+@pytest.mark.parametrize(
+    ("fails", "installs"),
+    [
+        ("nothing", "-m uv pip install --python {python} --only-binary pybullet -e .[collect]"),
+        (
+            "*install*uv*",
+            "-m pip install --no-compile --disable-pip-version-check --only-binary=pybullet -e .[collect]",
+        ),
+        ("*uv*-e*", "-m pip install --no-compile --disable-pip-version-check --only-binary=pybullet -e .[collect]"),
+    ],
+    ids=["by uv", "uv cannot be had", "uv cannot install"],
+)
+def test_uv_installs_and_pip_where_uv_cannot(fails: str, installs: str, tmp_path: Path) -> None:
+    python = tmp_path / "python"
+    python.write_text(f'#!/bin/sh\necho "$*"\ncase "$*" in {fails}) exit 1 ;; esac\n')
+    python.chmod(0o755)
+    command = [SCRIPT.with_name("install.sh"), python, "-e", ".[collect]"]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    assert done.returncode == 0
+    assert done.stdout.splitlines()[-1] == installs.format(python=python)
+    assert ("pip tries" in done.stderr) == (fails == "*uv*-e*")
 
 
 def works(python: str) -> bool:
