@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
 
 from throwcollect.dataset.data_card import count_outcomes
 from throwcollect.dataset.digest import combine_digests
@@ -46,7 +47,7 @@ def summary(dataset: Dataset) -> Info:
         episodes=episodes,
         outcomes=count_outcomes(dataset.throws),
         wanted=dataset.config.until.wanted if dataset.config.until else None,
-        landing=_find_landing_area(dataset) if dataset.config.task.throws else None,
+        landing=_find_landing_area(dataset.throws) if dataset.config.task.throws else None,
         samples=samples,
         duration_s=(samples - episodes) / dataset.config.record.rate_hz,
         shards=len(shards),
@@ -61,11 +62,12 @@ def summary(dataset: Dataset) -> Info:
     )
 
 
-def _find_landing_area(dataset: Dataset) -> Mapping[str, tuple[float, float]] | None:
-    bounds = dataset.landings.bounds
-    if np.isnan(bounds).any():
+def _find_landing_area(throws: pa.Table) -> Mapping[str, tuple[float, float]] | None:
+    # Not by arrays of NumPy: the launcher asks, and Arrow imports pandas, where it is installed, to make them.
+    limits = {axis: pc.min_max(throws[f"landing_{axis}"]).as_py() for axis in ("x_m", "y_m")}
+    if limits["x_m"]["min"] is None:
         return None
-    return {axis: (low, high) for axis, (low, high) in zip(("x_m", "y_m"), bounds[:2].tolist(), strict=True)}
+    return {axis: (each["min"], each["max"]) for axis, each in limits.items()}
 
 
 def digest(directory: Path) -> str:
