@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Any
 
 from ruamel.yaml import YAML
@@ -32,8 +33,12 @@ class _Scanner(Scanner):
         raise ScannerError(None, None, reason, self.reader.get_mark())
 
 
+@lru_cache(maxsize=8)
 def compose(text: str) -> Node | None:
-    """Parse a text into a node; None if the text is empty.
+    """Parse a text into a node, which nobody may change; None if the text is empty.
+
+    It remembers the last texts, because parsing takes 10 ms, and one command reads the configuration of a dataset
+    several times: for the plan, for its tables, for each file that it verifies.
 
     Raises:
         YAMLError: If the text is no YAML, or too large.

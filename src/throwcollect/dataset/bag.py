@@ -8,6 +8,7 @@ from __future__ import annotations
 import io
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -114,16 +115,21 @@ def from_yaml(path: Path) -> Mapping[str, Any]:
     Raises:
         DatasetError: If the file cannot be read, is no such YAML, or is larger than any bag's metadata.
     """
-    yaml = YAML(typ="safe", pure=True)
-    yaml.Composer = _PlainComposer
-    text = read_text(path, most_bytes=_MOST_BYTES)
     try:
-        document = yaml.load(text)
+        document = _parse(read_text(path, most_bytes=_MOST_BYTES))
     except RecursionError as error:
         raise DatasetError("cannot be read: values are nested too deeply", path=path) from error
     except (YAMLError, ValueError) as error:
         raise DatasetError(f"cannot be read: {error}", path=path) from error
     return document if isinstance(document, dict) else {}
+
+
+@lru_cache(maxsize=8)
+def _parse(text: str) -> Any:
+    """Parse a text; the last ones are remembered, because one command reads the metadata of a dataset several times."""
+    yaml = YAML(typ="safe", pure=True)
+    yaml.Composer = _PlainComposer
+    return yaml.load(text)
 
 
 def read_bag_metadata(directory: Path) -> Mapping[str, Any]:
