@@ -49,7 +49,7 @@ show("frame", frame.rotation_at(np.linspace(-7, 7, 5000)))
 
 def computed(**environment: str) -> list[str]:
     """Hashes of everything that is computed with numbers before a simulation gets it."""
-    whole = {**os.environ, "PYTHONPATH": str(ROOT), **environment}
+    whole = {**os.environ, "PYTHONPATH": f"{ROOT / 'src'}:{ROOT}", **environment}
     script = [sys.executable, "-c", COMPUTED]
     done = subprocess.run(script, cwd=ROOT, env=whole, capture_output=True, text=True, timeout=120, check=True)
     return done.stdout.splitlines()

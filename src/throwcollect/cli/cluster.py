@@ -42,7 +42,7 @@ def submit(
     elif wait:
         from throwcollect.cli.cluster_runs import follow_to_the_end
 
-        follow_to_the_end(done.directory, json=json)
+        follow_to_the_end(done.directory, as_json=json)
     elif json:
         print_json({"directory": str(done.directory), "array": done.job.array, "join": done.job.join})
     else:

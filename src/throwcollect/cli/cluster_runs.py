@@ -5,6 +5,7 @@ They do the same as for runs of this machine, as far as the queue and the files 
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -20,18 +21,18 @@ from throwcollect.errors import ConfigError, Interrupted
 from throwcollect.wording import command, format_count
 
 
-def follow_to_the_end(directory: Path, *, json: bool) -> None:
+def follow_to_the_end(directory: Path, *, as_json: bool) -> None:
     """Show the progress of a run until it ends, and then its summary; Ctrl-C leaves the run alone."""
     run = ClusterRun.open(directory)
     progress = ProgressOfSlices(run)
-    with display(quiet=json) as shown, count_interruptions() as interruptions:
+    with display(quiet=as_json) as shown, count_interruptions() as interruptions:
         for look in follow(run, keep_on=lambda: not interruptions()):
             shown.update(progress.at(look))
     if look.lives and not look.complete:
         raise Interrupted(f"left; {directory} goes on", hint=command("wait", "--run", directory))
     if (error := run.explain(look)) is not None:
         raise error
-    print_collected(info(directory), directory, as_json=json)
+    print_collected(info(directory), directory, as_json=as_json)
 
 
 def print_logs(run: ClusterRun, tasks: list[str]) -> None:
@@ -47,17 +48,22 @@ def print_logs(run: ClusterRun, tasks: list[str]) -> None:
             typer.echo(f"{text:>{len(str(run.submission.tasks))}} | {line}")
 
 
-def print_events(run: ClusterRun) -> None:
-    """Print each change of the state of a task, until the run ends."""
+def print_events(run: ClusterRun, *, as_json: bool) -> None:
+    """Print each change of the state of a task, until the run ends; as JSON, one document a line."""
+
+    def tell(line: str, **document: object) -> None:
+        typer.echo(json.dumps(document) if as_json else line)
+
     before: dict[int | None, str] = {}
     for look in follow(run):
         states = {task.index: f"{task.state.lower()}{f' on {task.node}' if task.node else ''}" for task in look.tasks}
         for index in sorted(states.keys() | before.keys(), key=lambda each: each or 0):
             now = states.get(index, "ended")
             if before.get(index) != now and (index in states or before.get(index) != "ended"):
-                typer.echo(f"task {index}: {now}")
+                tell(f"task {index}: {now}", event="task", task=index, state=now)
             before[index] = now
-    typer.echo("finished" if look.complete else "over")
+    end = "finished" if look.complete else "over"
+    tell(end, event=end)
 
 
 def end(run: ClusterRun) -> None:
@@ -74,7 +80,7 @@ def rows() -> Iterator[tuple[str, ...]]:
     for run in find_queued():
         look = run.look()
         yield (
-            run.submission.jobs[-1].array or run.submission.jobs[-1].join,
+            _number_of(run),
             "slurm",
             str(look.running * run.simulations_per_task),
             f"{ProgressOfSlices(run).at(look).ended}/{run.trials}",
@@ -90,7 +96,7 @@ def documents() -> list[dict[str, Any]]:
         look = run.look()
         found.append(
             {
-                "run": run.submission.jobs[-1].array,
+                "run": _number_of(run),
                 "runtime": "slurm",
                 "directory": str(run.directory),
                 "tasks": run.submission.tasks,
@@ -100,6 +106,11 @@ def documents() -> list[dict[str, Any]]:
             }
         )
     return found
+
+
+def _number_of(run: ClusterRun) -> str:
+    """Number of the run's last array; of its joining job if nothing else was left to submit."""
+    return run.submission.jobs[-1].array or run.submission.jobs[-1].join
 
 
 def _status(look: Look, run: ClusterRun) -> str:

@@ -67,7 +67,7 @@ def wait(run: RunOption = None, json: JsonOption = False) -> None:
     if (submitted := _find_submitted(run)) is not None:
         from throwcollect.cli.cluster_runs import follow_to_the_end
 
-        follow_to_the_end(submitted.directory, json=json)
+        follow_to_the_end(submitted.directory, as_json=json)
         return
     from throwcollect.cli.dataset.info import print_summary
     from throwcollect.runs.following import follow
@@ -117,7 +117,7 @@ def events(run: RunOption = None, json: JsonOption = False) -> None:
     if (submitted := _find_submitted(run)) is not None:
         from throwcollect.cli.cluster_runs import print_events
 
-        print_events(submitted)
+        print_events(submitted, as_json=json)
         return
     from throwcollect.runs.following import read_events
 

@@ -159,7 +159,12 @@ class OpenShard:
         Raises:
             DatasetError: If the shard cannot be written.
         """
-        if self._descriptor is None or not self._runs:
+        if self._descriptor is None:
+            return FinishedShard(None, {})
+        if not self._runs:
+            # The first episode could not be written, and its trial and all others were lost.
+            self.close()
+            self.part.unlink(missing_ok=True)
             return FinishedShard(None, {})
         with replacing(self.path) as descriptor:
             write = partial(write_all, descriptor)

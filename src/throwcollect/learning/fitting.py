@@ -155,7 +155,7 @@ def _find_axes(
         role = _choose_role(dataset.config, key, parameters, context)
         # Nothing can be learned of a key with one value, and scaling would divide by zero.
         if low == high and low is not None:
-            if key in parameters:
+            if key in (*parameters, *context):
                 raise ConfigError(f"{key} has the value {low:g} in all throws", expected="a key that varies")
             continue
         axes.append(Axis(key, role, low, high, float(nominal[key])))

@@ -62,6 +62,20 @@ def test_a_shard_is_beside_its_name_until_its_last_trial_is_in(collection: Any, 
     writer.close()
 
 
+def test_a_shard_whose_first_episode_had_no_room_leaves_nothing_if_all_its_trials_are_lost(
+    collection: Any, tmp_path: Path
+) -> None:
+    directory = tmp_path / "dataset"
+    writer = DatasetWriter.create(directory, collection.plan)
+    with file_size_limit(0), pytest.raises(DatasetError, match="cannot be written"):
+        collection.fill(writer, [0])
+    assert (directory / "quick_00000.mcap.part").exists()
+    for trial in range(3):
+        writer.append_lost(trial, "full disk")
+    assert not list(directory.glob("*_00000.mcap*"))
+    writer.close()
+
+
 def test_an_open_shard_holds_each_episode_as_soon_as_it_is_appended(collection: Any, tmp_path: Path) -> None:
     """What `kill -9` leaves behind are whole records: every chunk is followed by the metadata that name its trial."""
     from mcap.records import Chunk, Metadata

@@ -136,6 +136,8 @@ def test_a_constant_parameter_is_left_out_or_refused_by_name(dataset: Dataset) -
     assert KEYS[2] not in fit(constant).parameters
     with pytest.raises(ConfigError, match=r"torso_1_joint has the value 0\.1 in all throws"):
         fit(constant, parameters=KEYS)
+    with pytest.raises(ConfigError, match=r"torso_1_joint has the value 0\.1 in all throws"):
+        fit(constant, given=KEYS[2:3])
 
 
 def test_numbers_that_are_not_finite_are_named(dataset: Dataset) -> None:

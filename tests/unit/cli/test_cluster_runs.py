@@ -1,0 +1,49 @@
+"""What `events` and `ps` tell of datasets that were submitted to a cluster."""
+
+from __future__ import annotations
+
+import json
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from throwcollect.cli import cluster_runs
+from throwcollect.cluster.following import Look
+from throwcollect.cluster.slurm import Task
+
+RUN: Any = SimpleNamespace()
+
+
+def look(*tasks: Task, complete: bool = False) -> Look:
+    return Look(frozenset(), tasks, None, complete)
+
+
+@pytest.fixture
+def looks(monkeypatch: pytest.MonkeyPatch) -> None:
+    seen = [look(Task(0, "RUNNING", "n1", "")), look(Task(0, "COMPLETED", "n1", "0:0"), complete=True)]
+    monkeypatch.setattr(cluster_runs, "follow", lambda _run: iter(seen))
+
+
+@pytest.mark.usefixtures("looks")
+def test_events_are_lines(capsys: pytest.CaptureFixture[str]) -> None:
+    cluster_runs.print_events(RUN, as_json=False)
+    assert capsys.readouterr().out.splitlines() == ["task 0: running on n1", "task 0: completed on n1", "finished"]
+
+
+@pytest.mark.usefixtures("looks")
+def test_events_are_documents_where_json_is_asked_for(capsys: pytest.CaptureFixture[str]) -> None:
+    cluster_runs.print_events(RUN, as_json=True)
+    assert [json.loads(line) for line in capsys.readouterr().out.splitlines()] == [
+        {"event": "task", "task": 0, "state": "running on n1"},
+        {"event": "task", "task": 0, "state": "completed on n1"},
+        {"event": "finished"},
+    ]
+
+
+def test_a_run_of_which_only_the_joining_job_was_submitted_has_its_number(monkeypatch: pytest.MonkeyPatch) -> None:
+    jobs = [SimpleNamespace(array="7", join="8"), SimpleNamespace(array="", join="9")]
+    run = SimpleNamespace(submission=SimpleNamespace(jobs=jobs, tasks=3), directory="data", look=look)
+    monkeypatch.setattr(cluster_runs, "find_queued", lambda: [run])
+    (document,) = cluster_runs.documents()
+    assert document["run"] == "9"
