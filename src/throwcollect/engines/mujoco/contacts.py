@@ -38,13 +38,13 @@ def aim_contacts(data: mujoco.MjData, hz: float, restitutions: NDArray[np.float6
             if nothing bounces.
     """
     # The last rows are those of contacts, three for each: one along its normal, and two of friction. Contacts of shapes
-    # that merely touch have no rows.
-    first = data.ne + data.nf + data.nl
-    away, speeds = data.efc_pos[first::_ROWS] * hz, data.efc_vel[first::_ROWS]
-    wanted = np.maximum(away, _CORRECTED * away)
-    if restitutions is not None:
-        bounces = (speeds < -_LEAST_BOUNCE_MPS) & (speeds + away < 0.0)
-        wanted[bounces] = (restitutions[data.contact.geom[data.efc_id[first::_ROWS]]].prod(axis=1) * speeds)[bounces]
-    wanted += speeds
-    wanted *= -hz / HARDNESS
-    data.efc_aref[first::_ROWS] = wanted
+    # that merely touch have no rows. There are one or two contacts, for which plain numbers take a third of the time of
+    # arrays, to the same bits.
+    gaps, speeds, targets = data.efc_pos.tolist(), data.efc_vel.tolist(), data.efc_aref
+    for row in range(data.ne + data.nf + data.nl, len(gaps), _ROWS):
+        away, speed = gaps[row] * hz, speeds[row]
+        wanted = max(away, _CORRECTED * away)
+        if restitutions is not None and speed < -_LEAST_BOUNCE_MPS and speed + away < 0.0:
+            one, other = restitutions[data.contact.geom[data.efc_id[row]]].tolist()
+            wanted = one * other * speed
+        targets[row] = (wanted + speed) * (-hz / HARDNESS)

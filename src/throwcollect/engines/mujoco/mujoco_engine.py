@@ -182,7 +182,8 @@ class MujocoEngine(Engine):
         begin_step, end_step, inverse, greater = mujoco.mj_step1, mujoco.mj_step2, mujoco.mj_rne, np.greater
         drag, due, stride = steps.drag_kgpm, steps.first_sample, steps.stride
         restitutions = self._restitutions
-        last_presses, number = None, 0
+        untouched = presses.tobytes()
+        last_presses, number = b"", 0
         for want in list(pull * steps.targets[:-1, self._columns] + brake * steps.velocities[:, self._columns]):
             begin_step(model, data)
             subtract(want, multiply(position, pull, work), work)
@@ -193,16 +194,17 @@ class MujocoEngine(Engine):
             subtract(work, pushed, work)
             add(work, load, work)
             maximum(minimum(work, most, out=work), least, out=torque)
-            if data.ncon:
+            contacts = data.ncon
+            if contacts:
                 aim_contacts(data, hz, restitutions)
             if drag:
                 self._apply_drag(drag)
             end_step(model, data)
             number += 1
-            greater(pressing, nothing, presses)
-            if (now := presses.tobytes()) != last_presses:
+            now = greater(pressing, nothing, presses).tobytes() if contacts else untouched
+            if now != last_presses:
                 last_presses = now
-                self._tell_touch(number, presses, observer)
+                self._tell_touch(number, now, observer)
             if number == due:
                 due += stride
                 if observer.on_sample(number, self._sample()):
@@ -240,8 +242,14 @@ class MujocoEngine(Engine):
         mujoco.mj_kinematics(self._model, self._data)
         return boxes(self._model, self._data, bodies)
 
-    def _tell_touch(self, step: int, presses: NDArray[np.bool_], observer: Observer) -> None:
-        """Tell the observer which bodies press on the ball now, if others did before."""
+    def _tell_touch(self, step: int, presses: bytes, observer: Observer) -> None:
+        """Tell the observer which bodies press on the ball now, if others did before.
+
+        Args:
+            step: Number of the step.
+            presses: One byte for each surface, 1 if it presses.
+            observer: Whom to tell.
+        """
         touching = frozenset(surface.name for surface in compress(self._surfaces, presses))
         if touching != self._touching:
             self._touching = touching
