@@ -60,6 +60,10 @@ for python in ${named:-python3 python3.12 python3.13 python3.14}; do
         exit
     fi
 done
+if [ -n "$named" ] && said=$("$named" --version 2> /dev/null) && ! suits "$named" "(3, 10)" "(3, 15)"; then
+    echo "$named is $said, and this needs a Python from 3.10 to 3.14: make PYTHON=/path/to/python3.11" >&2
+    exit 1
+fi
 echo "no Python from 3.10 to 3.14 that can make environments is here (${named:-python3.11, python3.10, python3}):" \
     "install python3-venv or uv, or name one: make PYTHON=/path/to/python3.11" >&2
 exit 1

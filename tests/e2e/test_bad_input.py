@@ -147,7 +147,7 @@ def test_all_problems_of_a_file_come_at_once(say: Callable[..., Said], tmp_path:
     ("directory", "message"),
     [
         ("used", "used: holds notes.txt\n  expected: a directory that is new or empty"),
-        ("file", "file: cannot be used as directory of a dataset: File exists"),
+        ("file", "file: cannot be used as directory of a dataset: Not a directory"),
         ("file/data", "file/data: cannot be used as directory of a dataset: Not a directory"),
     ],
 )
@@ -324,7 +324,7 @@ def test_directories_that_are_no_whole_dataset(
         for name, message in {
             "none": "none: holds no dataset",
             "empty": "empty: holds no dataset",
-            "begun": "begun: the dataset is not finished: it has no metadata.yaml",
+            "begun": "begun: the dataset is not finished: it has no metadata.yaml\n  try: throwcollect resume begun",
             "torn": "throws.parquet: is missing",
         }.items():
             said = say("dataset", verb, name)

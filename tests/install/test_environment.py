@@ -159,7 +159,9 @@ def test_a_python_that_is_named_is_the_only_one_that_is_looked_at(commands: Path
     put(commands, "uv")
     code, _, err = made("python3.9")
     assert code == 1
-    assert "(python3.9)" in err
+    assert err.startswith("python3.9 is ")
+    assert "from 3.10 to 3.14" in err
+    assert made("python3.8")[2].startswith("no Python from 3.10 to 3.14 that can make environments is here (python3.8)")
     assert "python3.12 -m venv there" in made("python3.12")[1]
     assert "python3.11 -m venv there" in made("python3.11")[1]
 
@@ -199,6 +201,31 @@ def test_make_uses_it_before_anything_else(target: str, tmp_path: Path) -> None:
     assert first == "packaging/environment.sh .venv python3.12"
     (install,) = [line for line in others if " -e " in line]
     assert install.startswith("packaging/install.sh .venv/bin/python -e ")
+
+
+def test_an_environment_with_another_python_than_the_named_one_is_not_used(tmp_path: Path) -> None:
+    shutil.copy(ROOT / "Makefile", tmp_path)
+    (tmp_path / "pyproject.toml").touch()
+    binaries = tmp_path / ".venv" / "bin"
+    binaries.mkdir(parents=True)
+    pythons = {binaries / "python": "3.11.2", tmp_path / "same": "3.11.2", tmp_path / "other": "3.12.1"}
+    for path, version in pythons.items():
+        path.write_text(f"#!/bin/sh\n[ $1 != -V ] || echo Python {version}\n")
+        path.chmod(0o755)
+    (binaries / "throwcollect").write_text("#!/bin/sh\necho collects\n")
+    (binaries / "throwcollect").chmod(0o755)
+    (tmp_path / ".venv" / ".ready").touch()
+
+    def make_up(*named: str) -> subprocess.CompletedProcess[str]:
+        environment = {name: value for name, value in os.environ.items() if not name.startswith("MAKE")}
+        words = ["make", "--silent", "up", *named]
+        return subprocess.run(words, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
+
+    for named in ((), ("PYTHON=./same",)):
+        assert make_up(*named).stdout.startswith("collects\n")
+    refused = make_up("PYTHON=./other")
+    assert (refused.returncode != 0, refused.stdout) == (True, "")
+    assert refused.stderr.startswith(".venv has Python 3.11.2, not that of ./other: rm -r .venv, then make up")
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from throwcollect.config.schema import Config, RobotConfig
 from throwcollect.config.values import with_values
-from throwcollect.dataset.creation import create
+from throwcollect.dataset.creation import create, refuse_taken
 from throwcollect.dataset.directory import TRIALS
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.robots.feasibility import Feasibility
@@ -212,6 +212,8 @@ def prepare(
         ConfigError: If the sweep or the directory cannot be used; nothing stays on the disk then.
         WorkerError: If a process that checks trials is killed.
     """
+    # To check many trials takes minutes, so what needs no plan is looked at before.
+    refuse_taken(directory)
     _check_room(directory, _count_before(config))
     points = _draw_points(config, sweep_directory, say)
     _check_room(directory, len(points.values))

@@ -22,6 +22,7 @@ from throwcollect.dataset.directory import METADATA, PLAN
 from throwcollect.episode.channels import Channel
 from throwcollect.errors import DatasetError
 from throwcollect.files import read_text
+from throwcollect.wording import command
 
 VERSION = 9
 _MOST_BYTES = 10_000_000
@@ -141,7 +142,8 @@ def read_bag_metadata(directory: Path) -> Mapping[str, Any]:
     path = directory / METADATA
     if not path.exists():
         if (directory / PLAN).is_file():
-            raise DatasetError(f"the dataset is not finished: it has no {METADATA}", path=directory)
+            hint = command("resume", directory)
+            raise DatasetError(f"the dataset is not finished: it has no {METADATA}", path=directory, hint=hint)
         raise DatasetError("holds no dataset", path=directory)
     bag = from_yaml(path).get("rosbag2_bagfile_information")
     if not isinstance(bag, dict):

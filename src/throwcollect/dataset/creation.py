@@ -37,9 +37,16 @@ def create(directory: Path, plan: Plan, *, listed: Points | None = None) -> None
         _fill(directory, plan, listed, made=made)
 
 
-def _fill(directory: Path, plan: Plan, listed: Points | None, *, made: bool) -> None:
+def refuse_taken(directory: Path) -> None:
+    """Refuse a directory that holds anything; one that does not exist yet is as good as an empty one.
+
+    Raises:
+        ConfigError: If it holds files, or cannot be a directory.
+    """
     try:
         taken = sorted(path.name for path in directory.iterdir())
+    except FileNotFoundError:
+        return
     except OSError as error:
         raise _unusable(directory, error) from error
     if taken:
@@ -49,6 +56,10 @@ def _fill(directory: Path, plan: Plan, listed: Points | None, *, made: bool) -> 
             expected="a directory that is new or empty",
             hint="choose another one with --output" + (f", or go on: {command('resume', directory)}" if begun else ""),
         )
+
+
+def _fill(directory: Path, plan: Plan, listed: Points | None, *, made: bool) -> None:
+    refuse_taken(directory)
     with ExitStack() as undo:
         undo.callback(_clear, directory, remove=made)
         write_file(directory / CONFIG, dump_yaml(plan.config).encode())

@@ -8,7 +8,7 @@ import pytest
 
 from throwcollect.config.schema import Config
 from throwcollect.coordinator import prepare
-from throwcollect.errors import PlanError
+from throwcollect.errors import ConfigError, PlanError
 
 CONFIG = {
     "name": "many",
@@ -31,6 +31,16 @@ def test_a_plan_of_which_no_trial_is_left_is_refused(monkeypatch: pytest.MonkeyP
     impossible = {**CONFIG, "sweep": {"parameters": {"task.duration_s": {"min": 0.1, "max": 0.12}}}}
     with pytest.raises(PlanError, match=r"60 trials, all refused"):
         prepare.draw_plan(Config.model_validate(impossible), directory=Path(), processes=2)
+
+
+def test_a_directory_that_is_taken_is_refused_before_trials_are_checked(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(prepare, "draw_first_points", lambda *_, **__: pytest.fail("points are drawn"))
+    (tmp_path / "notes.txt").touch()
+    for directory, reason in ((tmp_path, "holds notes.txt"), (tmp_path / "notes.txt", "cannot be used")):
+        with pytest.raises(ConfigError, match=reason):
+            prepare.prepare(Config.model_validate(CONFIG), directory, sweep_directory=tmp_path)
 
 
 def test_of_a_large_plan_it_is_told_at_once_what_goes_on(monkeypatch: pytest.MonkeyPatch) -> None:
