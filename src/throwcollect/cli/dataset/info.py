@@ -82,7 +82,7 @@ def describe(found: Info) -> str:
         speed = found.episodes / found.wall_s
         factor = found.duration_s / found.wall_s
         lines["took"] = (
-            f"{found.wall_s:.1f} s, {speed:.1f} {found.noun}s/s, {factor:.1f} x real time, start-up included"
+            f"{found.wall_s:.1f} s, {speed:.1f} {found.noun}s/s, {factor:.1f} x real time, start of the nodes included"
         )
     if isinstance(found, Summary) and found.open:
         lines["open"] = "anybody who reached the router could join, read and disturb the run"
