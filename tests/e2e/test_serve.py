@@ -30,6 +30,7 @@ from throwcollect.run_key import RunKey
 from throwcollect.runs.records import Records
 from throwcollect.runs.state_directory import STATE_VARIABLE
 from throwcollect.serve.finding import find_server, make_page_address
+from throwcollect.serve.rosbridge.reassembly import LONGEST_FRAME
 
 pytestmark = pytest.mark.e2e
 TRIALS, MANY = 10, 24
@@ -59,10 +60,15 @@ class Server:
         return answer.status_code, answer.json() if answer.content else None
 
     def open(self, path: str) -> ClientConnection:
-        url = self.address["url"].replace("http", "ws", 1)
-        return connect(
-            f"{url}/api/v1{path}", subprotocols=[f"bearer.{self.address['token']}"], open_timeout=60, max_size=None
-        )  # type: ignore[arg-type]
+        return self._connect(f"/api/v1{path}")
+
+    def open_rosbridge(self, instance: str) -> ClientConnection:
+        return self._connect(f"/rosbridge/{instance}")
+
+    def _connect(self, path: str) -> ClientConnection:
+        url = self.address["url"].replace("http", "ws", 1) + path
+        protocol: Any = f"bearer.{self.address['token']}"
+        return connect(url, subprotocols=[protocol], open_timeout=60, max_size=None)
 
     def instance(self, name: str) -> dict[str, Any]:
         status, found = self.ask("GET", f"/instances/{name}")
@@ -265,6 +271,15 @@ def test_a_session_serves_clients_and_is_slow_as_long_as_somebody_watches(place:
     with server.open("/instances/talos/live/sim_1") as nobody, pytest.raises(ConnectionClosed) as end:
         nobody.recv()
     assert (end.value.rcvd and end.value.rcvd.code) == 4404
+    longest = '{"op": "nothing", "pad": "' + "x" * (LONGEST_FRAME - 28) + '"}'
+    with server.open_rosbridge("talos") as client:
+        client.send(longest)
+        assert "no operation nothing" in json.loads(client.recv(60))["msg"]
+        # The server does not read to the end of what is longer, so the client may see a reset in the place of 1009.
+        with suppress(ConnectionClosed):
+            client.send(longest + " ")
+        with pytest.raises(ConnectionClosed):
+            client.recv(60)
     with server.open("/instances/talos/live/sim_0"):
         server.kill()
         # Another server lets go of what a killed one has slowed down.

@@ -236,9 +236,13 @@ def _check_room(component: Component) -> None:
     living = [run.id for run in runs if run.status == "running"]
     if len(living) >= component.max_instances:
         raise ConflictError(
-            f"component {component.name}: {len(living)} instances live, as many as max_instances allows",
+            f"component {component.name}: {_count_living(len(living))}, as many as max_instances allows",
             hint=f"stop one of {', '.join(living)}",
         )
+
+
+def _count_living(number: int) -> str:
+    return "1 instance lives" if number == 1 else f"{number} instances live"
 
 
 @contextmanager

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable
+from contextlib import AsyncExitStack
 
 from fastapi import APIRouter, WebSocket
 
-from throwcollect.errors import ConflictError, ThrowcollectError
+from throwcollect.errors import ConflictError, NotFoundError, ThrowcollectError
 from throwcollect.runs.records import Records, Run
 from throwcollect.serve.bridges import Bridges
 from throwcollect.serve.instances import Instances
 from throwcollect.serve.rosbridge import attend
-from throwcollect.serve.sockets import NOT_FOUND
+from throwcollect.serve.sockets import NOT_FOUND, refuse
 
 
 def make_rosbridge_routes(instances: Instances, bridges: Bridges) -> APIRouter:
@@ -21,7 +22,7 @@ def make_rosbridge_routes(instances: Instances, bridges: Bridges) -> APIRouter:
 
     @router.websocket("/rosbridge/{instance}")
     async def one(socket: WebSocket, instance: str) -> None:
-        await _attend(socket, bridges, lambda: instances.get(instance))
+        await _attend(socket, bridges, lambda: _find(instances, instance))
 
     @router.websocket("/")
     async def only(socket: WebSocket) -> None:
@@ -31,12 +32,26 @@ def make_rosbridge_routes(instances: Instances, bridges: Bridges) -> APIRouter:
 
 
 async def _attend(socket: WebSocket, bridges: Bridges, find_run: Callable[[], Run]) -> None:
-    try:
-        run = await asyncio.to_thread(find_run)
-        async with bridges.bridge(run) as bridge:
-            await attend(socket, bridge, read_only=not socket.scope["state"]["may_change"])
-    except ThrowcollectError as error:
-        await socket.close(NOT_FOUND, error.message[:120])
+    async with AsyncExitStack() as stack:
+        try:
+            run = await asyncio.to_thread(find_run)
+            bridge = await stack.enter_async_context(bridges.bridge(run))
+        except ThrowcollectError as error:
+            await refuse(socket, NOT_FOUND, error.message)
+            return
+        await attend(socket, bridge, read_only=not socket.scope["state"]["may_change"])
+
+
+def _find(instances: Instances, instance: str) -> Run:
+    """The run of an id.
+
+    Raises:
+        NotFoundError: If there is none, or it has ended: nobody would ever answer.
+    """
+    run = instances.get(instance)
+    if run.status == "ended":
+        raise NotFoundError(f"run {instance} has ended")
+    return run
 
 
 def _find_only_run() -> Run:

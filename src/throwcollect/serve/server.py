@@ -25,12 +25,12 @@ from throwcollect.serve.app import make_app
 from throwcollect.serve.finding import Address, log_path, publish
 from throwcollect.serve.instances import Instances
 from throwcollect.serve.models import Models
+from throwcollect.serve.rosbridge.reassembly import LONGEST_FRAME
 
 _PORT = 8080
 """Port to serve at if the user names none and it is free."""
 WEBSOCKETS: Literal["websockets-sansio"] = "websockets-sansio"
 """Implementation of WebSockets: it waits for a client that reads slowly, instead of collecting frames in memory."""
-_MOST_FRAME = 10_000_000
 _MOST_CLIENTS = 256
 _LOG_BYTES = 1_000_000
 _END_S = 2.5
@@ -89,7 +89,7 @@ def serve(
             log_config=None,
             access_log=False,
             ws=WEBSOCKETS,
-            ws_max_size=_MOST_FRAME,
+            ws_max_size=LONGEST_FRAME,
             # Most clients are on this machine, where compression only costs time.
             ws_per_message_deflate=False,
             limit_concurrency=_MOST_CLIENTS,

@@ -108,7 +108,8 @@ def test_a_container_may_join_a_run(
     assert (first.status_code, first.json()["kind"], first.json()["joins"]) == (202, "container", "t")
     assert ask("e", component="ear", joins="t").status_code == 200
     assert ask("e", component="ear").status_code == 409
-    assert ask("f", component="ear", joins="t").status_code == 409
+    assert (answer := ask("f", component="ear", joins="t")).status_code == 409
+    assert answer.json()["title"] == "component ear: 1 instance lives, as many as max_instances allows"
     assert [each.joins for each in orders] == ["t"]
     assert client.get(f"{URL}/e/urdf").text == "<robot/>"
     assert client.put(f"{URL}/e/urdf", content="<robot/>").status_code == 409

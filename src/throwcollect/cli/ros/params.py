@@ -69,7 +69,8 @@ def show_parameter(node: NodeArgument, name: ParameterArgument, run: RunOption =
         print(label, plain(getattr(values[0], field)))
 
 
-@param_app.command("set")
+# A value may be a negative number, which is no option.
+@param_app.command("set", context_settings={"ignore_unknown_options": True})
 def set_parameter(
     node: NodeArgument,
     name: ParameterArgument,

@@ -220,6 +220,7 @@ def test_parameters_are_listed_read_and_set(say: Callable[..., Said]) -> None:
     refused = say("param", "set", "/robot/driver", "limit", "10")
     assert refused.code == 2
     assert refused.err.startswith("throwcollect: setting limit of /robot/driver failed: Parameter limit out of range")
+    assert say("param", "set", "/robot/driver", "limit", "-1").err.endswith("value: -1\n"), "a number, and no option"
 
 
 def test_a_goal_is_sent_and_its_result_told(say: Callable[..., Said]) -> None:

@@ -110,7 +110,8 @@ def url(bridge: Bridge) -> Iterator[str]:
         await attend(websocket, bridge)
 
     app = Starlette(routes=[WebSocketRoute("/", route)])
-    config = uvicorn.Config(app, port=0, log_level="warning", lifespan="off", ws_per_message_deflate=False)
+    options: dict[str, Any] = {"lifespan": "off", "ws_per_message_deflate": False, "timeout_graceful_shutdown": 1}
+    config = uvicorn.Config(app, port=0, log_level="warning", **options)
     server = uvicorn.Server(config)
     thread = threading.Thread(target=server.run, daemon=True)
     thread.start()

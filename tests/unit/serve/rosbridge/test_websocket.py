@@ -9,9 +9,9 @@ from typing import Any
 
 import psutil
 import pytest
-from tests.unit.serve.rosbridge.conftest import wait_for, wait_for_listener
+from tests.unit.serve.rosbridge.conftest import PATIENCE_S, wait_for, wait_for_listener
 from websockets.exceptions import ConnectionClosedError
-from websockets.sync.client import connect
+from websockets.sync.client import ClientConnection, connect
 
 from throwcollect.ros import Node, get_message, get_service
 from throwcollect.serve.rosbridge import websocket
@@ -19,6 +19,11 @@ from throwcollect.serve.rosbridge.websocket import Outbox
 
 String: Any = get_message("std_msgs/msg/String")
 Trigger: Any = get_service("std_srvs/srv/Trigger")
+
+
+def hear(socket: ClientConnection) -> Any:
+    """The next frame, read; one that never comes fails the test instead of holding up all of them."""
+    return json.loads(socket.recv(PATIENCE_S))
 
 
 def test_topics_are_listed_heard_and_services_called(url: str, node: Node) -> None:
@@ -32,7 +37,7 @@ def test_topics_are_listed_heard_and_services_called(url: str, node: Node) -> No
 
         def ask(**fields: Any) -> Any:
             socket.send(json.dumps(fields))
-            return json.loads(socket.recv())
+            return hear(socket)
 
         listed = wait_for(
             lambda: (
@@ -50,7 +55,7 @@ def test_topics_are_listed_heard_and_services_called(url: str, node: Node) -> No
         socket.send(json.dumps({"op": "subscribe", "topic": "words"}))
         wait_for_listener(publisher)
         publisher.publish(String(data="hello"))
-        assert json.loads(socket.recv()) == {"op": "publish", "topic": "words", "msg": {"data": "hello"}}
+        assert hear(socket) == {"op": "publish", "topic": "words", "msg": {"data": "hello"}}
     wait_for(lambda: not publisher.get_subscription_count(), "who has left hears nothing any more")
     node.destroy_service(service)
 
@@ -58,10 +63,10 @@ def test_topics_are_listed_heard_and_services_called(url: str, node: Node) -> No
 def test_a_frame_that_is_too_long_ends_the_connection(url: str) -> None:
     with connect(url) as socket:
         socket.send(json.dumps({"op": "nothing"}))
-        assert json.loads(socket.recv())["op"] == "status"
+        assert hear(socket)["op"] == "status"
         socket.send("ä" * (6 * 2**20))
         with pytest.raises(ConnectionClosedError, match="1009"):
-            socket.recv()
+            hear(socket)
 
 
 def test_who_does_not_read_loses_the_oldest_frames_and_holds_up_nobody(url: str, node: Node) -> None:
@@ -70,16 +75,19 @@ def test_who_does_not_read_loses_the_oldest_frames_and_holds_up_nobody(url: str,
     with connect(url, max_queue=1) as slow, connect(url) as quick:
         for each in (slow, quick):
             each.send(subscribe)
+            # What follows is answered when the bridge has taken in this subscription, and not that of the other alone.
+            each.send(json.dumps({"op": "nothing"}))
+            assert hear(each)["op"] == "status"
         wait_for_listener(publisher)
         # More than the buffers of the connection hold.
         for number in range(100):
             publisher.publish(String(data=f"{number} " + "x" * 500_000))
-            assert json.loads(quick.recv())["msg"]["data"].startswith(f"{number} ")
+            assert hear(quick)["msg"]["data"].startswith(f"{number} ")
         publisher.publish(String(data="last"))
-        assert json.loads(quick.recv())["msg"]["data"] == "last"
+        assert hear(quick)["msg"]["data"] == "last"
         told: list[Any] = []
         while not told or told[-1].get("msg") != {"data": "last"}:
-            told.append(json.loads(slow.recv()))
+            told.append(hear(slow))
         assert len(told) < 100
         statuses = [each["msg"] for each in told if each["op"] == "status"]
         assert len(statuses) == 1
@@ -104,7 +112,7 @@ def test_memory_for_who_never_reads_is_bounded(url: str, node: Node) -> None:
         wait_for(hears, "the topic is heard")
         for number in range(250):
             publisher.publish(String(data=f"{number} {text}"))
-            while not json.loads(quick.recv(20))["msg"]["data"].startswith(f"{number} "):
+            while not hear(quick)["msg"]["data"].startswith(f"{number} "):
                 pass
             memory.append(process.memory_info().rss)
         # As much waits after 100 MiB as may.

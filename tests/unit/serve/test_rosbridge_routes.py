@@ -1,0 +1,38 @@
+"""Whom the sockets of rosbridge turn away, and with which words."""
+
+from __future__ import annotations
+
+from typing import NoReturn
+
+import pytest
+from starlette.websockets import WebSocketDisconnect
+from tests.unit.serve.conftest import Remember, Served, ended
+
+from throwcollect.errors import ConflictError
+from throwcollect.serve import rosbridge_routes
+
+
+def end_of(served: Served, path: str) -> tuple[int, str]:
+    """Close code and reason of a socket."""
+    with served.socket(path, served.keys.full) as socket, pytest.raises(WebSocketDisconnect) as end:
+        socket.receive_text()
+    return end.value.code, end.value.reason
+
+
+def test_a_client_of_no_run_is_told_why(served: Served) -> None:
+    assert end_of(served, "/rosbridge/nope") == (4404, "no run nope")
+    assert end_of(served, "/") == (4404, "0 runs live")
+
+
+def test_a_client_of_a_run_that_is_over_does_not_wait_for_good(served: Served, remember: Remember) -> None:
+    remember("over", **ended())
+    assert end_of(served, "/rosbridge/over") == (4404, "run over has ended")
+
+
+def test_a_reason_has_as_many_bytes_as_fit_into_a_frame(served: Served, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(rosbridge_routes, "_find_only_run", lambda: _fail("ä" * 100))
+    assert end_of(served, "/") == (4404, "ä" * 61)
+
+
+def _fail(message: str) -> NoReturn:
+    raise ConflictError(message)
