@@ -217,7 +217,10 @@ def _show_throughput(throughput: Throughput | None, info: Info) -> Section:
         return Section("throughput", "Throughput", title, no_journal)
     wall_s = info.wall_s or float(throughput.edges_s[-1])
     mean = throughput.commits / wall_s
-    text = f"{throughput.commits:,} {info.noun}s in {wall_s:,.1f} s, {mean:.1f} a second on average, start of the nodes included."
+    text = (
+        f"{throughput.commits:,} {info.noun}s in {wall_s:,.1f} s, start of the nodes included; "
+        f"{mean:.1f} a second on average."
+    )
     if resumed := len(throughput.resumed_s):
         text += f" It was resumed {f'{resumed} times' if resumed > 1 else 'once'} (dotted); the pauses are left out."
     panel = Panel("rate", f"{info.noun.capitalize()}s a second", figures.draw_throughput(throughput, info.noun))
