@@ -298,11 +298,11 @@ def _read_table(path: Path, names: Sequence[str]) -> list[dict[str, float]]:
                 numbers = {name: _to_number(row[name]) for name in names}
                 if wrong := [name for name in names if not math.isfinite(numbers[name])]:
                     raise ConfigError(
-                        f"{path}:{reader.line_num}: {wrong[0]}: {row[wrong[0]]!r}", expected="a finite number"
+                        f"{path}:{reader.line_num}: {wrong[0]}: {row[wrong[0]] or ''!r}", expected="a finite number"
                     )
                 rows.append(numbers)
     except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise ConfigError(f"{path}: cannot be read: {error}") from error
+        raise ConfigError(f"{path}: cannot be read: {getattr(error, 'strerror', error)}") from error
     if not rows:
         raise ConfigError(f"{path}: has no rows", expected=f"columns {', '.join(names)}")
     return rows

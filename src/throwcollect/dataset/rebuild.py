@@ -11,6 +11,7 @@ from typing import Any
 import pyarrow as pa
 
 from throwcollect.config.loader import load
+from throwcollect.config.schema import Config
 from throwcollect.dataset.bag import FileSummary
 from throwcollect.dataset.data_card import data_card, outcome_lines
 from throwcollect.dataset.description import WRITTEN, write_description
@@ -28,7 +29,7 @@ from throwcollect.dataset.verify_episode import EpisodeCheck
 from throwcollect.dataset.verify_shard import check_shard
 from throwcollect.dataset.verify_tables import find_wrong_trials
 from throwcollect.episode.channels import Channels
-from throwcollect.errors import DatasetError
+from throwcollect.errors import DatasetError, ForeignPlanError
 from throwcollect.files import read_text, write_file
 from throwcollect.robots.description import full_description
 from throwcollect.sweep.plan import Plan
@@ -87,10 +88,26 @@ def rebuild(directory: Path) -> Rebuilt:
         return _rebuild(directory)
 
 
+def _read_plan(directory: Path, config: Config, repair: str) -> Plan:
+    """Read the plan.
+
+    Raises:
+        DatasetError: If it is missing or damaged; its hint is to repair the dataset, which makes the plan again.
+        ForeignPlanError: If it is that of another configuration.
+    """
+    try:
+        return Plan.read(directory / PLAN, config)
+    except ForeignPlanError:
+        raise
+    except DatasetError as error:
+        error.hint = error.hint or repair
+        raise
+
+
 def _rebuild(directory: Path) -> Rebuilt:
     config = load(config_path(directory))
-    plan = Plan.read(directory / PLAN, config)
     repair = command("dataset", "repair", directory, "OUTPUT")
+    plan = _read_plan(directory, config, repair)
     remove_unfinished(directory)
     if unfinished := sorted(path.name for path in directory.glob("*.part")):
         raise DatasetError(

@@ -7,6 +7,7 @@ from enum import Enum
 
 import numpy as np
 
+from throwcollect.errors import ConfigError
 from throwcollect.learning.arrays import Array
 from throwcollect.learning.learned_map import Correction, LearnedMap, Role
 from throwcollect.reproducible_math import matmul, solve
@@ -27,6 +28,8 @@ _LOOKS = 4
 _SMALL_STEP = 1e-5
 """The search ends after a step that is smaller [scaled, or m or rad]: nobody could measure the difference."""
 _THROWS_FOR_BIAS = 3
+_FAR = 2.0
+"""Parameters that are farther from the middle of their range [scaled: it ends at 1] are refused."""
 _CLEARLY = 3.0
 """Adapting helps if the sum of squared misses falls by more than the square of so many standard deviations."""
 
@@ -106,6 +109,21 @@ def adapt(
     if method is None and not helps:
         return leave_as_it_is(learned, before)
     return Adaptation(chosen, _shift(learned.correction, chosen, found), deviations, before, after)
+
+
+def refuse_far_parameters(learned: LearnedMap, parameters: Array) -> None:
+    """Refuse throws by scaled parameters where the polynomials say nothing: mostly slips, such as degrees for radians.
+
+    Raises:
+        ConfigError: If a parameter is outside of the range of the dataset by more than half of that range.
+    """
+    for number, column in np.argwhere(np.abs(parameters) > _FAR).tolist():
+        axis = learned.axes_of(Role.PARAMETER)[column]
+        value = learned.unscale(Role.PARAMETER, parameters)[number, column]
+        raise ConfigError(
+            f"throw {number}: {axis.key} is {value:g}",
+            expected=f"about {axis.minimum:g} to {axis.maximum:g}, the range that the model was learned from",
+        )
 
 
 def leave_as_it_is(learned: LearnedMap, distances: Array) -> Adaptation:

@@ -15,7 +15,7 @@ from throwcollect.config.loader import dump_yaml
 from throwcollect.errors import ConfigError
 from throwcollect.extras import require
 from throwcollect.files import StrPath
-from throwcollect.learning.adapting import Method, adapt
+from throwcollect.learning.adapting import Method, adapt, refuse_far_parameters
 from throwcollect.learning.aiming import Choice, aim
 from throwcollect.learning.arrays import Array
 from throwcollect.learning.distilling import distil
@@ -198,7 +198,7 @@ class Model:
 
         Raises:
             ConfigError: If there are no throws, or not as many places; a key is missing or unknown, a value not finite,
-                or there is no such method.
+                there is no such method, or a parameter is far outside of the range of the dataset.
         """
         parameters, context = self._inputs(points)
         measured = np.array([self._check_target(place, self.targets) for place in places], np.float64)
@@ -212,6 +212,7 @@ class Model:
             raise ConfigError(
                 "method: the dataset has no latents", expected="a dataset whose sweep varies the world", hint="try bias"
             )
+        refuse_far_parameters(self.learned, parameters)
         # A measured place differs from its prediction by the scatter of the throw, and by the error of the model.
         deviation = float(np.hypot(scatter, self.file.trained_on.error))
         adapted = adapt(

@@ -104,12 +104,18 @@ def _draw_errors(numbers: Sequence[int], misses: Sequence[Misses]) -> go.Figure:
     factor, unit = SHOWN_AS.get(misses[0].unit, (1.0, misses[0].unit))
     figure = go.Figure()
     lines = (
-        ("median", [each.median for each in misses], {"color": BLUE, "width": 2}),
-        ("9 of 10 below", [each.share90 for each in misses], {"color": BLUE, "width": 1.5, "dash": "dash"}),
+        ("median", "circle", [each.median for each in misses], {"color": BLUE, "width": 2}),
+        # The legend has room for a marker, but hardly for a dash: so the markers differ, too.
+        (
+            "9 of 10 below",
+            "circle-open",
+            [each.share90 for each in misses],
+            {"color": BLUE, "width": 1.5, "dash": "dash"},
+        ),
     )
-    for name, values, line in lines:
+    for name, symbol, values, line in lines:
         scaled = [None if value is None else value * factor for value in values]
-        marker = {"color": BLUE, "size": 5, "symbol": "circle"}
+        marker = {"color": BLUE, "size": 5, "symbol": symbol}
         figure.add_scatter(x=list(numbers), y=scaled, mode="lines+markers", line=line, marker=marker, name=name)
     title = f"{_NOUNS.get(misses[0].unit, 'difference')} from the target [{unit.strip()}]"
     return figure.update_yaxes(title=title).update_layout(height=420, legend=LEGEND_ABOVE)

@@ -36,6 +36,8 @@ _FRAME_PX = 100
 _PT = 72 / _PX_PER_IN
 """Printer's points in one pixel."""
 _SMALLEST_TEXT_PT = 5
+_SHORT = 2
+"""Logarithmic axes of fewer powers of ten have ticks between these."""
 _COLOURS = "viridis"
 _DASHES = {None: "-", "dash": "--", "dot": ":"}
 MARKERS = {
@@ -159,7 +161,9 @@ def _set_axis(axes: Axes, letter: Literal["x", "y"], axis: Any, *, has_labels: b
     own = {"x": axes.xaxis, "y": axes.yaxis}[letter]
     if axis.type == "log":
         axes.set(**{f"{letter}scale": "log"})
-        own.set_major_locator(LogLocator(numticks=6))
+        low, high = axis.range or np.log10(getattr(axes, f"get_{letter}lim")())
+        # Powers of ten alone would leave a short axis with a single tick.
+        own.set_major_locator(LogLocator(subs=(1, 2, 5) if high - low < _SHORT else (1,), numticks=6))
         own.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
         own.set_minor_locator(NullLocator())
     elif axis.nticks and isinstance(own.get_major_locator(), AutoLocator):
@@ -268,16 +272,19 @@ def _add_colour_bar(axes: Axes, colours: Any, title: str) -> Any:
 
 def _add_legend(painted: Figure, legend: Any) -> None:
     """Name all lines and markers if there are several: a picture has no text that explains its colours."""
-    named: dict[str, Artist] = {}
+    named: dict[str, Any] = {}
     for axes in painted.axes:
-        handles, names = axes.get_legend_handles_labels()
-        named |= dict(zip(names, handles, strict=True))
+        # A trace may have both a line and markers, which its entry then shows together.
+        together: dict[str, tuple[Artist, ...]] = {}
+        for handle, name in zip(*axes.get_legend_handles_labels(), strict=True):
+            together[name] = (*together.get(name, ()), handle)
+        named |= together
     if len(named) < 2:
         return
     if legend.x == 1:
-        painted.legend(named.values(), named.keys(), loc="upper right", markerscale=2)
+        painted.legend(named.values(), named.keys(), loc="upper right", markerscale=2, scatteryoffsets=[0.5])
     else:
-        painted.legend(named.values(), named.keys(), loc="outside upper center", ncols=3)
+        painted.legend(named.values(), named.keys(), loc="outside upper center", ncols=3, scatteryoffsets=[0.5])
 
 
 def _plain(text: str) -> str:

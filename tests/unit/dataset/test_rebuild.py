@@ -99,6 +99,12 @@ def test_a_plan_that_was_changed_is_refused(spoiled: Path) -> None:
         rebuild(spoiled)
 
 
+def test_a_plan_that_cannot_be_read_is_refused_with_a_way_out(spoiled: Path) -> None:
+    (spoiled / "plan.parquet").unlink()
+    with pytest.raises(DatasetError, match=r"plan\.parquet: is missing\n  try: throwcollect dataset repair .* OUTPUT"):
+        rebuild(spoiled)
+
+
 def test_a_missing_recording_is_refused(spoiled: Path) -> None:
     (spoiled / "quick_00001.mcap").unlink()
     with pytest.raises(DatasetError, match=r"quick_00001\.mcap is missing\n  try: throwcollect dataset repair"):

@@ -178,6 +178,13 @@ def test_adapting_wants_a_place_for_each_throw(model: Model) -> None:
         model.adapt([point], [(1.0, 0.0)], scatter=-1.0)
 
 
+def test_adapting_refuses_throws_of_which_the_model_knows_nothing(model: Model) -> None:
+    points = [dict(zip(KEYS, row, strict=True)) for row in draw(2, 8).tolist()]
+    points[1][KEYS[1]] = 45.0
+    with pytest.raises(ConfigError, match=f"throw 1: {KEYS[1]} is 45\\n  expected: about .* to .*, the range"):
+        model.adapt(points, land(draw(2, 8), 0.0).tolist())
+
+
 @pytest.mark.parametrize(
     ("file", "change", "message"),
     [

@@ -81,6 +81,15 @@ def test_subplots_go_where_their_domains_are(tmp_path: Path) -> None:
     assert across > 0.55
 
 
+def test_the_legend_shows_line_and_markers_of_a_trace(tmp_path: Path) -> None:
+    figure = scatter([1.0, 2.0], [0.0, 0.0], "lines+markers").update_traces(name="red")
+    figure.add_scatter(x=[1.0], y=[1.0], mode="lines", line={"color": "#888888", "width": 2}, name="grey")
+    rows, columns = np.nonzero(red_pixels([figure], tmp_path / "legend.png"))
+    entry = rows < rows.max() / 3
+    width = np.ptp(columns[entry])
+    assert width > 1.2 * np.ptp(rows[entry])  # a dot alone is as high as it is wide
+
+
 def test_every_outcome_has_a_marker_of_its_own() -> None:
     names = (*(outcome.value for outcome in ThrowOutcome), REFUSED, "unheard of")
     assert len({MARKERS[style_of(name).symbol] for name in names}) == len(names)

@@ -45,6 +45,8 @@ def replay_dataset(
         raise ConfigError("--plot: should be given with --engine")
     dataset = Dataset.open(directory)
     for trial in trials or ():
+        if not 0 <= trial < len(dataset.throws):
+            raise ConfigError(f"{directory}: no trial {trial}", expected=f"0 to {len(dataset.throws) - 1}")
         dataset.episode(trial)
     chosen = list(dict.fromkeys(trials or ())) or select_trials(dataset, sample=sample)
     if engine is not None:

@@ -52,6 +52,12 @@ def test_a_throw_that_comes_out_otherwise_is_an_error_with_its_differences(
     assert capsys.readouterr().out == f"trial 5: {'; '.join(DIFFERENT.differences)}\n"
 
 
+@pytest.mark.usefixtures("chosen")
+def test_a_trial_that_there_is_not_is_a_wrong_request() -> None:
+    with pytest.raises(ConfigError, match="data: no trial 20\n  expected: 0 to 19"):
+        replay_dataset(Path("data"), [20], everything=False, sample=None, json=False)
+
+
 def test_programs_get_every_comparison(chosen: list[int], capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(DatasetError, match="1 of 19 throws"):
         replay_dataset(Path("data"), [], everything=True, sample=None, json=True)
