@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from functools import partial
 from typing import Generic, TypeVar
@@ -15,7 +16,7 @@ _POLL_S = 0.02
 _WATCH_S = 1.0
 
 
-class Errand:
+class Errand(ABC):
     """One thing that a client has asked of a node; it ends once.
 
     Attributes:
@@ -27,9 +28,9 @@ class Errand:
         self.name = name
         self.is_open = True
 
+    @abstractmethod
     def fail(self, why: str) -> None:
         """Tell the client why there is no answer."""
-        raise NotImplementedError
 
 
 AnErrand = TypeVar("AnErrand", bound=Errand)
