@@ -105,9 +105,10 @@ test-ros: ros
 test-containers:
 	$(call twice,$(BIN)/python -m pytest tests/docker)
 
-# Two files at a time.
+# Two files at a time, in their order: files of few long tests come first, and short ones at the end, so that both workers have
+# something to do until then.
 test-processes:
-	$(call twice,$(BIN)/python -m pytest -n 2 --dist loadfile tests/e2e tests/integration)
+	$(call twice,$(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder tests/e2e tests/integration)
 
 # Slurm with four nodes of this machine, and Apptainer; `.ci/cluster.sh` installs both on Debian.
 test-cluster:

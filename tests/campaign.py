@@ -98,8 +98,11 @@ def kills(config: Path, reference: Path, scratch: Path, count: int, source: rand
     """Send signals to the parties of collections, `count` in all, and compare what is collected in the end."""
     result = Count()
     wanted = fingerprints(reference)
+    collections = 0
     while result.tried < count:
-        directory = scratch / f"killed-{result.tried}"
+        # A collection may end before any signal reaches it; the next one needs another directory all the same.
+        directory = scratch / f"killed-{collections}"
+        collections += 1
         said: list[str] = []
         running = start(config, directory, 2)
         code = -1
