@@ -11,7 +11,7 @@ from uuid import uuid4
 
 from docker.client import DockerClient
 
-from tests.e2e.collection import CONFIG
+from tests.e2e.collection import FAST, write_config
 from throwcollect.config.loader import load
 from throwcollect.config.schema import Config
 from throwcollect.coordinator.prepare import prepare
@@ -29,9 +29,7 @@ TRIALS = 40
 
 
 def config_for(directory: Path, *overrides: str) -> Config:
-    path = directory / "small.yaml"
-    path.write_text(CONFIG.format(trials=TRIALS))
-    return load(path, overrides)
+    return load(write_config(directory, trials=TRIALS, sim=f"{FAST}, real_time_factor: 20"), overrides)
 
 
 @dataclass

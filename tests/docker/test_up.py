@@ -23,7 +23,8 @@ LABEL = "throwcollect.run"
 
 @pytest.fixture(scope="module")
 def config(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return write_config(tmp_path_factory.mktemp("config"), trials=64)
+    # In slow motion, so that a collection takes long enough for what is done to it meanwhile.
+    return write_config(tmp_path_factory.mktemp("config"), trials=64, sim=f"{FAST}, real_time_factor: 20")
 
 
 @pytest.fixture(scope="module")

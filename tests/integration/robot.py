@@ -251,9 +251,16 @@ class Robot:
         controller = robot.controller_of(name)
         kind = "control_msgs/msg/JointTrajectoryControllerState"
         with self.listening(kind, f"{controller}/controller_state") as heard:
-            # A request makes an idle simulation look around, and tell its state.
-            self.wait_until(lambda: self.state() in (PLAYING, PAUSED) and bool(heard), "a controller state")
+            self.wait_until_found(heard)
         return float(heard[-1].feedback.positions[robot.controllers[controller].index(name)])
+
+    def wait_until_found(self, heard: list[Any]) -> None:
+        """Wait for the first state of a controller: on DDS, nothing else shows that the simulation has found its listener.
+
+        A simulation tells the states of steps only to listeners that it had found before. A request makes an idle one look
+        around, and tell its present state.
+        """
+        self.wait_until(lambda: self.state() in (PLAYING, PAUSED) and bool(heard), "a controller state")
 
     @contextmanager
     def listening(

@@ -184,6 +184,7 @@ def test_steps_advance_a_trajectory_by_as_many_periods(robot: Robot) -> None:
     robot.put_into(PAUSED)
     robot.send(swing())
     with robot.listening(STATE, f"{ARM}/controller_state") as heard:
+        robot.wait_until_found(heard)
         for steps, total in ((1, 1), (9, 10), (40, 50)):
             robot.step(steps)
             due_ns = (total - 1) * STEP_NS
@@ -276,6 +277,7 @@ def test_joints_can_brake_when_a_goal_is_cancelled(other: Robot) -> None:
     handle = other.send(swing(), RIGHT_ARM)
     other.step(250)
     with other.listening(STATE, f"{RIGHT_ARM}/controller_state") as heard:
+        other.wait_until_found(heard)
         assert other.result(handle.cancel_goal_async()).return_code == 0
         assert other.outcome(handle) == (CANCELED, 0, "")
         other.step(200)
