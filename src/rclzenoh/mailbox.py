@@ -105,7 +105,7 @@ class Receiver(ABC):
     def handle(self, item: Any) -> None:
         """Handle one item, in the thread that spins."""
 
-    def refuse(self, item: Any) -> None:
+    def refuse(self, item: Any) -> None:  # noqa: B027 - most have nobody to tell
         """Turn away an item for which there is no room, in Zenoh's thread."""
 
     def discard_all(self) -> None:
