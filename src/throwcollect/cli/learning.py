@@ -132,8 +132,8 @@ def aim(
         if not aim.reachable:
             tell(
                 f"target {number} of {len(aims)} is out of reach: {_join_numbers(aim.target)}; the nearest point that "
-                f"was reached: {_join_numbers(aim.nearest)}\n  its parameters cannot be relied on; they are predicted to "
-                f"end at {_join_numbers(aim.predicted)}"
+                f"was reached: {_join_numbers(aim.nearest)}\n  its parameters cannot be relied on; they are predicted "
+                f"to end at {_join_numbers(aim.predicted)}"
             )
     if not all(aim.reachable for aim in aims):
         raise typer.Exit(1)
