@@ -88,6 +88,24 @@ def rebuild(directory: Path) -> Rebuilt:
         return _rebuild(directory)
 
 
+def _read_config(directory: Path) -> Config:
+    """Read the configuration.
+
+    Raises:
+        ConfigError: If it is wrong.
+        DatasetError: If its file is not as the manifest says.
+    """
+    # A line that equals its default can be lost without a change of the plan's digest. A new manifest would then hide
+    # that the file is not the one that the same collection gives.
+    if was_changed(directory, CONFIG):
+        raise DatasetError(
+            f"is not as it was written: {MANIFEST} has another hash of it",
+            path=directory / CONFIG,
+            hint=f"{command('resume', directory)} puts back lines that equal their defaults",
+        )
+    return load(config_path(directory))
+
+
 def _read_plan(directory: Path, config: Config, repair: str) -> Plan:
     """Read the plan.
 
@@ -105,15 +123,7 @@ def _read_plan(directory: Path, config: Config, repair: str) -> Plan:
 
 
 def _rebuild(directory: Path) -> Rebuilt:
-    config = load(config_path(directory))
-    # A line that equals its default can be lost without a change of the plan's digest. A new manifest would then hide
-    # that the file is not the one that the same collection gives.
-    if was_changed(directory, CONFIG):
-        raise DatasetError(
-            f"is not as it was written: {MANIFEST} has another hash of it",
-            path=directory / CONFIG,
-            hint=f"{command('resume', directory)} puts back lines that equal their defaults",
-        )
+    config = _read_config(directory)
     repair = command("dataset", "repair", directory, "OUTPUT")
     plan = _read_plan(directory, config, repair)
     remove_unfinished(directory)

@@ -6,7 +6,6 @@ import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from throwcollect.coordinator.resume import is_complete
 from throwcollect.errors import ConfigError, ConflictError, NotFoundError, WorkerError
 from throwcollect.members import names_of
 from throwcollect.runs.record import Record
@@ -191,6 +190,9 @@ def has_complete_dataset(run: Run) -> bool:
     if run.record.kind != "collection" or run.status == "running":
         return False
     if run.status == "died":
+        # This imports what reads tables, which takes a while and is rarely needed.
+        from throwcollect.coordinator.resume import is_complete
+
         return run.record.volume is None and is_complete(run.place.directory)
     return run.record.exit_code == 0
 
