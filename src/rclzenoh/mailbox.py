@@ -8,13 +8,20 @@ their order of arrival across topics and services, and looking for work costs ne
 from __future__ import annotations
 
 import threading
+from abc import ABC, abstractmethod
 from collections import deque
 from queue import SimpleQueue
 from typing import Any, Protocol
 
 
 class Work(Protocol):
-    """Something an executor can do."""
+    """Something an executor can do.
+
+    Attributes:
+        mailbox: The mailbox that it was put into.
+    """
+
+    mailbox: Mailbox
 
     def run(self) -> bool:
         """Do it; returns False if there was nothing to do after all."""
@@ -45,12 +52,12 @@ class Mailbox:
             self.queue = queue
 
     def detach(self) -> None:
-        """Deliver to a queue of its own again, and take back the items that the executor has not handled yet."""
+        """Deliver to a queue of its own again, and take back the work that the executor has not done yet."""
         with self.lock:
             shared, own, others = self.queue, SimpleQueue[Work | None](), []
             while not shared.empty():
                 work = shared.get()
-                if isinstance(work, Receiver) and work.mailbox is self:
+                if work is not None and work.mailbox is self:
                     own.put(work)
                 else:
                     others.append(work)
@@ -59,7 +66,7 @@ class Mailbox:
             self.queue = own
 
 
-class Receiver:
+class Receiver(ABC):
     """Gets items from Zenoh and handles them when its executor spins.
 
     Args:
@@ -94,11 +101,11 @@ class Receiver:
         self.handle(item)
         return True
 
+    @abstractmethod
     def handle(self, item: Any) -> None:
         """Handle one item, in the thread that spins."""
-        raise NotImplementedError
 
-    def refuse(self, item: Any) -> None:
+    def refuse(self, item: Any) -> None:  # noqa: B027 - most have nobody to tell
         """Turn away an item for which there is no room, in Zenoh's thread."""
 
     def discard_all(self) -> None:

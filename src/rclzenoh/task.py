@@ -112,18 +112,21 @@ class Task(Future):
     Args:
         work: The coroutine, or a function without arguments, which may return one.
         mailbox: Where the task waits until it is carried on.
+
+    Attributes:
+        mailbox: The same.
     """
 
     def __init__(self, work: Callable[[], Any] | Coroutine[Any, Any, Any], mailbox: Mailbox) -> None:
         super().__init__()
         self.call_back_through(mailbox)
-        self._waits_in = mailbox
+        self.mailbox = mailbox
         self._function = None if isinstance(work, Coroutine) else work
         self._coroutine = work if isinstance(work, Coroutine) else None
 
     def schedule(self) -> None:
         """Have the thread that spins carry on with this task."""
-        self._waits_in.submit(self)
+        self.mailbox.submit(self)
 
     def run(self) -> bool:
         """Carry on until the task ends or awaits something; returns whether there was anything to do.

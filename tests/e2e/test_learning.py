@@ -141,15 +141,18 @@ def test_a_score_tells_how_throws_hit_here_and_elsewhere(place: Path) -> None:
         (["aim", "model"], "no target"),
         (["aim", "model", "--at", "1.4"], "--at 1.4\n  expected: 2 numbers: landing_x_m,landing_y_m"),
         (["aim", "model", "--at", "1,nan"], "finite numbers"),
-        (["aim", "model", "--at", "1,0", "--choose", "best"], "choose: 'best'"),
+        (["aim", "model", "--at", "1,0", "--choose", "best"], "--choose: 'best'"),
+        (["adapt", "model", "data", "-o", "new", "--method", "best"], "--method: 'best'"),
         (["aim", "model", "--targets", "throws.yaml"], "throws.yaml:1: no column landing_x_m and landing_y_m"),
         (["aim", "data", "--at", "1,0"], "model.json"),
         (["fit", "data", "-o", "data"], "exists"),
+        (["fit", "data", "-o", "new", "--where", "trial < 0"], "--where: no throw of "),
+        (["fit", "data", "-o", "new", "--where", "trial < 0"], "fulfils 'trial < 0'"),
         (["fit", "data", "-o", "new", "--where", "trial < 5"], "at least 18 for 5 parameters"),
         (["adapt", "model", "model/config.yaml", "-o", "new"], "no column"),
-        (["score", "model", "--targets", "0"], "targets: got 0"),
-        (["score", "model", "--seeds", "0"], "seeds: got 0"),
-        (["score", "model", "--seed", "-1"], "seed: got -1"),
+        (["score", "model", "--targets", "0"], "--targets: got 0"),
+        (["score", "model", "--seeds", "0"], "--seeds: got 0"),
+        (["score", "model", "--seed", "-1"], "--seed: got -1"),
         (["score", "model", "--set", "ball.mass_kg=1"], "--config CONFIG"),
         (["throw", "throws.yaml", "--set", "task.duration_s=0.2"], "its limit is 1.76 rad/s"),
     ],
@@ -183,6 +186,47 @@ def test_a_target_out_of_reach_is_told_with_the_nearest_point(place: Path) -> No
     said = call_here("aim", place / "model", "--at", "9,0")
     assert said.returncode == 1
     assert re.search(r"out of reach: 9\.000,0\.000; the nearest point that was reached: \d\.\d+,-?\d\.\d+", said.stderr)
+
+
+def test_each_target_out_of_reach_is_told_with_where_its_parameters_lead(place: Path) -> None:
+    said = call_here("aim", place / "model", "--at", middle(place), "--at", "9,0", "--at", "0,-9", "--json")
+    found = json.loads(said.stdout)
+    assert [each["reachable"] for each in found] == [True, False, False]
+    ends = [",".join(f"{value:.3f}" for value in each["predicted"]) for each in found]
+    assert re.findall(
+        r"^target (\d) of 3 is out of reach: .*\n  its parameters .* end at (\S+)$", said.stderr, re.M
+    ) == [
+        ("2", ends[1]),
+        ("3", ends[2]),
+    ]
+
+
+def test_a_model_is_learned_from_a_directory_as_from_what_was_loaded(place: Path) -> None:
+    directory = place / "data"
+    by_path, loaded = throwcollect.fit(str(directory)), throwcollect.fit(throwcollect.load(directory))
+    assert by_path.file.model_dump_json() == loaded.file.model_dump_json()
+    with pytest.raises(throwcollect.DatasetError, match="holds no dataset"):
+        throwcollect.fit(place / "nowhere")
+
+
+def test_targets_are_read_from_a_list_that_aiming_wrote(place: Path) -> None:
+    aim = call_here("aim", place / "model", "--at", middle(place), "-o", place / "written.csv")
+    assert aim.returncode == 0, aim.stderr
+    again = call_here("aim", place / "model", "--targets", place / "written.csv", "-o", place / "again.csv")
+    assert again.returncode == 0, again.stderr
+    assert (place / "again.csv").read_text() == (place / "written.csv").read_text()
+
+
+def test_a_missing_target_column_is_told_with_the_other_name_that_it_may_have(place: Path) -> None:
+    (place / "half.csv").write_text("landing_x_m\n1\n")
+    said = call_here("aim", place / "model", "--targets", place / "half.csv")
+    assert "half.csv:1: no column landing_y_m\n" in said.stderr
+    assert "columns landing_x_m, landing_y_m, or target_y_m for landing_y_m" in said.stderr
+
+
+def test_adapting_tells_by_how_much_throws_missed_with_its_unit(place: Path) -> None:
+    said = call_here("adapt", place / "model", place / "data", "-o", place / "told")
+    assert re.search(r"^throws were off by [\d.]+ cm before, median", said.stdout, re.M), said.stdout
 
 
 def test_the_program_of_the_documents_runs(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:

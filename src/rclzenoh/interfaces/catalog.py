@@ -41,7 +41,8 @@ class Field:
         nested: Whether ``type`` names a structure.
         length: Length of a fixed array; None otherwise.
         sequence: Whether the field is a sequence.
-        bound: Largest length of a bounded sequence or string; None when unbounded.
+        bound: Largest length of a bounded sequence or string, or of the strings of a fixed array; None when unbounded.
+            The bound of strings in a sequence is not known here.
         default: Value of a field that is not set; None for zero, empty, or the nested structure's own defaults.
     """
 
@@ -162,7 +163,7 @@ def _field(name: str, description: tuple[Nodetype, Any], default: Default | None
     if kind == _NAME:
         return Field(name, content, True, length, sequence, bound, default)
     primitive, capacity = content
-    return Field(name, primitive, False, length, sequence, bound or capacity or None, default)
+    return Field(name, primitive, False, length, sequence, bound if sequence else capacity or None, default)
 
 
 def _require(name: str) -> None:

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import csv
 import json as jsonlib
-import math
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -20,7 +18,6 @@ from throwcollect.side_by_side import count_cores
 from throwcollect.wording import command, format_count, join_names
 
 if TYPE_CHECKING:
-    from throwcollect.config.task import TaskConfig
     from throwcollect.learning.model import Aim, Model
     from throwcollect.learning.score import Errors, Score
 
@@ -58,14 +55,13 @@ def fit(
     json: JsonOption = False,
 ) -> None:
     """Learn from a dataset where throws end, and which parameters lead to a target."""
-    from throwcollect.dataset.reader import Dataset
     from throwcollect.learning.model import fit
     from throwcollect.learning.score import tell_length
 
     if onnx:
         require("onnx")
     model = fit(
-        Dataset.open(dataset),
+        dataset,
         kind=kind,
         targets=_split(targets),
         parameters=_split(parameters),
@@ -111,6 +107,7 @@ def aim(
 ) -> None:
     """Find parameters of throws at targets."""
     from throwcollect.config.loader import load as load_config
+    from throwcollect.learning.lists import read_targets, write_aims
     from throwcollect.learning.model import load_model
     from throwcollect.learning.model_directory import CONFIG
 
@@ -118,7 +115,7 @@ def aim(
     names = (*model.targets, *model.given)
     given = [_read_target(text, names) for text in at or ()]
     if targets is not None:
-        given += [[row[name] for name in names] for row in _read_table(targets, names)]
+        given += read_targets(targets, names, load_config(directory / CONFIG).task)
     if not given:
         raise ConfigError(
             "no target", expected="--at, or --targets FILE", hint=command("aim", directory, "--at", _example(model))
@@ -130,12 +127,15 @@ def aim(
         for aim in aims:
             typer.echo(" ".join(f"--set {key}={value!r}" for key, value in aim.parameters.items()))
     if output is not None:
-        _write_aims(output, aims, names, load_config(directory / CONFIG).task)
-    unreached = [aim for aim in aims if not aim.reachable]
-    for aim in unreached:
-        nearest = _join_numbers(aim.nearest)
-        tell(f"out of reach: {_join_numbers(aim.target)}; the nearest point that was reached: {nearest}")
-    if unreached:
+        write_aims(output, aims, names, load_config(directory / CONFIG).task)
+    for number, aim in enumerate(aims, start=1):
+        if not aim.reachable:
+            tell(
+                f"target {number} of {len(aims)} is out of reach: {_join_numbers(aim.target)}; the nearest point that "
+                f"was reached: {_join_numbers(aim.nearest)}\n  its parameters cannot be relied on; they are predicted "
+                f"to end at {_join_numbers(aim.predicted)}"
+            )
+    if not all(aim.reachable for aim in aims):
         raise typer.Exit(1)
 
 
@@ -228,11 +228,13 @@ def adapt(
     json: JsonOption = False,
 ) -> None:
     """Make the model of another world, of a few throws there."""
+    from throwcollect.learning.lists import read_table
     from throwcollect.learning.model import load_model
+    from throwcollect.learning.score import tell_length
 
     model = load_model(directory)
     keys = (*model.parameters, *model.given)
-    rows = _read_dataset(throws, keys, model) if throws.is_dir() else _read_table(throws, (*keys, *model.targets))
+    rows = _read_dataset(throws, keys, model) if throws.is_dir() else read_table(throws, (*keys, *model.targets))
     adapted = model.adapt(
         [{key: row[key] for key in keys} for row in rows],
         [[row[target] for target in model.targets] for row in rows],
@@ -249,10 +251,12 @@ def adapt(
     typer.echo(f"{format_count(entry.throws, 'throw')}; what differs: {entry.method.value}")
     for estimate in entry.found:
         typer.echo(f"{estimate.name}: {estimate.value:.4g} (standard deviation {estimate.deviation:.2g})")
-    before, after = (sorted(misses)[len(misses) // 2] if misses else None for misses in (entry.before, entry.after))
+    before, after = (
+        tell_length(sorted(misses)[len(misses) // 2], model.targets) if misses else None
+        for misses in (entry.before, entry.after)
+    )
     typer.echo(
-        f"throws were off by {before:.4f} before, median"
-        + ("" if after is None else f"; {after:.4f} by a model of the others")
+        f"throws were off by {before} before, median" + ("" if after is None else f"; {after} by a model of the others")
     )
 
 
@@ -279,41 +283,6 @@ def _read_target(text: str, names: Sequence[str]) -> list[float]:
     if len(values) != len(names):
         raise ConfigError(f"--at {text}", expected=f"{format_count(len(names), 'number')}: {','.join(names)}")
     return values
-
-
-def _read_table(path: Path, names: Sequence[str]) -> list[dict[str, float]]:
-    """Read some columns of a CSV file with a header line.
-
-    Raises:
-        ConfigError: If it cannot be read, a column is missing, or a cell is no finite number.
-    """
-    try:
-        with path.open(encoding="utf-8-sig", newline="") as file:
-            reader = csv.DictReader(file)
-            header = reader.fieldnames or []
-            if missing := [name for name in names if name not in header]:
-                raise ConfigError(f"{path}:1: no column {join_names(missing)}", expected=f"columns {', '.join(names)}")
-            rows = []
-            for row in reader:
-                numbers = {name: _to_number(row[name]) for name in names}
-                if wrong := [name for name in names if not math.isfinite(numbers[name])]:
-                    raise ConfigError(
-                        f"{path}:{reader.line_num}: {wrong[0]}: {row[wrong[0]] or ''!r}", expected="a finite number"
-                    )
-                rows.append(numbers)
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise ConfigError(f"{path}: cannot be read: {getattr(error, 'strerror', error)}") from error
-    if not rows:
-        raise ConfigError(f"{path}: has no rows", expected=f"columns {', '.join(names)}")
-    return rows
-
-
-def _to_number(text: str | None) -> float:
-    """Read the number in a cell; NaN if the cell holds none."""
-    try:
-        return float(text or "")
-    except ValueError:
-        return math.nan
 
 
 def _read_dataset(directory: Path, keys: Sequence[str], model: Model) -> list[dict[str, float]]:
@@ -353,28 +322,6 @@ def _aim_as_json(aim: Aim) -> dict[str, object]:
 
 def _join_numbers(values: Iterable[float]) -> str:
     return ",".join(f"{value:.3f}" for value in values)
-
-
-def _write_aims(path: Path, aims: Sequence[Aim], names: Sequence[str], task: TaskConfig) -> None:
-    """Write a list that the sampler `list` reads: a CSV file with a row for each aim, of which there is at least one.
-
-    Each of the names says what a number of their targets is: a column of the table of throws, or a key that is given.
-    The list has columns for those targets alone that the task declares.
-
-    Raises:
-        ConfigError: If the file cannot be written.
-    """
-    columns = {column.name: names.index(column.of) for column in task.target_columns if column.of in names}
-    if task.find_wrong_targets(columns):
-        columns = {}
-    rows = [{**aim.parameters, **{name: float(aim.target[at]) for name, at in columns.items()}} for aim in aims]
-    try:
-        with path.open("w", encoding="utf-8", newline="") as file:
-            writer = csv.writer(file, lineterminator="\n")
-            writer.writerow(rows[0])
-            writer.writerows([map(repr, row.values()) for row in rows])
-    except OSError as error:
-        raise ConfigError(f"{path}: cannot be written: {error.strerror}") from error
 
 
 def _describe_score(score: Score) -> list[str]:

@@ -215,8 +215,11 @@ def _in_json(value: datetime) -> str:
 
 
 def _make_document(run: Run) -> dict[str, Any]:
+    from throwcollect.runs.selection import has_complete_dataset
+
     error = run.record.error if run.record.failure else None
-    return {**asdict(run.record), "message": str(error or ""), "status": run.status}
+    complete = has_complete_dataset(run)
+    return {**asdict(run.record), "message": str(error or ""), "status": run.status, "complete": complete}
 
 
 def _make_unrecorded_document(runtime: str, held: HeldRun) -> dict[str, Any]:
@@ -234,7 +237,11 @@ def _make_row(run: Run) -> tuple[str, ...]:
 def _status(run: Run, record: Record) -> str:
     if record.ended is not None:
         return f"{run.status} {_age(record.ended)} ago, exit code {record.exit_code}"
-    return f"running for {_age(record.started)}" if run.lives else run.status
+    if run.lives:
+        return f"running for {_age(record.started)}"
+    from throwcollect.runs.selection import has_complete_dataset
+
+    return f"{run.status}, but the dataset is complete" if has_complete_dataset(run) else run.status
 
 
 def _make_unrecorded_row(runtime: str, held: HeldRun) -> tuple[str, ...]:

@@ -37,6 +37,10 @@ _UNSEEN_OUTPUT = "0:53"
 """Exit code of a task whose log could not be opened: its node does not see the directory."""
 
 
+_UNREACHED = ("Could not establish a configuration source", "Unable to contact slurm controller")
+"""What its commands say where Slurm has no controller, or one that cannot be reached."""
+
+
 @dataclass(frozen=True)
 class Task:
     """One task of an array, or a job that is no array.
@@ -91,7 +95,8 @@ def check(script: Path) -> None:
     try:
         _run("sbatch", "--test-only", str(script))
     except WorkerError as error:
-        raise ConfigError(error.message, hint="the keys of the section cluster become options of the script") from error
+        hint = error.hint or "the keys of the section cluster become options of the script"
+        raise ConfigError(error.message, hint=hint) from error
 
 
 def find_tasks(job: str) -> tuple[Task, ...]:
@@ -222,5 +227,10 @@ def _run(program: str, *arguments: str, patience_s: float = _PATIENCE_S) -> str:
         raise WorkerError(f"{program} has not answered within {patience_s:g} s") from error
     if done.returncode:
         said = [line for line in done.stderr.splitlines() if line.strip()]
+        if any(words in line for words in _UNREACHED for line in said):
+            raise WorkerError(
+                f"Slurm has no controller that {program} can reach: none is configured here, or it is down",
+                hint="run this on a login node, or see docs/cluster.md for other schedulers",
+            )
         raise WorkerError(f"{program} refuses: {'; '.join(said) or f'exit code {done.returncode}'}")
     return done.stdout

@@ -160,6 +160,15 @@ def finished(directory: Path, plan: Plan) -> bool:
         return False
 
 
+def is_complete(directory: Path) -> bool:
+    """Whether a directory holds a dataset in which nothing is left to collect, and no file of it is missing."""
+    try:
+        plan = Plan.read(directory / PLAN, load(config_path(directory)))
+        return finished(directory, plan) and not find_damage(directory, plan, in_full=False)
+    except (ConfigError, DatasetError):
+        return False
+
+
 def _read_stored_config(directory: Path) -> Config | None:
     """The configuration that a dataset was begun with; None unless its file is complete."""
     try:

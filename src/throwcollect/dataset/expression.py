@@ -91,7 +91,9 @@ class Expression:
         try:
             self._tree = ast.parse(self._text, mode="eval").body
         except SyntaxError as error:
-            raise self._error((error.offset or 1) - 1, f"cannot be understood: {error.msg}", example=True) from error
+            # Python gives no place, or 0, to an expression that ends too early.
+            column = error.offset - 1 if error.offset else len(self._text)
+            raise self._error(column, f"cannot be understood: {error.msg}", example=True) from error
         except (ValueError, RecursionError, MemoryError) as error:
             raise self._error(0, "cannot be understood", example=True) from error
 

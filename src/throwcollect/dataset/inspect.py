@@ -15,6 +15,11 @@ from throwcollect.dataset.misses import summarise_misses
 from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.summary import Info
 from throwcollect.errors import DatasetError
+from throwcollect.files import is_there
+from throwcollect.wording import command, join_names
+
+_MOST_NAMED = 5
+"""A message names so many missing files."""
 
 
 def info(directory: Path) -> Info:
@@ -68,6 +73,23 @@ def _find_landing_area(throws: pa.Table) -> Mapping[str, tuple[float, float]] | 
     if limits["x_m"]["min"] is None:
         return None
     return {axis: (each["min"], each["max"]) for axis, each in limits.items()}
+
+
+def check_recordings_are_there(directory: Path) -> None:
+    """Refuse a finished dataset of which recordings are missing; `verify` says whether the others are right.
+
+    Raises:
+        DatasetError: If recordings are missing, or the directory holds no finished dataset.
+        ConfigError: If its ``config.yaml`` is wrong.
+    """
+    missing = [name for name in Dataset.open(directory).shards if not is_there(directory / name)]
+    if missing:
+        raise DatasetError(
+            f"{join_names(missing[:_MOST_NAMED])}{' and more' if len(missing) > _MOST_NAMED else ''} "
+            f"{'is' if len(missing) == 1 else 'are'} missing",
+            path=directory,
+            hint=f"{command('resume', directory)} collects the trials of missing recordings again",
+        )
 
 
 def digest(directory: Path) -> str:

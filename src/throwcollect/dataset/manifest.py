@@ -171,6 +171,15 @@ def is_as_written(directory: Path, name: str) -> bool:
         return False
 
 
+def was_changed(directory: Path, name: str) -> bool:
+    """Whether there is a manifest, and it says of a file of a dataset that it is another one than was written."""
+    try:
+        written = {entry.path: entry for entry in read_manifest(directory)}
+        return name in written and written[name] != entry_of_file(directory / name)
+    except DatasetError:
+        return False
+
+
 def find_manifest_problems(directory: Path, name: str | None) -> Iterator[Finding]:
     """Find where the manifest of a dataset and its files differ; every byte of the promised files is read.
 

@@ -15,11 +15,11 @@ from throwcollect.config.schema import Config
 from throwcollect.dataset.bag import FileSummary
 from throwcollect.dataset.data_card import data_card, outcome_lines
 from throwcollect.dataset.description import WRITTEN, write_description
-from throwcollect.dataset.directory import CARD, PLAN, THROWS, config_path
+from throwcollect.dataset.directory import CARD, CONFIG, MANIFEST, PLAN, THROWS, config_path
 from throwcollect.dataset.findings import Finding
 from throwcollect.dataset.journal import was_open
 from throwcollect.dataset.lock import hold_lock
-from throwcollect.dataset.manifest import entry_of_file
+from throwcollect.dataset.manifest import entry_of_file, was_changed
 from throwcollect.dataset.mcap_reader import StoredEpisode
 from throwcollect.dataset.provenance import Provenance, read_provenance, write_provenance
 from throwcollect.dataset.recovery import remove_unfinished
@@ -80,12 +80,30 @@ def rebuild(directory: Path) -> Rebuilt:
     otherwise than it says, the data card gets the new numbers of outcomes.
 
     Raises:
-        DatasetError: If the plan or a recording is missing or damaged, another process changes the dataset, it is not
-            collected to its end, or a file cannot be written.
+        DatasetError: If the plan or a recording is missing or damaged, ``config.yaml`` is not as the manifest says,
+            another process changes the dataset, it is not collected to its end, or a file cannot be written.
         ConfigError: If the ``config.yaml`` is wrong.
     """
     with hold_lock(directory):
         return _rebuild(directory)
+
+
+def _read_config(directory: Path) -> Config:
+    """Read the configuration.
+
+    Raises:
+        ConfigError: If it is wrong.
+        DatasetError: If its file is not as the manifest says.
+    """
+    # A line that equals its default can be lost without a change of the plan's digest. A new manifest would then hide
+    # that the file is not the one that the same collection gives.
+    if was_changed(directory, CONFIG):
+        raise DatasetError(
+            f"is not as it was written: {MANIFEST} has another hash of it",
+            path=directory / CONFIG,
+            hint=f"{command('resume', directory)} puts back lines that equal their defaults",
+        )
+    return load(config_path(directory))
 
 
 def _read_plan(directory: Path, config: Config, repair: str) -> Plan:
@@ -105,7 +123,7 @@ def _read_plan(directory: Path, config: Config, repair: str) -> Plan:
 
 
 def _rebuild(directory: Path) -> Rebuilt:
-    config = load(config_path(directory))
+    config = _read_config(directory)
     repair = command("dataset", "repair", directory, "OUTPUT")
     plan = _read_plan(directory, config, repair)
     remove_unfinished(directory)

@@ -137,7 +137,7 @@ def _find_cells(axes: Sequence[str], throws: pa.Table) -> list[Cell | None]:
     """
     columns = []
     for text in axes:
-        name, width = _read_pair(text, "--cells")
+        name, width = _read_pair(text, "--cells", "an expression and the width of cells, such as landing_x_m=0.05")
         if not float(width) > 0:
             raise ConfigError([Problem(f"the width of cells should be above 0, got {text!r}", "--cells")])
         values = Expression(name, place="--cells").numbers(throws)
@@ -156,7 +156,8 @@ def _choose_part(hashed: str, shares: Mapping[str, Fraction], seed: int) -> str:
 
 
 def _read_shares(text: str) -> dict[str, Fraction]:
-    pairs = [_read_pair(item, "--fractions") for item in text.split(",")]
+    what = "a part and its share, such as train=0.8"
+    pairs = [_read_pair(item, "--fractions", what) for item in text.split(",")]
     shares = dict(pairs)
     problem = None
     if len(shares) < len(pairs):
@@ -177,14 +178,14 @@ def _read_shares(text: str) -> dict[str, Fraction]:
     return shares
 
 
-def _read_pair(text: str, option: str) -> tuple[str, Fraction]:
+def _read_pair(text: str, option: str, what: str) -> tuple[str, Fraction]:
     name, _, number = text.rpartition("=")
     try:
         value = Fraction(number) if _NUMBER.fullmatch(number) else None
     except ZeroDivisionError:
         value = None
     if value is None or not name.strip():
-        raise ConfigError([Problem(f"should be a name, an equals sign and a number such as 0.5, got {text!r}", option)])
+        raise ConfigError([Problem(f"should be {what}, got {text!r}", option)])
     return name.strip(), value
 
 

@@ -116,7 +116,7 @@ class Model:
         rows = np.array([self._check_target(target, names) for target in targets], np.float64).reshape(-1, len(names))
         ends, values = rows[:, : len(self.targets)], rows[:, len(self.targets) :]
         context = self.learned.scale(Role.CONTEXT, values)
-        found = aim(self.learned, ends, context, _read_word(Choice, "choose", choose))
+        found = aim(self.learned, ends, context, _read_word(Choice, "--choose", choose))
         chosen = self.learned.unscale(Role.PARAMETER, found.parameters)
         inside = np.all(np.abs(context) <= 1.0, axis=1).tolist()
         return [
@@ -160,7 +160,7 @@ class Model:
         """
         for name, number, least in (("targets", targets, 1), ("seeds", seeds, 1), ("seed", seed, 0)):
             if number < least:
-                raise ConfigError(f"{name}: got {number}", expected=f"{least} or more")
+                raise ConfigError(f"--{name}: got {number}", expected=f"{least} or more")
         _check_scatter(scatter)
         distilled = None if self.file.distilled is None else distil(leave_out_correction(self.learned))
         scores = [
@@ -207,10 +207,12 @@ class Model:
                 f"{len(parameters)} throws and {len(measured)} places", expected="one place for each throw"
             )
         _check_scatter(scatter)
-        chosen = None if method is None else _read_word(Method, "method", method)
+        chosen = None if method is None else _read_word(Method, "--method", method)
         if chosen is Method.LATENT and not self.latents:
             raise ConfigError(
-                "method: the dataset has no latents", expected="a dataset whose sweep varies the world", hint="try bias"
+                "--method latent: the dataset has no latents",
+                expected="a dataset whose sweep varies the world",
+                hint="try bias",
             )
         refuse_far_parameters(self.learned, parameters)
         # A measured place differs from its prediction by the scatter of the throw, and by the error of the model.
@@ -300,7 +302,7 @@ class Model:
 
 
 def fit(
-    dataset: Dataset,
+    dataset: Dataset | StrPath,
     *,
     kind: str = Kind.LOCAL.value,
     targets: Sequence[str] = (),
@@ -311,7 +313,7 @@ def fit(
     """Learn a model from the throws of a dataset that succeeded.
 
     Args:
-        dataset: The dataset.
+        dataset: The dataset, or its directory.
         kind: ``local``: predict by a polynomial, corrected by the nearest throws; or ``polynomial``: by the polynomial
             alone.
         targets: Columns that say where a trial ended; those of the task by default.
@@ -320,11 +322,18 @@ def fit(
         where: A condition on throws, as `Dataset.select` takes it.
 
     Raises:
-        ConfigError: If there is no such kind, nothing to aim at, a key was not swept, or too few throws succeeded.
-        DatasetError: If the dataset is damaged.
+        ConfigError: If there is no such kind, nothing to aim at, a key was not swept, no throw fulfils the condition,
+            or too few throws succeeded.
+        DatasetError: If the directory holds no finished dataset, or the dataset is damaged.
     """
-    chosen = _read_word(Kind, "kind", kind)
+    from throwcollect.dataset.reader import Dataset
+
+    chosen = _read_word(Kind, "--kind", kind)
+    if not isinstance(dataset, Dataset):
+        dataset = Dataset.open(dataset)
     throws = dataset if where is None else dataset.select(where)
+    if where is not None and not throws:
+        raise ConfigError(f"--where: no {dataset.config.task.noun} of {dataset.directory} fulfils {where!r}")
     found = fit_map(throws, kind=chosen, targets=targets, parameters=parameters, context=given)
     return Model(_describe(found, dataset, where), found.learned, found.trials, dump_yaml(dataset.config))
 

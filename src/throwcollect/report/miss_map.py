@@ -8,7 +8,9 @@ import numpy as np
 import plotly.graph_objects as go
 from numpy.typing import NDArray
 
+from throwcollect.config.task import TaskConfig
 from throwcollect.report.figures import BLUE, LEGEND_ABOVE, LIMIT_LINE, NEUTRAL
+from throwcollect.units import unit_of_name
 
 ARROWS = 10
 """Misses are drawn so many times as long, unless they are large, so that they are seen."""
@@ -31,6 +33,7 @@ def draw_miss_map(
     targets: NDArray[np.float64],
     places: NDArray[np.float64],
     titles: Sequence[str],
+    task: TaskConfig,
     *,
     times: int = ARROWS,
 ) -> go.Figure:
@@ -41,15 +44,17 @@ def draw_miss_map(
         targets: Shape ``(n_targets, n_columns)``.
         places: Where the trials at these targets ended, NaN for one without an end, shape ``(n_targets, n_columns)``.
         titles: Titles of the columns.
+        task: The task of the trials, which has a noun for them.
         times: How many times as long misses are drawn.
     """
     figure = go.Figure()
     ends, targets, places = map(_take_two, (ends, targets, places))
     if len(ends):
         grey = {"color": NEUTRAL, "size": 3, "opacity": 0.5, "symbol": "circle"}
-        figure.add_scatter(x=ends[:, 0], y=ends[:, 1], mode="markers", marker=grey, name="throws of the dataset")
+        figure.add_scatter(x=ends[:, 0], y=ends[:, 1], mode="markers", marker=grey, name=f"{task.noun}s of the dataset")
     hit = np.isfinite(places).all(axis=1)
-    for own, name, colour in ((hit, "targets", BLUE), (~hit, "targets where no throw landed", LIMIT_LINE["color"])):
+    missed = f"targets where no {task.noun} {task.success}"
+    for own, name, colour in ((hit, "targets", BLUE), (~hit, missed, LIMIT_LINE["color"])):
         if own.any():
             marker = {"color": colour, "size": 7, "symbol": "cross"}
             figure.add_scatter(x=targets[own, 0], y=targets[own, 1], mode="markers", marker=marker, name=name)
@@ -70,3 +75,10 @@ def draw_miss_map(
 def _take_two(points: NDArray[np.float64]) -> NDArray[np.float64]:
     """The first two columns; if there is only one, a column of zeros after it."""
     return np.column_stack([points, np.zeros(len(points))])[:, :2]
+
+
+def title_column(column: str, task: TaskConfig) -> str:
+    """Title of an axis for a column of places: the word that the task has for it, or its own name, and the unit."""
+    words = {each.of: each.word for each in task.target_columns}
+    unit = unit_of_name(column)
+    return f"{words.get(column, column.removesuffix(f'_{unit}'))} [{unit}]" if unit else column

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import plotly.graph_objects as go
 
+from throwcollect.config.task import TaskConfig
 from throwcollect.dataset.reader import Dataset
 from throwcollect.errors import ConfigError
 from throwcollect.learning.model import Model, load_model
@@ -15,7 +16,7 @@ from throwcollect.learning.model_directory import read_score
 from throwcollect.learning.score import SHOWN_AS, Errors, Misses, Score, ThrowAtTarget, tell_length, tell_misses
 from throwcollect.report.contents import Panel, Row, Section, Table
 from throwcollect.report.figures import BLUE, LEGEND_ABOVE
-from throwcollect.report.miss_map import ARROWS, draw_miss_map
+from throwcollect.report.miss_map import ARROWS, draw_miss_map, title_column
 from throwcollect.wording import command, format_count
 
 _TITLE = "How a model of it hits"
@@ -52,7 +53,7 @@ def show_model(directory: Path, dataset: Dataset) -> Section:
         Panel(
             "targets",
             f"Targets, and misses drawn {ARROWS} times as long",
-            _draw_misses(model, score.throws),
+            _draw_misses(model, score.throws, dataset.config.task),
             picture="targets",
         ),
         *_show_errors(
@@ -68,7 +69,7 @@ def show_model(directory: Path, dataset: Dataset) -> Section:
         there = Panel(
             "elsewhere",
             f"Targets there after the last of them, misses {ARROWS} times as long",
-            _draw_misses(model, score.adapted_throws),
+            _draw_misses(model, score.adapted_throws, dataset.config.task),
         )
         errors = _show_errors(
             "adapting",
@@ -81,12 +82,13 @@ def show_model(directory: Path, dataset: Dataset) -> Section:
     return Section("model", "Model", _TITLE, text, tuple(rows))
 
 
-def _draw_misses(model: Model, throws: Sequence[ThrowAtTarget]) -> go.Figure:
+def _draw_misses(model: Model, throws: Sequence[ThrowAtTarget], task: TaskConfig) -> go.Figure:
     """Draw targets amid the places that the dataset reached, and a line for each miss."""
     shape, nowhere = (len(throws), len(model.targets)), [np.nan] * len(model.targets)
     targets = np.array([throw.target for throw in throws], np.float64).reshape(shape)
     places = np.array([throw.place or nowhere for throw in throws], np.float64).reshape(shape)
-    return draw_miss_map(model.learned.outputs, targets, places, model.targets)
+    titles = [title_column(column, task) for column in model.targets]
+    return draw_miss_map(model.learned.outputs, targets, places, titles, task)
 
 
 def _show_errors(

@@ -170,6 +170,9 @@ def _set_axis(axes: Axes, letter: Literal["x", "y"], axis: Any, *, has_labels: b
         own.set_major_locator(MaxNLocator(axis.nticks - 1))
     if axis.tickvals is not None:
         own.set_ticks(axis.tickvals, axis.ticktext)
+    if axis.rangemode == "tozero":
+        low, high = getattr(axes, f"get_{letter}lim")()
+        axes.set(**{f"{letter}lim": (min(low, 0.0), max(high, 0.0))})
     if axis.range is not None:
         axes.set(**{f"{letter}lim": [10**end for end in axis.range] if axis.type == "log" else axis.range})
     if axis.scaleanchor is not None:

@@ -57,7 +57,7 @@ def _show_map(dataset: Dataset, targets: Targets) -> Panel:
     aimed = ~np.isnan(goals).any(axis=1)
     titles = [f"{declared[name].word} [{unit_of_name(name)}]" for name in shown]
     times = choose_scale(goals[aimed], places[aimed]) if aimed.any() else 1
-    figure = draw_miss_map(places[~aimed], goals[aimed], places[aimed], titles, times=times)
+    figure = draw_miss_map(places[~aimed], goals[aimed], places[aimed], titles, dataset.config.task, times=times)
     title = f"Targets, and misses drawn {times} times as long" if times > 1 else "Targets and misses"
     return Panel("map", title, figure, picture="targets_and_misses")
 

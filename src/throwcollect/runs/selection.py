@@ -169,6 +169,10 @@ def busy(record: Record) -> ConflictError:
 def describe_death(run: Run) -> WorkerError:
     """The error that the launcher of a run died before the run ended."""
     hint = f"{command('down', '--run', run.id)} cleans up"
+    if has_complete_dataset(run):
+        return WorkerError(
+            f"run {run.id}: its launcher died, but the dataset is complete: {run.place.dataset}", hint=hint
+        )
     if again := run.place.way_on:
         hint = f"{again} goes on where it ended, or with its containers if they live; {hint}"
     return WorkerError(
@@ -176,6 +180,21 @@ def describe_death(run: Run) -> WorkerError:
         evidence=f"the logs are in {run.record.logs}",
         hint=hint,
     )
+
+
+def has_complete_dataset(run: Run) -> bool:
+    """Whether nothing is left to collect into the directory of a run.
+
+    A later run may have gone on with what this one left, so the dataset is asked where the record does not know.
+    """
+    if run.record.kind != "collection" or run.status == "running":
+        return False
+    if run.status == "died":
+        # This imports what reads tables, which takes a while and is rarely needed.
+        from throwcollect.coordinator.resume import is_complete
+
+        return run.record.volume is None and is_complete(run.place.directory)
+    return run.record.exit_code == 0
 
 
 def require_living(run: Run) -> Record:

@@ -10,6 +10,7 @@ import shutil
 from collections import deque
 from collections.abc import Iterator
 from pathlib import Path
+from typing import TextIO
 
 from throwcollect.heartbeat import ready_line
 
@@ -25,6 +26,11 @@ class NodeLogs:
 
     def __init__(self, directory: Path) -> None:
         self._directory = directory
+        self._earlier_bytes: dict[str, int] = {}
+
+    def skip_earlier(self) -> None:
+        """Leave what is in the files by now out of `tail` and `said_ready`: nodes of an earlier run printed it."""
+        self._earlier_bytes = {name: path.stat().st_size for name, path in self.files().items() if path.is_file()}
 
     def path(self, name: str) -> Path:
         """Log file of a node."""
@@ -33,7 +39,7 @@ class NodeLogs:
     def tail(self, name: str) -> str:
         """Last lines that a node printed, and a remark if the disk is full, so that more may be missing."""
         try:
-            with self.path(name).open(encoding="utf-8", errors="replace") as log:
+            with self._open(name) as log:
                 lines = "".join(deque(log, _TAIL_LINES)).strip() + "\n"
             free = shutil.disk_usage(self._directory).free
         except OSError:
@@ -51,10 +57,20 @@ class NodeLogs:
     def said_ready(self, name: str) -> bool:
         """Whether a simulation has ever printed that it is ready for trials."""
         try:
-            with self.path(name).open(encoding="utf-8", errors="replace") as log:
+            with self._open(name) as log:
                 return f"{ready_line(name)}\n" in log
         except OSError:
             return False
+
+    def _open(self, name: str) -> TextIO:
+        """Open the log of a node behind what is left out.
+
+        Raises:
+            OSError: If it cannot be opened.
+        """
+        log = self.path(name).open(encoding="utf-8", errors="replace")
+        log.seek(self._earlier_bytes.get(name, 0))
+        return log
 
 
 class Tail:

@@ -15,6 +15,7 @@ from pydantic import JsonValue
 
 from throwcollect.config.containers import ContainerSpec
 from throwcollect.config.loader import load
+from throwcollect.coordinator.resume import is_complete
 from throwcollect.dataset.directory import config_path
 from throwcollect.errors import ConfigError, ConflictError, NotFoundError, Problem, WorkerError
 from throwcollect.robots.appearance import check_appearance
@@ -29,6 +30,7 @@ from throwcollect.serve.catalogue import NAME, Catalogue, Component
 from throwcollect.serve.live import name_node
 from throwcollect.serve.robot_files import description_of
 from throwcollect.serve.state import simulations_of
+from throwcollect.wording import command
 
 _KEPT = ("run", "containers", "cluster", "sweep.file")
 """Keys of a configuration that only the operator sets, because they name files and resources of this machine."""
@@ -112,7 +114,8 @@ class Instances:
 
         Raises:
             NotFoundError: If there is no such run.
-            ConflictError: If it lives, has no dataset to go on with, or as many instances live as may.
+            ConflictError: If it lives, has no dataset to go on with or a complete one, or as many instances live as
+                may.
             ConfigError: If the configuration cannot be used.
             WorkerError: If it cannot be begun.
         """
@@ -124,6 +127,11 @@ class Instances:
                 raise ConflictError(f"run {run.id} is still running")
             if run.record.kind != "collection" or run.record.volume is not None or not config.is_file():
                 raise ConflictError(f"run {run.id} has no dataset in a directory to go on with")
+            if is_complete(run.place.directory):
+                raise ConflictError(
+                    f"the dataset of run {run.id} is complete",
+                    hint=f"{command('resume', run.place.directory, '--trials', 'K')} adds trials",
+                )
             if origin is not None and origin.component in self.catalogue.components:
                 _check_room(self.catalogue.get(origin.component))
             return begin_run(config, overrides=(), output=run.place.directory, origin=origin, resumed=True)

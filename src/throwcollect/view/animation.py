@@ -85,6 +85,8 @@ def render(directory: Path, output: Path, *, trial: int | None = None, slow: flo
     config = dataset.plan.config_of(dataset.plan.trial(row["trial"]))
     samples = dataset.episode(row["trial"]).samples(dataset.joints)
     pictures = _draw_all(config, dataset.joints, samples, row, slow)
+    if kind == "GIF":
+        pictures = _reduce_colours(pictures)
     times = [_FRAME_MS] * (len(pictures) - 1) + [_LAST_FRAME_MS]
     buffer = io.BytesIO()
     pictures[0].save(
@@ -127,6 +129,24 @@ def _draw_all(config: Config, joints: tuple[str, ...], samples: Samples, row: di
             picture.paste(body, (0, 0), body)
             pictures.append(picture.resize((_WIDTH, _HEIGHT), images.Resampling.LANCZOS))
     return pictures
+
+
+def _reduce_colours(pictures: list[Any]) -> list[Any]:
+    """Give pictures the 256 colours that a GIF can have.
+
+    Thin lines have so few pixels that their colours would not be chosen: the cross would be as orange as the path. So
+    these colours are set, with those of their smooth edges on the ground.
+    """
+    ground = np.array(_GROUND)
+    fixed = [_SKY, _GROUND, _LINE] + [
+        tuple(np.round(ground + share * (np.array(color) - ground)).astype(int).tolist())
+        for color in (_HELD, _FLOWN, _LANDED)
+        for share in (0.25, 0.5, 0.75, 1.0)
+    ]
+    others = pictures[-1].quantize(256 - len(fixed)).getpalette()
+    palette = images.new("P", (1, 1))
+    palette.putpalette([value for color in fixed for value in color] + others)
+    return [picture.quantize(palette=palette, dither=images.Dither.NONE) for picture in pictures]
 
 
 def _place(renderer: Renderer, joints: tuple[str, ...], samples: Samples, number: int) -> None:

@@ -4,7 +4,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from rosbags.typesys import Stores, get_typestore
 
-from rclzenoh.interfaces import deserialize, get_action, get_message, message_class, serialize
+from rclzenoh.interfaces import catalog, deserialize, get_action, get_message, message_class, serialize
 from rclzenoh.interfaces.catalog import _FIELDDEFS, DEFINITIONS, structure
 from rclzenoh.interfaces.message import DTYPES
 
@@ -161,3 +161,17 @@ def test_a_number_that_does_not_fit_is_refused():
     time = get_message("builtin_interfaces/msg/Time")(sec=2**31)
     with pytest.raises(ValueError, match="builtin_interfaces/msg/Time cannot be serialised"):
         serialize(time)
+
+
+def test_bounded_strings_of_arrays_are_checked_one_by_one(monkeypatch):
+    monkeypatch.setattr("rclzenoh.interfaces.catalog._FIELDDEFS", {**_FIELDDEFS})
+    name = "made_up_msgs/msg/Bounded"
+    catalog._add_message("made_up_msgs", "Bounded", ["string<=3[5] names\nstring<=2[] more\n"])
+    kind = message_class(name)
+    names, more = ["abc", "", "a", "b", "c"], ["x", "y", "z"]
+    message = kind(names=names, more=more)
+    assert deserialize(serialize(message), kind) == message
+    with pytest.raises(ValueError, match="names: expected at most 3, got 4"):
+        serialize(kind(names=["abcd", "", "", "", ""], more=more))
+    with pytest.raises(ValueError, match="names: expected 5 elements, got 4"):
+        serialize(kind(names=names[1:], more=more))

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from throwcollect.cluster import slurm
+from throwcollect.errors import ConfigError, WorkerError
 
 QUEUE = """\
 7|0|SIGNALING|a1|None
@@ -31,3 +32,23 @@ def test_a_task_that_is_being_warned_of_its_time_limit_still_runs(
         (2, True, False),
         (3, True, False),
     ]
+
+
+def test_without_a_controller_one_sentence_says_so_in_place_of_internals(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    said = """\
+scontrol: error: resolve_ctls_from_dns_srv: res_nsearch error: Unknown host
+scontrol: error: fetch_config: DNS SRV lookup failed
+scontrol: fatal: Could not establish a configuration source
+"""
+    for name in ("scontrol", "sbatch"):
+        (tmp_path / name).write_text(f"#!/bin/sh\ncat >&2 <<END\n{said}END\nexit 1\n")
+        (tmp_path / name).chmod(0o755)
+    monkeypatch.setenv("PATH", f"{tmp_path}:/usr/bin:/bin")
+    with pytest.raises(WorkerError, match="Slurm has no controller that scontrol can reach") as caught:
+        slurm.find_largest_array()
+    assert "resolve_ctls" not in str(caught.value)
+    with pytest.raises(ConfigError, match="Slurm has no controller that sbatch can reach") as refused:
+        slurm.check(tmp_path / "script")
+    assert "try: run this on a login node" in str(refused.value)

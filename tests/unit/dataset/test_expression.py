@@ -62,6 +62,8 @@ def test_what_is_null_fulfils_no_comparison() -> None:
     ("text", "message"),
     [
         ("outcome = 'landed'", r"cannot be understood: .* \(character 9\)\n    outcome = 'landed'\n            \^"),
+        ("trial >", r"cannot be understood: .* \(character 8\)\n    trial >\n           \^"),
+        ("(trial > 1", r"cannot be understood: .* \(character 1\)\n    \(trial > 1\n    \^"),
         ("", "cannot be understood"),
         ("trial > 1\0", "cannot be understood"),
         ("not " * 5000 + "trial > 1", "cannot be understood|nested too deeply"),

@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 
+from throwcollect.cli.dataset.info import show_info
 from throwcollect.dataset.creation import create
 from throwcollect.dataset.inspect import digest, info
 from throwcollect.episode.message import header_to_json
@@ -68,3 +69,15 @@ def test_an_unfinished_dataset_and_no_dataset_are_told_apart(collection: Any, tm
     create(tmp_path / "dataset", collection.plan)
     with pytest.raises(DatasetError, match="the dataset is not finished"):
         info(tmp_path / "dataset")
+
+
+def test_a_missing_recording_is_told_after_the_summary(dataset: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    missing = info(dataset).shards
+    shard = next(iter(sorted(dataset.glob("*.mcap"))))
+    shard.unlink()
+    assert missing > 1
+    with pytest.raises(
+        DatasetError, match=f"{shard.name} is missing\n  try: throwcollect resume .* collects the trials"
+    ):
+        show_info(dataset)
+    assert capsys.readouterr().out.startswith("trials ")

@@ -91,6 +91,21 @@ def test_a_damaged_recording_is_refused_and_nothing_is_written(spoiled: Path) ->
     assert not (spoiled / "throws.parquet").exists()
 
 
+def test_a_configuration_that_lost_a_line_is_refused_though_it_says_the_same(spoiled: Path) -> None:
+    path = spoiled / "config.yaml"
+    whole = path.read_text()
+    path.write_text(whole.replace("  drag_coefficient: 0.0\n", ""))
+    before = {each.name: each.read_bytes() for each in spoiled.iterdir() if each.is_file()}
+    with pytest.raises(
+        DatasetError, match=r"config\.yaml: is not as it was written: datapackage\.json has another hash"
+    ):
+        rebuild(spoiled)
+    assert {each.name: each.read_bytes() for each in spoiled.iterdir() if each.is_file()} == before
+    # Without a manifest, it may be the file of an earlier version, which had fewer keys.
+    (spoiled / "datapackage.json").unlink()
+    assert rebuild(spoiled).written == DERIVED
+
+
 def test_a_plan_that_was_changed_is_refused(spoiled: Path) -> None:
     table = pq.read_table(spoiled / "plan.parquet")
     seeds = pa.array(range(7), pa.uint64())

@@ -103,10 +103,10 @@ def test_cells_may_be_of_any_expression(some: Path) -> None:
         ("train=0.5,train=0.5", "names a part twice"),
         ("train=1,test=0", "should be above 0"),
         ("train=0.5,../test=0.5", "'../test' should be lower-case letters"),
-        ("train=0.5,test", "should be a name, an equals sign and a number such as 0.5, got 'test'"),
-        ("train=0.5,test=1/0", "should be a name, an equals sign and a number such as 0.5, got 'test=1/0'"),
-        ("train=0.5,test=1e9", "should be a name, an equals sign and a number such as 0.5, got 'test=1e9'"),
-        ("=0.5,test=0.5", "should be a name, an equals sign and a number such as 0.5, got '=0.5'"),
+        ("train=0.5,test", "should be a part and its share, such as train=0.8, got 'test'"),
+        ("train=0.5,test=1/0", "should be a part and its share, such as train=0.8, got 'test=1/0'"),
+        ("train=0.5,test=1e9", "should be a part and its share, such as train=0.8, got 'test=1e9'"),
+        ("=0.5,test=0.5", "should be a part and its share, such as train=0.8, got '=0.5'"),
         ("train=0.999999,test=0.000001", "test would get none of the 12 trials"),
     ],
 )
@@ -119,7 +119,7 @@ def test_wrong_fractions_are_explained(some: Path, tmp_path: Path, fractions: st
 @pytest.mark.parametrize(
     ("axis", "message"),
     [
-        ("landing_x_m", "should be a name, an equals sign and a number"),
+        ("landing_x_m", "should be an expression and the width of cells, such as landing_x_m=0.05, got 'landing_x_m'"),
         ("landing_x_m=0", "the width of cells should be above 0"),
         (f"landing_x_m=0.{'0' * 400}1", "the width of cells should be above 0"),
         ("landing_x=0.1", "no column 'landing_x'; did you mean 'landing_x_m'"),

@@ -55,6 +55,8 @@ def test_misses_are_arrows_from_their_targets(dataset: Dataset, model: Path) -> 
     write_score(model, score())
     panels = {panel.key: panel.figure for panel in show_model(model, dataset).panels}
     assert list(panels) == ["targets", "training", "adapting", "elsewhere"]
+    axes = panels["targets"].layout
+    assert (axes.xaxis.title.text, axes.yaxis.title.text) == ("x [m]", "y [m]")
     traces = {trace.name: trace for trace in panels["targets"].data}
     assert len(traces["throws of the dataset"].x) == 80
     assert list(traces["targets"].x) == [1.0, 1.2]

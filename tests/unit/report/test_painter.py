@@ -50,6 +50,14 @@ def test_points_are_where_their_axes_say(tmp_path: Path) -> None:
     assert down > 0.7  # 1 is near the lower end
 
 
+def test_an_axis_begins_at_zero_where_the_figure_wants_that(tmp_path: Path) -> None:
+    figure = scatter([8.0, 10.0], [1.0, 1.0])
+    _, before = centre(red_pixels([figure], tmp_path / "before.png"))
+    _, after = centre(red_pixels([figure.update_xaxes(rangemode="tozero")], tmp_path / "after.png"))
+    assert before == pytest.approx(0.5, abs=0.1)
+    assert after > 0.8
+
+
 def test_a_scale_anchor_makes_a_circle_of_a_circle(tmp_path: Path) -> None:
     angles = np.linspace(0, 2 * np.pi, 100)
     figure = scatter(np.cos(angles).tolist(), np.sin(angles).tolist(), "lines").update_yaxes(scaleanchor="x")

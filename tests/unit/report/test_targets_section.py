@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 from tests.unit.dataset.conftest import Collection
 from tests.unit.dataset.targeted import collect_targeted
 
+from throwcollect.config.task import TaskConfig
+from throwcollect.config.until import UntilConfig, Wanted
 from throwcollect.dataset.reader import Dataset
 from throwcollect.episode.record import EpisodeHeader, Samples
-from throwcollect.report.miss_map import choose_scale
+from throwcollect.report.miss_map import choose_scale, draw_miss_map, title_column
 from throwcollect.report.pictures import write_pictures
 from throwcollect.report.sections import report_dataset
 from throwcollect.report.targets_section import show_targets
@@ -48,6 +51,19 @@ def test_there_is_no_section_without_targets_and_one_without_misses(tmp_path: Pa
     assert section.text == "3 of 4 throws should end at a target. None of them ended anywhere."
     (above,) = section.panels
     assert [trace.name for trace in above.figure.data] == ["throws of the dataset", "targets where no throw landed"]
+
+
+def test_the_map_names_trials_as_their_task_does() -> None:
+    class UntilReached(UntilConfig):
+        reached: Wanted
+
+    class Reach(TaskConfig):
+        until: ClassVar[type[UntilConfig]] = UntilReached
+
+    targets = np.zeros((1, 2))
+    figure = draw_miss_map(targets, targets, np.full((1, 2), np.nan), "xy", Reach.model_construct())
+    assert [trace.name for trace in figure.data] == ["trials of the dataset", "targets where no trial reached"]
+    assert title_column("end_error_rad", Reach.model_construct()) == "end_error [rad]"
 
 
 def test_large_misses_are_drawn_as_long_as_they_are() -> None:

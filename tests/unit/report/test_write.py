@@ -97,6 +97,9 @@ def test_the_command_writes_beside_the_dataset_and_says_what(dataset: Path, tmp_
     assert found["page"] == str(tmp_path / "dataset.html")
     assert found["size_bytes"] == (tmp_path / "dataset.html").stat().st_size
     assert found["pictures"] == []
+    named = CliRunner().invoke(dataset_app, ["report", str(dataset), "-o", str(tmp_path / "named.html")])
+    assert named.exit_code == 0, named.output
+    assert (tmp_path / "named.html").read_bytes() == (tmp_path / "dataset.html").read_bytes()
 
 
 def test_the_documented_command_gives_the_same_report_again_with_or_without_a_display(

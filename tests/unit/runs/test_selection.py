@@ -1,3 +1,4 @@
+import json
 import os
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
@@ -5,8 +6,10 @@ from datetime import datetime, timedelta, timezone
 from pathlib import Path
 
 import pytest
+from tests.e2e.collection import FAST, collect_here, write_config
 from tests.unit.runtimes.docker.engine import Engine, engine_at
 
+from throwcollect.cli.runs import ps
 from throwcollect.errors import ConfigError, DatasetError, Interrupted, ThrowcollectError, WorkerError
 from throwcollect.runs.record import Failure, Record
 from throwcollect.runs.records import Records, Run
@@ -299,6 +302,21 @@ def test_the_way_on_after_the_death_of_a_launcher_depends_on_where_the_dataset_i
     assert again in told(make("a", "died", directory="/b"))
     assert again in told(make("b", "died", runtime="docker", directory="/b"))
     assert "resume" not in told(make("c", "died", runtime="docker", volume="v"))
+
+
+def test_a_run_that_died_is_told_with_a_dataset_that_is_complete_by_now(
+    records: Records, make: Make, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    collect_here(write_config(tmp_path, trials=2, sim=FAST), tmp_path / "data")
+    record = make("a", "died", directory=str(tmp_path / "data"))
+    said = str(describe_death(records.get(record.run)))
+    assert said.startswith(f"run {record.run}: its launcher died, but the dataset is complete: {tmp_path / 'data'}\n")
+    assert "resume" not in said
+    ps()
+    assert "died, but the dataset is complete" in capsys.readouterr().out
+    (tmp_path / "data" / "throws.parquet").unlink()
+    ps(json=True)
+    assert [each["complete"] for each in json.loads(capsys.readouterr().out) if each["run"] == record.run] == [False]
 
 
 def test_without_a_client_of_engines_none_is_asked(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

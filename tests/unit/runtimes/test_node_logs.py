@@ -4,6 +4,7 @@ from types import SimpleNamespace
 
 import pytest
 
+from throwcollect.heartbeat import ready_line
 from throwcollect.runtimes.node_logs import NodeLogs, Tail
 
 
@@ -16,6 +17,17 @@ def test_a_log_that_a_full_disk_has_cut_off_ends_with_the_reason(
     assert logs.tail("sim_0") == printed.strip()
     monkeypatch.setattr(shutil, "disk_usage", lambda path: SimpleNamespace(free=512) if path == tmp_path else None)
     assert logs.tail("sim_0") == (f"{before}the disk of {tmp_path} is full: 512 bytes are free; free space, and resume")
+
+
+def test_what_an_earlier_run_printed_is_left_out(tmp_path: Path) -> None:
+    logs = NodeLogs(tmp_path)
+    ready = f"{ready_line('sim_0')}\n".encode()
+    append(logs.path("sim_0"), ready + "größer\n".encode())
+    logs.skip_earlier()
+    assert (logs.tail("sim_0"), logs.said_ready("sim_0")) == ("", False)
+    append(logs.path("sim_0"), b"begun\n" + ready)
+    assert (logs.tail("sim_0").splitlines()[0], logs.said_ready("sim_0")) == ("begun", True)
+    assert NodeLogs(tmp_path).tail("sim_0").splitlines()[1] == "größer"
 
 
 def test_a_node_without_a_log_has_said_nothing(tmp_path: Path) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import re
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -79,6 +80,21 @@ def test_a_resumed_collection_counts(client: TestClient, remember: Remember, tmp
     assert [resume(name) for name in ("nobody", "none", "session", "resumed-1")] == [404, 409, 409, 409]
     assert put(client, "a").status_code == 202
     assert resume("old") == 409
+
+
+def test_a_complete_collection_is_not_resumed(
+    client: TestClient, begun: list[dict[str, Any]], collected: Path, remember: Remember, tmp_path: Path
+) -> None:
+    directory = tmp_path / "datasets" / "old"
+    shutil.copytree(collected, directory)
+    remember("old", **ended(origin=Origin("throws"), directory=str(directory)))
+    said = client.post("/api/v1/collections/old/resume")
+    assert (said.status_code, said.json()["title"]) == (409, "the dataset of run old is complete")
+    assert said.headers["content-type"] == "application/problem+json"
+    assert begun == []
+    # A dataset that has lost a file is no complete one.
+    next(directory.glob("*.mcap")).unlink()
+    assert client.post("/api/v1/collections/old/resume").status_code == 202
 
 
 def test_a_container_may_join_a_run(

@@ -56,6 +56,14 @@ def test_slower_takes_longer(collected: Path, written: Animation, tmp_path: Path
     assert fast.file.read_bytes()[:6] == b"GIF89a"
 
 
+def test_the_colours_of_lines_are_among_the_few_of_a_gif(collected: Path, written: Animation, tmp_path: Path) -> None:
+    gif = render(collected, tmp_path / "throw.gif", trial=4)
+    pixels = picture(gif.file, written.pictures - 1)
+    assert pixels[0, 0] == pytest.approx([247, 249, 251], abs=2)
+    for color in ((255, 115, 0), (200, 30, 30)):
+        assert (pixels == color).all(axis=2).sum() > 10
+
+
 def test_the_camera_sees_all_points_and_stands_no_farther_than_needed() -> None:
     points = np.random.default_rng(1).uniform([-0.5, -0.5, 0], [3, 1, 2], (200, 3))
     shares = camera_on(points, 1.6).project(points)

@@ -21,10 +21,12 @@ if TYPE_CHECKING:
 
 def show_info(directory: DatasetArgument, json: JsonOption = False) -> None:
     """Say what a dataset holds."""
-    from throwcollect.dataset.inspect import info
+    from throwcollect.dataset.inspect import check_recordings_are_there, info
 
     found = info(directory)
     print_result(found.as_dict(), describe(found), json=json)
+    # The summary follows from the tables, which are there all the same.
+    check_recordings_are_there(directory)
 
 
 def show_digest(directory: DatasetArgument) -> None:

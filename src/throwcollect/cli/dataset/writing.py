@@ -41,7 +41,9 @@ def report_dataset(
     directory: DatasetArgument,
     output: Annotated[
         Path | None,
-        typer.Option("--output", metavar="FILE", help="HTML file to write; DIR.html beside the dataset if not given."),
+        typer.Option(
+            "--output", "-o", metavar="FILE", help="HTML file to write; DIR.html beside the dataset if not given."
+        ),
     ] = None,
     png: Annotated[
         Path | None,

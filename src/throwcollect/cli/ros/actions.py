@@ -11,6 +11,7 @@ from throwcollect.cli.ros.options import RunOption, TypesOption
 from throwcollect.cli.ros.session import Session, join_graph, print_names, require_name
 from throwcollect.errors import ConfigError, Interrupted, ThrowcollectError
 from throwcollect.ros.names import absolute_name, find_interface
+from throwcollect.wording import command
 
 action_app = typer.Typer(help="Actions: list, send.", no_args_is_help=True)
 
@@ -54,9 +55,8 @@ def send_goal(
         sent = client.send_goal_async(message, feedback_callback=_show_feedback if feedback else None)
         handle = session.answer(sent, alive=client.server_is_ready, who=name)
         if not handle.accepted:
-            raise ConfigError(
-                f"{name}: the goal was rejected", hint="the log of the node says why: ros topic echo /rosout"
-            )
+            echo = command("ros", "topic", "echo", "/rosout", *(("--run", run) if run is not None else ()))
+            raise ConfigError(f"{name}: the goal was rejected", hint=f"the log of the node says why: {echo}")
         try:
             print(f"Goal accepted with ID: {bytes(bytearray(handle.goal_id.uuid)).hex()}\n", flush=True)
             response = session.answer(handle.get_result_async(), alive=client.server_is_ready, who=name)

@@ -128,6 +128,8 @@ class DockerNodes(NodeHost):
                     placing.result()
         self._watch = EngineWatch(self._client, place, self._clock)
         found = self._adopt()
+        if not found:
+            self.logs.skip_earlier()
         if place.in_volume and not found:
             place_directory(self._client, place, self.config, self.place.directory)
         return found
