@@ -15,15 +15,15 @@ from throwcollect.config.sweep import LANDING_HEIGHT, TargetConfig
 from throwcollect.coordinator.progress import Progress
 from throwcollect.dataset.summary import Info
 from throwcollect.errors import ConfigError
-from throwcollect.runs.record import Kind, Record
+from throwcollect.runs.record import Kind, Planning, Record
 from throwcollect.runs.records import Records, Run
 from throwcollect.runtimes.runtime import NodeState
 from throwcollect.serve.catalogue import Catalogue, Component
 
 _MOST_OVER = 100
 
-Status = Literal["starting", "running", "ended", "died"]
-_LIVING: tuple[Status, ...] = ("starting", "running")
+Status = Literal["planning", "starting", "running", "ended", "died"]
+_LIVING: tuple[Status, ...] = ("planning", "starting", "running")
 
 
 @dataclass(frozen=True)
@@ -57,7 +57,8 @@ class InstanceState:
         name: Name of the collection.
         kind: Whether it collects a dataset, has simulations for clients alone, or is a container of the catalogue.
         joins: Id of the run that a container has joined; None if it has joined none.
-        status: ``starting`` until all nodes run, ``running``, ``ended``, or ``died``: its launcher did before it ended.
+        status: ``planning`` while a large plan is made, ``starting`` until all nodes run, ``running``, ``ended``, or
+            ``died``: its launcher did before it ended.
         started: When it was begun.
         ended: When it ended; None before.
         stopping: Whether it ends because somebody has asked for that; running trials are finished.
@@ -65,6 +66,7 @@ class InstanceState:
         message: What it ended with, in words; empty if there was no error.
         simulations: Number of simulations that are wanted.
         nodes: Its nodes; none once it has ended.
+        planning: How far the plan is while it is made; else None.
         progress: How far it has come; None before the first report, and without a coordinator.
         dataset: Where the dataset is, in words; None if it collects none.
         summary: What the dataset holds; None if it is not finished.
@@ -84,6 +86,7 @@ class InstanceState:
     message: str
     simulations: int
     nodes: list[NodeState]
+    planning: Planning | None
     progress: Progress | None
     dataset: str | None
     summary: Info | None
@@ -194,6 +197,7 @@ def describe(run: Run) -> InstanceState:
         message=str(error or ""),
         simulations=record.simulations,
         nodes=list(record.nodes),
+        planning=record.planning if run.status == "running" else None,
         progress=record.progress,
         dataset=run.place.dataset if record.kind == "collection" else None,
         summary=record.summary,
@@ -211,5 +215,7 @@ def _status(run: Run) -> Status:
         return "ended"
     if run.status == "died":
         return "died"
+    if run.record.planning is not None:
+        return "planning"
     nodes = run.record.nodes
     return "running" if nodes and all(node.status != "starting" for node in nodes) else "starting"

@@ -302,6 +302,7 @@ function inWords(values) {
 
 function emptiness(instance) {
   if (!instance) return "Nothing runs. Start a component, or look at a run that has ended.";
+  if (instance.status === "planning") return `${instance.id} is being planned …`;
   if (instance.status === "starting") return `${instance.id} is starting …`;
   if (lives(instance)) return `${instance.id} has no simulation that is ready yet.`;
   return `${instance.id} has ended; nothing moves any more.`;
