@@ -34,11 +34,10 @@ _CODE_S = 600.0
 """Time for which a one-time code can be exchanged."""
 _SUBPROTOCOL = "bearer."
 _POLICY = (
-    "default-src 'self'; img-src 'self' data: blob:; style-src 'self' 'unsafe-inline'; connect-src 'self' ws: wss:; "
+    "default-src 'self'; img-src 'self' data: blob:; style-src 'self' 'unsafe-inline'; connect-src 'self'{sockets}; "
     "object-src 'none'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 )
 _HEADERS = (
-    (b"content-security-policy", _POLICY.encode()),
     (b"x-content-type-options", b"nosniff"),
     (b"referrer-policy", b"no-referrer"),
     (b"cross-origin-opener-policy", b"same-origin"),
@@ -104,7 +103,8 @@ class Access:
         headers = {name.decode("latin-1"): value.decode("latin-1") for name, value in scope["headers"]}
         refusal, may_change = self._judge(scope, headers)
         scope.setdefault("state", {})["may_change"] = bool(may_change)
-        answer = _Answer(scope, send, _GROUPS[may_change])
+        host = headers.get("host", "")
+        answer = _Answer(scope, send, _GROUPS[may_change], _write_policy(host if host in self._hosts else None))
         if refusal is not None:
             await _refuse(scope, receive, answer, *refusal)
         elif scope["type"] == "http":
@@ -202,20 +202,27 @@ async def _refuse(scope: Scope, receive: Receive, send: Any, status: int, title:
         await send({"type": "websocket.close", "code": 1008, "reason": title})
 
 
+def _write_policy(host: str | None) -> bytes:
+    """Write the policy by which the page connects to this server alone; to no socket if its name is not ours."""
+    # Not every browser takes sockets of the same host for 'self'.
+    return _POLICY.format(sockets=f" ws://{host} wss://{host}" if host else "").encode()
+
+
 class _Answer:
     """Sends the answer to a request with the headers that all answers have, and writes a line to the log."""
 
-    def __init__(self, scope: Scope, send: Send, group: str) -> None:
+    def __init__(self, scope: Scope, send: Send, group: str, policy: bytes) -> None:
         self._send = send
         self._scope = scope
         self._group = group
+        self._headers = (*_HEADERS, (b"content-security-policy", policy))
         self._is_noted = False
         self._protocol = next((p for p in scope.get("subprotocols", ()) if p.startswith(_SUBPROTOCOL)), None)
 
     async def __call__(self, message: MutableMapping[str, Any]) -> None:
         if message["type"] in ("http.response.start", "websocket.http.response.start"):
             self._note(message["status"])
-            message = {**message, "headers": [*message.get("headers", ()), *_HEADERS]}
+            message = {**message, "headers": [*message.get("headers", ()), *self._headers]}
         elif message["type"] == "websocket.accept":
             self._note(HTTPStatus.SWITCHING_PROTOCOLS)
             # A browser closes the socket if none of its protocols is taken.

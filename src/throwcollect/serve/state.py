@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from functools import lru_cache
@@ -15,7 +16,7 @@ from throwcollect.config.sweep import LANDING_HEIGHT, TargetConfig
 from throwcollect.coordinator.progress import Progress
 from throwcollect.dataset.summary import Info
 from throwcollect.errors import ConfigError
-from throwcollect.runs.record import Kind, Planning, Record
+from throwcollect.runs.record import Kind, Planning
 from throwcollect.runs.records import Records, Run
 from throwcollect.runtimes.runtime import NodeState
 from throwcollect.serve.catalogue import Catalogue, Component
@@ -65,7 +66,7 @@ class InstanceState:
         exit_code: Exit code of its launcher; None before it ended.
         message: What it ended with, in words; empty if there was no error.
         simulations: Number of simulations that are wanted.
-        nodes: Its nodes; none once it has ended.
+        nodes: Its nodes; none once it has ended, or died with them.
         planning: How far the plan is while it is made; else None.
         progress: How far it has come; None before the first report, and without a coordinator.
         dataset: Where the dataset is, in words; None if it collects none.
@@ -196,18 +197,18 @@ def describe(run: Run) -> InstanceState:
         exit_code=record.exit_code,
         message=str(error or ""),
         simulations=record.simulations,
-        nodes=list(record.nodes),
+        nodes=list(run.nodes),
         planning=record.planning if run.status == "running" else None,
         progress=record.progress,
         dataset=run.place.dataset if record.kind == "collection" else None,
         summary=record.summary,
-        robots=simulations_of(record),
+        robots=simulations_of(run.nodes),
     )
 
 
-def simulations_of(record: Record) -> list[str]:
-    """Names of the simulations of a run that are running."""
-    return [node.name for node in record.nodes if node.name.startswith("sim_") and node.status == "running"]
+def simulations_of(nodes: Sequence[NodeState]) -> list[str]:
+    """Names of the simulations among the nodes of a run that are running."""
+    return [node.name for node in nodes if node.name.startswith("sim_") and node.status == "running"]
 
 
 def _status(run: Run) -> Status:

@@ -55,6 +55,16 @@ def test_every_answer_forbids_what_a_page_does_not_need(served: Served) -> None:
         assert not [name for name in answer.headers if name.startswith("access-control") or name == "set-cookie"]
 
 
+def test_the_page_connects_to_this_server_alone(served: Served) -> None:
+    def connections(**headers: str) -> str:
+        policy = served.client("").get("/", headers=headers).headers["content-security-policy"]
+        return next(rule for rule in policy.split("; ") if rule.startswith("connect-src"))
+
+    assert connections() == f"connect-src 'self' ws://{HOST} wss://{HOST}"
+    # What a stranger names is not repeated.
+    assert connections(Host="evil.example; script-src *") == "connect-src 'self'"
+
+
 def test_who_may_only_look_changes_nothing(served: Served) -> None:
     client = served.client(served.keys.read_only)
     assert client.get(STATE).status_code == 200

@@ -278,14 +278,19 @@ def test_the_state_tells_of_all_that_live_and_the_latest_that_are_over(client: T
     nodes = (NodeState("router", "running", 0, "1", ""), NodeState("sim_0", "running", 0, "2", ""))
     remember("living", origin=Origin("throws"), nodes=nodes)
     remember("lost", lives=False, nodes=(NodeState("sim_0", "running", 0, "2", ""),))
+    remember("left", lives=False, runtime="docker", nodes=(NodeState("sim_0", "running", 0, "2", ""),))
     remember("failed", **ended(exit_code=2, failure=Failure("no plan", hint="mend it")))
     found = client.get("/api/v1/state").json()
     assert [each["status"] for each in found["instances"]][:3] == ["running", "ended", "died"]
     assert len(found["instances"]) == 101
     assert found["components"][0]["instances"] == ["living"]
     assert found["instances"][0]["robots"] == ["sim_0"]
+    # Processes have ended with the launcher; containers outlive it.
+    died = {each["id"]: each for each in client.get(URL).json() if each["status"] == "died"}
+    assert (died["lost"]["nodes"], died["lost"]["robots"]) == ([], [])
+    assert died["left"]["robots"] == ["sim_0"]
     assert found["instances"][1]["message"] == "no plan\n  try: mend it"
-    assert len(client.get(URL).json()) == 106
+    assert len(client.get(URL).json()) == 107
     assert client.get("/api/v1/state").json() == found
 
 
