@@ -25,6 +25,9 @@ Send = Callable[[MutableMapping[str, Any]], Awaitable[None]]
 _MOST_BODY = 1_000_000
 """Bytes of a request's body."""
 _TOO_LONG = 413, f"a body may have {_MOST_BODY} bytes"
+_MOST_SOCKETS = 128
+"""Sockets that may be open at once; a page has up to four."""
+_TOO_MANY = 503, f"{_MOST_SOCKETS} sockets are open, as many as there may be"
 MAY_ONLY_LOOK = 403, "this token may only look"
 """Status and sentence for a request to change something with the token that may only look."""
 _GROUPS = {True: "full", False: "read-only", None: "anybody"}
@@ -93,6 +96,7 @@ class Access:
         self._app = app
         self._keys = keys
         self._hosts = hosts
+        self._sockets = 0
         self._origins = origins | {f"{scheme}://{host}" for scheme in ("http", "https") for host in hosts}
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -114,8 +118,14 @@ class Access:
             finally:
                 if body.is_too_long:
                     await _refuse(scope, receive, answer, *_TOO_LONG)
+        elif self._sockets >= _MOST_SOCKETS:
+            await _refuse(scope, receive, answer, *_TOO_MANY)
         else:
-            await self._app(scope, receive, answer)
+            self._sockets += 1
+            try:
+                await self._app(scope, receive, answer)
+            finally:
+                self._sockets -= 1
 
     def _judge(self, scope: Scope, headers: dict[str, str]) -> tuple[tuple[int, str] | None, bool | None]:
         """Decide on a request.

@@ -165,6 +165,17 @@ def exchange(client: TestClient, code: str) -> Any:
     return client.post("/api/v1/exchange", json={"code": code})
 
 
+def test_one_socket_too_many_is_not_opened(served: Served, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(access, "_MOST_SOCKETS", 1)
+    with served.socket(STATE, served.keys.full) as first:
+        first.receive_text()
+        with pytest.raises(WebSocketDenialResponse) as refusal, served.socket(STATE, served.keys.full):
+            pass
+        assert problem_of(refusal.value, 503) == "128 sockets are open, as many as there may be"
+    with served.socket(STATE, served.keys.full) as after:
+        after.receive_text()
+
+
 def test_a_code_is_exchanged_once(served: Served) -> None:
     code = served.client().post("/api/v1/codes").json()["code"]
     anybody = served.client("")
