@@ -15,7 +15,7 @@ from pydantic import JsonValue
 
 from throwcollect.config.containers import ContainerSpec
 from throwcollect.config.loader import load
-from throwcollect.dataset.directory import config_path
+from throwcollect.dataset.directory import MANIFEST, config_path
 from throwcollect.errors import ConfigError, ConflictError, NotFoundError, Problem, WorkerError
 from throwcollect.robots.appearance import check_appearance
 from throwcollect.runs import control
@@ -112,7 +112,8 @@ class Instances:
 
         Raises:
             NotFoundError: If there is no such run.
-            ConflictError: If it lives, has no dataset to go on with, or as many instances live as may.
+            ConflictError: If it lives, has no dataset to go on with or a complete one, or as many instances live as
+                may.
             ConfigError: If the configuration cannot be used.
             WorkerError: If it cannot be begun.
         """
@@ -124,6 +125,8 @@ class Instances:
                 raise ConflictError(f"run {run.id} is still running")
             if run.record.kind != "collection" or run.record.volume is not None or not config.is_file():
                 raise ConflictError(f"run {run.id} has no dataset in a directory to go on with")
+            if _is_complete(run.place.directory):
+                raise ConflictError(f"run {run.id}: every trial has ended, nothing is left to do")
             if origin is not None and origin.component in self.catalogue.components:
                 _check_room(self.catalogue.get(origin.component))
             return begin_run(config, overrides=(), output=run.place.directory, origin=origin, resumed=True)
@@ -197,6 +200,12 @@ class Instances:
         for result in control.set_parameter(run, nodes, "robot_description", urdf or own):
             if not result.successful:
                 raise ConflictError(f"run {run.id}: {result.reason}")
+
+
+def _is_complete(directory: Path) -> bool:
+    """Whether a run has finished the dataset in a directory, without a trial that was lost."""
+    is_there = (directory / MANIFEST).is_file()
+    return is_there and any(run.record.exit_code == 0 and run.record.summary for run in Records().into(directory))
 
 
 def _check_simulations(run: Run) -> None:

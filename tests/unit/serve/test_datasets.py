@@ -13,6 +13,8 @@ import pytest
 from starlette.testclient import TestClient
 from tests.unit.serve.conftest import Remember, ended
 
+from throwcollect.dataset.inspect import info
+from throwcollect.runs.record import Summary
 from throwcollect.serve import dataset_routes
 
 URL = "/api/v1/collections"
@@ -154,6 +156,15 @@ def test_a_dataset_that_somebody_goes_on_with_is_not_given(
     assert client.get(f"{URL}/a/files").status_code == 200
     remember("again", directory=str(directory))
     assert client.get(f"{URL}/a/files").status_code == 409
+
+
+def test_what_is_complete_is_not_gone_on_with(client: TestClient, directory: Path, remember: Remember) -> None:
+    remember("done", **ended(directory=str(directory), summary=Summary(**vars(info(directory)))))
+    # Another run may have completed what this one left.
+    for name in ("done", "a"):
+        answer = client.post(f"{URL}/{name}/resume")
+        assert answer.status_code == 409
+        assert answer.json()["title"] == f"run {name}: every trial has ended, nothing is left to do"
 
 
 def test_a_damaged_manifest_is_told(client: TestClient, directory: Path) -> None:
