@@ -8,6 +8,7 @@ import subprocess
 import time
 from collections.abc import Callable, Iterator
 from contextlib import suppress
+from dataclasses import replace
 from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any
@@ -25,7 +26,7 @@ from tests.e2e.collection import (
     start,
     write_config,
 )
-from throwcollect.runs.record import Record
+from throwcollect.runs.record import Planning, Record
 from throwcollect.runs.records import Records
 from throwcollect.runs.state_directory import STATE_VARIABLE
 
@@ -399,6 +400,14 @@ def test_without_any_run_every_verb_says_so() -> None:
         assert say(*verb, "--run", "none") == (2, "", "throwcollect: no run 'none'\n")
     code, out, _ = say("ps")
     assert (code, out.split()) == (0, ["RUN", "RUNTIME", "SIMULATIONS", "THROWS", "STATUS", "DATASET"])
+
+
+def test_a_run_whose_plan_is_being_made_tells_how_far_it_is(records: Records) -> None:
+    run, started = records.new("large"), datetime.now(timezone.utc)
+    record = Record(run.run, "large", "", "/data", None, "/data/logs", 0, started, os.getpid(), 2)
+    run.write(replace(record, planning=Planning(1200, 30000)))
+    assert "planning for 0 s, 1200 of 30000 trials checked" in say("ps")[1]
+    run.forget()
 
 
 def test_a_damaged_record_is_named_and_can_be_forgotten(tmp_path: Path) -> None:

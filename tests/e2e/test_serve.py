@@ -320,6 +320,8 @@ def test_view_starts_one_server(place: Place, monkeypatch: pytest.MonkeyPatch) -
             assert code not in (place.state / "serve.log").read_text()
         said = call_here("up", "--view", "--runtime", "inprocess", "--trials", "1", "small.yaml", "--output", "seen")
         assert f"look inside: {address['url']}/#code=" in said.stderr
+        port = address["url"].rpartition(":")[2]
+        assert f"from another machine: ssh -L {port}:127.0.0.1:{port} " in said.stderr
         assert len(pids) == 1
     finally:
         psutil.Process(place.address()["pid"]).kill()

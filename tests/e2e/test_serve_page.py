@@ -6,6 +6,7 @@ import json
 import subprocess
 import sys
 from collections.abc import Iterator
+from datetime import datetime, timezone
 from pathlib import Path
 from urllib.parse import urlsplit
 
@@ -15,6 +16,9 @@ from tests.e2e.chromium import browse, chromium
 from tests.e2e.collection import FAST, write_config
 from tests.e2e.page import CHANGED, load, press, served, unexpected
 from tests.unit.serve.made_model import make_model
+from throwcollect.runs.record import Record
+from throwcollect.runs.records import Records
+from throwcollect.serve.finding import find_server, make_page_address
 
 pytestmark = pytest.mark.e2e
 
@@ -78,6 +82,36 @@ def test_a_collection_is_started_watched_and_stopped_by_the_page(address: str) -
         assert {urlsplit(url).netloc for url in tab.requests if not url.startswith(("data:", "blob:"))} == {
             urlsplit(address).netloc
         }
+        assert unexpected(tab) == []
+
+
+@pytest.fixture
+def over() -> Iterator[tuple[str, str]]:
+    """Two runs that have ended."""
+    runs, now = [Records().new(name) for name in ("early", "late")], datetime.now(timezone.utc)
+    for run in runs:
+        record = Record(run.run, "small", "local", "/none", None, "/none/logs", 0, now, 1, 1, ended=now, exit_code=0)
+        run.write(record)
+        run.close()
+    yield runs[0].run, runs[1].run
+    for run in runs:
+        run.forget()
+
+
+@pytest.mark.skipif(chromium() is None, reason="needs Chromium: apt-get install chromium")
+def test_the_address_names_the_run_that_is_seen_also_in_a_tab_that_has_the_page(
+    address: str, over: tuple[str, str]
+) -> None:
+    watched = "window.throwcollect?.watching.id"
+    with browse(f"{address}&run={over[0]}") as tab:
+        load(tab)
+        tab.wait_for(f"{watched} === {json.dumps(over[0])}")
+        server = find_server()
+        assert server is not None
+        # To go there changes the fragment alone, so the browser does not load the page by itself.
+        tab.ask("Page.navigate", url=make_page_address(server, over[1]))
+        tab.wait_for(f"{watched} === {json.dumps(over[1])}")
+        assert tab.evaluate("location.hash") == ""
         assert unexpected(tab) == []
 
 

@@ -255,10 +255,10 @@ class Robot:
         return float(heard[-1].feedback.positions[robot.controllers[controller].index(name)])
 
     def wait_until_found(self, heard: list[Any]) -> None:
-        """Wait for the first state of a controller: on DDS, nothing else shows that the simulation has found its listener.
+        """Wait for a state of a controller: on DDS, nothing else shows that the simulation has found its listener.
 
-        A simulation tells the states of steps only to listeners that it had found before. A request makes an idle one look
-        around, and tell its present state.
+        A simulation tells the states of steps only to listeners that it had found before. A request makes an idle one
+        look around, and tell its present state.
         """
         self.wait_until(lambda: self.state() in (PLAYING, PAUSED) and bool(heard), "a controller state")
 

@@ -246,9 +246,12 @@ def _announce(run: PreparedRun, token_file: Path | None, *, view: bool) -> None:
         # The token is a secret, and what a display is told may be written to a log.
         tell(f"other machines join by: {command('join-run', run.token, '-n', 4)}")
     if view:
+        from throwcollect.cli.serve import write_tunnel
         from throwcollect.serve.finding import ensure_server, make_page_address
 
-        tell(f"look inside: {make_page_address(ensure_server(), run.record.run)}")
+        address = ensure_server()
+        tell(f"look inside: {make_page_address(address, run.record.run)}")
+        tell(write_tunnel(address))
 
 
 def _start(run: PreparedRun, *, json: bool) -> None:

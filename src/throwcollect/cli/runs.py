@@ -237,6 +237,9 @@ def _make_row(run: Run) -> tuple[str, ...]:
 def _status(run: Run, record: Record) -> str:
     if record.ended is not None:
         return f"{run.status} {_age(record.ended)} ago, exit code {record.exit_code}"
+    if run.lives and record.planning is not None:
+        plan = record.planning
+        return f"planning for {_age(record.started)}, {plan.checked} of {plan.trials} trials checked"
     if run.lives:
         return f"running for {_age(record.started)}"
     from throwcollect.runs.selection import has_complete_dataset

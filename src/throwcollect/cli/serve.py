@@ -79,7 +79,7 @@ def serve(
             typer.echo(jsonlib.dumps({"url": address.url, "page": address.page(code), "pid": address.pid}))
         else:
             typer.echo(f"open {address.page(code)}")
-            tell(f"from another machine: {_tunnel(address)}")
+            tell(write_tunnel(address))
 
     serve_all(
         Instances(Catalogue.read(catalogue) if catalogue else Catalogue.find(DEFAULT_CONFIG), datasets.absolute()),
@@ -106,14 +106,15 @@ def view(run: RunOption = None, json: JsonOption = False) -> None:
         typer.echo(jsonlib.dumps({"url": address.url, "page": page}))
         return
     typer.echo(page)
-    tell(f"from another machine: {_tunnel(address)}   and then the same address, which opens once")
+    tell(write_tunnel(address))
     if sys.stdout.isatty() and (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
         webbrowser.open(page)
 
 
-def _tunnel(address: Address) -> str:
-    """The command by which another machine reaches the port of the server."""
+def write_tunnel(address: Address) -> str:
+    """Write the line that says how another machine reaches the page."""
     import socket
 
     port = address.url.rpartition(":")[2]
-    return f"ssh -L {port}:127.0.0.1:{port} {socket.gethostname()}"
+    tunnel = f"ssh -L {port}:127.0.0.1:{port} {socket.gethostname()}"
+    return f"from another machine: {tunnel}   and then the same address, which opens once"

@@ -15,7 +15,7 @@ from throwcollect.dataset.creation import create, refuse_taken
 from throwcollect.dataset.directory import TRIALS
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.robots.feasibility import Feasibility
-from throwcollect.side_by_side import work_side_by_side
+from throwcollect.side_by_side import working_side_by_side
 from throwcollect.sweep.plan import Check, Plan, check_some_left, draw_first_points, make_trials, refusal
 from throwcollect.sweep.point_file import read_points
 from throwcollect.sweep.points import Points
@@ -38,6 +38,12 @@ _LEAST_BYTES = 40
 """Bytes that each trial takes in the file of a plan: its digest and its seed, which nothing compresses."""
 
 Say = Callable[[str], object]
+Tell = Callable[[int, int], object]
+"""Is told how many trials of how many have been checked; an error that it raises gives the plan up."""
+
+
+def _tell_nobody(_checked: int, _trials: int) -> None:
+    pass
 
 
 def draw_plan(config: Config, *, directory: Path, processes: int = 1, say: Say = lambda _: None) -> Plan:
@@ -54,7 +60,8 @@ def draw_plan(config: Config, *, directory: Path, processes: int = 1, say: Say =
         ConfigError: If the sweep cannot be drawn, or no trial is left.
         WorkerError: If a process that checks trials is killed.
     """
-    return _check_trials(config, _draw_points(config, directory, say), processes=processes, say=say)
+    points = _draw_points(config, directory, say)
+    return _check_trials(config, points, processes=processes, say=say, tell=_tell_nobody)
 
 
 def _draw_points(config: Config, directory: Path, say: Say) -> Points:
@@ -68,7 +75,7 @@ def _count_before(config: Config) -> int:
     return 0 if config.grows else config.trials or 0
 
 
-def _check_trials(config: Config, points: Points, *, processes: int, say: Say) -> Plan:
+def _check_trials(config: Config, points: Points, *, processes: int, say: Say, tell: Tell) -> Plan:
     """Make the plan of points, and refuse the trials that the robot cannot do (see `draw_plan`)."""
     if sentence := find_sunken_robot(config):
         say(sentence)
@@ -79,20 +86,19 @@ def _check_trials(config: Config, points: Points, *, processes: int, say: Say) -
     # The first pieces are small, so that progress can be reported soon.
     firsts = [*range(0, min(size, count), _TRIALS_A_PIECE), *range(size, count, size)]
     pieces = [(first, points[first:stop]) for first, stop in pairwise([*firsts, count])]
-    checked = work_side_by_side(
-        pieces,
-        _make_checked_trials,
-        (config,),
-        processes=processes if count >= _MANY_TRIALS else 1,
-        doing="checks trials",
-    )
-    tell_at = time.monotonic() + _TELL_FIRST_S
-    trials = next(checked)
-    for piece in checked:
-        trials.extend(piece)
-        if time.monotonic() >= tell_at:
-            tell_at = time.monotonic() + _TELL_EVERY_S
-            say(f"plan: {len(trials)} of {count} trials checked")
+    processes = processes if count >= _MANY_TRIALS else 1
+    say_at = time.monotonic() + _TELL_FIRST_S
+    tell(0, count)
+    with working_side_by_side(
+        pieces, _make_checked_trials, (config,), processes=processes, doing="checks trials"
+    ) as checked:
+        trials = next(checked)
+        for piece in checked:
+            tell(len(trials), count)
+            trials.extend(piece)
+            if time.monotonic() >= say_at:
+                say_at = time.monotonic() + _TELL_EVERY_S
+                say(f"plan: {len(trials)} of {count} trials checked")
     check_some_left(trials)
     return Plan(config, trials)
 
@@ -197,7 +203,13 @@ def _check_room(directory: Path, trials: int) -> None:
 
 
 def prepare(
-    config: Config, directory: Path, *, sweep_directory: Path, processes: int = 1, say: Say = lambda _: None
+    config: Config,
+    directory: Path,
+    *,
+    sweep_directory: Path,
+    processes: int = 1,
+    say: Say = lambda _: None,
+    tell: Tell = _tell_nobody,
 ) -> Plan:
     """Freeze the plan: write a dataset directory that holds the resolved configuration and all trials.
 
@@ -207,6 +219,7 @@ def prepare(
         sweep_directory: Where a relative `sweep.file` is looked for.
         processes: As `draw_plan` takes it.
         say: As `draw_plan` takes it.
+        tell: Is told often how many trials have been checked.
 
     Raises:
         ConfigError: If the sweep or the directory cannot be used; nothing stays on the disk then.
@@ -215,9 +228,10 @@ def prepare(
     # To check many trials takes minutes, so what needs no plan is looked at before.
     refuse_taken(directory)
     _check_room(directory, _count_before(config))
+    tell(0, _count_before(config))
     points = _draw_points(config, sweep_directory, say)
     _check_room(directory, len(points.values))
-    plan = _check_trials(config, points, processes=processes, say=say)
+    plan = _check_trials(config, points, processes=processes, say=say, tell=tell)
     plan = replace(plan, config=make_self_contained(config))
     try:
         create(directory, plan, listed=read_listed_points(config, directory=sweep_directory))

@@ -9,7 +9,9 @@ import os
 import shutil
 import signal
 import subprocess
+import time
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from datetime import datetime, timezone
 from pathlib import Path
@@ -19,6 +21,7 @@ from pydantic import TypeAdapter
 
 from throwcollect.config.loader import dump_yaml, load, load_locating_errors
 from throwcollect.config.schema import Config
+from throwcollect.coordinator.progress import Progress
 from throwcollect.dataset.directory import config_path
 from throwcollect.errors import ConfigError, Interrupted, Problem, ThrowcollectError, WorkerError
 from throwcollect.files import open_log, write_file
@@ -32,14 +35,16 @@ from throwcollect.runs.component_container import (
     launch_container,
 )
 from throwcollect.runs.onlooker import Onlooker
-from throwcollect.runs.preparation import Request, prepare_run, resume
+from throwcollect.runs.preparation import MANY_TRIALS, Request, prepare_run, resume
 from throwcollect.runs.prepared_run import PreparedRun
-from throwcollect.runs.record import Failure, Kind, Origin, Record
+from throwcollect.runs.record import Failure, Kind, Origin, Planning, Record
 from throwcollect.runs.records import OpenRun, Records, Run
 from throwcollect.runtimes.node_logs import NodeLogs
 from throwcollect.runtimes.nodes import LAUNCHER
 from throwcollect.runtimes.registry import get_runtime
 from throwcollect.side_by_side import count_cores
+
+_WRITE_PLANNING_S = 1.0
 
 
 @dataclass(frozen=True)
@@ -200,19 +205,67 @@ def carry_out(run: str, lock: int, order: bytes, *, onlooker: Onlooker, interrup
     log = NodeLogs(Path(opened.record.logs)).path(LAUNCHER)
     try:
         prepare = _prepare_session if opened.record.kind == "session" else _prepare_collection
-        prepared = prepare(records, opened, _ORDERS.validate_json(order), onlooker)
+        planner = _Planner(opened, onlooker, interruptions)
+        prepared = prepare(records, opened, _ORDERS.validate_json(order), planner)
         if prepared is None:
             opened.update(ended=datetime.now(timezone.utc), exit_code=0)
             opened.close()
             return
         _move_log(log, NodeLogs(Path(prepared.record.logs)).path(LAUNCHER))
-        if interruptions():
-            raise Interrupted("stopped before any node was started")
+        planner.end_if_asked()
     except ThrowcollectError as error:
-        opened.update(ended=datetime.now(timezone.utc), exit_code=error.exit_code, failure=Failure.of(error))
+        end = datetime.now(timezone.utc)
+        opened.update(ended=end, exit_code=error.exit_code, failure=Failure.of(error), planning=None)
         raise
     with prepared:
         prepared.launch(interruptions=interruptions)
+
+
+class _Planner(Onlooker):
+    """Writes into the record how far the plan is, gives it up if somebody asks to stop, and passes all else on.
+
+    Args:
+        run: The run, with a record.
+        onlooker: To whom all else is passed on.
+        interruptions: How often somebody has asked to stop.
+    """
+
+    def __init__(self, run: OpenRun, onlooker: Onlooker, interruptions: Callable[[], int]) -> None:
+        self._onlooker = onlooker
+        self._run = run
+        self._interruptions = interruptions
+        self._write_at = 0.0
+
+    def update(self, progress: Progress) -> None:
+        self._onlooker.update(progress)
+
+    def say(self, line: str) -> None:
+        self._onlooker.say(line)
+
+    def warn(self, line: str) -> None:
+        self._onlooker.warn(line)
+
+    def update_plan(self, checked: int, trials: int) -> None:
+        """Take in how many of a plan's trials have been checked.
+
+        Raises:
+            Interrupted: If somebody has asked to stop.
+        """
+        self.end_if_asked()
+        if trials >= MANY_TRIALS and time.monotonic() >= self._write_at:
+            self._write_at = time.monotonic() + _WRITE_PLANNING_S
+            # The plan goes on; whoever cannot write the record is told of it when the plan is made.
+            with suppress(ConfigError):
+                self._run.update(planning=Planning(checked, trials))
+
+    def end_if_asked(self) -> None:
+        """End the preparation if somebody has asked to stop.
+
+        Raises:
+            Interrupted: If so.
+        """
+        if self._interruptions():
+            raise Interrupted("stopped before any node was started")
 
 
 def _move_log(before: Path, after: Path) -> None:

@@ -15,6 +15,9 @@ class Onlooker:
     def update(self, progress: Progress) -> None:
         """Take in a progress report of the coordinator."""
 
+    def update_plan(self, checked: int, trials: int) -> None:
+        """Take in how many of a plan's trials have been checked; an error that is raised here gives the plan up."""
+
     def say(self, line: str) -> None:
         """Take in a line of information."""
 

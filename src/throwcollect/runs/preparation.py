@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     # This import takes long; it happens only once the runtime has begun, so that both run at the same time.
     from throwcollect.sweep.plan import Plan
 
-_MANY_TRIALS = 1000
+MANY_TRIALS = 1000
 """A plan of this many trials takes seconds, so the user is told before."""
 
 
@@ -245,10 +245,15 @@ def _make_plan(request: Request, directory: Path, onlooker: Onlooker) -> Plan:
     from throwcollect.coordinator.prepare import prepare as prepare_plan
 
     config = request.config
-    if (config.trials or 0) >= _MANY_TRIALS and not config.grows:
+    if (config.trials or 0) >= MANY_TRIALS and not config.grows:
         onlooker.say(f"plan: checking {config.trials} trials against limits and collisions, 1 to 5 ms each and core")
     return prepare_plan(
-        config, directory, sweep_directory=request.sweep_directory, processes=request.processes, say=onlooker.say
+        config,
+        directory,
+        sweep_directory=request.sweep_directory,
+        processes=request.processes,
+        say=onlooker.say,
+        tell=onlooker.update_plan,
     )
 
 

@@ -75,6 +75,19 @@ class Origin:
 
 
 @dataclass(frozen=True)
+class Planning:
+    """How far the plan of a run is.
+
+    Attributes:
+        checked: Number of trials that have been checked.
+        trials: Number of trials that the plan will have.
+    """
+
+    checked: int
+    trials: int
+
+
+@dataclass(frozen=True)
 class Record:
     """The record of a run; its launcher changes it, everybody else reads it.
 
@@ -102,6 +115,7 @@ class Record:
         kind: Purpose of the run.
         origin: The request of a client; None if a command or a program began the run.
         stopping: Whether somebody has asked the run to stop; it still finishes the trials that run.
+        planning: How far the plan is while a large one is made in the background; else None.
         version: Version of this layout.
     """
 
@@ -128,6 +142,7 @@ class Record:
     kind: Kind = "collection"
     origin: Origin | None = None
     stopping: bool = False
+    planning: Planning | None = None
     version: Literal[1] = VERSION
 
     def place(self, key: RunKey) -> Place:

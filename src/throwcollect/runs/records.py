@@ -39,7 +39,7 @@ from throwcollect.runs.state_directory import is_locked, state_directory, unusab
 from throwcollect.runtimes.node_logs import NodeLogs
 from throwcollect.runtimes.nodes import LAUNCHER
 from throwcollect.runtimes.registry import get_runtime
-from throwcollect.runtimes.runtime import Place
+from throwcollect.runtimes.runtime import NodeState, Place
 from throwcollect.units import NS_PER_S
 from throwcollect.wording import command
 
@@ -90,6 +90,11 @@ class Run:
         if record.endpoint is None:
             return None
         return Connection(record.endpoint, self.key, record.domain_id, record.middleware)
+
+    @property
+    def nodes(self) -> tuple[NodeState, ...]:
+        """The nodes, as far as they can still run: processes of a launcher that died have ended with it."""
+        return self.record.nodes if self.status != "died" or _may_outlive(self.record) else ()
 
     @property
     def status(self) -> Literal["running", "ended", "abandoned", "died"]:

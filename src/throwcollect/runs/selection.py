@@ -6,6 +6,7 @@ import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from throwcollect.dataset.directory import config_path
 from throwcollect.errors import ConfigError, ConflictError, NotFoundError, WorkerError
 from throwcollect.members import names_of
 from throwcollect.runs.record import Record
@@ -173,13 +174,18 @@ def describe_death(run: Run) -> WorkerError:
         return WorkerError(
             f"run {run.id}: its launcher died, but the dataset is complete: {run.place.dataset}", hint=hint
         )
-    if again := run.place.way_on:
-        hint = f"{again} goes on where it ended, or with its containers if they live; {hint}"
-    return WorkerError(
-        f"run {run.id}: its launcher died; finished throws are in {run.place.dataset}",
-        evidence=f"the logs are in {run.record.logs}",
-        hint=hint,
-    )
+    what = f"run {run.id}: its launcher died"
+    if _may_have_throws(run.record):
+        what = f"{what}; finished throws are in {run.place.dataset}"
+        if again := run.place.way_on:
+            hint = f"{again} goes on where it ended, or with its containers if they live; {hint}"
+    return WorkerError(what, evidence=f"the logs are in {run.record.logs}", hint=hint)
+
+
+def _may_have_throws(record: Record) -> bool:
+    """Whether a run collects and has got as far as its plan, before which no runtime is chosen."""
+    is_planned = record.runtime != "" or config_path(Path(record.directory)).is_file()
+    return record.kind == "collection" and is_planned
 
 
 def has_complete_dataset(run: Run) -> bool:

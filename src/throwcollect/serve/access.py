@@ -25,6 +25,9 @@ Send = Callable[[MutableMapping[str, Any]], Awaitable[None]]
 _MOST_BODY = 1_000_000
 """Bytes of a request's body."""
 _TOO_LONG = 413, f"a body may have {_MOST_BODY} bytes"
+_MOST_SOCKETS = 128
+"""Sockets that may be open at once; a page has up to four."""
+_TOO_MANY = 503, f"{_MOST_SOCKETS} sockets are open, as many as there may be"
 MAY_ONLY_LOOK = 403, "this token may only look"
 """Status and sentence for a request to change something with the token that may only look."""
 _GROUPS = {True: "full", False: "read-only", None: "anybody"}
@@ -34,11 +37,10 @@ _CODE_S = 600.0
 """Time for which a one-time code can be exchanged."""
 _SUBPROTOCOL = "bearer."
 _POLICY = (
-    "default-src 'self'; img-src 'self' data: blob:; style-src 'self' 'unsafe-inline'; connect-src 'self' ws: wss:; "
+    "default-src 'self'; img-src 'self' data: blob:; style-src 'self' 'unsafe-inline'; connect-src 'self'{sockets}; "
     "object-src 'none'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 )
 _HEADERS = (
-    (b"content-security-policy", _POLICY.encode()),
     (b"x-content-type-options", b"nosniff"),
     (b"referrer-policy", b"no-referrer"),
     (b"cross-origin-opener-policy", b"same-origin"),
@@ -94,6 +96,7 @@ class Access:
         self._app = app
         self._keys = keys
         self._hosts = hosts
+        self._sockets = 0
         self._origins = origins | {f"{scheme}://{host}" for scheme in ("http", "https") for host in hosts}
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -104,7 +107,8 @@ class Access:
         headers = {name.decode("latin-1"): value.decode("latin-1") for name, value in scope["headers"]}
         refusal, may_change = self._judge(scope, headers)
         scope.setdefault("state", {})["may_change"] = bool(may_change)
-        answer = _Answer(scope, send, _GROUPS[may_change])
+        host = headers.get("host", "")
+        answer = _Answer(scope, send, _GROUPS[may_change], _write_policy(host if host in self._hosts else None))
         if refusal is not None:
             await _refuse(scope, receive, answer, *refusal)
         elif scope["type"] == "http":
@@ -114,8 +118,14 @@ class Access:
             finally:
                 if body.is_too_long:
                     await _refuse(scope, receive, answer, *_TOO_LONG)
+        elif self._sockets >= _MOST_SOCKETS:
+            await _refuse(scope, receive, answer, *_TOO_MANY)
         else:
-            await self._app(scope, receive, answer)
+            self._sockets += 1
+            try:
+                await self._app(scope, receive, answer)
+            finally:
+                self._sockets -= 1
 
     def _judge(self, scope: Scope, headers: dict[str, str]) -> tuple[tuple[int, str] | None, bool | None]:
         """Decide on a request.
@@ -202,20 +212,27 @@ async def _refuse(scope: Scope, receive: Receive, send: Any, status: int, title:
         await send({"type": "websocket.close", "code": 1008, "reason": title})
 
 
+def _write_policy(host: str | None) -> bytes:
+    """Write the policy by which the page connects to this server alone; to no socket if its name is not ours."""
+    # Not every browser takes sockets of the same host for 'self'.
+    return _POLICY.format(sockets=f" ws://{host} wss://{host}" if host else "").encode()
+
+
 class _Answer:
     """Sends the answer to a request with the headers that all answers have, and writes a line to the log."""
 
-    def __init__(self, scope: Scope, send: Send, group: str) -> None:
+    def __init__(self, scope: Scope, send: Send, group: str, policy: bytes) -> None:
         self._send = send
         self._scope = scope
         self._group = group
+        self._headers = (*_HEADERS, (b"content-security-policy", policy))
         self._is_noted = False
         self._protocol = next((p for p in scope.get("subprotocols", ()) if p.startswith(_SUBPROTOCOL)), None)
 
     async def __call__(self, message: MutableMapping[str, Any]) -> None:
         if message["type"] in ("http.response.start", "websocket.http.response.start"):
             self._note(message["status"])
-            message = {**message, "headers": [*message.get("headers", ()), *_HEADERS]}
+            message = {**message, "headers": [*message.get("headers", ()), *self._headers]}
         elif message["type"] == "websocket.accept":
             self._note(HTTPStatus.SWITCHING_PROTOCOLS)
             # A browser closes the socket if none of its protocols is taken.

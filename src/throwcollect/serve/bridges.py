@@ -16,6 +16,10 @@ _MOST_CLIENTS = 16
 _LOOK_S = 0.5
 
 
+class FullError(ConflictError):
+    """As many clients are connected as there may be."""
+
+
 @dataclass
 class _Shared:
     bridge: Bridge
@@ -34,10 +38,10 @@ class Bridges:
         """The bridge of a run, for one more client.
 
         Raises:
-            ConflictError: If there are as many clients, of all runs together, as there may be.
+            FullError: If there are as many clients, of all runs together, as there may be.
         """
         if sum(each.clients for each in self._shared.values()) >= _MOST_CLIENTS:
-            raise ConflictError(f"{_MOST_CLIENTS} clients are connected by rosbridge, as many as there may be")
+            raise FullError(f"{_MOST_CLIENTS} clients are connected by rosbridge, as many as there may be")
         if (shared := self._shared.get(run.id)) is None:
             run.record.middleware.joining.settle()
             bridge = Bridge(run.connection)

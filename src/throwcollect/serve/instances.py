@@ -199,7 +199,7 @@ class Instances:
             check_appearance(own, urdf)
         record = require_living(run)
         config = load(config_path(run.place.directory))
-        nodes = [name_node(config, name) for name in simulations_of(record)]
+        nodes = [name_node(config, name) for name in simulations_of(record.nodes)]
         if not nodes:
             raise ConflictError(f"run {run.id}: no simulation runs")
         for result in control.set_parameter(run, nodes, "robot_description", urdf or own):

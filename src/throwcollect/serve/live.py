@@ -123,7 +123,7 @@ def _share(path: Path) -> int:
 
 
 def _runs(run: Run, simulation: str) -> bool:
-    return run.status == "running" and simulation in simulations_of(run.record)
+    return run.status == "running" and simulation in simulations_of(run.record.nodes)
 
 
 def _set_speed(run: Run, simulation: str, factor: float | None) -> None:

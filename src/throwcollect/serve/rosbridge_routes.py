@@ -10,10 +10,10 @@ from fastapi import APIRouter, WebSocket
 
 from throwcollect.errors import ConflictError, NotFoundError, ThrowcollectError
 from throwcollect.runs.records import Records, Run
-from throwcollect.serve.bridges import Bridges
+from throwcollect.serve.bridges import Bridges, FullError
 from throwcollect.serve.instances import Instances
 from throwcollect.serve.rosbridge import attend
-from throwcollect.serve.sockets import NOT_FOUND, refuse
+from throwcollect.serve.sockets import FULL, NOT_FOUND, refuse
 
 
 def make_rosbridge_routes(instances: Instances, bridges: Bridges) -> APIRouter:
@@ -37,7 +37,7 @@ async def _attend(socket: WebSocket, bridges: Bridges, find_run: Callable[[], Ru
             run = await asyncio.to_thread(find_run)
             bridge = await stack.enter_async_context(bridges.bridge(run))
         except ThrowcollectError as error:
-            await refuse(socket, NOT_FOUND, error.message)
+            await refuse(socket, FULL if isinstance(error, FullError) else NOT_FOUND, error.message)
             return
         await attend(socket, bridge, read_only=not socket.scope["state"]["may_change"])
 

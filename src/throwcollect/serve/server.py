@@ -32,6 +32,7 @@ _PORT = 8080
 WEBSOCKETS: Literal["websockets-sansio"] = "websockets-sansio"
 """Implementation of WebSockets: it waits for a client that reads slowly, instead of collecting frames in memory."""
 _MOST_CLIENTS = 256
+"""Connections up to which requests are answered; uvicorn opens sockets beyond it, so `access` counts those."""
 _LOG_BYTES = 1_000_000
 _END_S = 2.5
 """Time within which the process ends after a signal."""

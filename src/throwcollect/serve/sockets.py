@@ -14,6 +14,8 @@ NOT_FOUND = 4404
 """Close code of a socket to something that does not exist."""
 MAY_NOT = 4403
 """Close code of a socket that would change something, while its token may only look."""
+FULL = 1013
+"""Close code of a socket that is one too many; those who try later may get in."""
 FAILED = 4503
 """Close code of a socket to something that does not answer."""
 _MOST_REASON = 123

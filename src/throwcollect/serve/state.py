@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from functools import lru_cache
@@ -15,15 +16,15 @@ from throwcollect.config.sweep import LANDING_HEIGHT, TargetConfig
 from throwcollect.coordinator.progress import Progress
 from throwcollect.dataset.summary import Info
 from throwcollect.errors import ConfigError
-from throwcollect.runs.record import Kind, Record
+from throwcollect.runs.record import Kind, Planning
 from throwcollect.runs.records import Records, Run
 from throwcollect.runtimes.runtime import NodeState
 from throwcollect.serve.catalogue import Catalogue, Component
 
 _MOST_OVER = 100
 
-Status = Literal["starting", "running", "ended", "died"]
-_LIVING: tuple[Status, ...] = ("starting", "running")
+Status = Literal["planning", "starting", "running", "ended", "died"]
+_LIVING: tuple[Status, ...] = ("planning", "starting", "running")
 
 
 @dataclass(frozen=True)
@@ -57,14 +58,16 @@ class InstanceState:
         name: Name of the collection.
         kind: Whether it collects a dataset, has simulations for clients alone, or is a container of the catalogue.
         joins: Id of the run that a container has joined; None if it has joined none.
-        status: ``starting`` until all nodes run, ``running``, ``ended``, or ``died``: its launcher did before it ended.
+        status: ``planning`` while a large plan is made, ``starting`` until all nodes run, ``running``, ``ended``, or
+            ``died``: its launcher did before it ended.
         started: When it was begun.
         ended: When it ended; None before.
         stopping: Whether it ends because somebody has asked for that; running trials are finished.
         exit_code: Exit code of its launcher; None before it ended.
         message: What it ended with, in words; empty if there was no error.
         simulations: Number of simulations that are wanted.
-        nodes: Its nodes; none once it has ended.
+        nodes: Its nodes; none once it has ended, or died with them.
+        planning: How far the plan is while it is made; else None.
         progress: How far it has come; None before the first report, and without a coordinator.
         dataset: Where the dataset is, in words; None if it collects none.
         summary: What the dataset holds; None if it is not finished.
@@ -84,6 +87,7 @@ class InstanceState:
     message: str
     simulations: int
     nodes: list[NodeState]
+    planning: Planning | None
     progress: Progress | None
     dataset: str | None
     summary: Info | None
@@ -193,17 +197,18 @@ def describe(run: Run) -> InstanceState:
         exit_code=record.exit_code,
         message=str(error or ""),
         simulations=record.simulations,
-        nodes=list(record.nodes),
+        nodes=list(run.nodes),
+        planning=record.planning if run.status == "running" else None,
         progress=record.progress,
         dataset=run.place.dataset if record.kind == "collection" else None,
         summary=record.summary,
-        robots=simulations_of(record),
+        robots=simulations_of(run.nodes),
     )
 
 
-def simulations_of(record: Record) -> list[str]:
-    """Names of the simulations of a run that are running."""
-    return [node.name for node in record.nodes if node.name.startswith("sim_") and node.status == "running"]
+def simulations_of(nodes: Sequence[NodeState]) -> list[str]:
+    """Names of the simulations among the nodes of a run that are running."""
+    return [node.name for node in nodes if node.name.startswith("sim_") and node.status == "running"]
 
 
 def _status(run: Run) -> Status:
@@ -211,5 +216,7 @@ def _status(run: Run) -> Status:
         return "ended"
     if run.status == "died":
         return "died"
+    if run.record.planning is not None:
+        return "planning"
     nodes = run.record.nodes
     return "running" if nodes and all(node.status != "starting" for node in nodes) else "starting"

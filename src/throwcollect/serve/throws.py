@@ -129,7 +129,7 @@ class ThrowWatch:
                     run = run.now()
                     if run.connection is not None:
                         run.record.middleware.joining.settle()
-                    subscriptions.add(simulations_of(run.record))
+                    subscriptions.add(simulations_of(run.record.nodes))
                     listener.spin(run.connection, _SPIN_S)
                 except ThrowcollectError:
                     # The run was forgotten, or cannot be joined; clients see that in the state.

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from throwcollect.config.schema import Config
 from throwcollect.coordinator import prepare
-from throwcollect.errors import ConfigError, PlanError
+from throwcollect.errors import ConfigError, Interrupted, PlanError
 
-CONFIG = {
+CONFIG: dict[str, Any] = {
     "name": "many",
     "trials": 60,
     "sweep": {"sampler": "uniform", "parameters": {"task.duration_s": {"min": 0.2, "max": 1.2}}},
@@ -55,6 +56,21 @@ def test_of_a_large_plan_it_is_told_at_once_what_goes_on(monkeypatch: pytest.Mon
     said.clear()
     prepare.draw_plan(Config.model_validate({**CONFIG, "trials": 399}), directory=Path(), say=said.append)
     assert said[0].endswith("of 399 trials checked")
+
+
+def test_whoever_wants_is_told_how_far_a_plan_is_and_can_give_it_up(tmp_path: Path) -> None:
+    config = Config.model_validate({**CONFIG, "trials": 250})
+    told: list[tuple[int, int]] = []
+
+    def tell(checked: int, trials: int) -> None:
+        told.append((checked, trials))
+        if checked == 200:
+            raise Interrupted("enough")
+
+    with pytest.raises(Interrupted, match="enough"):
+        prepare.prepare(config, tmp_path / "data", sweep_directory=tmp_path, tell=tell)
+    assert told == [(0, 250), (0, 250), (100, 250), (200, 250)]
+    assert not (tmp_path / "data").exists()
 
 
 def test_a_robot_in_the_ground_is_told(monkeypatch: pytest.MonkeyPatch) -> None:

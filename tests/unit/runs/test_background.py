@@ -15,7 +15,7 @@ from throwcollect.errors import ConfigError, ConflictError, Interrupted, WorkerE
 from throwcollect.runs import background
 from throwcollect.runs.background import begin_run, carry_out
 from throwcollect.runs.onlooker import SILENT
-from throwcollect.runs.record import Origin
+from throwcollect.runs.record import Origin, Planning
 from throwcollect.runs.records import OpenRun, Records
 from throwcollect.runs.state_directory import STATE_VARIABLE
 
@@ -182,6 +182,28 @@ def test_who_stops_it_while_it_is_prepared_is_heeded(
     record = Records().get("a").record
     assert (record.exit_code, str(record.error)) == (130, "stopped before any node was started")
     assert (record.origin, record.kind) == (ORIGIN, "collection")
+
+
+def test_while_a_large_plan_is_made_the_record_tells_how_far_it_is_and_who_stops_it_does_not_wait(
+    config: Path, tmp_path: Path, processes: list[subprocess.Popen[bytes]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(background, "MANY_TRIALS", 1)
+    order = take_over(config, tmp_path, processes)
+    run = Records().take("a")
+    assert run is not None
+    told: list[Planning | None] = []
+
+    def asks_after_a_look() -> int:
+        told.append(Records().get("a").record.planning)
+        return len(told) - 1
+
+    with pytest.raises(Interrupted):
+        carry_out("a", run.lock, order, onlooker=SILENT, interruptions=asks_after_a_look)
+    run.close()
+    assert told == [None, Planning(0, 1)]
+    record = Records().get("a").record
+    assert (record.exit_code, record.planning) == (130, None)
+    assert not (tmp_path / "data").exists()
 
 
 PREPARATION = """

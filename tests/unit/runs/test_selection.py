@@ -299,6 +299,16 @@ def test_the_way_on_after_the_death_of_a_launcher_depends_on_where_the_dataset_i
         return str(describe_death(records.get(record.run)))
 
     again = "try: throwcollect resume /b goes on where it ended, or with its containers if they live; throwcollect down"
+    # Before there is a plan there is no dataset, but one that is resumed is there from the start.
+    for died in (make("d", "died", runtime=""), make("e", "died", kind="session")):
+        assert told(died) == (
+            f"run {died.run}: its launcher died\n  evidence: the logs are in logs\n"
+            f"  try: throwcollect down --run {died.run} cleans up"
+        )
+    resumed = make("f", "died", runtime="")
+    Path(resumed.directory).mkdir()
+    (Path(resumed.directory) / "config.yaml").touch()
+    assert f"throwcollect resume {resumed.directory} goes on" in told(resumed)
     assert again in told(make("a", "died", directory="/b"))
     assert again in told(make("b", "died", runtime="docker", directory="/b"))
     assert "resume" not in told(make("c", "died", runtime="docker", volume="v"))

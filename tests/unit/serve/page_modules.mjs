@@ -8,7 +8,7 @@ import { pathToFileURL } from "node:url";
 const load = (name) => import(pathToFileURL(`${process.env.PAGE}/${name}`));
 const { ballAt, decodeThrow, jointsAt, seriesOf } = await load("throws.js");
 const { Playback } = await load("playback.js");
-const { inOrder, steps } = await load("state.js");
+const { inOrder, lives, steps } = await load("state.js");
 const { readChanges } = await load("controls.js");
 const { coarsen } = await load("coarse.js");
 const { coverPlace } = await load("target.js");
@@ -125,6 +125,11 @@ test("a coarse mesh keeps its extent with fewer triangles, and edges stay sharp"
   const box = coarsen(new BoxGeometry(1, 1, 1), 0.4);
   assert.equal(box.index.count, 36);
   assert.ok(box.getAttribute("position").count > 8);
+});
+
+test("a run lives from its plan to its end", () => {
+  const statuses = ["planning", "starting", "running", "ended", "died"];
+  assert.deepEqual(statuses.map((status) => lives({ status })), [true, true, true, false, false]);
 });
 
 test("a model is told in sentences, before and after it was adapted", () => {

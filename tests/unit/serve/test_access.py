@@ -55,6 +55,16 @@ def test_every_answer_forbids_what_a_page_does_not_need(served: Served) -> None:
         assert not [name for name in answer.headers if name.startswith("access-control") or name == "set-cookie"]
 
 
+def test_the_page_connects_to_this_server_alone(served: Served) -> None:
+    def connections(**headers: str) -> str:
+        policy = served.client("").get("/", headers=headers).headers["content-security-policy"]
+        return next(rule for rule in policy.split("; ") if rule.startswith("connect-src"))
+
+    assert connections() == f"connect-src 'self' ws://{HOST} wss://{HOST}"
+    # What a stranger names is not repeated.
+    assert connections(Host="evil.example; script-src *") == "connect-src 'self'"
+
+
 def test_who_may_only_look_changes_nothing(served: Served) -> None:
     client = served.client(served.keys.read_only)
     assert client.get(STATE).status_code == 200
@@ -153,6 +163,17 @@ def test_a_socket_with_a_token_is_opened(served: Served, way: str) -> None:
 
 def exchange(client: TestClient, code: str) -> Any:
     return client.post("/api/v1/exchange", json={"code": code})
+
+
+def test_one_socket_too_many_is_not_opened(served: Served, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(access, "_MOST_SOCKETS", 1)
+    with served.socket(STATE, served.keys.full) as first:
+        first.receive_text()
+        with pytest.raises(WebSocketDenialResponse) as refusal, served.socket(STATE, served.keys.full):
+            pass
+        assert problem_of(refusal.value, 503) == "128 sockets are open, as many as there may be"
+    with served.socket(STATE, served.keys.full) as after:
+        after.receive_text()
 
 
 def test_a_code_is_exchanged_once(served: Served) -> None:

@@ -15,7 +15,7 @@ from tests.unit.serve.conftest import Remember, Served, ended
 
 from throwcollect.robots.talos import TALOS
 from throwcollect.runs.component_container import ContainerOrder
-from throwcollect.runs.record import Failure, Origin
+from throwcollect.runs.record import Failure, Origin, Planning
 from throwcollect.runs.records import Records, Run
 from throwcollect.runtimes.runtime import NodeState
 from throwcollect.serve import instances as instances_module
@@ -294,15 +294,29 @@ def test_the_state_tells_of_all_that_live_and_the_latest_that_are_over(client: T
     nodes = (NodeState("router", "running", 0, "1", ""), NodeState("sim_0", "running", 0, "2", ""))
     remember("living", origin=Origin("throws"), nodes=nodes)
     remember("lost", lives=False, nodes=(NodeState("sim_0", "running", 0, "2", ""),))
+    remember("left", lives=False, runtime="docker", nodes=(NodeState("sim_0", "running", 0, "2", ""),))
     remember("failed", **ended(exit_code=2, failure=Failure("no plan", hint="mend it")))
     found = client.get("/api/v1/state").json()
     assert [each["status"] for each in found["instances"]][:3] == ["running", "ended", "died"]
     assert len(found["instances"]) == 101
     assert found["components"][0]["instances"] == ["living"]
     assert found["instances"][0]["robots"] == ["sim_0"]
+    # Processes have ended with the launcher; containers outlive it.
+    died = {each["id"]: each for each in client.get(URL).json() if each["status"] == "died"}
+    assert (died["lost"]["nodes"], died["lost"]["robots"]) == ([], [])
+    assert died["left"]["robots"] == ["sim_0"]
     assert found["instances"][1]["message"] == "no plan\n  try: mend it"
-    assert len(client.get(URL).json()) == 106
+    assert len(client.get(URL).json()) == 107
     assert client.get("/api/v1/state").json() == found
+
+
+def test_the_state_tells_how_far_a_plan_is(client: TestClient, remember: Remember) -> None:
+    remember("large", planning=Planning(1200, 30000))
+    remember("killed", lives=False, planning=Planning(7, 30000))
+    found = {each["id"]: (each["status"], each["planning"]) for each in client.get(URL).json()}
+    assert found == {"large": ("planning", {"checked": 1200, "trials": 30000}), "killed": ("died", None)}
+    # It counts as one that lives.
+    assert client.get("/api/v1/state").json()["instances"][0]["id"] == "large"
 
 
 def test_logs_and_events_are_read_where_they_lie(client: TestClient, remember: Remember, tmp_path: Path) -> None:

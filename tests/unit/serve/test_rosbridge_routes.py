@@ -9,7 +9,7 @@ from starlette.websockets import WebSocketDisconnect
 from tests.unit.serve.conftest import Remember, Served, ended
 
 from throwcollect.errors import ConflictError
-from throwcollect.serve import rosbridge_routes
+from throwcollect.serve import bridges, rosbridge_routes
 
 
 def end_of(served: Served, path: str) -> tuple[int, str]:
@@ -27,6 +27,17 @@ def test_a_client_of_no_run_is_told_why(served: Served) -> None:
 def test_a_client_of_a_run_that_is_over_does_not_wait_for_good(served: Served, remember: Remember) -> None:
     remember("over", **ended())
     assert end_of(served, "/rosbridge/over") == (4404, "run over has ended")
+
+
+def test_one_client_too_many_is_told_to_try_later(
+    served: Served, remember: Remember, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    remember("busy")
+    monkeypatch.setattr(bridges, "_MOST_CLIENTS", 0)
+    assert end_of(served, "/rosbridge/busy") == (
+        1013,
+        "0 clients are connected by rosbridge, as many as there may be",
+    )
 
 
 def test_a_reason_has_as_many_bytes_as_fit_into_a_frame(served: Served, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -55,9 +55,15 @@ class Page {
   #instances = [];
   #first = 0;
   #before = 0;
+  /** Id of the run that the address names, until the first state is known. */
+  #named;
 
-  /** @param {string} token */
-  constructor(token) {
+  /**
+   * @param {string} token
+   * @param {string | null} named id of the run that the address names
+   */
+  constructor(token, named) {
+    this.#named = named;
     this.connection = new Connection(token);
     this.view = new View(get("canvas"));
     this.map = new LandingMap((x, y) => this.target.setOnGround(x, y));
@@ -115,8 +121,10 @@ class Page {
     this.#instances = state.instances;
     this.controls.put(state);
     this.target.put(state);
-    const ids = state.instances.filter((each) => lives(each) || each.id === this.watching.id).map(({ id }) => id);
-    const wanted = get("watched").value;
+    const kept = [this.watching.id, this.#named];
+    const ids = state.instances.filter((each) => lives(each) || kept.includes(each.id)).map(({ id }) => id);
+    const wanted = ids.includes(this.#named) ? this.#named : get("watched").value;
+    this.#named = null;
     setChoices(get("watched"), [...ids.map((id) => [id, id]), ...(ids.length ? [] : [["", "none"]])]);
     this.#watch(ids.includes(wanted) ? wanted : (ids[0] ?? ""));
   }
@@ -302,12 +310,14 @@ function inWords(values) {
 
 function emptiness(instance) {
   if (!instance) return "Nothing runs. Start a component, or look at a run that has ended.";
+  if (instance.status === "planning") return `${instance.id} is being planned …`;
   if (instance.status === "starting") return `${instance.id} is starting …`;
   if (lives(instance)) return `${instance.id} has no simulation that is ready yet.`;
   return `${instance.id} has ended; nothing moves any more.`;
 }
 
 async function begin() {
+  const named = new URLSearchParams(location.hash.slice(1)).get("run");
   let token;
   try {
     token = await takeToken();
@@ -321,7 +331,10 @@ async function begin() {
   }
   get("page").hidden = false;
   // Tests and curious people reach the page by this name.
-  window.throwcollect = new Page(token);
+  window.throwcollect = new Page(token, named);
 }
+
+// To open an address in a tab that has the page changes the fragment alone.
+window.addEventListener("hashchange", () => location.hash.includes("code=") && location.reload());
 
 begin();
