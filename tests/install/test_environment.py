@@ -212,6 +212,8 @@ def test_an_environment_with_another_python_than_the_named_one_is_not_used(tmp_p
     for path, version in pythons.items():
         path.write_text(f"#!/bin/sh\n[ $1 != -V ] || echo Python {version}\n")
         path.chmod(0o755)
+    (tmp_path / "old").write_text('#!/bin/sh\n[ $1 = -V ] && echo Python 3.9.2\n')
+    (tmp_path / "old").chmod(0o755)
     (binaries / "throwcollect").write_text("#!/bin/sh\necho collects\n")
     (binaries / "throwcollect").chmod(0o755)
     (tmp_path / ".venv" / ".ready").touch()
@@ -226,6 +228,11 @@ def test_an_environment_with_another_python_than_the_named_one_is_not_used(tmp_p
     refused = make_up("PYTHON=./other")
     assert (refused.returncode != 0, refused.stdout) == (True, "")
     assert refused.stderr.startswith(".venv has Python 3.11.2, not that of ./other: rm -r .venv, then make up")
+    # Nobody is told to take an environment away for a Python that would be refused afterwards.
+    for unfit in ("./old", "./nowhere"):
+        refused = make_up(f"PYTHON={unfit}")
+        assert (refused.returncode != 0, refused.stdout) == (True, "")
+        assert refused.stderr.startswith(f".venv has Python 3.11.2, and {unfit} is no Python from 3.10 to 3.14: make up")
 
 
 @pytest.mark.parametrize(
