@@ -217,7 +217,7 @@ def test_an_environment_with_another_python_than_the_named_one_is_not_used(tmp_p
     for path, version in pythons.items():
         path.write_text(f"#!/bin/sh\n[ $1 != -V ] || echo Python {version}\n")
         path.chmod(0o755)
-    (tmp_path / "old").write_text('#!/bin/sh\n[ $1 = -V ] && echo Python 3.9.2\n')
+    (tmp_path / "old").write_text("#!/bin/sh\n[ $1 = -V ] && echo Python 3.9.2\n")
     (tmp_path / "old").chmod(0o755)
     (binaries / "throwcollect").write_text("#!/bin/sh\necho collects\n")
     (binaries / "throwcollect").chmod(0o755)
@@ -239,7 +239,9 @@ def test_an_environment_with_another_python_than_the_named_one_is_not_used(tmp_p
     for unfit in ("./old", "./nowhere"):
         refused = make_up(f"PYTHON={unfit}")
         assert (refused.returncode != 0, refused.stdout) == (True, "")
-        assert refused.stderr.startswith(f".venv has Python 3.11.2, and {unfit} is no Python from 3.10 to 3.14: make up")
+        assert refused.stderr.startswith(
+            f".venv has Python 3.11.2, and {unfit} is no Python from 3.10 to 3.14: make up"
+        )
 
 
 @pytest.mark.parametrize(
