@@ -1,6 +1,8 @@
 # Two commands do everything on a fresh machine: `make up` collects a first dataset, `make test` passes the tests.
 # `make up PYTHON=python3.10` takes another Python than the one that is found.
 PYTHON ?=
+# Some shells leave the ~ of `make PYTHON=~/...` as it is; below, the path is quoted, as it may have blanks.
+override PYTHON := $(PYTHON:~/%=$(HOME)/%)
 VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
@@ -19,14 +21,16 @@ export PYTHONDONTWRITEBYTECODE :=
 
 # Where the Python is too new for pybullet, MuJoCo simulates; `packaging/environment.sh` has said so.
 up: $(READY)
-	@test -z "$(PYTHON)" || test "$$($(PYTHON) -V 2> /dev/null)" = "$$($(BIN)/python -V)" || { echo "$(VENV) has $$($(BIN)/python -V), not\
-	 that of $(PYTHON): rm -r $(VENV), then make up PYTHON=$(PYTHON)" >&2; exit 1; }
+	@test -z "$(PYTHON)" || test "$$("$(PYTHON)" -V 2> /dev/null)" = "$$($(BIN)/python -V)" || { echo "$(VENV) has $$($(BIN)/python -V), \
+	$$("$(PYTHON)" -c 'import sys; sys.exit(not (3, 10) <= sys.version_info < (3, 15))' 2> /dev/null && \
+	echo "not that of $(PYTHON): rm -r $(VENV), then make up PYTHON=$(PYTHON)" || \
+	echo "and $(PYTHON) is no Python from 3.10 to 3.14: make up takes the one that is there")" >&2; exit 1; }
 	$(BIN)/throwcollect up -n 2 configs/quickstart.yaml \
 	    $$($(BIN)/python -c 'import sys; print("--set sim.engine=mujoco" * (sys.version_info >= (3, 12)))')
 	@command -v throwcollect > /dev/null || echo 'so that the shell finds throwcollect: export PATH="$(CURDIR)/$(BIN):$$PATH"'
 
 $(VENV)/bin/python:
-	@packaging/environment.sh $(VENV) $(PYTHON)
+	@packaging/environment.sh $(VENV) "$(PYTHON)"
 
 # Pinocchio loads this library, and no wheel brings it. Who lacks it hears of it before anything is downloaded.
 define find_libgomp

@@ -22,7 +22,9 @@ make_with() {
     exec "$1" -m venv "$directory"
 }
 
-for python in ${named:-python3.11 python3.10 python3}; do
+# The path of the named one may have blanks.
+if [ -n "$named" ]; then set -- "$named"; else set -- python3.11 python3.10 python3; fi
+for python; do
     suits "$python" "(3, 10)" "(3, 12)" "$MAKES" && make_with "$python" ""
 done
 
@@ -52,7 +54,8 @@ if [ -z "$named" ] && command -v "$uv" > /dev/null; then
 fi
 
 because="for which pybullet has no wheel: MuJoCo simulates, whose throws land some millimetres elsewhere (docs/engines.md)"
-for python in ${named:-python3 python3.12 python3.13 python3.14}; do
+if [ -z "$named" ]; then set -- python3 python3.12 python3.13 python3.14; fi
+for python; do
     suits "$python" "(3, 12)" "(3, 15)" "$MAKES" && make_with "$python" ", $because"
     if command -v "$uv" > /dev/null && suits "$python" "(3, 10)" "(3, 15)"; then
         "$uv" venv --quiet --seed --python "$python" "$directory" || continue

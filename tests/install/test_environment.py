@@ -164,6 +164,11 @@ def test_a_python_that_is_named_is_the_only_one_that_is_looked_at(commands: Path
     assert made("python3.8")[2].startswith("no Python from 3.10 to 3.14 that can make environments is here (python3.8)")
     assert "python3.12 -m venv there" in made("python3.12")[1]
     assert "python3.11 -m venv there" in made("python3.11")[1]
+    for version in ("3.11", "3.12"):
+        blank = commands / "of somebody"
+        blank.mkdir(exist_ok=True)
+        put(blank, f"python{version}", version=version)
+        assert f"python{version} -m venv there" in made(str(blank / f"python{version}"))[1]
 
 
 def test_without_python_and_uv_one_sentence_says_so_at_once(commands: Path) -> None:
@@ -198,7 +203,7 @@ def test_make_uses_it_before_anything_else(target: str, tmp_path: Path) -> None:
         check=True,
     )
     first, *others = said.stdout.splitlines()
-    assert first == "packaging/environment.sh .venv python3.12"
+    assert first == 'packaging/environment.sh .venv "python3.12"'
     (install,) = [line for line in others if " -e " in line]
     assert install.startswith("packaging/install.sh .venv/bin/python -e ")
 
@@ -212,6 +217,8 @@ def test_an_environment_with_another_python_than_the_named_one_is_not_used(tmp_p
     for path, version in pythons.items():
         path.write_text(f"#!/bin/sh\n[ $1 != -V ] || echo Python {version}\n")
         path.chmod(0o755)
+    (tmp_path / "old").write_text("#!/bin/sh\n[ $1 = -V ] && echo Python 3.9.2\n")
+    (tmp_path / "old").chmod(0o755)
     (binaries / "throwcollect").write_text("#!/bin/sh\necho collects\n")
     (binaries / "throwcollect").chmod(0o755)
     (tmp_path / ".venv" / ".ready").touch()
@@ -221,11 +228,20 @@ def test_an_environment_with_another_python_than_the_named_one_is_not_used(tmp_p
         words = ["make", "--silent", "up", *named]
         return subprocess.run(words, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
 
-    for named in ((), ("PYTHON=./same",)):
+    (tmp_path / "of somebody").mkdir()
+    (tmp_path / "of somebody" / "python").symlink_to(tmp_path / "same")
+    for named in ((), ("PYTHON=./same",), ("PYTHON=./of somebody/python",), ("PYTHON=~/same", f"HOME={tmp_path}")):
         assert make_up(*named).stdout.startswith("collects\n")
     refused = make_up("PYTHON=./other")
     assert (refused.returncode != 0, refused.stdout) == (True, "")
     assert refused.stderr.startswith(".venv has Python 3.11.2, not that of ./other: rm -r .venv, then make up")
+    # Nobody is told to take an environment away for a Python that would be refused afterwards.
+    for unfit in ("./old", "./nowhere"):
+        refused = make_up(f"PYTHON={unfit}")
+        assert (refused.returncode != 0, refused.stdout) == (True, "")
+        assert refused.stderr.startswith(
+            f".venv has Python 3.11.2, and {unfit} is no Python from 3.10 to 3.14: make up"
+        )
 
 
 @pytest.mark.parametrize(

@@ -27,6 +27,7 @@ from throwcollect.wording import command
 VERSION = 9
 _MOST_BYTES = 10_000_000
 _ROS_DISTRO = "jazzy"
+_MOST_NEARBY = 5
 """Release whose interface definitions the messages follow."""
 
 
@@ -144,11 +145,19 @@ def read_bag_metadata(directory: Path) -> Mapping[str, Any]:
         if (directory / PLAN).is_file():
             hint = command("resume", directory)
             raise DatasetError(f"the dataset is not finished: it has no {METADATA}", path=directory, hint=hint)
-        raise DatasetError("holds no dataset", path=directory)
+        raise DatasetError("holds no dataset", path=directory, hint=_name_nearby(directory))
     bag = from_yaml(path).get("rosbag2_bagfile_information")
     if not isinstance(bag, dict):
         raise DatasetError("not the metadata of a rosbag2 bag", path=path)
     return bag
+
+
+def _name_nearby(directory: Path) -> str | None:
+    """Name datasets that may be meant by a path that is none: the one that it lies in, or those that lie in it."""
+    if directory.is_file():
+        return str(directory.parent) if (directory.parent / METADATA).is_file() else None
+    found = sorted(str(path.parent) for path in directory.glob(f"*/{METADATA}"))
+    return ", ".join(found[:_MOST_NEARBY]) or None
 
 
 def to_yaml(data: Mapping[str, Any]) -> str:

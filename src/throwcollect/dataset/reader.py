@@ -311,9 +311,12 @@ class Dataset(Sequence[Throw]):
             threads: How many of them work; None for one a core, up to 4.
 
         Raises:
-            ConfigError: If there is no such column or joint.
+            ConfigError: If there is no such column or joint, or a text is given where a list of names belongs.
             DatasetError: If an episode is not where the table says, or it is damaged; CRCs are compared.
         """
+        for given in (columns, joints):
+            if isinstance(given, str):
+                raise ConfigError(f"trajectories: {given!r} is a text", expected=f"a list of names: [{given!r}]")
         trials, known = self.throws["trial"].to_pylist(), self.joints
         chosen = known if joints is None else tuple(joints)
         for joint in chosen:

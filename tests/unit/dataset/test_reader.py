@@ -187,6 +187,26 @@ def test_only_finished_datasets_are_opened(dataset: Path, tmp_path: Path, proble
             Dataset.open(tmp_path / "nowhere")
 
 
+def test_an_error_names_the_datasets_that_may_be_meant(dataset: Path, tmp_path: Path) -> None:
+    for wrong in (dataset.parent, dataset / "throws.parquet"):
+        with pytest.raises(DatasetError, match="holds no dataset") as caught:
+            Dataset.open(wrong)
+        assert caught.value.hint == str(dataset)
+    (tmp_path / "empty").mkdir()
+    for wrong in (tmp_path / "empty", tmp_path / "nowhere"):
+        with pytest.raises(DatasetError, match="holds no dataset") as caught:
+            Dataset.open(wrong)
+        assert caught.value.hint is None
+
+
+def test_a_text_in_place_of_a_list_of_names_is_refused(loaded: Dataset) -> None:
+    with pytest.raises(ConfigError, match="is a text") as caught:
+        loaded.trajectories("ball.position")
+    assert caught.value.expected == "a list of names: ['ball.position']"
+    with pytest.raises(ConfigError, match="'arm_right_4_joint' is a text"):
+        loaded.trajectories(["joints.position"], joints="arm_right_4_joint")
+
+
 def test_an_episode_comes_back_as_it_went_in(collection: Any, dataset: Path) -> None:
     loaded = Dataset.open(dataset)
     for trial in (5, 0, 6):

@@ -13,6 +13,7 @@ from throwcollect.dataset.columns import COLUMNS
 
 PAGE = (Path(__file__).parents[3] / "docs" / "reading.md").read_text(encoding="utf-8")
 BLOCKS = re.findall(r"```python\n(.*?)```", PAGE, flags=re.DOTALL)
+OF_FUNCTIONS = (Path(__file__).parents[3] / "docs" / "python.md").read_text(encoding="utf-8")
 
 
 def run(block: str, collected: Path, directory: Path) -> str:
@@ -42,6 +43,12 @@ def test_the_numpy_example_runs(collected: Path, tmp_path: Path) -> None:
     assert error
     assert float(error[1]) < 0.01
     assert "'arm_right_4_joint': " in printed
+
+
+def test_the_example_of_the_page_on_functions_runs(collected: Path, tmp_path: Path) -> None:
+    (block,) = re.findall(r"```python\n(.*?)```", OF_FUNCTIONS, flags=re.DOTALL)
+    assert re.search(r"^-?\d\.\d+ \d\.\d+$", run(block, collected, tmp_path), flags=re.MULTILINE)
+    assert (tmp_path / "short-npz" / "throws.npz").is_file()
 
 
 def test_the_torch_example_runs_with_two_workers(collected: Path, tmp_path: Path) -> None:
