@@ -98,7 +98,8 @@ def test_the_oldest_messages_make_room_when_nobody_spins(rig):
         publisher.publish(String(data=str(i)))
     end.publish(String())
     time.sleep(0.2)
-    assert rig.spin(lambda: marks)
+    # On DDS, what one publisher sends may overtake what another one sent before.
+    assert rig.spin(lambda: marks and "19" in heard)
     rig.rest(0.05)
     assert heard == ["17", "18", "19"]
 
