@@ -105,11 +105,13 @@ test-units:
 
 # On Fast DDS, nodes at times do not find each other on a busy machine. A run starts them again; so do its tests.
 test-ros: ros
-	$(call twice,$(ROS_VENV)/bin/python -m pytest -n 2 --dist loadfile tests/contract tests/ros)
+	$(call twice,$(ROS_VENV)/bin/python -m pytest -n 2 --dist loadfile tests/contract tests/ros --ignore=$(WITH_ENGINE))
 
-# Tests with an engine look at all that is on it, so one by one.
-test-containers:
+# Tests with an engine look at all that is on it, so one by one; also those of containers on genuine rclpy.
+WITH_ENGINE := tests/ros/test_containers.py
+test-containers: ros
 	$(call twice,$(BIN)/python -m pytest tests/docker)
+	$(call twice,$(ROS_VENV)/bin/python -m pytest $(WITH_ENGINE))
 
 # Two files at a time, in their order: files of few long tests come first, and short ones at the end, so that both workers have
 # something to do until then.

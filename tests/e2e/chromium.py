@@ -11,7 +11,7 @@ import subprocess
 import tempfile
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -39,6 +39,10 @@ def chromium() -> str | None:
     return next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 
 
+class ReloadedError(Exception):
+    """The page was loaded anew before it answered."""
+
+
 @dataclass
 class Tab:
     """A tab, and what it told on its own.
@@ -59,6 +63,8 @@ class Tab:
         while True:
             message = json.loads(self.socket.recv(timeout=60))
             if message.get("id") == self._count:
+                if "navigated" in message.get("error", {}).get("message", ""):
+                    raise ReloadedError
                 assert "error" not in message, message
                 return message["result"]
             self._hear(message["method"], message["params"])
@@ -70,12 +76,14 @@ class Tab:
         return answer["result"].get("value")
 
     def wait_for(self, expression: str, *, within_s: float = 60.0, every_s: float = 0.3) -> Any:
-        """Wait until an expression is true."""
+        """Wait until an expression is true; the page may be loaded anew meanwhile."""
         end = time.monotonic() + within_s
-        while not (value := self.evaluate(expression)):
+        while True:
+            with suppress(ReloadedError):
+                if value := self.evaluate(expression):
+                    return value
             assert time.monotonic() < end, f"never: {expression}; errors: {self.errors}"
             time.sleep(every_s)
-        return value
 
     def picture(self, path: Path) -> None:
         """Write what is seen as PNG."""
