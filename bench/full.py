@@ -10,6 +10,7 @@ from __future__ import annotations
 import argparse
 import hashlib
 import json
+import os
 import random
 import subprocess
 import sys
@@ -24,6 +25,7 @@ import psutil
 from throwcollect.dataset.inspect import info
 from throwcollect.dataset.journal import read_journal
 from throwcollect.dataset.verify import verify
+from throwcollect.runs.state_directory import STATE_VARIABLE
 from throwcollect.side_by_side import count_cores
 
 CONFIG = Path(__file__).parents[1] / "configs" / "quickstart.yaml"
@@ -149,6 +151,8 @@ def main() -> None:
     when = sorted(moments.randrange(arguments.landed // 50, arguments.landed) for _ in victims)
     with tempfile.TemporaryDirectory(prefix="throwcollect-bench-") as scratch:
         clean, disturbed = Path(scratch) / "clean", Path(scratch) / "disturbed"
+        # A launcher that is killed leaves the record of its run, which is none of the user's.
+        os.environ[STATE_VARIABLE] = str(Path(scratch) / "state")
         rows = {
             name: collect(
                 directory, engine=arguments.engine, landed=arguments.landed, simulations=arguments.n, kills=kills

@@ -18,6 +18,7 @@ from tests.cluster.slurm import Slurm
 from tests.e2e.collection import CONFIG, FAST, call_here, fingerprints, write_config
 from throwcollect import runs
 from throwcollect.cluster.submission import read_submission
+from throwcollect.runs.state_directory import STATE_VARIABLE
 
 pytestmark = pytest.mark.cluster
 SLICED = CONFIG + "record: {{trials_per_shard: {per_shard}}}\n"
@@ -169,7 +170,11 @@ def test_a_run_is_listed_and_can_be_stopped(slurm: Slurm, tmp_path: Path) -> Non
     assert "3 slices of 3 not collected: cancelled" in call(slurm, "wait", "--run", data, expect=130)
 
 
-def test_nothing_is_lost_when_nodes_die_and_tasks_are_preempted(slurm: Slurm, tmp_path: Path) -> None:
+def test_nothing_is_lost_when_nodes_die_and_tasks_are_preempted(
+    slurm: Slurm, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # The runs of tasks that are killed stay remembered; those of the user are not to be found among them.
+    monkeypatch.setenv(STATE_VARIABLE, str(tmp_path / "state"))
     config = configure(tmp_path, trials=240)
     whole = recordings(collect_whole(config, tmp_path / "whole"))
     data = tmp_path / "data"

@@ -103,7 +103,7 @@ def test_the_address_names_the_run_that_is_seen_also_in_a_tab_that_has_the_page(
     address: str, over: tuple[str, str]
 ) -> None:
     watched = "window.throwcollect?.watching.id"
-    with browse(f"{address}&run={over[0]}") as tab:
+    with browse(f"{address}&run={over[0]}", width=390, height=800) as tab:
         load(tab)
         tab.wait_for(f"{watched} === {json.dumps(over[0])}")
         server = find_server()

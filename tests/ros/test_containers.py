@@ -12,7 +12,7 @@ import pytest
 
 from tests.docker.conftest import client
 from tests.docker.test_up import containers_of, engine
-from tests.e2e.collection import collect, fingerprints, start, write_config
+from tests.e2e.collection import FAST, collect, fingerprints, start, write_config
 from throwcollect.heartbeat import SILENT_S
 from throwcollect.runtimes.docker.image import RMW_LABEL, default_tag
 
@@ -21,7 +21,7 @@ __all__ = ["client", "engine"]
 
 
 def test_nodes_that_are_killed_come_back_and_find_each_other(engine: docker.DockerClient, tmp_path: Path) -> None:
-    config, directory = write_config(tmp_path, trials=90), tmp_path / "data"
+    config, directory = write_config(tmp_path, trials=90, sim=FAST), tmp_path / "data"
     collect(config, tmp_path / "undisturbed", 2, "--set", "run.ros=embedded")
     # Slow enough to go on for longer than a router that was killed stays away.
     slow = ("--set", "sim.real_time_factor=2", "--set", "run.trial_timeout_s=20")
@@ -47,7 +47,7 @@ def test_nodes_that_are_killed_come_back_and_find_each_other(engine: docker.Dock
 def test_health_is_that_of_the_loop(engine: docker.DockerClient, tmp_path: Path) -> None:
     directory = tmp_path / "data"
     slow = ("--runtime", "docker", "--set", "run.ros=rclpy", "--set", "sim.real_time_factor=1", "--trials", "300")
-    running = start(write_config(tmp_path, trials=8), directory, 1, *slow)
+    running = start(write_config(tmp_path, trials=8, sim=FAST), directory, 1, *slow)
     running.wait_until(lambda: running.written() > 0)
     nodes = containers_of(engine, directory)
     assert nodes.keys() == {"router", "sim_0", "coordinator"}
