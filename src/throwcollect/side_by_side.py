@@ -15,6 +15,9 @@ from typing import Any, TypeVar
 from throwcollect.errors import WorkerError
 from throwcollect.interruption import die_with_parent
 
+THROWS_A_START = 20
+"""A process takes about as long to begin as to simulate so many throws."""
+
 _Piece = TypeVar("_Piece")
 _Found = TypeVar("_Found")
 
@@ -31,10 +34,13 @@ def work_side_by_side(
     *,
     processes: int,
     doing: str,
+    worth: int = 1,
     fork: bool = False,
 ) -> Iterator[_Found]:
     """Do pieces of work as `working_side_by_side` does, from the request for the first result to the last result."""
-    with working_side_by_side(pieces, begin, arguments, processes=processes, doing=doing, fork=fork) as found:
+    with working_side_by_side(
+        pieces, begin, arguments, processes=processes, doing=doing, worth=worth, fork=fork
+    ) as found:
         yield from found
 
 
@@ -46,6 +52,7 @@ def working_side_by_side(
     *,
     processes: int,
     doing: str,
+    worth: int = 1,
     fork: bool = False,
 ) -> Iterator[Iterator[_Found]]:
     """Do pieces of work in several processes, which import the calling program, as `multiprocessing` does.
@@ -59,6 +66,7 @@ def working_side_by_side(
         arguments: Arguments of `begin`.
         processes: Largest number of processes; with 1, this process does the work itself.
         doing: Verb and object for messages, such as ``checks trials``.
+        worth: How many pieces take as long as the start of a process: with fewer for each, there are fewer processes.
         fork: Whether to fork the processes off this one, with everything that it has imported and read, if it has only
             one Python thread. The pieces must not use libraries with threads of their own.
 
@@ -74,7 +82,7 @@ def working_side_by_side(
     from concurrent.futures import ProcessPoolExecutor
     from concurrent.futures.process import BrokenProcessPool
 
-    processes = min(processes, len(pieces))
+    processes = min(processes, len(pieces) // worth)
     if processes <= 1:
         yield _do_here(pieces, begin, arguments)
         return

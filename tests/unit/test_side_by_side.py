@@ -109,6 +109,14 @@ def test_results_are_given_after_something_else_was_done() -> None:
     assert multiprocessing.active_children() == []
 
 
+def test_a_process_is_begun_only_for_enough_pieces() -> None:
+    assert {pid for _, pid in work_side_by_side(range(39), begin, (3,), processes=2, doing="counts", worth=20)} == {
+        os.getpid()
+    }
+    found = work_side_by_side(range(40), begin, (3,), processes=2, doing="counts", worth=20)
+    assert os.getpid() not in {pid for _, pid in found}
+
+
 def test_processes_are_forked_off_one_without_other_threads_of_python() -> None:
     done = subprocess.run(
         [sys.executable, "-c", FORKED], capture_output=True, text=True, env=find_tests(), timeout=60, check=False

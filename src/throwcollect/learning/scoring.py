@@ -16,6 +16,7 @@ from throwcollect.learning.distilling import DistilledMap
 from throwcollect.learning.fitting import count_needed_throws, fit_throws, number_cells
 from throwcollect.learning.learned_map import LearnedMap, Role, no_correction
 from throwcollect.learning.score import Adapted, Errors, Score, ThrowAtTarget, Trained
+from throwcollect.side_by_side import THROWS_A_START
 
 SIZES = (30, 100, 300, 1000, 3000, 10_000)
 """Numbers of throws that models are learned from, to show how many throws a model takes."""
@@ -229,7 +230,7 @@ def _throw(learned: LearnedMap, lists: Sequence[Array], given: Array, world: Sim
         lists: Scaled parameters, each of shape ``(n, n_parameters)``.
         given: Scaled context of each of these lists, shape ``(n, n_context)``.
         world: Simulates the throws.
-        processes: How many processes simulate.
+        processes: How many processes simulate, if there are so many throws that it is worth their start.
 
     Returns:
         For each list, where the throws ended, shape ``(n, n_targets)``, with NaN where one did not succeed.
@@ -240,6 +241,7 @@ def _throw(learned: LearnedMap, lists: Sequence[Array], given: Array, world: Sim
     points = [dict(zip(keys, row, strict=True)) for row in values.tolist()]
     thrown = [number for number, point in enumerate(points) if world.find_refusal(point) is None]
     places = np.full((len(points), len(learned.targets)), np.nan)
+    processes = min(processes, max(1, len(thrown) // THROWS_A_START))
     throws = world.throw_many([points[number] for number in thrown], processes=processes)
     for number, throw in zip(thrown, throws, strict=True):
         if throw.outcome == world.config.task.success:

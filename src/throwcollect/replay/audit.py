@@ -10,7 +10,7 @@ from throwcollect.engine_packages import require_engine
 from throwcollect.errors import DatasetError
 from throwcollect.extras import require
 from throwcollect.replay.comparison import Comparison, compare
-from throwcollect.side_by_side import count_cores, work_side_by_side
+from throwcollect.side_by_side import THROWS_A_START, count_cores, work_side_by_side
 from throwcollect.trial.choice import choose_trials
 
 
@@ -27,7 +27,7 @@ def select_trials(dataset: Dataset, *, sample: int | None) -> list[int]:
 
 
 def replay_throws(directory: Path, trials: Sequence[int]) -> Iterator[Comparison]:
-    """Simulate stored throws again, on all cores, and compare them, in the given order.
+    """Simulate stored throws again, many of them on all cores, and compare them, in the given order.
 
     Args:
         directory: Directory of the dataset.
@@ -40,7 +40,9 @@ def replay_throws(directory: Path, trials: Sequence[int]) -> Iterator[Comparison
     """
     require_engine(Dataset.open(directory).config.sim.engine)
     require("pinocchio")
-    yield from work_side_by_side(trials, _begin, (directory,), processes=count_cores(), doing="simulates")
+    yield from work_side_by_side(
+        trials, _begin, (directory,), processes=count_cores(), doing="simulates", worth=THROWS_A_START
+    )
 
 
 def _begin(directory: Path) -> Callable[[int], Comparison]:

@@ -17,7 +17,7 @@ from throwcollect.errors import ConfigError
 from throwcollect.extras import require
 from throwcollect.members import names_of
 from throwcollect.replay.throw import Replayer
-from throwcollect.side_by_side import count_cores, work_side_by_side
+from throwcollect.side_by_side import THROWS_A_START, count_cores, work_side_by_side
 
 LANDING = ("landing_x_m", "landing_y_m")
 """Columns with the place where a throw landed."""
@@ -63,7 +63,7 @@ class Distribution:
 
 
 def simulate_with(directory: Path, engine: str, trials: Sequence[int]) -> Iterator[Deviation]:
-    """Simulate stored throws with another engine, on all cores; deviations come in the given order.
+    """Simulate stored throws with another engine, many of them on all cores; deviations come in the given order.
 
     Args:
         directory: Directory of the dataset.
@@ -83,7 +83,9 @@ def simulate_with(directory: Path, engine: str, trials: Sequence[int]) -> Iterat
         raise ConfigError(f"--engine {engine}: {problem}", expected=", ".join(others))
     require_engine(engine)
     require("pinocchio")
-    return work_side_by_side(trials, _begin, (directory, engine), processes=count_cores(), doing="simulates")
+    return work_side_by_side(
+        trials, _begin, (directory, engine), processes=count_cores(), doing="simulates", worth=THROWS_A_START
+    )
 
 
 def distributions(deviations: Sequence[Deviation]) -> list[Distribution]:
