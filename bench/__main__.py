@@ -69,12 +69,12 @@ def main() -> None:
     print(f"all numbers: {RESULT}")
 
 
-def _print_table(engine: str, simulations: int, rounds: list[dict], *, loops: int) -> None:
+def _print_table(engine: str, simulations: int, rounds: list[dict[str, Any]], *, loops: int) -> None:
     def median(*keys: str) -> float:
-        values = rounds
+        values: list[Any] = rounds
         for key in keys:
             values = [value[key] for value in values]
-        return statistics.median(values)
+        return float(statistics.median(values))
 
     plural = "s" if simulations > 1 else ""
     print(f"\n## {engine}, {simulations} simulation{plural}, medians of {len(rounds)}\n")

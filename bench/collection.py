@@ -8,8 +8,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-import docker
 import psutil
+from docker.client import DockerClient
 
 from throwcollect.coordinator.progress import Progress
 from throwcollect.dataset.creation import create
@@ -94,7 +94,7 @@ class _Watch:
         while self._supervisor.poll()[0] is None:
             self._listener.spin(self._supervisor.host.connection, _POLL_S)
 
-    def _sum(self, measure) -> dict[str, float]:
+    def _sum(self, measure: Callable[[psutil.Process], float]) -> dict[str, float]:
         return {
             role: sum(measure(node) for name, node in self._nodes.items() if name.startswith(role)) for role in ROLES
         }
@@ -104,7 +104,7 @@ def _process(handle: str) -> psutil.Process:
     """The process of a node, by the id of its process or container."""
     if handle.isdigit():
         return psutil.Process(int(handle))
-    init = docker.from_env().containers.get(handle).attrs["State"]["Pid"]
+    init = DockerClient.from_env().containers.get(handle).attrs["State"]["Pid"]
     (node,) = psutil.Process(init).children()
     return node
 

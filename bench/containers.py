@@ -6,7 +6,8 @@ import os
 from pathlib import Path
 from typing import Any
 
-import docker
+from docker.client import DockerClient
+from docker.errors import DockerException
 
 from bench import collection
 from throwcollect.runtimes.docker.image import default_tag
@@ -19,8 +20,8 @@ _KINDS = {"processes": collection.local_runtime, "containers": collection.docker
 def image_mb() -> float | None:
     """Size of the default image [MB]; None without an engine or the image."""
     try:
-        return docker.from_env(timeout=5).images.get(default_tag()).attrs["Size"] / 1e6
-    except (docker.errors.DockerException, OSError):
+        return float(DockerClient.from_env(timeout=5).images.get(default_tag()).attrs["Size"]) / 1e6
+    except (DockerException, OSError):
         return None
 
 

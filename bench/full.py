@@ -19,6 +19,7 @@ import time
 from collections import Counter
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
+from typing import Any
 
 import psutil
 
@@ -186,7 +187,7 @@ def main() -> None:
         raise SystemExit("the datasets differ" if not same else "verify found something")
 
 
-def _print(report: dict, rows: dict[str, Collected], *, episodes: int) -> None:
+def _print(report: dict[str, Any], rows: dict[str, Collected], *, episodes: int) -> None:
     print(f"\n{report['landed']} landed throws of {report['trials']} trials, digest {report['digest'][:8]}…")
     print(f"\n| | {' | '.join(rows)} |\n|---|{'---|' * len(rows)}")
 

@@ -13,6 +13,7 @@ import tempfile
 import time
 from pathlib import Path
 
+from throwcollect.build import build_digest
 from throwcollect.coordinator.acceptance import Acceptance
 from throwcollect.dataset.judging import judge_episode
 from throwcollect.dataset.reader import Dataset
@@ -21,6 +22,7 @@ from throwcollect.episode.message import Delivery, pack, unpack
 from throwcollect.run_key import Signer
 from throwcollect.sweep.plan import Plan
 from throwcollect.tasks.task import task_of
+from throwcollect.trial.conditions import Conditions, Settings
 
 _SECRET = b"key of a run"
 _SIGNER = Signer(_SECRET)
@@ -33,14 +35,22 @@ def measure(directory: Path) -> tuple[float, float]:
         directory: A finished dataset, whose episodes are collected once more.
     """
     dataset = Dataset.open(directory)
-    acceptance = Acceptance(dataset.config)
+    acceptance, settings = Acceptance(dataset.config), Settings(dataset.config)
+    build = build_digest(dataset.config.sim.engine)
     columns = task_of(dataset.config).columns
     messages = []
     for episode in dataset.episodes():
         trial = dataset.plan.trial(episode.header.trial)
-        result = columns.to_json(judge_episode(dataset.plan.config_of(trial), episode))
-        conditions = acceptance.expect(dataset.plan, trial, token="").to_json()
-        messages.append(pack(Delivery(episode, result, conditions), _SIGNER))
+        config = dataset.plan.config_of(trial)
+        result = columns.to_json(judge_episode(config, episode))
+        conditions = Conditions(
+            build=build,
+            settings=settings.digest,
+            values=settings.find_replaced(config),
+            trajectory=task_of(config).trajectory().digest,
+            lease="",
+        )
+        messages.append(pack(Delivery(episode, result, conditions.to_json()), _SIGNER))
     random.Random(0).shuffle(messages)
     with tempfile.TemporaryDirectory(prefix="throwcollect-bench-") as scratch:
         taken_in = _taken_in(messages, dataset.plan, acceptance, Path(scratch) / "data")

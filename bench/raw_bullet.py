@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import pybullet
 
@@ -16,7 +17,7 @@ def make_throw(world: World) -> Callable[[Commands], int]:
     Args:
         world: Loaded, with the ball in the tool.
     """
-    engine = world.engine
+    engine: Any = world.engine
     robot, joints, ball = engine._scenery.robot, engine._scenery.joints, engine._ball
     state = pybullet.saveState()
 

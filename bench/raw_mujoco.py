@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -20,7 +21,7 @@ def make_throw(world: World) -> Callable[[Commands], int]:
     Args:
         world: Loaded, with the ball in the tool.
     """
-    engine = world.engine
+    engine: Any = world.engine
     model, data, columns = engine._model, engine._data, engine._columns
     start = engine.state
     joints = len(columns)

@@ -166,6 +166,7 @@ def _by_messages(path: Path, throws: int) -> None:
     with path.open("rb") as file:
         reader = make_reader(file)
         summary = reader.get_summary()
+        assert summary is not None
         # The first chunk holds the latched messages.
         end_ns = sorted(index.message_end_time for index in summary.chunk_indexes)[throws]
         for _ in reader.iter_messages(ending_at=end_ns):
