@@ -103,12 +103,14 @@ WORKERS = $$(( $$(nproc) + 1 ))
 test-units:
 	$(call twice,$(BIN)/python -m pytest -n $(WORKERS) tests/unit tests/install tests/rclzenoh tests/contract tests/physics)
 
+# These tests of genuine ROS 2 need an engine, too.
+WITH_ENGINE := tests/ros/test_containers.py
+
 # On Fast DDS, nodes at times do not find each other on a busy machine. A run starts them again; so do its tests.
 test-ros: ros
 	$(call twice,$(ROS_VENV)/bin/python -m pytest -n 2 --dist loadfile tests/contract tests/ros --ignore=$(WITH_ENGINE))
 
 # Tests with an engine look at all that is on it, so one by one; also those of containers on genuine rclpy.
-WITH_ENGINE := tests/ros/test_containers.py
 test-containers: ros
 	$(call twice,$(BIN)/python -m pytest tests/docker)
 	$(call twice,$(ROS_VENV)/bin/python -m pytest $(WITH_ENGINE))

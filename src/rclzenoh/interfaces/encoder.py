@@ -52,20 +52,14 @@ def _strings(values: tuple[str, ...]) -> bytes:
 
 
 def _check_length(values: Sequence[Any], field: Field) -> None:
-    if field.length is not None:
-        if len(values) != field.length:
-            raise ValueError(f"{field.name}: expected {field.length} elements, got {len(values)}")
-        if field.bound is not None:
-            # The bound of a fixed array is that of each of its strings.
-            for value in values:
-                _check_bound(value, field)
-    elif field.bound is not None:
-        _check_bound(values, field)
-
-
-def _check_bound(values: Sequence[Any], field: Field) -> None:
-    if field.bound is not None and len(values) > field.bound:
-        raise ValueError(f"{field.name}: expected at most {field.bound}, got {len(values)}")
+    if field.length is not None and len(values) != field.length:
+        raise ValueError(f"{field.name}: expected {field.length} elements, got {len(values)}")
+    if field.bound is None:
+        return
+    # The bound of a fixed array is that of each of its strings.
+    for bounded in (values,) if field.length is None else values:
+        if len(bounded) > field.bound:
+            raise ValueError(f"{field.name}: expected at most {field.bound}, got {len(bounded)}")
 
 
 class _Writer(FunctionWriter):

@@ -35,10 +35,8 @@ _ENDED = frozenset(
 """States of tasks that have ended. All others, including those of future versions of Slurm, count as living."""
 _UNSEEN_OUTPUT = "0:53"
 """Exit code of a task whose log could not be opened: its node does not see the directory."""
-
-
 _UNREACHED = ("Could not establish a configuration source", "Unable to contact slurm controller")
-"""What its commands say where Slurm has no controller, or one that cannot be reached."""
+"""Words by which Slurm's commands say that there is no controller, or that it cannot be reached."""
 
 
 @dataclass(frozen=True)

@@ -38,12 +38,12 @@ _LEAST_BYTES = 40
 """Bytes that each trial takes in the file of a plan: its digest and its seed, which nothing compresses."""
 
 Say = Callable[[str], object]
-Tell = Callable[[int, int], object]
-"""Is told how many trials of how many have been checked; an error that it raises gives the plan up."""
+UpdatePlan = Callable[[int, int], object]
+"""Is called with how many trials of how many have been checked; an error that it raises gives the plan up."""
 
 
-def _tell_nobody(_checked: int, _trials: int) -> None:
-    pass
+def _ignore_update(_checked: int, _trials: int) -> None:
+    """Take in how far a plan is, where nobody wants to know."""
 
 
 def draw_plan(config: Config, *, directory: Path, processes: int = 1, say: Say = lambda _: None) -> Plan:
@@ -61,7 +61,7 @@ def draw_plan(config: Config, *, directory: Path, processes: int = 1, say: Say =
         WorkerError: If a process that checks trials is killed.
     """
     points = _draw_points(config, directory, say)
-    return _check_trials(config, points, processes=processes, say=say, tell=_tell_nobody)
+    return _check_trials(config, points, processes=processes, say=say, update_plan=_ignore_update)
 
 
 def _draw_points(config: Config, directory: Path, say: Say) -> Points:
@@ -75,7 +75,7 @@ def _count_before(config: Config) -> int:
     return 0 if config.grows else config.trials or 0
 
 
-def _check_trials(config: Config, points: Points, *, processes: int, say: Say, tell: Tell) -> Plan:
+def _check_trials(config: Config, points: Points, *, processes: int, say: Say, update_plan: UpdatePlan) -> Plan:
     """Make the plan of points, and refuse the trials that the robot cannot do (see `draw_plan`)."""
     if sentence := find_sunken_robot(config):
         say(sentence)
@@ -88,14 +88,15 @@ def _check_trials(config: Config, points: Points, *, processes: int, say: Say, t
     pieces = [(first, points[first:stop]) for first, stop in pairwise([*firsts, count])]
     processes = processes if count >= _MANY_TRIALS else 1
     say_at = time.monotonic() + _TELL_FIRST_S
-    tell(0, count)
+    update_plan(0, count)
     with working_side_by_side(
         pieces, _make_checked_trials, (config,), processes=processes, doing="checks trials"
     ) as checked:
         trials = next(checked)
+        update_plan(len(trials), count)
         for piece in checked:
-            tell(len(trials), count)
             trials.extend(piece)
+            update_plan(len(trials), count)
             if time.monotonic() >= say_at:
                 say_at = time.monotonic() + _TELL_EVERY_S
                 say(f"plan: {len(trials)} of {count} trials checked")
@@ -209,7 +210,7 @@ def prepare(
     sweep_directory: Path,
     processes: int = 1,
     say: Say = lambda _: None,
-    tell: Tell = _tell_nobody,
+    update_plan: UpdatePlan = _ignore_update,
 ) -> Plan:
     """Freeze the plan: write a dataset directory that holds the resolved configuration and all trials.
 
@@ -219,7 +220,7 @@ def prepare(
         sweep_directory: Where a relative `sweep.file` is looked for.
         processes: As `draw_plan` takes it.
         say: As `draw_plan` takes it.
-        tell: Is told often how many trials have been checked.
+        update_plan: Is called often with how many trials have been checked; see `UpdatePlan`.
 
     Raises:
         ConfigError: If the sweep or the directory cannot be used; nothing stays on the disk then.
@@ -228,10 +229,10 @@ def prepare(
     # To check many trials takes minutes, so what needs no plan is looked at before.
     refuse_taken(directory)
     _check_room(directory, _count_before(config))
-    tell(0, _count_before(config))
+    update_plan(0, _count_before(config))
     points = _draw_points(config, sweep_directory, say)
     _check_room(directory, len(points.values))
-    plan = _check_trials(config, points, processes=processes, say=say, tell=tell)
+    plan = _check_trials(config, points, processes=processes, say=say, update_plan=update_plan)
     plan = replace(plan, config=make_self_contained(config))
     try:
         create(directory, plan, listed=read_listed_points(config, directory=sweep_directory))

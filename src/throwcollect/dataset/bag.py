@@ -27,8 +27,9 @@ from throwcollect.wording import command
 VERSION = 9
 _MOST_BYTES = 10_000_000
 _ROS_DISTRO = "jazzy"
-_MOST_NEARBY = 5
 """Release whose interface definitions the messages follow."""
+_MOST_NEARBY = 5
+"""A message names so many datasets that may be meant."""
 
 
 @dataclass(frozen=True)

@@ -230,7 +230,7 @@ def _throw(learned: LearnedMap, lists: Sequence[Array], given: Array, world: Sim
         lists: Scaled parameters, each of shape ``(n, n_parameters)``.
         given: Scaled context of each of these lists, shape ``(n, n_context)``.
         world: Simulates the throws.
-        processes: How many processes simulate, if there are so many throws that it is worth their start.
+        processes: How many processes simulate at most; there are fewer where few throws are not worth their start.
 
     Returns:
         For each list, where the throws ended, shape ``(n, n_targets)``, with NaN where one did not succeed.

@@ -253,7 +253,7 @@ def _make_plan(request: Request, directory: Path, onlooker: Onlooker) -> Plan:
         sweep_directory=request.sweep_directory,
         processes=request.processes,
         say=onlooker.say,
-        tell=onlooker.update_plan,
+        update_plan=onlooker.update_plan,
     )
 
 

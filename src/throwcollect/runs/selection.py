@@ -191,16 +191,16 @@ def _may_have_throws(record: Record) -> bool:
 def has_complete_dataset(run: Run) -> bool:
     """Whether nothing is left to collect into the directory of a run.
 
-    A later run may have gone on with what this one left, so the dataset is asked where the record does not know.
+    A later run may have gone on with what this one left, so the dataset is asked unless this run has completed it.
     """
     if run.record.kind != "collection" or run.status == "running":
         return False
-    if run.status == "died":
-        # This imports what reads tables, which takes a while and is rarely needed.
-        from throwcollect.coordinator.resume import is_complete
+    if run.record.exit_code == 0:
+        return True
+    # This imports what reads tables, which takes a while and is rarely needed.
+    from throwcollect.coordinator.resume import is_complete
 
-        return run.record.volume is None and is_complete(run.place.directory)
-    return run.record.exit_code == 0
+    return run.record.volume is None and is_complete(run.place.directory)
 
 
 def require_living(run: Run) -> Record:

@@ -62,13 +62,13 @@ def test_whoever_wants_is_told_how_far_a_plan_is_and_can_give_it_up(tmp_path: Pa
     config = Config.model_validate({**CONFIG, "trials": 250})
     told: list[tuple[int, int]] = []
 
-    def tell(checked: int, trials: int) -> None:
+    def update_plan(checked: int, trials: int) -> None:
         told.append((checked, trials))
         if checked == 200:
             raise Interrupted("enough")
 
     with pytest.raises(Interrupted, match="enough"):
-        prepare.prepare(config, tmp_path / "data", sweep_directory=tmp_path, tell=tell)
+        prepare.prepare(config, tmp_path / "data", sweep_directory=tmp_path, update_plan=update_plan)
     assert told == [(0, 250), (0, 250), (100, 250), (200, 250)]
     assert not (tmp_path / "data").exists()
 

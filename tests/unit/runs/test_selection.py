@@ -17,6 +17,7 @@ from throwcollect.runs.selection import (
     describe_death,
     find_held_runs,
     find_left_in,
+    has_complete_dataset,
     require_living,
     to_change,
     to_watch,
@@ -324,6 +325,8 @@ def test_a_run_that_died_is_told_with_a_dataset_that_is_complete_by_now(
     assert "resume" not in said
     ps()
     assert "died, but the dataset is complete" in capsys.readouterr().out
+    interrupted = make("b", "ended", directory=str(tmp_path / "data"), exit_code=130)
+    assert has_complete_dataset(records.get(interrupted.run))
     (tmp_path / "data" / "throws.parquet").unlink()
     ps(json=True)
     assert [each["complete"] for each in json.loads(capsys.readouterr().out) if each["run"] == record.run] == [False]
