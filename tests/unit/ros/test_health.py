@@ -1,4 +1,5 @@
 import json
+import os
 import signal
 import subprocess
 import sys
@@ -104,6 +105,8 @@ def test_a_router_that_is_stuck_is_not_healthy(environment, monkeypatch, impatie
             monkeypatch.setenv(OVERRIDE_VARIABLE, f"connect/endpoints={json.dumps([endpoint])}")
             check("router")
             router.send_signal(signal.SIGSTOP)
+            # The signal may take effect only after the call that sends it.
+            os.waitpid(router.pid, os.WUNTRACED)
             with pytest.raises(ThrowcollectError, match="router: no session with the router"):
                 check("router")
         finally:
