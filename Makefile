@@ -144,9 +144,9 @@ check-house: $(READY_DEV)
 docs: $(READY_DEV)
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
 
-# Throws a second against the raw limit of the same machine, in the same run.
+# Throws a second against the raw limit of the same machine, in the same run; `make bench BEFORE=REVISION` measures that commit beside it.
 bench: $(READY_DEV) ros
-	$(BIN)/python -m bench
+	$(BIN)/python -m bench $(if $(BEFORE),--before '$(BEFORE)')
 	$(ROS_VENV)/bin/python -m bench.backends
 
 # A database as large as a published one, collected in peace and among crashes, with either engine: the same files. Takes a quarter of an hour.

@@ -8,12 +8,15 @@ import json
 import os
 import statistics
 import tempfile
+from collections.abc import Callable
 from dataclasses import asdict
+from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 from bench import collection, containers, intake, raw, reading, soak
+from bench.other_version import OtherVersion
 from throwcollect.config.loader import load
 from throwcollect.engine_packages import PACKAGES
 from throwcollect.sweep.plan import make_plan
@@ -29,21 +32,32 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m bench", description=__doc__)
     parser.add_argument("--rounds", type=int, default=5, help="measurements of each kind [%(default)s]")
     parser.add_argument("--trials", type=int, default=400, help="throws of each collection [%(default)s]")
+    parser.add_argument("--before", metavar="REVISION", help="a commit that is measured in turns with this version")
     arguments = parser.parse_args()
     cores = len(os.sched_getaffinity(0))
-    plans = {
-        engine: make_plan(load(CONFIG, [f"trials={arguments.trials}", f"sim.engine={engine}"]))
+    overrides = {
+        engine: [f"trials={arguments.trials}", f"sim.engine={engine}"]
         for engine in _ENGINES
         if find_spec(PACKAGES[engine].module) is not None
     }
-    report: dict[str, Any] = {"cores": cores, "trials": arguments.trials, "rounds": arguments.rounds}
+    report: dict[str, Any] = {"cores": cores, **vars(arguments)}
     with tempfile.TemporaryDirectory(prefix="throwcollect-bench-") as scratch:
-        for (engine, plan), simulations in itertools.product(plans.items(), sorted({1, cores, _MANY})):
+        before = OtherVersion(arguments.before, Path(scratch) / "before") if arguments.before else None
+        for (engine, keys), simulations in itertools.product(overrides.items(), sorted({1, cores, _MANY})):
+            plan = make_plan(load(CONFIG, keys))
             rounds = []
             for index in range(arguments.rounds):
+                place = Path(scratch) / f"{engine}-{simulations}-{index}"
                 limit = raw.measure(plan, min(simulations, cores), arguments.trials // 4)
-                found = collection.measure(plan, simulations, Path(scratch) / f"{engine}-{simulations}-{index}")
-                rounds.append({"raw_throws_per_s": limit, "ratio": found.throws_per_s / limit, **asdict(found)})
+                versions: list[tuple[str, Callable[[], collection.Collection]]] = [
+                    ("now", partial(collection.measure, plan, simulations, place))
+                ]
+                if before is not None:
+                    place = place.with_name(f"{place.name}-before")
+                    versions.append(("before", partial(before.measure, CONFIG, keys, simulations, place)))
+                # In turns, as whoever always comes second would find a machine that the first has warmed.
+                found = {name: run() for name, run in versions[:: -1 if index % 2 else 1]}
+                rounds.append({"raw_throws_per_s": limit} | {name: asdict(each) for name, each in found.items()})
             report[f"{engine}, n={simulations}"] = rounds
             _print_table(engine, simulations, rounds, loops=min(simulations, cores))
         if containers.image_mb() is None:
@@ -70,33 +84,56 @@ def main() -> None:
 
 
 def _print_table(engine: str, simulations: int, rounds: list[dict[str, Any]], *, loops: int) -> None:
+    raw_rate = statistics.median(each["raw_throws_per_s"] for each in rounds)
+    plural = "s" if simulations > 1 else ""
+    print(f"\n## {engine}, {simulations} simulation{plural}, medians of {len(rounds)}\n")
+    versions = [name for name in ("now", "before") if name in rounds[0]]
+    print(f"| what | {' | '.join(versions)} |\n|---|{'---|' * len(versions)}")
+    columns = [_describe([each[name] for each in rounds], rounds, loops / raw_rate * 1e3) for name in versions]
+    print(f"| raw loop of the engine, {loops} at once | {' | '.join([f'{raw_rate:.1f} throws/s'] * len(versions))} |")
+    for part in columns[0]:
+        print(f"| {part} | {' | '.join(column[part] for column in columns)} |")
+    if len(versions) > 1:
+        faster = statistics.median(each["now"]["throws_per_s"] / each["before"]["throws_per_s"] for each in rounds)
+        print(f"| throws/s now over before, of each round | {faster:.2f} | |")
+    print(end="", flush=True)
+
+
+def _describe(found: list[dict[str, Any]], rounds: list[dict[str, Any]], physics_ms: float) -> dict[str, str]:
+    """What a version has cost, in words by part.
+
+    Args:
+        found: A `Collection` of each round.
+        rounds: The rounds, with the raw loop of each.
+        physics_ms: Time of a throw in the raw loop [ms].
+    """
+
     def median(*keys: str) -> float:
-        values: list[Any] = rounds
+        values: list[Any] = found
         for key in keys:
             values = [value[key] for value in values]
         return float(statistics.median(values))
 
-    plural = "s" if simulations > 1 else ""
-    print(f"\n## {engine}, {simulations} simulation{plural}, medians of {len(rounds)}\n")
-    print("| what | |\n|---|---|")
-    print(f"| raw loop of the engine, {loops} at once | {median('raw_throws_per_s'):.1f} throws/s |")
-    print(f"| `throwcollect up -n {simulations}` | {median('throws_per_s'):.1f} throws/s |")
-    print(f"| ratio | {median('ratio'):.2f} |")
+    ratio = statistics.median(
+        each["throws_per_s"] / one["raw_throws_per_s"] for each, one in zip(found, rounds, strict=True)
+    )
     spent = {role: median("cpu_ms_per_throw", role) for role in collection.ROLES}
-    physics = loops * 1e3 / median("raw_throws_per_s")
     parts = {
-        "physics, as in the raw loop": physics,
-        "controllers, judging, encoding and ROS in the simulation": spent["sim"] - physics,
+        "physics, as in the raw loop": physics_ms,
+        "controllers, judging, encoding and ROS in the simulation": spent["sim"] - physics_ms,
         "router": spent["router"],
         "coordinator: checks, ROS": spent["coordinator"] - median("disk_ms_per_throw"),
         "coordinator: kernel, disk and network": median("disk_ms_per_throw"),
     }
-    for part, milliseconds in parts.items():
-        print(f"| {part} | {milliseconds:.1f} ms a throw ({milliseconds / sum(parts.values()):.0%}) |")
-    for role in collection.ROLES:
-        print(f"| memory of a {role} | {median('memory_mb', role):.0f} MB |")
-    print(f"| recordings | {median('bytes_per_throw') / 1e3:.0f} kB a throw |")
-    print(f"| start of the nodes to the first throw | {median('first_throw_s'):.1f} s |", flush=True)
+    total = sum(parts.values())
+    return {
+        "`throwcollect up`": f"{median('throws_per_s'):.1f} throws/s",
+        "ratio, of each round": f"{ratio:.2f}",
+        **{part: f"{cost:.1f} ms a throw ({cost / total:.0%})" for part, cost in parts.items()},
+        **{f"memory of a {role}": f"{median('memory_mb', role):.0f} MB" for role in collection.ROLES},
+        "recordings": f"{median('bytes_per_throw') / 1e3:.0f} kB a throw",
+        "start of the nodes to the first throw": f"{median('first_throw_s'):.1f} s",
+    }
 
 
 def _print_containers(report: dict[str, Any]) -> None:
