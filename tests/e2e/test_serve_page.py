@@ -59,6 +59,8 @@ def test_a_collection_is_started_watched_and_stopped_by_the_page(address: str) -
     with browse(address, width=800, height=600, features={"prefers-reduced-motion": "reduce"}) as tab:
         load(tab)
         assert tab.evaluate("location.hash") == "", "the code is still in the address"
+        # What smooths edges takes software longer than all else of a picture, and so simulations beside it.
+        assert tab.evaluate("throwcollect.view.renderer.getContextAttributes().antialias") is False
         assert "Nothing runs" in tab.evaluate("document.querySelector('#empty').textContent")
         tab.evaluate("document.querySelector('#components input').value = '2'")
         press(tab, "Start Throws")

@@ -261,6 +261,8 @@ class Page {
     const since = now - this.#before;
     // In a room, the device asks for pictures by itself.
     if (since < 1000 / RATE_HZ - 4 || this.room.isEntered) return;
+    // Changed texts make the browser draw as well, so they wait for the next picture of the view. Plots do not wait.
+    if (!this.view.isDue(since) && !this.plots.panels.length) return;
     this.#before = now;
     this.#advance(since / 1000);
     this.view.draw(since);
@@ -297,7 +299,7 @@ class Page {
     scrub.max = at.shown.duration.toFixed(2);
     if (document.activeElement !== scrub || playing) scrub.value = at.time.toFixed(2);
     const { shown, time } = at;
-    get("time").value = `${time.toFixed(2)} of ${shown.duration.toFixed(2)} s, trial ${shown.trial}, ${shown.outcome}`;
+    setText(get("time"), `${time.toFixed(2)} of ${shown.duration.toFixed(2)} s, trial ${shown.trial}, ${shown.outcome}`);
     scrub.setAttribute("aria-valuetext", `${time.toFixed(2)} seconds`);
     setText(get("values"), inWords(shown.values));
   }

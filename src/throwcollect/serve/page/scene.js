@@ -18,8 +18,12 @@ const ZOOM = 1.15;
 const MOST_FINE = 1;
 /** A picture that takes longer than this on average [ms] is drawn with less. */
 const SLOW_MS = 70;
-/** Least time between pictures that are drawn by software [ms], which leaves the processors to the simulations. */
-const SOFTWARE_STEP_MS = 95;
+/** Software that draws; some of it passes for graphics hardware in a browser that was told to use it. */
+const SOFTWARE = /swiftshader|llvmpipe|softpipe|software|basic render/i;
+/** Software draws for a quarter of the time at most, and leaves the rest of the processors to the simulations. */
+const SOFTWARE_SHARE = 1 / 4;
+/** Time between two pictures that are drawn by software, at least and at most [ms]. */
+const SOFTWARE_STEP_MS = [95, 400];
 /** Distance between two robots in a room [m]. */
 const SPACING_M = 1.5;
 
@@ -69,9 +73,12 @@ export class Station {
   }
 }
 
-/** Whether pictures are drawn by a graphics processor, and not by software. */
-function hasGraphicsHardware() {
-  return document.createElement("canvas").getContext("webgl2", { failIfMajorPerformanceCaveat: true }) !== null;
+/** Whether pictures are drawn by software, and not by a graphics processor. */
+function isDrawnBySoftware() {
+  const gl = document.createElement("canvas").getContext("webgl2", { failIfMajorPerformanceCaveat: true });
+  if (gl === null) return true;
+  const names = gl.getExtension("WEBGL_debug_renderer_info");
+  return SOFTWARE.test(gl.getParameter(names ? names.UNMASKED_RENDERER_WEBGL : gl.RENDERER));
 }
 
 /** Draws stations into a canvas. */
@@ -97,7 +104,8 @@ export class View {
   #mean = 0;
   #waited = 0;
   #plain = false;
-  #leastMs = hasGraphicsHardware() ? 0 : SOFTWARE_STEP_MS;
+  #isBySoftware = isDrawnBySoftware();
+  #leastMs = 0;
 
   /**
    * @param {HTMLCanvasElement} canvas
@@ -105,7 +113,8 @@ export class View {
    */
   constructor(canvas) {
     this.canvas = canvas;
-    this.renderer = new WebGLRenderer({ canvas, antialias: true });
+    // Smooth edges take software more time than all else.
+    this.renderer = new WebGLRenderer({ canvas, antialias: !this.#isBySoftware });
     this.#camera.up.set(0, 0, 1);
     this.orbit = new OrbitControls(this.#camera, canvas);
     this.orbit.maxPolarAngle = Math.PI / 2 - 0.02;
@@ -263,24 +272,49 @@ export class View {
   }
 
   /**
+   * @param {number} sinceMs time since the last call of `draw` [ms]
+   * @returns {boolean} whether the last picture is old enough for another one
+   */
+  isDue(sinceMs) {
+    return this.#waited + sinceMs >= this.#leastMs;
+  }
+
+  /**
    * Draw a picture, if something has changed and the last one is old enough.
    * @param {number} sinceMs time since the last call [ms]
    */
   draw(sinceMs) {
+    const isDue = this.isDue(sinceMs);
     this.#waited += sinceMs;
     if (!this.#changed) {
       this.#mean = 0;
       return;
     }
-    if (this.#waited < this.#leastMs) return;
+    if (!isDue) return;
     this.#waited = 0;
     this.#changed = false;
-    this.#adapt(sinceMs);
+    if (!this.#isBySoftware) this.#adapt(sinceMs);
+    const began = performance.now();
     this.#choose();
     this.#scene.updateMatrixWorld();
     this.renderer.setScissorTest(true);
     for (const station of this.stations.values()) station.group.visible = false;
     for (const name of this.shown.length ? this.shown : [""]) this.#drawTile(name);
+    if (this.#isBySoftware) this.#spare(began);
+  }
+
+  /**
+   * Wait for the picture, and have the next one come so late that the processors are free in between.
+   * @param {number} began when the picture was begun [ms]
+   */
+  #spare(began) {
+    const gl = this.renderer.getContext();
+    // What reads a point of the picture waits until it is there.
+    gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4));
+    const tookMs = performance.now() - began;
+    const [least, most] = SOFTWARE_STEP_MS;
+    this.#leastMs = Math.min(Math.max(tookMs / SOFTWARE_SHARE, least), most);
+    this.#adapt(tookMs);
   }
 
   /** Draw robots with all of their triangles if they are few. */
@@ -300,9 +334,12 @@ export class View {
     if (station) station.group.visible = false;
   }
 
-  /** Draw with less where pictures take long. */
-  #adapt(sinceMs) {
-    this.#mean = this.#mean === 0 ? Math.min(sinceMs, SLOW_MS) : 0.9 * this.#mean + 0.1 * Math.min(sinceMs, 1000);
+  /**
+   * Draw with less where pictures take long.
+   * @param {number} tookMs time that a picture took [ms]
+   */
+  #adapt(tookMs) {
+    this.#mean = this.#mean === 0 ? Math.min(tookMs, SLOW_MS) : 0.9 * this.#mean + 0.1 * Math.min(tookMs, 1000);
     if (this.#mean > SLOW_MS && !this.#plain) {
       this.#plain = true;
       this.#resize();
