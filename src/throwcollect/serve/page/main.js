@@ -55,6 +55,8 @@ class Page {
   #instances = [];
   #first = 0;
   #before = 0;
+  /** When the next picture is wanted [ms]. */
+  #due = 0;
   /** Id of the run that the address names, until the first state is known. */
   #named;
 
@@ -260,10 +262,12 @@ class Page {
     requestAnimationFrame((next) => this.#frame(next));
     const since = now - this.#before;
     // In a room, the device asks for pictures by itself.
-    if (since < 1000 / RATE_HZ - 4 || this.room.isEntered) return;
+    if (now < this.#due - 4 || this.room.isEntered) return;
     // Changed texts make the browser draw as well, so they wait for the next picture of the view. Plots do not wait.
     if (!this.view.isDue(since) && !this.plots.panels.length) return;
     this.#before = now;
+    // One that came late does not put off those behind it, so that there are as many where the browser is slow.
+    this.#due = Math.max(this.#due + 1000 / RATE_HZ, now);
     this.#advance(since / 1000);
     this.view.draw(since);
   }

@@ -20,8 +20,8 @@ const MOST_FINE = 1;
 const SLOW_MS = 70;
 /** Software that draws; some of it passes for graphics hardware in a browser that was told to use it. */
 const SOFTWARE = /swiftshader|llvmpipe|softpipe|software|basic render/i;
-/** Software draws for a quarter of the time at most, and leaves the rest of the processors to the simulations. */
-const SOFTWARE_SHARE = 1 / 4;
+/** Software draws for a third of the time at most, and leaves the rest of the processors to the simulations. */
+const SOFTWARE_SHARE = 1 / 3;
 /** Time between two pictures that are drawn by software, at least and at most [ms]. */
 const SOFTWARE_STEP_MS = [95, 400];
 /** Distance between two robots in a room [m]. */
@@ -103,8 +103,11 @@ export class View {
   #changed = true;
   #mean = 0;
   #waited = 0;
-  #plain = false;
   #isBySoftware = isDrawnBySoftware();
+  /** Whether robots have fewer triangles, and pictures no more points than the page. */
+  #plain = this.#isBySoftware;
+  /** @type {{ended: WebGLSync, beganMs: number} | null} the picture that software draws at the moment */
+  #drawn = null;
   #leastMs = 0;
 
   /**
@@ -273,10 +276,11 @@ export class View {
 
   /**
    * @param {number} sinceMs time since the last call of `draw` [ms]
-   * @returns {boolean} whether the last picture is old enough for another one
+   * @returns {boolean} whether the last picture is there, and old enough for another one
    */
   isDue(sinceMs) {
-    return this.#waited + sinceMs >= this.#leastMs;
+    if (this.#drawn !== null) this.#lookAtDrawn();
+    return this.#drawn === null && this.#waited + sinceMs >= this.#leastMs;
   }
 
   /**
@@ -293,28 +297,30 @@ export class View {
     if (!isDue) return;
     this.#waited = 0;
     this.#changed = false;
-    if (!this.#isBySoftware) this.#adapt(sinceMs);
-    const began = performance.now();
+    this.#adapt(sinceMs);
+    const beganMs = performance.now();
     this.#choose();
     this.#scene.updateMatrixWorld();
     this.renderer.setScissorTest(true);
     for (const station of this.stations.values()) station.group.visible = false;
     for (const name of this.shown.length ? this.shown : [""]) this.#drawTile(name);
-    if (this.#isBySoftware) this.#spare(began);
+    if (this.#isBySoftware) {
+      const gl = this.renderer.getContext();
+      this.#drawn = { ended: gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0), beganMs };
+      gl.flush();
+    }
   }
 
-  /**
-   * Wait for the picture, and have the next one come so late that the processors are free in between.
-   * @param {number} began when the picture was begun [ms]
-   */
-  #spare(began) {
+  /** If software has drawn the picture, have the next one come so late that the processors are free in between. */
+  #lookAtDrawn() {
     const gl = this.renderer.getContext();
-    // What reads a point of the picture waits until it is there.
-    gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4));
-    const tookMs = performance.now() - began;
+    const { ended, beganMs } = this.#drawn;
+    if (!gl.isContextLost() && gl.getSyncParameter(ended, gl.SYNC_STATUS) !== gl.SIGNALED) return;
+    gl.deleteSync(ended);
+    this.#drawn = null;
+    const tookMs = performance.now() - beganMs;
     const [least, most] = SOFTWARE_STEP_MS;
     this.#leastMs = Math.min(Math.max(tookMs / SOFTWARE_SHARE, least), most);
-    this.#adapt(tookMs);
   }
 
   /** Draw robots with all of their triangles if they are few. */
@@ -334,12 +340,9 @@ export class View {
     if (station) station.group.visible = false;
   }
 
-  /**
-   * Draw with less where pictures take long.
-   * @param {number} tookMs time that a picture took [ms]
-   */
-  #adapt(tookMs) {
-    this.#mean = this.#mean === 0 ? Math.min(tookMs, SLOW_MS) : 0.9 * this.#mean + 0.1 * Math.min(tookMs, 1000);
+  /** Draw with less where pictures take long. */
+  #adapt(sinceMs) {
+    this.#mean = this.#mean === 0 ? Math.min(sinceMs, SLOW_MS) : 0.9 * this.#mean + 0.1 * Math.min(sinceMs, 1000);
     if (this.#mean > SLOW_MS && !this.#plain) {
       this.#plain = true;
       this.#resize();
