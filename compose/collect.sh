@@ -8,6 +8,10 @@ if [ $# -ne 3 ]; then
     exit 2
 fi
 config=$1 simulations=$2 output=$3
+if [ ! -f "$config" ]; then
+    echo "$0: $config: no such file" >&2
+    exit 2
+fi
 if [ -e "$output" ]; then
     echo "$0: $output exists already" >&2
     exit 2

@@ -1,6 +1,6 @@
 """Attacks a collection in all ways that have a seed, and counts what was noticed; a small one runs with the tests.
 
-``python -m tests.campaign`` takes about an hour and prints the table of ``docs/reliability.md``. Its kinds:
+``python -m tests.campaign`` takes about an hour and prints a table like that of ``docs/reliability.md``. Its kinds:
 
 - *flips*: single bits of the promised files of a collected dataset; each must be seen by comparing with the manifest,
   and each hundredth also by the whole of `verify`.
@@ -170,11 +170,16 @@ def run(*, seed: int, flip_count: int, plans: int, kill_count: int, scratch: Pat
 
 def main() -> int:
     """Run a long campaign and print its counts."""
-    parser = argparse.ArgumentParser(prog="python -m tests.campaign", description=__doc__)
+    parser = argparse.ArgumentParser(
+        prog="python -m tests.campaign",
+        description=__doc__,
+        # The list of kinds stays a list.
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--flips", type=int, default=20_000)
+    parser.add_argument("--flips", type=int, default=20_000, help="bits that are flipped")
     parser.add_argument("--plans", type=int, default=50, help="plans of which an episode is forged in each way")
-    parser.add_argument("--kills", type=int, default=100)
+    parser.add_argument("--kills", type=int, default=100, help="signals that are sent, or a few more")
     wanted = parser.parse_args()
     with tempfile.TemporaryDirectory(prefix="throwcollect-campaign-") as scratch:
         counts = run(

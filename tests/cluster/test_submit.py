@@ -225,7 +225,7 @@ def test_a_plan_that_grows_is_collected_by_one_run_on_several_nodes(slurm: Slurm
     assert "one run on 3 nodes" in said
     assert recordings(fingerprints(data)) == recordings(fingerprints(tmp_path / "whole"))
     printed = call(slurm, "logs", "--run", data)
-    assert printed.count("1 simulation of this machine join it") == 2
+    assert printed.count("1 simulation of this machine will join") == 2
     # The simulations that joined end some seconds later, and the script after them.
     wait_until(lambda: not (data / "cluster" / "token").exists())
     assert "nothing is left to submit" in call(slurm, "resume", data)

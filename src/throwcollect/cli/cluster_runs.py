@@ -60,7 +60,8 @@ def print_events(run: ClusterRun, *, as_json: bool) -> None:
         for index in sorted(states.keys() | before.keys(), key=lambda each: each or 0):
             now = states.get(index, "ended")
             if before.get(index) != now and (index in states or before.get(index) != "ended"):
-                tell(f"task {index}: {now}", event="task", task=index, state=now)
+                who = "all tasks" if index is None else f"task {index}"
+                tell(f"{who}: {now}", event="task", task=index, state=now)
             before[index] = now
     end = "finished" if look.complete else "over"
     tell(end, event=end)

@@ -186,10 +186,15 @@ class Look:
 
 
 class ProgressOfSlices:
-    """Counts the trials of finished slices, and reads each slice only once."""
+    """Counts the trials of finished slices, and reads each slice only once.
 
-    def __init__(self, run: ClusterRun) -> None:
+    The speed is that since the first look, as nobody wrote down how fast trials ended before.
+    """
+
+    def __init__(self, run: ClusterRun, *, clock: Callable[[], float] = time.monotonic) -> None:
         self._run = run
+        self._clock = clock
+        self._first: tuple[float, int] | None = None
         self._outcomes: Counter[str] = Counter()
         self._read: set[Slice] = set()
 
@@ -207,16 +212,24 @@ class ProgressOfSlices:
             entries = read_journal(self._run.directory / JOURNAL)
             self._outcomes = Counter(entry.outcome for entry in entries if entry.outcome is not None)
         task = self._run.config.task
+        ended = self._run.trials if look.complete else self._outcomes.total()
         return Progress(
             total=self._run.trials,
-            ended=self._run.trials if look.complete else self._outcomes.total(),
+            ended=ended,
             outcomes=dict(self._outcomes),
             simulations=look.running * self._run.simulations_per_task,
-            throws_per_s=0.0,
+            throws_per_s=self._measure_speed(ended),
             hung=[],
             success=task.success,
             noun=task.noun,
         )
+
+    def _measure_speed(self, ended: int) -> float:
+        now = self._clock()
+        if self._first is None:
+            self._first = now, ended
+        began, before = self._first
+        return max(0, ended - before) / (now - began) if now > began else 0.0
 
 
 def follow(run: ClusterRun, *, keep_on: Callable[[], bool] = lambda: True) -> Iterator[Look]:

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from throwcollect.cluster.site import site_path
 from throwcollect.errors import ConfigError, WorkerError
 
 MARK = "throwcollect:"
@@ -93,7 +94,10 @@ def check(script: Path) -> None:
     try:
         _run("sbatch", "--test-only", str(script))
     except WorkerError as error:
-        hint = error.hint or "the keys of the section cluster become options of the script"
+        hint = (
+            error.hint
+            or f"correct the keys of cluster, by --set cluster.KEY=VALUE, in the YAML file or in {site_path()}"
+        )
         raise ConfigError(error.message, hint=hint) from error
 
 

@@ -62,7 +62,7 @@ def join_run(
         connection = Connection(token.endpoint, key, token.domain_id)
         write_file(scratch / "config.yaml", _read_configuration(connection, token).encode())
         config = load(scratch / "config.yaml")
-        onlooker.say(f"run {token.run}: {format_count(simulations, 'simulation')} of this machine join it")
+        onlooker.say(f"run {token.run}: {format_count(simulations, 'simulation')} of this machine will join")
         place = Place(token.run, scratch, None, scratch / "logs", simulations, Middleware(), key)
         _simulate(LocalNodes(place, config, elsewhere=token.endpoint), connection, config, onlooker, interruptions)
 

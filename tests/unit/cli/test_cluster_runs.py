@@ -47,3 +47,12 @@ def test_a_run_of_which_only_the_joining_job_was_submitted_has_its_number(monkey
     monkeypatch.setattr(cluster_runs, "find_queued", lambda: [run])
     (document,) = cluster_runs.documents()
     assert document["run"] == "9"
+
+
+def test_one_run_on_several_nodes_is_told_without_a_number(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    seen = [look(Task(None, "COMPLETED", "n[1-2]", "0:0"), complete=True)]
+    monkeypatch.setattr(cluster_runs, "follow", lambda _run: iter(seen))
+    cluster_runs.print_events(RUN, as_json=False)
+    assert capsys.readouterr().out.splitlines() == ["all tasks: completed on n[1-2]", "finished"]

@@ -52,3 +52,16 @@ scontrol: fatal: Could not establish a configuration source
     with pytest.raises(ConfigError, match="Slurm has no controller that sbatch can reach") as refused:
         slurm.check(tmp_path / "script")
     assert "try: run this on a login node" in str(refused.value)
+
+
+def test_whoever_is_refused_by_slurm_is_told_where_to_correct_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "sbatch").write_text("#!/bin/sh\necho 'invalid partition specified: standard' >&2\nexit 1\n")
+    (tmp_path / "sbatch").chmod(0o755)
+    monkeypatch.setenv("PATH", f"{tmp_path}:/usr/bin:/bin")
+    monkeypatch.setenv("XDG_CONFIG_HOME", "/home/me/.config")
+    with pytest.raises(ConfigError, match="invalid partition specified: standard") as refused:
+        slurm.check(tmp_path / "script")
+    assert "/home/me/.config/throwcollect/cluster.yaml" in str(refused.value)
+    assert "--set cluster." in str(refused.value)

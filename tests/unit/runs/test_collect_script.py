@@ -33,3 +33,16 @@ def test_a_collection_that_never_began_leaves_no_directory(tmp_path: Path, begun
     assert done.returncode == 4, done.stderr
     assert output.exists() == bool(begun)
     assert (tmp_path / "told").read_text().strip() == os.uname().nodename
+
+
+def test_a_file_that_is_not_there_is_named_before_anything_starts(tmp_path: Path) -> None:
+    (tmp_path / "docker").write_text('#!/bin/sh\necho "$@" >>"$TOLD"\n')
+    (tmp_path / "docker").chmod(0o755)
+    told = tmp_path / "told"
+    environment = {**os.environ, "TOLD": str(told), "PATH": f"{tmp_path}:{os.environ['PATH']}"}
+    missing = tmp_path / "missing.yaml"
+    done = subprocess.run(
+        [SCRIPT, missing, "2", tmp_path / "data"], env=environment, capture_output=True, text=True, check=False
+    )
+    assert (done.returncode, done.stderr) == (2, f"{SCRIPT}: {missing}: no such file\n")
+    assert not told.exists()
