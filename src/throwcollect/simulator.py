@@ -21,7 +21,7 @@ from throwcollect.dataset.throw import Throw
 from throwcollect.dataset.throws_table import ThrowsTable
 from throwcollect.episode.message import Episode
 from throwcollect.episode.trajectory_rows import trajectory_rows
-from throwcollect.errors import ConfigError, PlanError, Problem
+from throwcollect.errors import ConfigError, ConflictError, PlanError, Problem
 from throwcollect.extras import require
 from throwcollect.files import StrPath
 from throwcollect.replay.throw import Replayer
@@ -63,6 +63,7 @@ class Simulator:
         self.config: Config = load(Path(config), self._overrides)
         self._check = feasibility_check(self.config)
         self._replayer = Replayer(self.config)
+        self._is_closed = False
 
     def __enter__(self) -> Simulator:
         return self
@@ -73,8 +74,10 @@ class Simulator:
         self.close()
 
     def close(self) -> None:
-        """Free the physics engine; nothing can be simulated afterwards."""
-        self._replayer.close()
+        """Free the physics engine; nothing can be simulated afterwards. To close it once more does nothing."""
+        if not self._is_closed:
+            self._is_closed = True
+            self._replayer.close()
 
     def throw(self, values: Point | None = None, *, trial: int = 0, target: Point | None = None) -> Throw:
         """Simulate one throw.
@@ -92,8 +95,11 @@ class Simulator:
 
         Raises:
             ConfigError: If a key cannot vary, a value is out of its range, or the task has no such target.
+            ConflictError: If the simulator is closed.
             PlanError: If the plan of a collection would refuse it, for the reason that it would have.
         """
+        if self._is_closed:
+            raise ConflictError("this simulator is closed", hint="make another Simulator")
         if trial < 0:
             raise ConfigError(f"trial {trial}: there is no such trial", expected="a number from 0")
         point = dict(values or {})

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from throwcollect import Simulator
-from throwcollect.errors import ConfigError, PlanError
+from throwcollect.errors import ConfigError, ConflictError, PlanError
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "simulator.md").read_text(encoding="utf-8")
@@ -30,6 +30,14 @@ def test_a_throw_does_not_depend_on_those_before_it(simulator: Simulator) -> Non
     assert first.row == again.row
     assert first.row["digest"] != other.row["digest"]
     assert np.array_equal(first.ball.position, again.ball.position)
+
+
+def test_a_simulator_that_is_closed_says_so_and_may_be_closed_again() -> None:
+    with Simulator(ROOT / "configs" / "quickstart.yaml") as simulator:
+        pass
+    simulator.close()
+    with pytest.raises(ConflictError, match="this simulator is closed"):
+        simulator.throw(POINT)
 
 
 def test_the_number_of_the_trial_is_in_the_stamps_alone(simulator: Simulator) -> None:

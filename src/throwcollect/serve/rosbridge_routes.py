@@ -62,5 +62,6 @@ def _find_only_run() -> Run:
     """
     living = [run for run in Records().all() if run.status == "running"]
     if len(living) != 1:
-        raise ConflictError(f"{len(living)} runs live", hint="/rosbridge/RUN names one")
+        number = f"{len(living)} runs live" if living else "no run lives"
+        raise ConflictError(f"{number}; the path /rosbridge/RUN names one")
     return living[0]

@@ -34,6 +34,7 @@ WEBSOCKETS: Literal["websockets-sansio"] = "websockets-sansio"
 _MOST_CLIENTS = 256
 """Connections up to which requests are answered; uvicorn opens sockets beyond it, so `access` counts those."""
 _LOG_BYTES = 1_000_000
+_PEM = "a certificate and its key without a password, both in PEM"
 _END_S = 2.5
 """Time within which the process ends after a signal."""
 
@@ -130,12 +131,15 @@ def _load(config: uvicorn.Config) -> None:
     Raises:
         ConfigError: If the certificate or its key cannot be used.
     """
+    for option, path in (("--tls-cert", config.ssl_certfile), ("--tls-key", config.ssl_keyfile)):
+        if path is not None and not Path(path).is_file():
+            raise ConfigError(f"{option} {path}: no such file", expected=_PEM)
     try:
         config.load()
     except OSError as error:
         raise ConfigError(
             f"--tls-cert {config.ssl_certfile} --tls-key {config.ssl_keyfile}: cannot be used: {error}",
-            expected="a certificate and its key without a password, both in PEM",
+            expected=_PEM,
         ) from error
 
 

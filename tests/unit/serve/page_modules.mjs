@@ -11,6 +11,7 @@ const { Playback } = await load("playback.js");
 const { inOrder, lives, steps } = await load("state.js");
 const { readChanges } = await load("controls.js");
 const { coarsen } = await load("coarse.js");
+const { placeApart } = await load("places.js");
 const { coverPlace } = await load("target.js");
 const { describeModel } = await load("model_map.js");
 const { describe, tabulate } = await load("model_words.js");
@@ -34,6 +35,18 @@ test("between two samples, joints and ball are between both", () => {
   ballAt(thrown(), 0.015).forEach((value, i) => near(value, [1.5, 2.5, 3.5][i]));
   assert.deepEqual(jointsAt(thrown(), 99), [2, 12]);
   assert.deepEqual(jointsAt(thrown(), -1), [0, 10]);
+});
+
+test("a panel goes to the nearest place where it covers no other one", () => {
+  const stage = { most: 500, lowest: 300 };
+  const box = { left: 100, top: 4, width: 200, height: 100 };
+  assert.deepEqual(placeApart(box, [], stage), { left: 100, top: 4 });
+  const first = { ...box, left: 120 };
+  assert.deepEqual(placeApart(box, [first], stage), { left: 100, top: 108 });
+  const second = { ...box, top: 108 };
+  assert.deepEqual(placeApart(box, [first, second], stage), { left: 100, top: 212 });
+  assert.deepEqual(placeApart(box, [first], { most: 500, lowest: 50 }), { left: 324, top: 4 });
+  assert.deepEqual(placeApart(box, [first], { most: 150, lowest: 50 }), { left: 100, top: 4 });
 });
 
 test("velocities are slopes, and efforts are not made up", () => {

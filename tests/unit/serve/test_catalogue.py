@@ -80,7 +80,7 @@ def test_without_a_catalogue_nothing_can_be_begun(directory: Path) -> None:
         ),
         ("components:\n  a:\n    image: x\n    volumes: [/etc:/a]\n", "components.a.volumes.0: /etc is refused"),
         ("components:\n  a:\n    image: x\n    privileged: true\n", ":4: components.a.privileged: unknown key"),
-        ("components:\n  a:\n    image: x\n    urdf: none.urdf\n", ":4: components.a.urdf: "),
+        ("components:\n  a:\n    image: x\n    urdf: none.urdf\n", "none.urdf: cannot be read: No such file"),
         ("components:\n  a:\n    image: x\n    urdf: small.yaml\n", "should be a URDF"),
         ("components:\n  a:\n    config: small.yaml\n    max_instance: 2\n", "did you mean 'max_instances'"),
         ("components:\n  a:\n    config: small.yaml\n    max_instances: 0\n", ":4: components.a.max_instances: should"),

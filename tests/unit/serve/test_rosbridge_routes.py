@@ -21,7 +21,7 @@ def end_of(served: Served, path: str) -> tuple[int, str]:
 
 def test_a_client_of_no_run_is_told_why(served: Served) -> None:
     assert end_of(served, "/rosbridge/nope") == (4404, "no run nope")
-    assert end_of(served, "/") == (4404, "0 runs live")
+    assert end_of(served, "/") == (4404, "no run lives; the path /rosbridge/RUN names one")
 
 
 def test_a_client_of_a_run_that_is_over_does_not_wait_for_good(served: Served, remember: Remember) -> None:

@@ -89,3 +89,12 @@ def test_the_interfaces_are_built_and_not_asked_of_an_index(wheels: ModuleType) 
         "ros-jazzy-rclpy[fastrtps]",
         "ros-jazzy-common-interfaces",
     ]
+
+
+def test_a_word_that_asks_for_help_is_no_directory(tmp_path: Path) -> None:
+    script = ROOT / "packaging" / "ros_wheels.py"
+    said = subprocess.run(
+        [sys.executable, script, "--help"], cwd=tmp_path, capture_output=True, text=True, timeout=60, check=False
+    )
+    assert said.stdout.startswith("usage: ros_wheels.py")
+    assert list(tmp_path.iterdir()) == []

@@ -2,6 +2,7 @@
 
 import uPlot from "./vendor/uplot/dist/uPlot.esm.js";
 import { get, make, setText } from "./dom.js";
+import { EDGE_PX, placeApart } from "./places.js";
 import { seriesOf } from "./throws.js";
 
 const UNITS = { position: "rad", velocity: "rad/s", effort: "Nm", ball: "m" };
@@ -74,18 +75,23 @@ export class PlotPanel {
   }
 
   /**
-   * Move the panel to its link.
+   * Move the panel to its link, beside other panels.
    * @param {{x: number, y: number}} at on the stage [px]
    * @param {Element} stage
+   * @param {import("./places.js").Box[]} taken where other panels are; where this one is, is added
    * @returns {{x1: number, y1: number, x2: number, y2: number}} line from the panel to the link
    */
-  follow(at, stage) {
+  follow(at, stage, taken) {
     const { offsetWidth: width, offsetHeight: height } = this.element;
-    const [most, lowest] = [stage.clientWidth - width - 4, stage.clientHeight - height - 4];
+    const [most, lowest] = [stage.clientWidth - width - EDGE_PX, stage.clientHeight - height - EDGE_PX];
     const gap = Math.min(GAP_PX, stage.clientWidth * MOST_GAP);
     const isRight = at.x + gap + width < stage.clientWidth;
-    const left = Math.max(4, Math.min(isRight ? at.x + gap : at.x - gap - width, most));
-    const top = Math.max(4, Math.min(at.y - height - gap, lowest));
+    const wanted = {
+      left: Math.max(EDGE_PX, Math.min(isRight ? at.x + gap : at.x - gap - width, most)),
+      top: Math.max(EDGE_PX, Math.min(at.y - height - gap, lowest)),
+    };
+    const { left, top } = placeApart({ ...wanted, width, height }, taken, { most, lowest });
+    taken.push({ left, top, width, height });
     this.element.style.transform = `translate(${left.toFixed(1)}px, ${top.toFixed(1)}px)`;
     const x1 = Math.max(left, Math.min(at.x, left + width));
     const y1 = Math.max(top, Math.min(at.y, top + height));

@@ -50,14 +50,14 @@ export class Plots {
 
   /** Draw new values, and move panels to their links. */
   draw() {
-    const lines = [];
+    const [lines, taken] = [[], []];
     for (const panel of this.panels) {
       const { simulation, link } = panel.choice;
       panel.element.hidden = !this.#simulations.includes(simulation);
       if (panel.element.hidden) continue;
       panel.draw(this.playback.at(simulation), this.live.simulations.has(simulation) ? this.live.momentsOf(simulation) : null);
       const at = panel.follows ? this.view.project(simulation, link) : null;
-      if (at) lines.push(panel.follow(at, get("stage")));
+      if (at) lines.push(panel.follow(at, get("stage"), taken));
     }
     this.#drawLeaders(lines);
   }
