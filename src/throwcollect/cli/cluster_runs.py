@@ -14,6 +14,7 @@ import typer
 
 from throwcollect.cli.dataset.info import print_collected
 from throwcollect.cli.interruptions import count_interruptions
+from throwcollect.cli.streams import has_reader
 from throwcollect.cli.terminal import display
 from throwcollect.cluster.following import ClusterRun, Look, ProgressOfSlices, find_queued, follow
 from throwcollect.dataset.inspect import info
@@ -55,7 +56,7 @@ def print_events(run: ClusterRun, *, as_json: bool) -> None:
         typer.echo(json.dumps(document) if as_json else line)
 
     before: dict[int | None, str] = {}
-    for look in follow(run):
+    for look in follow(run, keep_on=has_reader):
         states = {task.index: f"{task.state.lower()}{f' on {task.node}' if task.node else ''}" for task in look.tasks}
         for index in sorted(states.keys() | before.keys(), key=lambda each: each or 0):
             now = states.get(index, "ended")

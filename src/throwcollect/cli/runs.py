@@ -14,7 +14,7 @@ import typer
 from throwcollect.cli.interruptions import count_interruptions
 from throwcollect.cli.options import JsonOption, RunOption
 from throwcollect.cli.printing import tell
-from throwcollect.cli.streams import end_with_reader
+from throwcollect.cli.streams import end_with_reader, has_reader
 from throwcollect.cli.terminal import display
 from throwcollect.errors import ConfigError, Interrupted
 from throwcollect.wording import command, format_count
@@ -107,7 +107,7 @@ def logs(
         return
     from throwcollect.runs.following import read_logs
 
-    for name, line, width in read_logs(_find_run(run), nodes or (), follow=follow):
+    for name, line, width in read_logs(_find_run(run), nodes or (), follow=follow, keep_on=has_reader):
         typer.echo(f"{name:{width}} | {line}")
 
 
@@ -121,7 +121,7 @@ def events(run: RunOption = None, json: JsonOption = False) -> None:
         return
     from throwcollect.runs.following import read_events
 
-    for event, line in read_events(_find_run(run)):
+    for event, line in read_events(_find_run(run), keep_on=has_reader):
         typer.echo(line if json else f"{event.time}  {event}")
 
 

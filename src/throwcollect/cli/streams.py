@@ -9,6 +9,7 @@ from __future__ import annotations
 import errno
 import io
 import os
+import select
 import sys
 from typing import TYPE_CHECKING, Literal, TextIO
 
@@ -73,6 +74,17 @@ def open_streams() -> None:
 def end_with_reader() -> None:
     """Make this command end without a message when its reader does, because it does nothing but print lines."""
     _set_kind("lines")
+
+
+def has_reader() -> bool:
+    """Find out whether anybody may still read standard output, without writing to it.
+
+    A command that waits for something to print asks this meanwhile; otherwise it would learn only with its next line
+    that its reader has ended.
+    """
+    poll = select.poll()
+    poll.register(1, 0)
+    return not any(happened & select.POLLERR for _, happened in poll.poll(0))
 
 
 def only_log() -> None:

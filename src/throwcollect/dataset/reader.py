@@ -19,7 +19,7 @@ from throwcollect.config.sweep import Range
 from throwcollect.dataset.bag import read_bag_metadata
 from throwcollect.dataset.columns import COLUMNS, StoredThrow
 from throwcollect.dataset.data_card import count_outcomes
-from throwcollect.dataset.directory import METADATA, PLAN, config_path
+from throwcollect.dataset.directory import METADATA, PLAN, THROWS, config_path
 from throwcollect.dataset.expression import Expression
 from throwcollect.dataset.guesses import DATASET, refuse_attribute
 from throwcollect.dataset.mcap_reader import open_mcap
@@ -30,10 +30,10 @@ from throwcollect.dataset.trajectories import Trajectories, read_trajectories
 from throwcollect.episode.message import Episode
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.extras import lazily
-from throwcollect.files import StrPath
+from throwcollect.files import StrPath, is_there
 from throwcollect.robots.description import robot_of
 from throwcollect.sweep.plan import Plan
-from throwcollect.wording import format_count
+from throwcollect.wording import command, format_count
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -77,6 +77,8 @@ class Dataset(Sequence[Throw]):
         path = Path(directory)
         bag = read_bag_metadata(path)
         plan = Plan.read(path / PLAN, load_config(config_path(path)))
+        if not is_there(path / THROWS):
+            raise DatasetError("is missing", path=path / THROWS, hint=command("dataset", "rebuild", path))
         return cls(path, plan, read_throws(path, plan), bag)
 
     def __len__(self) -> int:

@@ -82,13 +82,16 @@ def wait(run: Run) -> Summary:
     return run.record.summary
 
 
-def read_logs(run: Run, nodes: Collection[str], *, follow: bool) -> Iterator[tuple[str, str, int]]:
+def read_logs(
+    run: Run, nodes: Collection[str], *, follow: bool, keep_on: Callable[[], bool] = lambda: True
+) -> Iterator[tuple[str, str, int]]:
     """Read the logs of nodes of a run.
 
     Args:
         run: The run.
         nodes: Names of the nodes; empty takes all.
-        follow: Whether to go on with new lines until the run ends.
+        follow: Whether to go on with new lines until the run ends, or `keep_on` refuses to.
+        keep_on: Whether somebody still wants new lines.
 
     Yields:
         The name of a node, a line that it printed, and the length of the longest name so far.
@@ -103,7 +106,7 @@ def read_logs(run: Run, nodes: Collection[str], *, follow: bool) -> Iterator[tup
         message = f"run {run.id}: no node {unknown[0]!r} has printed anything"
         raise ConfigError(message, expected=", ".join(files) or None)
     tails: dict[str, Tail] = {}
-    for last in _looks(run, follow=follow):
+    for last in _looks(run, follow=follow, keep_on=keep_on):
         files = logs.files()
         width = max(map(len, files), default=0)
         for name, path in files.items():
@@ -112,8 +115,8 @@ def read_logs(run: Run, nodes: Collection[str], *, follow: bool) -> Iterator[tup
                     yield name, line, width
 
 
-def read_events(run: Run) -> Iterator[tuple[Event, str]]:
-    """Read the events of a run, from its start until it ends.
+def read_events(run: Run, *, keep_on: Callable[[], bool] = lambda: True) -> Iterator[tuple[Event, str]]:
+    """Read the events of a run, from its start until it ends or `keep_on` refuses to go on.
 
     Yields:
         An event, and the line of JSON in which it is written.
@@ -122,15 +125,15 @@ def read_events(run: Run) -> Iterator[tuple[Event, str]]:
         ConfigError: If the record vanishes.
     """
     tail = Tail(Path(run.record.logs) / EVENTS)
-    for _ in _looks(run, follow=True):
+    for _ in _looks(run, follow=True, keep_on=keep_on):
         for line in tail.lines():
             if (event := parse(line)) is not None:
                 yield event, line
 
 
-def _looks(run: Run, *, follow: bool) -> Iterator[bool]:
-    """Yield False several times a second while a run lives (if it is to be followed), and True once after its end."""
-    while follow and run.now().status == "running":
+def _looks(run: Run, *, follow: bool, keep_on: Callable[[], bool]) -> Iterator[bool]:
+    """Yield False several times a second while a run lives (if it is to be followed), and True once at the end."""
+    while follow and keep_on() and run.now().status == "running":
         yield False
         time.sleep(_READ_S)
     yield True

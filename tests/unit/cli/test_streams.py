@@ -3,6 +3,7 @@
 import os
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -60,6 +61,23 @@ def test_a_reader_that_leaves_ends_nothing_but_what_is_done_for_it(call: str, sa
     first = "" if "end_with_reader" in call else "print(1, flush=True)\n"
     said = run(f"lose(1)\n{first}{call}\nprint('goes on', file=sys.stderr)")
     assert said.stderr.rstrip().endswith(said_last)
+
+
+@pytest.mark.parametrize(
+    ("output", "read"),
+    [
+        ("os.dup2(os.pipe()[1], 1)", True),
+        ("lose(1)", False),
+        ("os.dup2(os.open(os.devnull, os.O_WRONLY), 1)", True),
+        ("os.dup2(os.open('out.txt', os.O_WRONLY | os.O_CREAT), 1)", True),
+        ("os.dup2(os.openpty()[1], 1)", True),
+    ],
+)
+def test_that_a_reader_has_left_is_known_before_anything_is_written(
+    output: str, read: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert run(f"{output}\nprint(streams.has_reader(), file=sys.stderr)").stderr == f"{read}\n"
 
 
 def test_what_cannot_be_said_is_dropped() -> None:

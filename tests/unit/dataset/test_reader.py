@@ -187,6 +187,13 @@ def test_only_finished_datasets_are_opened(dataset: Path, tmp_path: Path, proble
             Dataset.open(tmp_path / "nowhere")
 
 
+def test_whoever_lacks_the_table_of_throws_hears_what_writes_it_anew(dataset: Path) -> None:
+    (dataset / "throws.parquet").unlink()
+    with pytest.raises(DatasetError, match=r"throws\.parquet: is missing") as caught:
+        Dataset.open(dataset)
+    assert caught.value.hint == f"throwcollect dataset rebuild {dataset}"
+
+
 def test_an_error_names_the_datasets_that_may_be_meant(dataset: Path, tmp_path: Path) -> None:
     for wrong in (dataset.parent, dataset / "throws.parquet"):
         with pytest.raises(DatasetError, match="holds no dataset") as caught:

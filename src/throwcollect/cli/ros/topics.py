@@ -13,7 +13,7 @@ import typer
 from throwcollect import ros
 from throwcollect.cli.ros.options import HiddenOption, RunOption, TopicArgument, TypesOption
 from throwcollect.cli.ros.session import Session, join_graph, print_names, require_name
-from throwcollect.cli.streams import end_with_reader
+from throwcollect.cli.streams import end_with_reader, has_reader
 from throwcollect.errors import ConfigError
 from throwcollect.ros.names import absolute_name, find_interface, full_name, is_hidden
 from throwcollect.ros.offered_qos import find_offered_qos
@@ -94,7 +94,7 @@ def echo(
 
         qos = find_offered_qos(session.node, name, ros.ReliabilityPolicy.BEST_EFFORT)
         session.node.create_subscription(message_type, name, show, qos)
-        session.spin_until(lambda: once and printed)
+        session.spin_until(lambda: (once and printed) or not has_reader())
 
 
 @topic_app.command("hz")
@@ -115,7 +115,7 @@ def show_rate(
             message_type, name, lambda _: arrivals.append(time.monotonic_ns()), qos, raw=True
         )
         reported = time.monotonic_ns()
-        while True:
+        while has_reader():
             report = reported + _REPORT_NS
             session.spin_until(lambda until=report: time.monotonic_ns() >= until)  # type: ignore[misc]
             if len(arrivals) > 1 and arrivals[-1] > reported:

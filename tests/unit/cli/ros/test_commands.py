@@ -407,14 +407,26 @@ def test_ctrl_c_cancels_the_goal(endpoint: str) -> None:
     assert "Canceling goal...\nGoal canceled.\n" in out
 
 
-def test_a_reader_that_leaves_early_is_no_error(endpoint: str) -> None:
-    process = start("topic", "echo", "/robot/states")
+@pytest.mark.parametrize(
+    "command", [("echo", "/robot/states"), ("echo", "/robot/description"), ("hz", "/robot/states")], ids=" ".join
+)
+def test_a_reader_that_leaves_early_is_no_error_even_if_nothing_more_comes(
+    endpoint: str, command: tuple[str, str]
+) -> None:
+    process = start("topic", *command)
     assert process.stdout is not None
-    process.stdout.readline()
+    # The description has two lines: after these, nothing is written that could tell the command of its reader's end.
+    for _ in range(2):
+        process.stdout.readline()
     process.stdout.close()
     assert process.stderr is not None
-    assert process.stderr.read() == ""
-    assert process.wait(timeout=10) == 0
+    try:
+        assert process.wait(timeout=10) == 0
+        assert process.stderr.read() == ""
+    finally:
+        process.kill()
+        process.wait()
+        process.stderr.close()
 
 
 def test_a_service_that_goes_away_before_it_answers_is_told() -> None:
