@@ -4,15 +4,10 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from pydantic import AfterValidator, BeforeValidator, Field, PositiveInt
+from pydantic import AfterValidator, Field, PositiveInt
 
-from throwcollect.config.kinds import in_words, match
+from throwcollect.config.kinds import NUMBER_AS_TEXT, in_words, match
 from throwcollect.config.section import Section
-
-
-def _make_text(value: object) -> object:
-    """Turn a number of minutes, which YAML reads as a number, into text."""
-    return str(value) if type(value) is int else value
 
 
 def _require_line(text: str) -> str:
@@ -24,7 +19,7 @@ def _require_line(text: str) -> str:
 _TIME = r"\d+|\d+:\d{1,2}(:\d{1,2})?|\d+-\d{1,2}(:\d{1,2}){0,2}"
 Time = Annotated[
     str,
-    BeforeValidator(_make_text),
+    NUMBER_AS_TEXT,
     match(_TIME, "minutes, HOURS:MINUTES:SECONDS or DAYS-HOURS, such as 4:00:00"),
     in_words("a time such as 4:00:00"),
 ]

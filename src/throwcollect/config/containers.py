@@ -12,7 +12,7 @@ from pydantic import AfterValidator, ConfigDict, Field, PositiveFloat, PositiveI
 from typing_extensions import TypedDict
 
 from throwcollect.config.host_paths import DEVICES, is_allowed_device, normal_path, refusal
-from throwcollect.config.kinds import in_words, match
+from throwcollect.config.kinds import NUMBER_AS_TEXT, in_words, match
 from throwcollect.config.section import Section
 
 _LEAST_MEMORY = 6 * 1024**2
@@ -121,6 +121,7 @@ def _device(text: str) -> str:
 Size = Annotated[str, AfterValidator(_size), in_words("a size such as 512m or 2g")]
 Cores = Annotated[
     str,
+    NUMBER_AS_TEXT,
     match(r"\d+(-\d+)?(,\d+(-\d+)?)*", "numbers and ranges of cores, such as 0-3,6"),
     in_words("cores such as 0-3,6"),
 ]

@@ -6,7 +6,7 @@ import re
 from collections.abc import Mapping
 from typing import Annotated, Any
 
-from pydantic import AfterValidator, Field, GetJsonSchemaHandler, ValidationInfo, WithJsonSchema
+from pydantic import AfterValidator, BeforeValidator, Field, GetJsonSchemaHandler, ValidationInfo, WithJsonSchema
 from pydantic_core import CoreSchema
 
 from throwcollect.members import load_member, names_of
@@ -58,6 +58,14 @@ class _JointSchema:
 Joint = Annotated[str, AfterValidator(_require_joint), _JointSchema]
 Angle = Annotated[float, Field(ge=-6.3, le=6.3, json_schema_extra={"unit": "rad"})]
 Name = Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9_-]*$", max_length=64)]
+
+
+def _make_text(value: object) -> object:
+    return str(value) if type(value) is int else value
+
+
+NUMBER_AS_TEXT = BeforeValidator(_make_text)
+"""Lets a text be a single whole number without quotes, which YAML reads as a number: the core 0, or 90 minutes."""
 
 
 def match(pattern: str, expected: str) -> AfterValidator:

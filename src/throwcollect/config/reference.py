@@ -23,7 +23,8 @@ Units are part of the names; angles are in radians. A key that does not exist, a
 there twice are errors, and all of them are reported at once.
 
 `--set KEY=VALUE` replaces one key, such as `--set task.duration_s=1.1` or `--set 'record.topics=[joint_states,
-ball/odometry, clock]'`. The value is read as YAML; later ones win. Items of lists go by their index from 0.
+ball/odometry, clock]'`. The value is read as YAML; later ones win. Items of a list that the
+file has go by their index from 0; any other list is given as a whole.
 """
 
 _SAMPLERS = """\

@@ -61,6 +61,13 @@ def test_everything_that_may_be_said_of_containers_is_read_and_written_again(tmp
     assert load(again) == config
 
 
+def test_a_single_core_needs_no_quotes(tmp_path: Path) -> None:
+    path = tmp_path / "run.yaml"
+    path.write_text("containers: {sim: {cpuset: 0, options: {cpuset_mems: 1}}}")
+    sim = load(path).containers.sim
+    assert (sim.cpuset, sim.options["cpuset_mems"]) == ("0", "1")
+
+
 @pytest.mark.parametrize(
     ("section", "message"),
     [

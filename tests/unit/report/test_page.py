@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import re
+import statistics
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -54,6 +55,16 @@ def test_a_page_has_every_section_and_a_drawing_place_for_every_plot(text: str) 
         assert titled, name
         for axis in titled:
             assert re.search(r"\[.+\]$|^flights$|^throws$|^share of trials$", axis["title"]["text"]), axis
+
+
+def test_the_median_direction_at_release_is_above_or_below_the_horizontal_without_a_sign(
+    text: str, collected: Path
+) -> None:
+    elevations = [
+        each for each in Dataset.open(collected).throws["release_elevation_rad"].to_pylist() if each is not None
+    ]
+    side = "below" if statistics.median(elevations) < 0 else "above"
+    assert re.search(rf"the median direction \d+\.\d° {side} the horizontal", " ".join(text.split()))
 
 
 def test_a_page_needs_nothing_from_elsewhere(text: str) -> None:

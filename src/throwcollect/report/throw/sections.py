@@ -116,9 +116,10 @@ def _show_releases(landings: Landings, outcomes: Outcomes) -> Section:
     title = "How the balls are released"
     if not len(landings):
         return Section("release", "Release", title, "No ball crossed the landing plane.")
+    elevation_deg = np.median(landings.elevation_deg)
     text = (
         f"Of the balls that crossed the landing plane, the median speed is {np.median(landings.speed_mps):.2f} m/s, "
-        f"the median elevation {np.median(landings.elevation_deg):.1f}° above the horizontal."
+        f"the median direction {abs(elevation_deg):.1f}° {'below' if elevation_deg < 0 else 'above'} the horizontal."
     )
     figure = figures.draw_release_map(landings, outcomes)
     panel = Panel("map", "Speed and elevation at release", figure, _say_how_many(landings), picture="release")
