@@ -22,7 +22,7 @@ def look(*tasks: Task, complete: bool = False) -> Look:
 @pytest.fixture
 def looks(monkeypatch: pytest.MonkeyPatch) -> None:
     seen = [look(Task(0, "RUNNING", "n1", "")), look(Task(0, "COMPLETED", "n1", "0:0"), complete=True)]
-    monkeypatch.setattr(cluster_runs, "follow", lambda _run: iter(seen))
+    monkeypatch.setattr(cluster_runs, "follow", lambda _run, **_: iter(seen))
 
 
 @pytest.mark.usefixtures("looks")
@@ -53,6 +53,6 @@ def test_one_run_on_several_nodes_is_told_without_a_number(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     seen = [look(Task(None, "COMPLETED", "n[1-2]", "0:0"), complete=True)]
-    monkeypatch.setattr(cluster_runs, "follow", lambda _run: iter(seen))
+    monkeypatch.setattr(cluster_runs, "follow", lambda _run, **_: iter(seen))
     cluster_runs.print_events(RUN, as_json=False)
     assert capsys.readouterr().out.splitlines() == ["all tasks: completed on n[1-2]", "finished"]
