@@ -66,4 +66,6 @@ def miss(simulator: throwcollect.Simulator, parameters: dict[str, float], target
 
 
 if __name__ == "__main__":
+    if len(sys.argv) != 4:
+        sys.exit(f"usage: {sys.argv[0]} DATASET CONFIG REAL_CONFIG\n\n{__doc__}")
     main(*sys.argv[1:])
