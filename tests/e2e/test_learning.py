@@ -236,7 +236,7 @@ def test_the_program_of_the_documents_runs(place: Path, monkeypatch: pytest.Monk
     (place / "program.py").write_text(program.replace("(1.4, -0.2)", f"({x}, {y})"))
     monkeypatch.chdir(place)
     runpy.run_path("program.py", run_name="__main__")
-    assert (place / "models" / "real" / "model.json").exists()
+    assert (place / "models" / "corrected" / "model.json").exists()
 
 
 def test_the_example_ends_nearer_to_its_target_than_it_began(place: Path, capsys: pytest.CaptureFixture[str]) -> None:
