@@ -37,6 +37,7 @@ class Service(Receiver):
         self.qos_profile = qos_profile
         self.callback = callback
         self._open: set[_OpenRequest] = set()
+        self._is_destroyed = False
         self._endpoint = Endpoint(node, EntityKind.SERVICE, srv_name, srv_type.TYPE, qos_profile)
         handler = zenoh.handlers.Callback(self.deliver, indirect=False)
         # Clients of rmw_zenoh_cpp ask complete queryables only.
@@ -83,7 +84,7 @@ class Service(Receiver):
     def _reply(self, open_request: _OpenRequest, response: Message) -> None:
         received = open_request.attachment
         attachment = Attachment(received.sequence, time.time_ns(), received.gid).pack()
-        if open_request not in self._open:
+        if self._is_destroyed:
             return
         try:
             open_request.query.reply(self._endpoint.key, serialize(response), attachment=attachment)
@@ -92,9 +93,11 @@ class Service(Receiver):
 
     def destroy(self) -> None:
         """Withdraw the service; requests without an answer get none. See `Node.destroy_service`."""
+        # First, as the thread that spins may be answering a request with what its owner is about to forget.
+        self._is_destroyed = True
         self._endpoint.close()
         self.discard_all()
-        for open_request in self._open:
+        for open_request in list(self._open):
             open_request.query.drop()  # type: ignore[no-untyped-call]
         self._open.clear()
 

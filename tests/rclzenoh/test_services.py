@@ -7,7 +7,7 @@ import pytest
 import zenoh
 
 from rclzenoh.attachment import Attachment, unpack
-from rclzenoh.interfaces import get_service, serialize, type_hash
+from rclzenoh.interfaces import deserialize, get_service, serialize, type_hash
 from rclzenoh.keys import data_key
 
 Trigger = get_service("std_srvs/srv/Trigger")
@@ -101,3 +101,25 @@ def test_an_error_in_a_callback_ends_spinning_and_the_request(rig, pair):
     # Even while the traceback keeps everything alive.
     assert rig.spin(lambda: replies == [None])
     assert caught.value.args == ("callback failed",)
+
+
+def test_a_request_that_arrives_while_the_service_is_destroyed_gets_no_response(rig, pair, monkeypatch):
+    server, node, client = pair
+    service = server.create_service(SetBool, "~/set", answer)
+    assert client.wait_for_service(5)
+
+    def destroy_meanwhile(payload, kind):
+        # As another thread may, while the one that spins has just taken the request.
+        server.destroy_service(service)
+        return deserialize(payload, kind)
+
+    monkeypatch.setattr("rclzenoh.service.deserialize", destroy_meanwhile)
+    replies = []
+    node.context.session.get(
+        data_key(node.context.get_domain_id(), "/server/set", SetBool.TYPE, type_hash(SetBool.TYPE)),
+        zenoh.handlers.Callback(replies.append, drop=lambda: replies.append(None), indirect=False),
+        payload=serialize(SetBool.Request()),
+        attachment=Attachment(1, 0, bytes(16)).pack(),
+    )
+    assert rig.spin(lambda: replies)
+    assert replies == [None]

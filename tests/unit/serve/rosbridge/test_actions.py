@@ -105,8 +105,10 @@ def test_a_goal_is_given_up_when_its_action_has_gone(party: Party, arm: Arm) -> 
 @pytest.fixture
 def offer(party: Party, node: Node) -> Callable[[], Any]:
     """What has a node send a goal to the action that the client offers; gives what came of it."""
-    party.ask(op="advertise_action", action="swing", type=KIND)
     client = ActionClient(node, FJT, "/swing")
+    # The party of an earlier test may still be leaving, and a goal to its action is lost.
+    wait_for(lambda: not client.server_is_ready(), "the action of an earlier test is seen no more")
+    party.ask(op="advertise_action", action="swing", type=KIND)
     assert client.wait_for_server(5)
 
     class Sent:

@@ -87,8 +87,9 @@ def test_what_a_client_has_and_asks_for_survives_the_router(routers: Routers) ->
     assert party.next(op="publish")["msg"] == {"data": "again"}
     heard: list[Any] = []
     talker.node.create_subscription(String, "/answers", heard.append, 10)
-    wait_for(lambda: talker.node.count_subscribers("/answers"))
-    party.call("rosapi/get_time")
+    wait_for(
+        lambda: party.call("rosapi/subscribers", topic="/answers")["subscribers"], "the bridge sees the subscriber"
+    )
     party.ask(op="publish", topic="/answers", msg={"data": "yes"})
     executor = SingleThreadedExecutor(context=talker.context)
     executor.add_node(talker.node)
