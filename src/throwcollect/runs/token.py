@@ -69,7 +69,7 @@ class JoinToken:
             raise ConfigError(
                 f"run {self.run}: other sources, or another engine {self.engine} or robot model, compute there than "
                 "here; other bytes would be collected",
-                hint="install the same version of throwcollect on both machines; throwcollect doctor shows it",
+                hint="install the same version on both machines, or the image on both; throwcollect doctor shows it",
             )
 
 
