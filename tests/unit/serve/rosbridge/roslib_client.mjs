@@ -21,6 +21,8 @@ for (const compression of ["none", "cbor"]) {
       resolve([message.position.constructor.name, Array.from(message.position)]);
     });
   });
+  // What was on its way when the subscription ended comes before this answer, and the next subscription would hear it.
+  await new Promise((resolve, reject) => ros.getNodes(resolve, reject));
 }
 
 const lamp = new Service({ ros, name: "/lamp", serviceType: "std_srvs/SetBool" });
