@@ -89,6 +89,26 @@ _POINT_AT_COLLECT = """
   return someFrames();
 })()
 """
+_LEAVE_AT_ONCE = """
+(async () => {
+  const { room } = throwcollect;
+  const { xr } = throwcollect.view.renderer;
+  const { setSession } = xr;
+  let haveLeft;
+  const left = new Promise((resolve) => { haveLeft = resolve; });
+  // As a device whose user changes her mind before it is ready.
+  xr.setSession = async (session) => {
+    await setSession.call(xr, session);
+    await session.end();
+    haveLeft();
+  };
+  room.button.click();
+  await left;
+  xr.setSession = setSession;
+  // What was still to come of entering has come by then.
+  await new Promise((resolve) => setTimeout(resolve, 500));
+})()
+"""
 _ENTER = "document.querySelector('#enter-room').click()"
 
 
@@ -194,6 +214,18 @@ def test_a_target_is_set_by_hand_and_collected_for(server: dict[str, Any], emula
         assert (aimed.min, aimed.max) == pytest.approx((distance - 0.1, distance + 0.1), abs=_MM)
         assert found.scene.landing_height_m == pytest.approx(0.5, abs=_MM)
         leave(tab)
+        assert unexpected(tab) == []
+
+
+def test_a_room_that_is_left_while_it_is_entered_stays_left(server: dict[str, Any], emulator: str) -> None:
+    with browse(server["page"], width=640, height=400, script=emulator) as tab:
+        load(tab)
+        before = tab.evaluate(_PAGE)
+        tab.evaluate(_LEAVE_AT_ONCE)
+        assert tab.evaluate(_PAGE) == before
+        enter(tab)
+        leave(tab)
+        tab.wait_for(f"{_PAGE.strip().rstrip(';')} === {json.dumps(before)}")
         assert unexpected(tab) == []
 
 

@@ -105,9 +105,12 @@ export class Room {
     view.world.add(this.mapBoard.mesh);
     view.room.add(this.info.mesh, this.reticle);
     await view.renderer.xr.setSession(session);
+    // The user may have left before the device was ready.
+    if (this.#session !== session) return;
     view.renderer.setAnimationLoop((now, frame) => this.#draw(now, frame));
     this.#label("Leave AR");
-    this.#finder = await findFloor(session);
+    const finder = await findFloor(session);
+    if (this.#session === session) this.#finder = finder;
   }
 
   #leave() {
