@@ -84,9 +84,9 @@ def how_to_install() -> str:
         this = f"{platform.python_implementation()} {platform.python_version()} on {platform.system()}"
         return f"{_SETUP}: by pip it is for {_BY_PIP} alone, and this is {this}, {platform.machine()}"
     if (_CLONE / _INTERFACES).is_dir():
-        command = shlex.join(["pip", "install", str(_CLONE / _INTERFACES), "-e", f"{_CLONE}[ros]"])
+        command = shlex.join(["pip", "install", str(_CLONE / _INTERFACES), "-e", f"{_CLONE}[collect,ros]"])
         return f"{command}, or {_SETUP}"
-    return f"in a clone of throwcollect: pip install ./{_INTERFACES} '.[ros]', or {_SETUP}"
+    return f"in a clone of throwcollect: pip install ./{_INTERFACES} '.[collect,ros]', or {_SETUP}"
 
 
 def module_name(interface: str) -> str:

@@ -92,7 +92,7 @@ def test_an_rclpy_without_all_interfaces_is_taken_only_if_asked_for_and_then_say
     [
         (
             ("cpython", (3, 11, 2), "x86_64"),
-            f"pip install {quote(f'{ROOT}/packaging/ros_interfaces')} -e '{ROOT}[ros]', or",
+            f"pip install {quote(f'{ROOT}/packaging/ros_interfaces')} -e '{ROOT}[collect,ros]', or",
         ),
         (("cpython", (3, 12, 1), "x86_64"), "source the setup script of a ROS 2 Jazzy"),
         (("cpython", (3, 11, 2), "aarch64"), "by pip it is for CPython 3.11 on Linux, x86-64, with glibc alone"),
