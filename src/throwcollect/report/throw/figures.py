@@ -29,7 +29,7 @@ _SHADES = ("#3b528b", "#2c728e", "#21908d", "#27ad81", "#5dc863", "#aadc32")
 """Colours of paths that landed, from the nearest to the farthest."""
 _MOST_SVG_POINTS = 1500
 """Plots of more points are drawn by WebGL, which is faster."""
-_FLOOR_M = 1e-17
+FLOOR_M = 1e-17
 """Residuals are drawn as at least this, as 0 has no place on a logarithmic axis."""
 
 
@@ -140,9 +140,9 @@ def draw_coverage_bars(axis: Axis, counts: NDArray[np.intp]) -> go.Figure:
 
 def draw_residuals(residuals: Residuals) -> go.Figure:
     """Draw how far flights depart from ballistic motion, on a logarithmic axis."""
-    shown = np.maximum(residuals.finite_m, _FLOOR_M)
+    shown = np.maximum(residuals.finite_m, FLOOR_M)
     low = np.floor(np.log10(shown.min()))
-    high = max(np.ceil(np.log10(max(shown.max(), 10 * _FLOOR_M))), low + 1)
+    high = max(np.ceil(np.log10(max(shown.max(), 10 * FLOOR_M))), low + 1)
     edges = 10 ** np.arange(low, high + 0.1, 0.25)
     counts, _ = np.histogram(np.clip(shown, edges[0], edges[-1]), edges)
     hover = "%{y} flights near %{x:.1e} m<extra></extra>"

@@ -170,9 +170,10 @@ def _show_physics(residuals: Residuals) -> Section:
     if residuals.checked < residuals.episodes:
         compared = f"{residuals.checked:,} of {residuals.episodes:,} episodes, chosen at random,"
     exact = int((residuals.distance_m == 0).sum())
+    exactly = f", {exact:,} agree to the last bit (drawn at {figures.FLOOR_M:g} m)" if exact else ""
     text = (
         f"{compared} were compared, sample by sample, with ballistic motion from their release: the largest distance "
-        f"is {residuals.finite_m.max():.1e} m{f', {exact:,} agree to the last bit' if exact else ''}. "
+        f"is {residuals.finite_m.max():.1e} m{exactly}. "
     )
     # NaN counts as a departure, too.
     above = int((~(residuals.distance_m <= BALLISTIC_TOLERANCE_M)).sum())
