@@ -63,6 +63,10 @@ for python; do
         exit
     fi
 done
+if [ -n "$named" ] && ! command -v "$named" > /dev/null; then
+    echo "there is no $named here: make PYTHON=/path/to/python3.11" >&2
+    exit 1
+fi
 if [ -n "$named" ] && said=$("$named" --version 2> /dev/null) && ! suits "$named" "(3, 10)" "(3, 15)"; then
     echo "$named is $said, and this needs a Python from 3.10 to 3.14: make PYTHON=/path/to/python3.11" >&2
     exit 1

@@ -161,7 +161,12 @@ def test_a_python_that_is_named_is_the_only_one_that_is_looked_at(commands: Path
     assert code == 1
     assert err.startswith("python3.9 is ")
     assert "from 3.10 to 3.14" in err
-    assert made("python3.8")[2].startswith("no Python from 3.10 to 3.14 that can make environments is here (python3.8)")
+    assert made("python3.8") == (1, "", "there is no python3.8 here: make PYTHON=/path/to/python3.11\n")
+    put(commands, "python3.13", version="3.13", makes=False)
+    (commands / "uv").unlink()
+    assert made("python3.13")[2].startswith(
+        "no Python from 3.10 to 3.14 that can make environments is here (python3.13)"
+    )
     assert "python3.12 -m venv there" in made("python3.12")[1]
     assert "python3.11 -m venv there" in made("python3.11")[1]
     for version in ("3.11", "3.12"):

@@ -12,20 +12,27 @@ from throwcollect.config.task import TaskConfig
 from throwcollect.report.figures import BLUE, LEGEND_ABOVE, LIMIT_LINE, NEUTRAL
 from throwcollect.units import unit_of_name
 
-ARROWS = 10
-"""Misses are drawn so many times as long, unless they are large, so that they are seen."""
+_MOST = 10_000
+"""A miss is drawn at most so many times as long as it is."""
 
 
 def choose_scale(targets: NDArray[np.float64], places: NDArray[np.float64]) -> int:
-    """Choose how many times as long misses are drawn: the longest must not exceed the distance of the targets.
+    """Choose how many times as long misses are drawn, so that they are seen: the largest power of ten that fits.
+
+    It fits if the longest miss is drawn no longer than the targets are apart.
 
     Args:
         targets: At least one, shape ``(n_targets, n_columns)``.
         places: Where the trials at these targets ended, NaN for one without an end, in the same shape.
     """
+    targets, places = _take_two(targets), _take_two(places)
     hit = np.isfinite(places).all(axis=1)
     longest = float(np.abs(places[hit] - targets[hit]).max(initial=0.0))
-    return ARROWS if ARROWS * longest <= float(np.ptp(targets, axis=0).max()) or not longest else 1
+    span = float(np.ptp(targets, axis=0).max())
+    times = 1
+    while longest and times < _MOST and 10 * times * longest <= span:
+        times *= 10
+    return times
 
 
 def draw_miss_map(
@@ -35,7 +42,7 @@ def draw_miss_map(
     titles: Sequence[str],
     task: TaskConfig,
     *,
-    times: int = ARROWS,
+    times: int,
 ) -> go.Figure:
     """Draw targets amid the ends of other trials, and a line for each miss, in the first two columns.
 
@@ -75,6 +82,11 @@ def draw_miss_map(
 def _take_two(points: NDArray[np.float64]) -> NDArray[np.float64]:
     """The first two columns; if there is only one, a column of zeros after it."""
     return np.column_stack([points, np.zeros(len(points))])[:, :2]
+
+
+def title_misses(targets: str, times: int) -> str:
+    """Title of a map of misses, with what it calls the targets and how many times as long misses are drawn."""
+    return f"{targets}, and misses drawn {times:,} times as long" if times > 1 else f"{targets} and misses"
 
 
 def title_column(column: str, task: TaskConfig) -> str:

@@ -16,7 +16,7 @@ from throwcollect.learning.model_directory import read_score
 from throwcollect.learning.score import SHOWN_AS, Errors, Misses, Score, ThrowAtTarget, tell_length, tell_misses
 from throwcollect.report.contents import Panel, Row, Section, Table
 from throwcollect.report.figures import BLUE, LEGEND_ABOVE
-from throwcollect.report.miss_map import ARROWS, draw_miss_map, title_column
+from throwcollect.report.miss_map import choose_scale, draw_miss_map, title_column, title_misses
 from throwcollect.wording import command, format_count
 
 _TITLE = "How a model of it hits"
@@ -50,12 +50,7 @@ def show_model(directory: Path, dataset: Dataset) -> Section:
     seeds = format_count(score.seeds, "seed")
     text += f" Misses are medians of {seeds}, of {score.targets} targets each, in simulation."
     panels = [
-        Panel(
-            "targets",
-            f"Targets, and misses drawn {ARROWS} times as long",
-            _draw_misses(model, score.throws, dataset.config.task),
-            picture="targets",
-        ),
+        _show_misses("targets", "Targets", model, score.throws, dataset.config.task, picture="targets"),
         *_show_errors(
             "training",
             "Misses by number of throws learned from",
@@ -66,11 +61,8 @@ def show_model(directory: Path, dataset: Dataset) -> Section:
     ]
     rows: list[Row | Table] = [tuple(panels), _tabulate(score)]
     if score.adapted:
-        there = Panel(
-            "elsewhere",
-            f"Targets there after the last of them, misses {ARROWS} times as long",
-            _draw_misses(model, score.adapted_throws, dataset.config.task),
-        )
+        shown = "Targets there after the last of them"
+        there = _show_misses("elsewhere", shown, model, score.adapted_throws, dataset.config.task)
         errors = _show_errors(
             "adapting",
             "In another world, by number of throws there",
@@ -82,13 +74,17 @@ def show_model(directory: Path, dataset: Dataset) -> Section:
     return Section("model", "Model", _TITLE, text, tuple(rows))
 
 
-def _draw_misses(model: Model, throws: Sequence[ThrowAtTarget], task: TaskConfig) -> go.Figure:
-    """Draw targets amid the places that the dataset reached, and a line for each miss."""
+def _show_misses(
+    key: str, shown: str, model: Model, throws: Sequence[ThrowAtTarget], task: TaskConfig, *, picture: str = ""
+) -> Panel:
+    """Show targets amid the places that the dataset reached, and a line for each miss."""
     shape, nowhere = (len(throws), len(model.targets)), [np.nan] * len(model.targets)
     targets = np.array([throw.target for throw in throws], np.float64).reshape(shape)
     places = np.array([throw.place or nowhere for throw in throws], np.float64).reshape(shape)
     titles = [title_column(column, task) for column in model.targets]
-    return draw_miss_map(model.learned.outputs, targets, places, titles, task)
+    times = choose_scale(targets, places)
+    figure = draw_miss_map(model.learned.outputs, targets, places, titles, task, times=times)
+    return Panel(key, title_misses(shown, times), figure, picture=picture)
 
 
 def _show_errors(

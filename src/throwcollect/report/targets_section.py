@@ -11,13 +11,15 @@ from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.summary import MissSummary
 from throwcollect.report.contents import Panel, Section, Table
 from throwcollect.report.figures import BLUE
-from throwcollect.report.miss_map import choose_scale, draw_miss_map
+from throwcollect.report.miss_map import choose_scale, draw_miss_map, title_misses
 from throwcollect.report.points import choose_points, read_numbers
 from throwcollect.sweep.points import Targets
 from throwcollect.units import unit_of_name
 from throwcollect.wording import format_count
 
 _TITLE = "How targets are missed"
+_LEAST_TOLD = 0.01
+"""What is smaller has two significant digits instead of two decimals, which would be zeros."""
 
 
 def show_targets(dataset: Dataset) -> tuple[Section, ...]:
@@ -58,8 +60,7 @@ def _show_map(dataset: Dataset, targets: Targets) -> Panel:
     titles = [f"{declared[name].word} [{unit_of_name(name)}]" for name in shown]
     times = choose_scale(goals[aimed], places[aimed]) if aimed.any() else 1
     figure = draw_miss_map(places[~aimed], goals[aimed], places[aimed], titles, dataset.config.task, times=times)
-    title = f"Targets, and misses drawn {times} times as long" if times > 1 else "Targets and misses"
-    return Panel("map", title, figure, picture="targets_and_misses")
+    return Panel("map", title_misses("Targets", times), figure, picture="targets_and_misses")
 
 
 def _draw_share(dataset: Dataset, miss: str) -> go.Figure:
@@ -94,8 +95,11 @@ def _tabulate(misses: dict[str, MissSummary]) -> Table:
 
 
 def _format(miss: str, value: float | None) -> str:
+    if value is None:
+        return "-"
     scale, unit = _scale(miss)
-    return "-" if value is None else f"{scale * value:.2f} {unit}"
+    digits = ".2f" if value == 0 or scale * value >= _LEAST_TOLD else ".2g"
+    return f"{scale * value:{digits}} {unit}"
 
 
 def _scale(miss: str) -> tuple[float, str]:

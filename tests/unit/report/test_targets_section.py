@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
+import pytest
 from tests.unit.dataset.conftest import Collection
 from tests.unit.dataset.targeted import collect_targeted
 
@@ -14,7 +15,7 @@ from throwcollect.config.task import TaskConfig
 from throwcollect.config.until import UntilConfig, Wanted
 from throwcollect.dataset.reader import Dataset
 from throwcollect.episode.record import EpisodeHeader, Samples
-from throwcollect.report.miss_map import choose_scale, draw_miss_map, title_column
+from throwcollect.report.miss_map import choose_scale, draw_miss_map, title_column, title_misses
 from throwcollect.report.pictures import write_pictures
 from throwcollect.report.sections import report_dataset
 from throwcollect.report.targets_section import show_targets
@@ -61,12 +62,33 @@ def test_the_map_names_trials_as_their_task_does() -> None:
         until: ClassVar[type[UntilConfig]] = UntilReached
 
     targets = np.zeros((1, 2))
-    figure = draw_miss_map(targets, targets, np.full((1, 2), np.nan), "xy", Reach.model_construct())
+    figure = draw_miss_map(targets, targets, np.full((1, 2), np.nan), "xy", Reach.model_construct(), times=1)
     assert [trace.name for trace in figure.data] == ["trials of the dataset", "targets where no trial reached"]
     assert title_column("end_error_rad", Reach.model_construct()) == "end_error [rad]"
 
 
-def test_large_misses_are_drawn_as_long_as_they_are() -> None:
+@pytest.mark.parametrize(
+    ("miss", "times"), [(0.4, 1), (0.01, 10), (0.0049, 100), (3e-5, 10_000), (1e-9, 10_000), (0, 1)]
+)
+def test_misses_are_drawn_as_long_as_the_distance_of_the_targets_allows(miss: float, times: int) -> None:
     targets = np.array([[1.0, 0.0], [1.5, 0.2]])
-    assert choose_scale(targets, targets + 0.01) == 10
-    assert choose_scale(targets, targets + np.array([0.4, 0.0])) == 1
+    assert choose_scale(targets, targets + np.array([miss, 0.0])) == times
+    third = np.array([miss, 0.0, 5.0])
+    assert choose_scale(np.eye(2, 3), np.eye(2, 3) + third) == choose_scale(np.eye(2), np.eye(2) + third[:2])
+
+
+def test_the_title_of_the_map_tells_how_long_misses_are_drawn() -> None:
+    assert title_misses("Targets", 1000) == "Targets, and misses drawn 1,000 times as long"
+    assert title_misses("Targets", 1) == "Targets and misses"
+
+
+def test_a_miss_that_two_decimals_would_make_nothing_is_told_by_its_digits(tmp_path: Path) -> None:
+    landed = [throw.row for throw in Dataset.open(collect_targeted(tmp_path / "first"))]
+    lines = [
+        f"{0.9 + 0.1 * n:.1f},{row['landing_y_m']!r},{row['landing_x_m'] + 3e-5!r}" for n, row in enumerate(landed)
+    ]
+    text = "\n".join(["task.duration_s,target_y_m,target_x_m", *lines, ""])
+    (section,) = show_targets(Dataset.open(collect_targeted(tmp_path / "data", text)))
+    assert "miss_m: median 0.003 cm, 9 of 10 below 0.003 cm" in section.text
+    above, _ = section.panels
+    assert above.title == "Targets, and misses drawn 10,000 times as long"

@@ -12,6 +12,7 @@ from throwcollect.errors import ConfigError, WorkerError
 from throwcollect.ros.discovery_server import discovery_server
 from throwcollect.ros.fast_dds import client_profile, server_profile, write_temporarily
 from throwcollect.ros.router import router
+from throwcollect.ros_installation import how_to_install
 
 ENDPOINT = "udp/127.0.0.1:7447"
 
@@ -75,7 +76,7 @@ def test_without_the_program_of_fast_dds_there_is_one_message(monkeypatch, tmp_p
         discovery_server("udp/127.0.0.1:1"),
     ):
         pass
-    assert "run.ros to embedded" in caught.value.hint
+    assert caught.value.hint == f"it comes with Fast DDS: {how_to_install()}; or set run.ros to embedded"
 
 
 @pytest.fixture

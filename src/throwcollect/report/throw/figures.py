@@ -29,6 +29,8 @@ _SHADES = ("#3b528b", "#2c728e", "#21908d", "#27ad81", "#5dc863", "#aadc32")
 """Colours of paths that landed, from the nearest to the farthest."""
 _MOST_SVG_POINTS = 1500
 """Plots of more points are drawn by WebGL, which is faster."""
+_FEW = 8
+"""Up to so many throws in a cell, each of them has its own mark beside the scale; Plotly would mark halves."""
 FLOOR_M = 1e-17
 """Residuals are drawn as at least this, as 0 has no place on a logarithmic axis."""
 
@@ -111,6 +113,8 @@ def _colour_bar(title: str) -> dict[str, object]:
 
 def draw_coverage_map(x: Axis, y: Axis, counts: NDArray[np.intp]) -> go.Figure:
     """Draw the number of throws over two axes of the cells; empty cells are blank."""
+    most = max(int(counts.max()), 1)
+    marks = {"dtick": 1} if most <= _FEW else {}
     figure = go.Figure(
         go.Heatmap(
             x=x.edges,
@@ -118,9 +122,10 @@ def draw_coverage_map(x: Axis, y: Axis, counts: NDArray[np.intp]) -> go.Figure:
             z=np.where(counts, counts, np.nan).T,
             colorscale=_SCALE,
             zmin=0,
+            zmax=most,
             xgap=1,
             ygap=1,
-            colorbar=_colour_bar("throws"),
+            colorbar={**_colour_bar("throws"), **marks},
             hovertemplate="%{x:.3f}, %{y:.3f}<br>%{z} throws<extra></extra>",
         )
     )
