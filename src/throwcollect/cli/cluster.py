@@ -17,7 +17,10 @@ def submit(
     output: Annotated[
         Path,
         typer.Option(
-            "--output", metavar="DIR", help="Directory of the dataset, which all nodes see: new, or with a plan alone."
+            "--output",
+            "-o",
+            metavar="DIR",
+            help="Directory of the dataset, which all nodes see: new, or with a plan alone.",
         ),
     ],
     tasks: Annotated[int, typer.Option("--tasks", metavar="N", min=1, help="Number of tasks; each collects a slice.")],

@@ -59,7 +59,8 @@ def up(
     settings: SetOption = None,
     runtime: RuntimeOption = None,
     output: Annotated[
-        Path | None, typer.Option("--output", metavar="DIR", help="Directory of the dataset; must be new or empty.")
+        Path | None,
+        typer.Option("--output", "-o", metavar="DIR", help="Directory of the dataset; must be new or empty."),
     ] = None,
     resume: Annotated[
         Path | None,

@@ -60,7 +60,7 @@ def plan(
     output: Annotated[
         Path | None,
         typer.Option(
-            "--output", metavar="DIR", help="Freeze the plan in DIR, for `up --slice`, instead of printing it."
+            "--output", "-o", metavar="DIR", help="Freeze the plan in DIR, for `up --slice`, instead of printing it."
         ),
     ] = None,
     json: JsonOption = False,

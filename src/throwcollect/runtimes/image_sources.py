@@ -28,6 +28,8 @@ _PACKAGE = Path(__file__).parents[1]
 _SOURCES = ("pyproject.toml", "configs/quickstart.yaml", "src")
 _INTERFACES = ("packaging/ros_interfaces", "packaging/ros_constraints.txt")
 """Further sources of the wheel with interfaces of ROS 2."""
+_WHEEL_OF_ROS = "throwcollect_ros_interfaces-*.whl"
+"""The wheel with these interfaces, which no package index has."""
 _LEFT_OUT = re.compile(r"__pycache__|.*\.egg-info")
 _SCHEMES = ("https", "http", "ssh", "git")
 _SSH_ADDRESS = re.compile(r"(?:[^@:/]+@)?([^@:/]{2,}):(?!//)/?(.+)")
@@ -72,17 +74,29 @@ def are_others(sources: str | None) -> bool:
     return sources not in (None, UNKNOWN, digest_sources(root))
 
 
-def check_wheelhouse(root: Path, wheelhouse: Path | None) -> None:
+def check_wheelhouse(root: Path, wheelhouse: Path | None, *, ros: bool) -> None:
     """Make sure that a directory of wheels holds some; None takes them from the package index.
 
+    Args:
+        root: Root of the clone.
+        wheelhouse: The directory.
+        ros: Whether the wheels of genuine ROS 2 must be there, too, some of which are in no package index.
+
     Raises:
-        ConfigError: If it holds none.
+        ConfigError: If it does not hold them.
     """
-    if wheelhouse is not None and not any(wheelhouse.glob("*.whl")):
-        raise ConfigError(
-            f"{wheelhouse}: holds no wheels",
-            hint=shlex.join(["python", f"{root}/docker/wheelhouse.py", str(wheelhouse)]),
-        )
+    if wheelhouse is None:
+        return
+    lacking = "" if any(wheelhouse.glob("*.whl")) else "holds no wheels"
+    if not lacking and ros and not any(wheelhouse.glob(_WHEEL_OF_ROS)):
+        lacking = "holds no wheels of genuine ROS 2, which the image has"
+    if lacking:
+        raise ConfigError(f"{wheelhouse}: {lacking}", hint=fill_command(root / "docker", wheelhouse, ros=ros))
+
+
+def fill_command(docker: Path, wheelhouse: Path, *, ros: bool) -> str:
+    """The command that fills a directory of wheels, by the script in the directory `docker` of a clone."""
+    return shlex.join(["python", str(docker / "wheelhouse.py"), *["--ros"] * ros, str(wheelhouse)])
 
 
 def write_context(archive: IO[bytes], root: Path, wheelhouse: Path | None) -> None:

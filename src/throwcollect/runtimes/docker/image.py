@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import shlex
 import tempfile
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping
@@ -25,6 +24,7 @@ from throwcollect.runtimes.image_sources import (
     are_others,
     check_wheelhouse,
     digest_sources,
+    fill_command,
     find_address,
     find_revision,
     source_root,
@@ -64,18 +64,18 @@ def build(
         client: Client of the engine.
         tag: Name of the image.
         base: Base image, which is pulled if the engine does not have it.
-        wheelhouse: Directory of wheels, as `docker/wheelhouse.py` fills it; None takes them from the package index.
+        wheelhouse: Directory of wheels, as `docker/wheelhouse.py --ros` fills it; None takes the package index.
         say: Is called with one line for each step.
 
     Returns:
         Size of the image [B].
 
     Raises:
-        ConfigError: If the package does not run from a clone, or the wheelhouse holds no wheels.
+        ConfigError: If the package does not run from a clone, or the wheelhouse lacks wheels.
         WorkerError: If the engine does not answer, the base image cannot be pulled, or a step fails.
     """
     root = source_root()
-    check_wheelhouse(root, wheelhouse)
+    check_wheelhouse(root, wheelhouse, ros=True)
     if not is_there(client, base):
         hint = "throwcollect image build --base IMAGE takes another one; docker/base.sh makes one from Debian packages"
         say(f"pulling {base}")
@@ -256,7 +256,7 @@ def _failure(tag: str, error: str, missing: str | None, wheelhouse: Path | None,
     if missing is None:
         return WorkerError(f"{tag}: cannot be built: {error}", evidence=log)
     if wheelhouse is None:
-        hint = "throwcollect image build --wheelhouse DIR takes wheels from there; docker/wheelhouse.py fills one"
+        hint = "throwcollect image build --wheelhouse DIR takes wheels from there; docker/wheelhouse.py --ros fills one"
         return WorkerError(f"{tag}: cannot be built: the package index gives no {missing}", evidence=log, hint=hint)
-    hint = shlex.join(["python", "docker/wheelhouse.py", str(wheelhouse)])
+    hint = fill_command(Path("docker"), wheelhouse, ros=True)
     return WorkerError(f"{tag}: cannot be built: {wheelhouse} lacks {missing}", evidence=log, hint=hint)

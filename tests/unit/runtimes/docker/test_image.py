@@ -13,6 +13,7 @@ from typing import Any
 
 import pytest
 from docker.errors import APIError, ImageNotFound
+from docker.utils.build import exclude_paths
 
 import throwcollect
 from throwcollect.errors import ConfigError, WorkerError
@@ -29,6 +30,7 @@ from throwcollect.runtimes.image_sources import (
 
 ROOT = Path(__file__).parents[4]
 DOCKERFILE = (ROOT / "docker" / "Dockerfile").read_text(encoding="utf-8")
+COPIED = [name for line in re.findall(r"^COPY (?!--from)(.*) \S+$", DOCKERFILE, re.MULTILINE) for name in line.split()]
 
 
 class Engine:
@@ -76,6 +78,7 @@ def wheelhouse(tmp_path: Path) -> Path:
     directory = tmp_path / "wheels"
     directory.mkdir()
     (directory / "numpy-2.whl").write_bytes(b"")
+    (directory / "throwcollect_ros_interfaces-1.whl").write_bytes(b"")
     (directory / "made-from.sha256").write_bytes(b"")
     return directory
 
@@ -97,17 +100,25 @@ def test_the_target_and_the_arguments_are_those_of_the_dockerfile(said: list[str
 def test_the_context_is_what_the_dockerfile_copies_and_nothing_else(said: list[str], wheelhouse: Path) -> None:
     engine = Engine("base")
     build(engine, "mine", base="base", wheelhouse=wheelhouse, say=said.append)
-    copied = [
-        name for line in re.findall(r"^COPY (?!--from)(.*) \S+$", DOCKERFILE, re.MULTILINE) for name in line.split()
-    ]
-    for source in copied:
+    for source in COPIED:
         assert any(name.startswith(source.removesuffix("*")) for name in engine.context), source
     files = {name for name, member in engine.context.items() if member.isfile()}
-    assert {name for name in files if name.startswith("docker/wheelhouse/")} == {"docker/wheelhouse/numpy-2.whl"}
+    assert {Path(name).name for name in files if name.startswith("docker/wheelhouse/")} == {
+        "numpy-2.whl",
+        "throwcollect_ros_interfaces-1.whl",
+    }
     above = {"configs", "docker", "packaging", "pyproject.toml", "src"}
     assert {name.partition("/")[0] for name in files} == above
     assert not [name for name in files if "__pycache__" in name or ".egg-info" in name]
     assert {member.uid for member in engine.context.values()} == {0}
+
+
+def test_a_build_by_docker_alone_finds_what_the_dockerfile_copies() -> None:
+    patterns = (ROOT / ".dockerignore").read_text().splitlines()
+    sent = exclude_paths(str(ROOT), patterns)
+    # Directories of wheels are there only where somebody has filled one.
+    for source in (each for each in COPIED if not each.endswith("*")):
+        assert any(path == source or path.startswith(f"{source}/") for path in sent), source
 
 
 def test_each_step_is_one_line_and_the_size_is_returned(said: list[str]) -> None:
@@ -135,7 +146,7 @@ def test_a_wheel_that_is_missing_is_named_together_with_the_place_that_lacks_it(
     answers = [{"stream": "ERROR: No matching distribution found for scipy>=1.11\n"}, {"error": "code: 1"}]
     with pytest.raises(WorkerError, match=rf"{wheelhouse} lacks scipy>=1.11") as caught:
         build(Engine("base", answers=answers), "mine", base="base", wheelhouse=wheelhouse, say=said.append)
-    assert caught.value.hint == f"python docker/wheelhouse.py {wheelhouse}"
+    assert caught.value.hint == f"python docker/wheelhouse.py --ros {wheelhouse}"
     with pytest.raises(WorkerError, match=r"the package index gives no scipy>=1.11") as caught:
         build(Engine("base", answers=answers), "mine", base="base", say=said.append)
     assert caught.value.hint is not None
@@ -149,6 +160,17 @@ def test_a_wheelhouse_without_wheels_is_refused_before_anything_is_built(
     engine = Engine("base")
     with pytest.raises(ConfigError, match="holds no wheels"):
         build(engine, "mine", base="base", wheelhouse=tmp_path if exists else tmp_path / "none", say=said.append)
+    assert not engine.options
+
+
+def test_a_wheelhouse_without_ros_is_refused_before_anything_is_built(said: list[str], wheelhouse: Path) -> None:
+    for wheel in wheelhouse.glob("throwcollect_ros_interfaces-*.whl"):
+        wheel.unlink()
+    engine = Engine("base")
+    with pytest.raises(ConfigError, match="holds no wheels of genuine ROS 2, which the image has") as caught:
+        build(engine, "mine", base="base", wheelhouse=wheelhouse, say=said.append)
+    assert caught.value.hint is not None
+    assert caught.value.hint.endswith(f"docker/wheelhouse.py --ros {wheelhouse}")
     assert not engine.options
 
 
