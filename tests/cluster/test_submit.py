@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import shlex
 import shutil
 import subprocess
 import time
@@ -200,16 +201,18 @@ def test_a_script_collects_in_an_image_for_whoever_submits_it(
     config, whole = short
     data = shared / "data"
     shutil.copy(config, shared / "throws.yaml")
-    inside = ("apptainer", "--quiet", "exec", str(sif), "throwcollect")
-    slurm.run(*inside, "plan", "throws.yaml", "--output", "data", user=USER, cwd=shared)
-    arguments = ("submit", config, "--output", data, "--tasks", str(TASKS), "--dry-run")
-    script = call(slurm, *arguments, "--set", "cluster.memory=1G", "--set", f"cluster.image={sif}")
-    (shared / "collect.sh").write_text(script)
-    # Slurm makes no directories for logs.
-    slurm.run("mkdir", "-p", "data/cluster/logs", user=USER, cwd=shared)
+    arguments = ("submit", shared / "throws.yaml", "--output", data, "--tasks", str(TASKS), "--dry-run")
+    said = call(slurm, *arguments, "--set", "cluster.memory=1G", "--set", f"cluster.image={sif}")
+    begin = said.index("#!")
+    (shared / "collect.sh").write_text(said[begin:])
+    # What has to be done besides is told beside the script.
+    plan, logs, join = (shlex.split(line.rpartition(": ")[2]) for line in said[:begin].splitlines())
+    inside = ("apptainer", "--quiet", "exec", str(sif))
+    slurm.run(*inside, *plan, user=USER, cwd=shared)
+    slurm.run(*logs, user=USER, cwd=shared)
     slurm.run("sbatch", "--wait", "collect.sh", user=USER, cwd=shared)
-    slurm.run(*inside, "join", "data", user=USER, cwd=shared)
-    assert fingerprints(data) == whole
+    slurm.run(*inside, *join, user=USER, cwd=shared)
+    assert recordings(fingerprints(data)) == recordings(whole)
 
 
 def test_a_plan_that_grows_is_collected_by_one_run_on_several_nodes(slurm: Slurm, tmp_path: Path) -> None:

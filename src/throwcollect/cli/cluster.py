@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -37,11 +38,15 @@ def submit(
     """Collect a dataset on a cluster: submit an array of tasks to Slurm, and a job that joins what they collect."""
     from throwcollect.cluster.submit import submit as submit_dataset
 
-    done = submit_dataset(
-        config, output, tasks, overrides=overrides(settings, trials=trials), live=mode == "live", dry=dry_run, say=tell
-    )
+    changes = overrides(settings, trials=trials)
+    done = submit_dataset(config, output, tasks, overrides=changes, live=mode == "live", dry=dry_run, say=tell)
     if done.job is None:
         typer.echo(done.script, nl=False)
+        if mode == "array":
+            words = [word for change in changes for word in ("--set", change)]
+            tell(f"before it is submitted by hand: {command('plan', config, *words, '--output', done.directory)}")
+            tell(f"and, as Slurm makes no directory for logs: {shlex.join(['mkdir', '-p', str(done.logs)])}")
+            tell(f"after its last task: {command('join', done.directory)}")
     elif wait:
         from throwcollect.cli.cluster_runs import follow_to_the_end
 

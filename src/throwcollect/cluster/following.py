@@ -200,19 +200,20 @@ class ProgressOfSlices:
 
     def at(self, look: Look) -> Progress:
         """Count the trials that have ended."""
-        if not look.complete:
+        directory = self._run.directory
+        if look.complete:
+            self._outcomes = _count_outcomes(directory)
+        elif self._run.submission.live:
+            entries = read_journal(directory / JOURNAL)
+            self._outcomes = Counter(entry.outcome for entry in entries if entry.outcome is not None)
+        else:
             for each in look.finished - self._read:
                 try:
-                    table = read_parquet(slice_directory(self._run.directory, each) / THROWS)
+                    self._outcomes += _count_outcomes(slice_directory(directory, each))
                 except ThrowcollectError:
                     continue  # a join moves the files of slices
-                self._outcomes.update(table["outcome"].to_pylist())
                 self._read.add(each)
-        if self._run.submission.live and not look.complete:
-            entries = read_journal(self._run.directory / JOURNAL)
-            self._outcomes = Counter(entry.outcome for entry in entries if entry.outcome is not None)
-        task = self._run.config.task
-        ended = self._run.trials if look.complete else self._outcomes.total()
+        task, ended = self._run.config.task, self._outcomes.total()
         return Progress(
             total=self._run.trials,
             ended=ended,
@@ -230,6 +231,11 @@ class ProgressOfSlices:
             self._first = now, ended
         began, before = self._first
         return max(0, ended - before) / (now - began) if now > began else 0.0
+
+
+def _count_outcomes(directory: Path) -> Counter[str]:
+    """Count the trials of each outcome in a finished dataset or slice."""
+    return Counter(read_parquet(directory / THROWS)["outcome"].to_pylist())
 
 
 def follow(run: ClusterRun, *, keep_on: Callable[[], bool] = lambda: True) -> Iterator[Look]:

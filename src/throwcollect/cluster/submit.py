@@ -56,6 +56,11 @@ class Submitted:
     script: str
     job: Job | None = None
 
+    @property
+    def logs(self) -> Path:
+        """Directory of the logs of tasks."""
+        return self.directory / CLUSTER / _LOGS
+
 
 def submit(
     config: Path,
