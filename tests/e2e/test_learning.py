@@ -86,7 +86,7 @@ def test_targets_become_a_list_of_throws_and_these_adapt_a_model(place: Path) ->
     x, y = middle(place).split(",")
     (place / "targets.csv").write_text(f"landing_x_m,landing_y_m\n{x},{y}\n{x},{y}\n")
     aim = call_here("aim", place / "model", "--targets", place / "targets.csv", "-o", place / "throws.csv")
-    assert aim.returncode == 0, aim.stderr
+    assert (aim.returncode, aim.stdout) == (0, f"{place / 'throws.csv'}: 2 throws\n"), aim.stderr
     throws = call_here("throw", place / "throws.yaml", "--list", place / "throws.csv")
     assert throws.stdout.count("landed: landing_x_m") == 2, throws.stderr
     with (place / "throws.csv").open() as file:

@@ -128,6 +128,8 @@ def aim(
             typer.echo(" ".join(f"--set {key}={value!r}" for key, value in aim.parameters.items()))
     if output is not None:
         write_aims(output, aims, names, load_config(directory / CONFIG).task)
+        if not json:
+            typer.echo(f"{output}: {format_count(len(aims), 'throw')}")
     for number, aim in enumerate(aims, start=1):
         if not aim.reachable:
             tell(

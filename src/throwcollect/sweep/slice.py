@@ -53,6 +53,7 @@ class Slice:
         """
         shards = -(-trials // trials_per_shard)
         if self.count > shards:
+            smaller = f", or shards of at most {trials // self.count}" if self.count <= trials else ""
             raise ConfigError(
                 [
                     Problem(
@@ -61,7 +62,7 @@ class Slice:
                         key="record.trials_per_shard",
                     )
                 ],
-                expected=f"at most {format_count(shards, 'slice')}, or smaller shards",
+                expected=f"at most {format_count(shards, 'slice')}{smaller}",
             )
         first, last = (shards * bound // self.count for bound in (self.index, self.index + 1))
         return range(first * trials_per_shard, min(last * trials_per_shard, trials))

@@ -6,7 +6,7 @@ from itertools import chain
 from pathlib import Path
 
 import pytest
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from throwcollect.config.schema import Config
@@ -35,6 +35,21 @@ def test_slices_are_the_plan_in_whole_shards(trials: int, per_shard: int, data: 
     assert all(each.start % per_shard == 0 for each in ranges)
     sizes = [-(-len(each) // per_shard) for each in ranges]
     assert max(sizes) - min(sizes) <= 1
+
+
+@given(st.integers(1, 500), st.integers(1, 40), st.integers(2, 600))
+def test_of_a_plan_with_too_few_shards_it_is_said_how_small_they_must_be(
+    trials: int, per_shard: int, count: int
+) -> None:
+    assume(-(-trials // per_shard) < count)
+    with pytest.raises(ConfigError) as caught:
+        Slice(0, count).trials_of(trials, trials_per_shard=per_shard)
+    assert caught.value.expected is not None
+    _, _, smaller = caught.value.expected.partition(", or shards of at most ")
+    assert bool(smaller) == (count <= trials)
+    if smaller:
+        assert -(-trials // int(smaller)) >= count
+        assert Slice(0, count).trials_of(trials, trials_per_shard=int(smaller))
 
 
 def test_a_slice_is_written_as_it_is_read() -> None:
