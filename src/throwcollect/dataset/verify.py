@@ -112,8 +112,7 @@ def find_damage(directory: Path, plan: Plan | None, *, in_full: bool) -> list[Fi
     """Find the files of a finished dataset that are not as they were written.
 
     Files are compared with the manifest. Earlier versions wrote none: then the recordings that the table of throws
-    names
-    have to begin and end as MCAP files do, or, in full, the dataset is verified.
+    names have to begin and end as MCAP files do, or, in full, the dataset is verified.
 
     Args:
         directory: Directory of a dataset that has its ``metadata.yaml``.
