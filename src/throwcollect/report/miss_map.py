@@ -22,9 +22,11 @@ def choose_scale(targets: NDArray[np.float64], places: NDArray[np.float64]) -> i
     It fits if the longest miss is drawn no longer than the targets are apart.
 
     Args:
-        targets: At least one, shape ``(n_targets, n_columns)``.
+        targets: Shape ``(n_targets, n_columns)``.
         places: Where the trials at these targets ended, NaN for one without an end, in the same shape.
     """
+    if not len(targets):
+        return 1
     targets, places = _take_two(targets), _take_two(places)
     hit = np.isfinite(places).all(axis=1)
     longest = float(np.abs(places[hit] - targets[hit]).max(initial=0.0))

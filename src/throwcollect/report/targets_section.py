@@ -58,7 +58,7 @@ def _show_map(dataset: Dataset, targets: Targets) -> Panel:
     goals, places = targets.values[chosen, : len(shown)], np.column_stack(ends)[chosen]
     aimed = ~np.isnan(goals).any(axis=1)
     titles = [f"{declared[name].word} [{unit_of_name(name)}]" for name in shown]
-    times = choose_scale(goals[aimed], places[aimed]) if aimed.any() else 1
+    times = choose_scale(goals[aimed], places[aimed])
     figure = draw_miss_map(places[~aimed], goals[aimed], places[aimed], titles, dataset.config.task, times=times)
     return Panel("map", title_misses("Targets", times), figure, picture="targets_and_misses")
 

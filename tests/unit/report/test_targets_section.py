@@ -73,6 +73,7 @@ def test_the_map_names_trials_as_their_task_does() -> None:
 def test_misses_are_drawn_as_long_as_the_distance_of_the_targets_allows(miss: float, times: int) -> None:
     targets = np.array([[1.0, 0.0], [1.5, 0.2]])
     assert choose_scale(targets, targets + np.array([miss, 0.0])) == times
+    assert choose_scale(targets[:0], targets[:0]) == 1
     third = np.array([miss, 0.0, 5.0])
     assert choose_scale(np.eye(2, 3), np.eye(2, 3) + third) == choose_scale(np.eye(2), np.eye(2) + third[:2])
 
