@@ -66,7 +66,7 @@ def quote(value: Any) -> str:
     if isinstance(value, str):
         return repr(value if len(value) <= _LONGEST_QUOTE else value[:_LONGEST_QUOTE] + "…")
     if isinstance(value, Mapping):
-        return "keys and values"
+        return "keys and values" if value else "no keys"
     if isinstance(value, list):
         return "a list" if value else "an empty list"
     if value is None:

@@ -141,7 +141,8 @@ def _list_sweepable() -> str:
     keys = [*sweepable_keys(config), *sweepable_keys(config.model_copy(update={"task": learned}))]
     joints = "|".join(all_joints())
     general = dict.fromkeys(re.sub(rf"({joints})(\.\d+)?", _general, key) for key in keys)
-    return ", ".join(f"`{key}`" for key in general) + ".\nA joint must be in `task.end`."
+    where = "A joint must be in `task.end`, and a weight in `task.trajectory.weights`."
+    return ", ".join(f"`{key}`" for key in general) + f".\n{where}"
 
 
 def _general(match: re.Match[str]) -> str:

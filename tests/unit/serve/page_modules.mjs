@@ -8,7 +8,7 @@ import { pathToFileURL } from "node:url";
 const load = (name) => import(pathToFileURL(`${process.env.PAGE}/${name}`));
 const { ballAt, decodeThrow, jointsAt, seriesOf } = await load("throws.js");
 const { Playback } = await load("playback.js");
-const { inOrder, lives, steps } = await load("state.js");
+const { inOrder, lives, steps, watchable } = await load("state.js");
 const { readChanges } = await load("controls.js");
 const { coarsen } = await load("coarse.js");
 const { placeApart } = await load("places.js");
@@ -143,6 +143,13 @@ test("a coarse mesh keeps its extent with fewer triangles, and edges stay sharp"
 test("a run lives from its plan to its end", () => {
   const statuses = ["planning", "starting", "running", "ended", "died"];
   assert.deepEqual(statuses.map((status) => lives({ status })), [true, true, true, false, false]);
+});
+
+test("a container is watched by nobody who has not asked for it", () => {
+  const runs = [["ear", "container", "running"], ["talos", "session", "running"], ["old", "collection", "ended"]];
+  const instances = runs.map(([id, kind, status]) => ({ id, kind, status }));
+  assert.deepEqual(watchable(instances, [null]), ["talos"]);
+  assert.deepEqual(watchable(instances, ["old", "ear"]), ["ear", "talos", "old"]);
 });
 
 test("a model is told in sentences, before and after it was adapted", () => {

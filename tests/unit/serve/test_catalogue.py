@@ -67,7 +67,7 @@ def test_without_a_catalogue_nothing_can_be_begun(directory: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("components: {}\n", ":1: components: should"),
+        ("components: {}\n", ":1: components: should be keys, each with keys and values, got no keys"),
         ("components:\n  a:\n    pretty_name: A\n", ":2: components.a: should have one of config, session and image"),
         ("components:\n  a: {config: small.yaml, session: small.yaml}\n", ":2: components.a: should have one of"),
         (

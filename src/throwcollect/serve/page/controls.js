@@ -181,7 +181,7 @@ class InstanceCard {
     else this.#putProgress(instance.progress);
     const troubled = instance.nodes.filter(({ status }) => !["running", "starting"].includes(status));
     const joined = instance.joins ? `joined ${instance.joins}` : "";
-    const all = instance.nodes.length ? `${instance.nodes.length} nodes` : "";
+    const all = instance.nodes.length ? `${instance.nodes.length} ${instance.nodes.length === 1 ? "node" : "nodes"}` : "";
     setText(this.nodes, [joined, all, ...troubled.map(({ name, status }) => `${name} ${status}`)].filter(Boolean).join(", "));
     this.stop.hidden = !isLiving;
     this.scale.hidden = !isLiving || instance.kind === "container";

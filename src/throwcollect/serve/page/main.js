@@ -12,7 +12,7 @@ import { Plots } from "./plots.js";
 import { Meshes } from "./robot.js";
 import { Room } from "./room.js";
 import { View } from "./scene.js";
-import { inOrder, lives, steps } from "./state.js";
+import { inOrder, lives, steps, watchable } from "./state.js";
 import { Target } from "./target.js";
 import { Watching } from "./watching.js";
 
@@ -123,8 +123,7 @@ class Page {
     this.#instances = state.instances;
     this.controls.put(state);
     this.target.put(state);
-    const kept = [this.watching.id, this.#named];
-    const ids = state.instances.filter((each) => lives(each) || kept.includes(each.id)).map(({ id }) => id);
+    const ids = watchable(state.instances, [this.watching.id, this.#named]);
     const wanted = ids.includes(this.#named) ? this.#named : get("watched").value;
     this.#named = null;
     setChoices(get("watched"), [...ids.map((id) => [id, id]), ...(ids.length ? [] : [["", "none"]])]);
@@ -318,6 +317,7 @@ function emptiness(instance) {
   if (!instance) return "Nothing runs. Start a component, or look at a run that has ended.";
   if (instance.status === "planning") return `${instance.id} is being planned …`;
   if (instance.status === "starting") return `${instance.id} is starting …`;
+  if (instance.kind === "container") return `${instance.id} is a container, and has no simulations.`;
   if (lives(instance)) return `${instance.id} has no simulation that is ready yet.`;
   return `${instance.id} has ended; nothing moves any more.`;
 }

@@ -53,6 +53,16 @@ export function lives(instance) {
 }
 
 /**
+ * Runs that can be watched. A container has no simulations, so whoever opens the page does not see one that joined last.
+ * @param {Instance[]} instances
+ * @param {(string | null)[]} kept ids of those that the user has asked for, whatever they are
+ * @returns {string[]} ids
+ */
+export function watchable(instances, kept) {
+  return instances.filter((each) => (lives(each) && each.kind !== "container") || kept.includes(each.id)).map(({ id }) => id);
+}
+
+/**
  * How far a collection has come: in successes if a number of them is wanted, else in trials.
  * @param {Progress} progress
  * @returns {[number, number]} steps done, and all

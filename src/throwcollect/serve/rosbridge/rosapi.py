@@ -117,19 +117,24 @@ class Rosapi:
     def _find_service_type(self, call: Call) -> Values:
         return {"type": self._services().get(absolute_name(call.fields.text("service")), "")}
 
-    def _providers(self, call: Call) -> list[str]:
-        service = absolute_name(call.fields.text("service"))
+    def _providers(self, name: str, type_name: str | None = None) -> list[str]:
+        """Nodes that offer a service of this name, or one of this type."""
         return [
-            _join(namespace, name)
-            for name, namespace in self._nodes()
-            if service in dict(self._node.get_service_names_and_types_by_node(name, namespace))
+            _join(namespace, node)
+            for node, namespace in self._nodes()
+            if any(
+                service == name or type_name in types
+                for service, types in self._node.get_service_names_and_types_by_node(node, namespace)
+            )
         ]
 
     def _list_providers(self, call: Call) -> Values:
-        return {"providers": self._providers(call)}
+        # rosapi of ROS 2 takes a type here, though the field is called service; earlier ones took a name.
+        wanted = call.fields.text("service")
+        return {"providers": self._providers(absolute_name(wanted), full_name("srv", wanted))}
 
     def _find_provider(self, call: Call) -> Values:
-        return {"node": next(iter(self._providers(call)), "")}
+        return {"node": next(iter(self._providers(absolute_name(call.fields.text("service")))), "")}
 
     def _list_actions(self, _call: Call) -> Values:
         actions = [name for name, _ in _visible(ros.get_action_names_and_types(self._node))]

@@ -67,6 +67,8 @@ def test_services_are_told_with_their_types_and_nodes(party: Party, graph: Node)
     assert party.call("/rosapi/service_type", service="/lamp") == {"type": "std_srvs/srv/SetBool"}
     assert party.call("/rosapi/service_type", service="/none") == {"type": ""}
     assert party.call("/rosapi/service_providers", service="lamp") == {"providers": ["/other"]}
+    assert party.call("/rosapi/service_providers", service="std_srvs/srv/SetBool") == {"providers": ["/other"]}
+    assert party.call("/rosapi/service_providers", service="std_srvs/Trigger") == {"providers": []}
     assert party.call("/rosapi/service_node", service="/none") == {"node": ""}
 
 
