@@ -20,6 +20,9 @@ from importlib.metadata import EntryPoint, entry_points
 from types import MappingProxyType
 from typing import Any
 
+from throwcollect.errors import ConfigError, ThrowcollectError
+from throwcollect.extras import explain_missing
+
 _OWN = MappingProxyType(
     {
         "robots": {"talos": "throwcollect.robots.talos:TALOS"},
@@ -37,6 +40,17 @@ _OWN = MappingProxyType(
         },
     }
 )
+
+_KINDS = MappingProxyType(
+    {
+        "robots": "throwcollect.robots.robot:Robot",
+        "tools": "throwcollect.config.tool:ToolConfig",
+        "engines": "throwcollect.engines.engine:Engine",
+        "tasks": "throwcollect.config.task:TaskConfig",
+        "runtimes": "throwcollect.runtimes.runtime:Runtime",
+    }
+)
+"""What the members of a family are: a robot is a value, all others are classes derived from this one."""
 
 
 def names_of(family: str) -> tuple[str, ...]:
@@ -57,15 +71,77 @@ def load_member(family: str, name: str) -> Any:
 
     Raises:
         KeyError: If the family has no such member.
-        ImportError: If the package that the member is in cannot be imported.
+        ConfigError: If it is of another package, and cannot be imported or is not what the family consists of.
+        ImportError: If it is our own, and a package that it needs cannot be imported.
     """
-    return _table(family)[name].load()
+    entry = _table(family)[name]
+    if name in _OWN[family]:
+        return entry.load()
+    namesakes = [each for each in entry_points(group=entry.group) if each.name == name]
+    what = f"the {family.removesuffix('s')} {name} of {' and '.join(sorted(map(_owner, namesakes)))}"
+    if len({each.value for each in namesakes}) > 1:
+        raise ConfigError(f"{what}: a name has to be that of one", hint="uninstall all of these packages but one")
+    found, kind, where = _import(entry.value, what), load_object(_KINDS[family]), f"{what}: {entry.value}"
+    if family != "robots":
+        return _check_class(found, kind, where)
+    if not isinstance(found, kind):
+        raise ConfigError(f"{where} should be a {kind.__module__}.{kind.__name__}, is {found!r}")
+    return found
 
 
-def load_object(path: str) -> Any:
-    """Import the object ``module:name``."""
+def load_object(path: str, kind: type | None = None) -> Any:
+    """Import the object ``module:name``; where a kind is given, it has to be a whole class that is derived from it.
+
+    Raises:
+        ConfigError: If it is of another package, and cannot be imported or is not of this kind.
+    """
     module, _, name = path.partition(":")
-    return getattr(import_module(module), name)
+    if module.partition(".")[0] == __package__:
+        return getattr(import_module(module), name)
+    found = _import(path, path)
+    return found if kind is None else _check_class(found, kind, path)
+
+
+def _import(path: str, what: str) -> Any:
+    """Import an object of another package, whose mistakes are told as such: they are none of ours.
+
+    Raises:
+        ConfigError: If it cannot be imported.
+    """
+    try:
+        with explain_missing():
+            return EntryPoint(what, path, "").load()
+    except ThrowcollectError:
+        raise
+    except Exception as error:
+        raise ConfigError(
+            f"{what} cannot be loaded: {type(error).__name__}: {error}",
+            hint="mend or uninstall the package that it is of; THROWCOLLECT_DEBUG=1 shows where it fails",
+        ) from error
+
+
+def _check_class(found: Any, kind: type, where: str) -> Any:
+    """Make sure that an object of another package is a class that is derived from a kind, and has all that it needs.
+
+    Raises:
+        ConfigError: If it is anything else.
+    """
+    if not (isinstance(found, type) and issubclass(found, kind)):
+        raise ConfigError(f"{where} should be a class derived from {kind.__module__}.{kind.__name__}, is {found!r}")
+    # What is declared without a value is there for each derived class to set.
+    declared = {name for each in kind.__mro__ for name, text in _annotations(each) if "ClassVar" in text}
+    lacking = {name for name in declared if not hasattr(found, name)}
+    if lacking := lacking | getattr(found, "__abstractmethods__", frozenset()):
+        raise ConfigError(f"{where} lacks {', '.join(sorted(lacking))}")
+    return found
+
+
+def _annotations(kind: type) -> list[tuple[str, str]]:
+    return [(name, str(text)) for name, text in vars(kind).get("__annotations__", {}).items()]
+
+
+def _owner(entry: EntryPoint) -> str:
+    return f"{entry.dist.name} {entry.dist.version}" if entry.dist else "an unknown package"
 
 
 @cache

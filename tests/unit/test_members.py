@@ -1,17 +1,19 @@
 import os
 import subprocess
 import sys
-from fractions import Fraction
 from importlib.metadata import EntryPoint, EntryPoints
 from pathlib import Path
 
 import pytest
 
 from throwcollect import members
+from throwcollect.engines.ballistic.ballistic_engine import BallisticEngine
 from throwcollect.engines.bullet.bullet_engine import BulletEngine
+from throwcollect.errors import ConfigError
 from throwcollect.members import load_member, names_of
 
 PLUGINS = Path(__file__).parents[1] / "plugins"
+BALLISTIC = "throwcollect.engines.ballistic.ballistic_engine:BallisticEngine"
 ARM = """\
 robot: {name: planar_arm}
 task:
@@ -44,13 +46,13 @@ def test_a_member_of_another_package_is_found_and_takes_the_place_of_none_of_our
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     group = "throwcollect.engines"
-    points = EntryPoints([EntryPoint("free_fall", "fractions:Fraction", group), EntryPoint("bullet", "x:Other", group)])
+    points = EntryPoints([EntryPoint("free_fall", BALLISTIC, group), EntryPoint("bullet", "x:Other", group)])
     monkeypatch.setattr(members, "entry_points", lambda **_: points)
     caches = (members._table, load_member)
     for cached in caches:
         cached.cache_clear()
     assert names_of("engines") == ("bullet", "mujoco", "ballistic", "free_fall")
-    assert load_member("engines", "free_fall") is Fraction
+    assert load_member("engines", "free_fall") is BallisticEngine
     assert load_member("engines", "bullet") is BulletEngine
     for cached in caches:
         cached.cache_clear()
@@ -84,3 +86,86 @@ def test_with_a_robot_that_there_is_not_its_joints_are_not_complained_of(tmp_pat
     assert done.returncode == 2
     assert "robot.name: should be 'talos' or 'planar_arm', got 'planar_hand'; did you mean 'planar_arm'?" in done.stderr
     assert "joint" not in done.stderr
+
+
+BROKEN = """
+from throwcollect.config.task import TaskConfig
+from throwcollect.engines.engine import Engine
+
+NUMBER = 3
+
+class Stopped(Engine):
+    def close(self): ...
+
+class Aimless(TaskConfig):
+    implementation = "nothing:Nothing"
+"""
+
+
+@pytest.mark.parametrize(
+    ("family", "value", "said"),
+    [
+        ("robots", "broken:ARM", "cannot be loaded: AttributeError: module 'broken' has no attribute 'ARM'"),
+        ("robots", "not_there:ARM", "cannot be loaded: ModuleNotFoundError: No module named 'not_there'"),
+        ("robots", "broken:NUMBER", ": broken:NUMBER should be a throwcollect.robots.robot.Robot, is 3"),
+        ("engines", "broken:NUMBER", "should be a class derived from throwcollect.engines.engine.Engine, is 3"),
+        ("engines", "broken:Stopped", ": broken:Stopped lacks ball_boxes, configure, is_as_loaded, load, place_ball"),
+        ("tasks", "broken:Aimless", ": broken:Aimless lacks until"),
+    ],
+)
+def test_a_broken_member_of_another_package_is_told_with_the_name_of_the_package(
+    family: str, value: str, said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "broken.py").write_text(BROKEN)
+    install(tmp_path, "somebodys", family, value)
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.delitem(sys.modules, "broken", raising=False)
+    for cached in (members._table, load_member):
+        cached.cache_clear()
+    with pytest.raises(ConfigError) as caught:
+        load_member(family, "mine")
+    assert str(caught.value).startswith(f"the {family[:-1]} mine of somebodys 1.0")
+    assert said in str(caught.value)
+    monkeypatch.undo()
+    members._table.cache_clear()
+
+
+def test_two_packages_with_a_member_of_one_name_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    install(tmp_path, "first", "engines", BALLISTIC)
+    install(tmp_path, "second", "engines", "x:Other")
+    monkeypatch.syspath_prepend(tmp_path)
+    for cached in (members._table, load_member):
+        cached.cache_clear()
+    with pytest.raises(
+        ConfigError, match=r"the engine mine of first 1\.0 and second 1\.0: a name has to be that of one"
+    ):
+        load_member("engines", "mine")
+    monkeypatch.undo()
+    members._table.cache_clear()
+
+
+def test_an_engine_that_is_broken_is_told_before_a_run_begins(tmp_path: Path) -> None:
+    install(tmp_path, "somebodys", "engines", "not_there:Engine")
+    path = os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")])
+    (tmp_path / "throws.yaml").write_text(
+        "trials: 1\nsim: {engine: mine}\nsweep: {parameters: {task.duration_s: {values: [1.1]}}}\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-m", "throwcollect", "up", "--runtime", "local", "throws.yaml"],
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": path},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 2
+    assert "the engine mine of somebodys 1.0 cannot be loaded" in done.stderr
+    assert "sim_0" not in done.stderr
+
+
+def install(directory: Path, package: str, family: str, value: str) -> None:
+    """Add the member `mine` of a package to a directory, as pip would."""
+    about = directory / f"{package}-1.0.dist-info"
+    about.mkdir()
+    (about / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {package}\nVersion: 1.0\n")
+    (about / "entry_points.txt").write_text(f"[throwcollect.{family}]\nmine = {value}\n")

@@ -13,6 +13,7 @@ from throwcollect.config.schema import Config, RobotConfig
 from throwcollect.config.values import with_values
 from throwcollect.dataset.creation import create, refuse_taken
 from throwcollect.dataset.directory import TRIALS
+from throwcollect.dataset.throws_table import ThrowsTable
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.robots.feasibility import Feasibility
 from throwcollect.side_by_side import working_side_by_side
@@ -79,6 +80,8 @@ def _check_trials(config: Config, points: Points, *, processes: int, say: Say, u
     """Make the plan of points, and refuse the trials that the robot cannot do (see `draw_plan`)."""
     if sentence := find_sunken_robot(config):
         say(sentence)
+    # A task of another package may be broken. Trials would be refused for it one by one, or their results would be.
+    ThrowsTable((), config)
     count = len(points.values)
     size = max(_TRIALS_A_PIECE, count // _MOST_PIECES)
     if count >= _TOLD_TRIALS:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,15 +14,15 @@ from throwcollect.config.schema import Config
 from throwcollect.config.shape import unit_of_key
 from throwcollect.dataset.directory import THROWS
 from throwcollect.dataset.misses import Misses
-from throwcollect.errors import DatasetError
+from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.sweep.arrow_column import make_table
 from throwcollect.sweep.parquet_file import read_parquet
 from throwcollect.sweep.plan import Plan
 from throwcollect.sweep.trials import Trial
 from throwcollect.tasks.columns import ball_columns, join_ball
 from throwcollect.tasks.measures import BallState
-from throwcollect.tasks.result import Result
-from throwcollect.tasks.task import task_of
+from throwcollect.tasks.result import LIMIT_VIOLATED, LOST, TRACKING_FAILED, Result
+from throwcollect.tasks.task import Task, task_of
 from throwcollect.units import unit_of_name
 
 REFUSED = "refused"
@@ -73,6 +74,24 @@ def ball_state(row: Row, name: str) -> BallState | None:
     return None if None in values else join_ball(values)
 
 
+def _check_task(task: Task[Any], columns: Sequence[str]) -> None:
+    """Make sure that a task, which may be of another package, can have its results in a table of these columns.
+
+    Raises:
+        ConfigError: If it lacks an outcome that it needs, or two columns have the same name.
+    """
+    name, outcomes = task.config.task.name, {each.value for each in task.outcomes}
+    needed = (task.config.task.success, LIMIT_VIOLATED, TRACKING_FAILED, LOST)
+    if missing := [each for each in needed if each not in outcomes]:
+        raise ConfigError(f"task.name: outcomes of the task {name} lack {', '.join(missing)}")
+    if twice := [column for column, count in Counter(columns).items() if count > 1]:
+        raise ConfigError(
+            f"task.name: results of the task {name} have columns of the same name as others of the table: "
+            f"{', '.join(twice)}",
+            hint="rename the fields of its results",
+        )
+
+
 class ThrowsTable:
     """The schema of one collection's table; turns results into rows, and rows into results.
 
@@ -84,6 +103,9 @@ class ThrowsTable:
         parameters: Swept dotted configuration keys, in the order of their columns.
         config: Configuration of the collection.
         targets: Names of the columns of targets.
+
+    Raises:
+        ConfigError: If the task lacks an outcome that it needs, or a column of its results has the name of another.
     """
 
     def __init__(self, parameters: Sequence[str], config: Config, targets: Sequence[str] = ()) -> None:
@@ -108,6 +130,7 @@ class ThrowsTable:
                 _field("digest", pa.string(), "SHA-256 of the episode: of its header and its message records."),
             ]
         )
+        _check_task(task, self.schema.names)
 
     @classmethod
     def of(cls, plan: Plan) -> ThrowsTable:

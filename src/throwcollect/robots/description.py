@@ -189,6 +189,12 @@ def _read_description(robot: Robot) -> ElementTree.Element:
                 link.remove(shape)
     if description.find(f"link[@name='{robot.hand}']") is None:
         raise ConfigError(f"{path}: link {robot.hand} is missing")
+    links, joints = ({element.get("name", "") for element in description.findall(kind)} for kind in ("link", "joint"))
+    if shared := links & joints:
+        # Pinocchio has frames for both, and cannot tell which one is meant.
+        raise ConfigError(
+            f"{path}: a joint has the name of a link: {', '.join(sorted(shared))}", hint="rename the joint in a copy"
+        )
     return description
 
 
@@ -201,6 +207,9 @@ def _whole(robot: Robot, source: ElementTree.Element) -> pinocchio.Model:
         raise ConfigError(
             f"{robot.urdf_path}: has other movable joints than {robot.title}: {', '.join(sorted(missing))}"
         )
+    types = {joint.get("name"): joint.get("type") for joint in source.iter("joint")}
+    if others := [f"{joint} is {types[joint]}" for joint in robot.joints if types[joint] != "revolute"]:
+        raise ConfigError(f"{robot.urdf_path}: joints should be revolute or fixed; {', '.join(others)}")
     return model
 
 

@@ -24,10 +24,10 @@ class Robot:
         controllers: Joint trajectory controller of each limb and its joints, in order.
         share: Returns the directory that ``package://`` paths of the description are relative to; raises `ConfigError`
             if the package that brings it is not installed.
-        urdf: Path of the URDF in that directory.
-        srdf: Path of the SRDF in that directory; it says which links may overlap, and holds the posture at rest.
+        urdf: Path of the URDF in that directory, or an absolute one.
+        srdf: Path of the SRDF, likewise; it says which links may overlap, and holds the posture at rest.
         rest: Name of the SRDF's posture that joints have unless a configuration says otherwise.
-        hand: Link that the tool is fixed to.
+        hand: Link that the tool is fixed to: the spoon's handle lies along -z of it, and the cup opens along +x.
         open_hand: Prefix of the names of links that have no collision shapes, as the tool reaches into them.
         holding: Prefixes of the names of links that hold the tool and are not checked for collisions with it.
         rigid: Prefix of the names of links for each group of links that only mimic joints move. Links of a group are

@@ -12,7 +12,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar, Literal, Protocol
 
-from throwcollect.engine_packages import require_engine
+from throwcollect.engine_packages import PACKAGES, require_engine
+from throwcollect.members import load_member
 from throwcollect.ros.middleware import Middleware
 from throwcollect.run_key import RunKey
 from throwcollect.wording import command
@@ -239,6 +240,9 @@ class Runtime(ABC):
             MissingExtraError: If simulations run on this Python, and it lacks the physics engine.
         """
         require_engine(config.sim.engine)
+        if config.sim.engine not in PACKAGES:
+            # One of another package may be broken, which would be told by every simulation, and late.
+            load_member("engines", config.sim.engine)
         return middleware
 
     def check(self) -> Check | None:

@@ -125,5 +125,5 @@ class Task(ABC, Generic[AnyResult]):
 
 def task_of(config: Config) -> Task[Any]:
     """Make the task that a configuration describes."""
-    task: Task[Any] = load_object(config.task.implementation)(config)
+    task: Task[Any] = load_object(config.task.implementation, Task)(config)
     return task

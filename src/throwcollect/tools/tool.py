@@ -91,5 +91,5 @@ class Tool(ABC):
 
 def tool_of(section: ToolConfig) -> Tool:
     """Make the tool that a section of a configuration describes."""
-    tool: Tool = load_object(section.implementation)(section)
+    tool: Tool = load_object(section.implementation, Tool)(section)
     return tool

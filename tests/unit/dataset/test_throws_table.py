@@ -1,16 +1,20 @@
-from dataclasses import replace
+from dataclasses import make_dataclass, replace
 from pathlib import Path
 
 import pyarrow.parquet as pq
 import pytest
 from tests.unit.dataset.conftest import Collection
 
+from throwcollect.config.schema import Config
 from throwcollect.dataset.throws_table import Place, ThrowsTable, read_throws
 from throwcollect.dataset.verify import verify
 from throwcollect.derive.selection import merge
 from throwcollect.episode.record import Contact, EpisodeHeader, Samples
-from throwcollect.errors import DatasetError
-from throwcollect.tasks.throw.outcome import ThrowOutcome
+from throwcollect.errors import ConfigError, DatasetError
+from throwcollect.tasks.columns import Number, measured
+from throwcollect.tasks.result import Outcome
+from throwcollect.tasks.throw.outcome import ThrowOutcome, ThrowResult
+from throwcollect.tasks.throw.throw_task import ThrowTask
 
 
 def held(samples: Samples, header: EpisodeHeader) -> tuple[Samples, EpisodeHeader]:
@@ -49,6 +53,24 @@ def test_a_swept_key_has_a_unit_and_a_name_without_dots() -> None:
     ]
     assert [each[b"unit"].decode() for each in told.values()] == ["rad", "s", ""]
     assert told["ball.friction"][b"description"] == b"Swept value of ball.friction [-]."
+
+
+@pytest.mark.parametrize("column", ["digest", "trial", "landing_x_m"])
+def test_a_task_whose_results_have_a_column_of_the_table_is_refused(
+    column: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    results = make_dataclass(
+        "Results", [(column, float, measured(Number("A number.")))], bases=(ThrowResult,), frozen=True
+    )
+    monkeypatch.setattr(ThrowTask, "results", results)
+    with pytest.raises(ConfigError, match=f"the task throw have columns of the same name as others .*: {column}"):
+        ThrowsTable((), Config())
+
+
+def test_a_task_without_an_outcome_that_it_needs_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(ThrowTask, "outcomes", Outcome("Few", {"LOST": "lost", "LIMIT_VIOLATED": "limit_violated"}))
+    with pytest.raises(ConfigError, match="outcomes of the task throw lack landed, tracking_failed"):
+        ThrowsTable((), Config())
 
 
 def test_a_table_of_an_earlier_version_is_read_and_verified_and_merged(collection: Collection, tmp_path: Path) -> None:

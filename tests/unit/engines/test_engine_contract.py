@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
@@ -102,6 +103,19 @@ def test_the_ball_rests_in_the_tool_of_the_still_robot(engine: Engine) -> None:
     assert ball.linear_velocity == pytest.approx((0, 0, 0), abs=1e-4)
     engine.run(still(engine, 100), Observer())
     assert ball_of(engine.state.sample).position == pytest.approx(ball.position, abs=1e-4)
+
+
+def test_the_names_of_links_have_no_effect(engine: Engine) -> None:
+    usual = thrown(engine)
+    root = re.search(r'<link name="([^"]+)"', SCENE.urdf)
+    assert root is not None
+    # Most arms of example-robot-data stand on a link of this name.
+    engine.load(replace(SCENE, urdf=SCENE.urdf.replace(f'"{root[1]}"', '"world"')))
+    engine.configure(PHYSICS)
+    engine.rest(START.tolist(), SEAT)
+    engine.run(still(engine, 25), Observer())
+    engine.reset(engine.state)
+    assert thrown(engine) == usual
 
 
 def test_what_follows_from_a_state_does_not_depend_on_what_was_before(name: str, engine: Engine) -> None:

@@ -9,10 +9,18 @@ import pytest
 from throwcollect.config.schema import Config, RobotConfig
 from throwcollect.errors import ConfigError
 from throwcollect.robots import description
-from throwcollect.robots.description import find_locked_joints, full_description, physics_description, start_posture
+from throwcollect.robots.description import (
+    find_locked_joints,
+    full_description,
+    joint_model,
+    physics_description,
+    start_posture,
+)
+from throwcollect.robots.robot import Robot
 from throwcollect.robots.talos import TALOS
 
 JOINTS = TALOS.joints
+PLUGINS = Path(__file__).parents[2] / "plugins"
 
 CONFIG = Config()
 MOVED = tuple(CONFIG.task.end)
@@ -148,3 +156,28 @@ def test_merging_keeps_every_collision_shape_in_its_place():
     assert collision_shapes(physics_description(CONFIG).urdf, posture) == collision_shapes(
         full_description(CONFIG), posture
     )
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ('name="hand_joint"', 'name="hand_link"', "a joint has the name of a link: hand_link"),
+        ('name="elbow_joint" type="revolute"', 'name="elbow_joint" type="prismatic"', "elbow_joint is prismatic"),
+    ],
+)
+def test_a_description_that_would_be_misunderstood_is_refused(old: str, new: str, said: str, tmp_path: Path) -> None:
+    urdf = (PLUGINS / "planar_arm" / "planar_arm.urdf").read_text()
+    assert old in urdf
+    (tmp_path / "arm.urdf").write_text(urdf.replace(old, new))
+    arm = Robot(
+        name="arm",
+        title="the arm",
+        controllers={"arm_controller": ("shoulder_joint", "elbow_joint")},
+        share=lambda: tmp_path,
+        urdf="arm.urdf",
+        srdf=str(PLUGINS / "planar_arm" / "planar_arm.srdf"),
+        rest="rest",
+        hand="hand_link",
+    )
+    with pytest.raises(ConfigError, match=said):
+        joint_model(arm)

@@ -5,6 +5,7 @@ As in Bullet, nothing but the ball collides with other things as long as no body
 
 from __future__ import annotations
 
+import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterable
 from dataclasses import dataclass
 
@@ -33,6 +34,9 @@ _BALL_PRIORITY = 1
 
 _COMPILER = '<mujoco><compiler strippath="false" discardvisual="true" fusestatic="false"/></mujoco>'
 _ROOT_TAG_END = ">"
+
+_WORLD_LINK, _STAND_IN = "world", "world of the robot"
+"""MuJoCo takes a root link of this name for the world itself, which is at height 0; so that link has another name."""
 
 
 @dataclass(frozen=True)
@@ -73,14 +77,15 @@ def make_spec(scene: Scene) -> tuple[mujoco.MjSpec, list[Surface]]:
         ConfigError: If MuJoCo cannot read the robot's description.
     """
     try:
-        spec = read_urdf(scene.urdf)
+        spec = read_urdf(_rename_world(scene.urdf))
     except ValueError as error:
         raise ConfigError(f"MuJoCo cannot read the robot's description: {error}") from error
     world = spec.worldbody
     world.first_body().pos = (0.0, 0.0, scene.base_height_m)
     surfaces = [Surface(world.name, GROUND)]
+    names = {scene.tool.link: scene.tool.name, _STAND_IN: _WORLD_LINK}
     for body in spec.bodies[1:]:
-        surfaces.append(Surface(body.name, scene.tool.name if body.name == scene.tool.link else body.name))
+        surfaces.append(Surface(body.name, names.get(body.name, body.name)))
         for geom in body.geoms:
             geom.contype, geom.conaffinity = _ROBOT_BIT, 0
     world.add_geom(
@@ -98,6 +103,20 @@ def make_spec(scene: Scene) -> tuple[mujoco.MjSpec, list[Surface]]:
     # MuJoCo would reset a world that diverges. Without that, its numbers are not finite, and the trial is refused.
     option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
     return spec, surfaces
+
+
+def _rename_world(urdf: str) -> str:
+    """Rename the link `_WORLD_LINK`; a description without one stays as it is."""
+    robot = ElementTree.fromstring(urdf)  # noqa: S314 - a scene's files can be trusted
+    found = [link for link in robot.findall("link") if link.get("name") == _WORLD_LINK]
+    if not found:
+        return urdf
+    for link in found:
+        link.set("name", _STAND_IN)
+    for end in (*robot.iter("parent"), *robot.iter("child")):
+        if end.get("link") == _WORLD_LINK:
+            end.set("link", _STAND_IN)
+    return ElementTree.tostring(robot, encoding="unicode")
 
 
 def _add_ball(spec: mujoco.MjSpec, radius: float) -> None:

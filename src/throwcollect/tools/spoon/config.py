@@ -12,18 +12,18 @@ from throwcollect.config.tool import ToolConfig
 
 
 class SpoonConfig(ToolConfig):
-    """The throwing spoon: a handle and a cone of thin walls, fixed to the right gripper."""
+    """The throwing spoon: a handle and a cone of thin walls, fixed to the robot's hand."""
 
     implementation: ClassVar[str] = "throwcollect.tools.spoon.spoon:Spoon"
 
     name: Literal["spoon"] = "spoon"
     """Tool model."""
     handle_length_m: Annotated[float, Field(ge=0.05, le=0.5), Key(swept=True)] = 0.15
-    """Length of the handle, along -z of the gripper's base link."""
+    """Length of the handle, along -z of the hand's link."""
     handle_width_m: Annotated[float, Field(ge=0.004, le=0.05)] = 0.012
     """Width and thickness of the handle."""
     mount_offset_m: Annotated[float, Field(ge=0.0, le=0.3), Key(swept=True)] = 0.10
-    """Distance from the gripper's base link to the handle's upper end."""
+    """Distance from the hand's link to the handle's upper end."""
     cup_walls: Annotated[int, Field(ge=4, le=24)] = 6
     """Number of flat walls that form the cone; each costs about 5 µs a step."""
     cup_floor_radius_m: Annotated[float, Field(gt=0, le=0.05)] = 0.004
