@@ -210,7 +210,9 @@ def refuse_changes(directory: Path, stored: Config, config: Config) -> None:
         if key.partition(".")[0] not in _MAY_GROW or not _grows(before, after, config)
     ]
     if problems:
-        raise ConfigError(problems, expected="the same configuration, but for `run`, `containers` and more `trials`")
+        raise ConfigError(
+            problems, expected="the same configuration, but for `run`, `containers`, `cluster` and more `trials`"
+        )
 
 
 def _grows(before: int | None, after: int | None, config: Config) -> bool:

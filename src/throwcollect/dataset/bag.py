@@ -18,7 +18,8 @@ from ruamel.yaml.error import YAMLError
 from ruamel.yaml.events import AliasEvent
 
 from rclzenoh.interfaces import type_hash
-from throwcollect.dataset.directory import METADATA, PLAN
+from throwcollect.config.yaml_nodes import line, reason
+from throwcollect.dataset.directory import CONFIG, MANIFEST, METADATA, PLAN, SHARD_SUFFIX, THROWS
 from throwcollect.episode.channels import Channel
 from throwcollect.errors import DatasetError
 from throwcollect.files import read_text
@@ -122,7 +123,11 @@ def from_yaml(path: Path) -> Mapping[str, Any]:
         document = _parse(read_text(path, most_bytes=_MOST_BYTES))
     except RecursionError as error:
         raise DatasetError("cannot be read: values are nested too deeply", path=path) from error
-    except (YAMLError, ValueError) as error:
+    except YAMLError as error:
+        # The library's own text shows lines of the file, in a paragraph that looks like no other message.
+        place = "" if (at := line(error)) is None else f"line {at}"
+        raise DatasetError(f"cannot be read: {reason(error)}", path=path, place=place) from error
+    except ValueError as error:
         raise DatasetError(f"cannot be read: {error}", path=path) from error
     return document if isinstance(document, dict) else {}
 
@@ -151,6 +156,17 @@ def read_bag_metadata(directory: Path) -> Mapping[str, Any]:
     if not isinstance(bag, dict):
         raise DatasetError("not the metadata of a rosbag2 bag", path=path)
     return bag
+
+
+def refuse_other_directory(directory: Path) -> None:
+    """Refuse a directory that no file of a dataset is in, as the advice on damaged ones would lead nowhere there.
+
+    Raises:
+        DatasetError: If there is no such directory, or it has no such file.
+    """
+    own = (CONFIG, MANIFEST, METADATA, PLAN, THROWS)
+    if not any(path.name in own or SHARD_SUFFIX in path.suffixes for path in directory.glob("*")):
+        raise DatasetError("holds no dataset", path=directory, hint=_name_nearby(directory))
 
 
 def _name_nearby(directory: Path) -> str | None:

@@ -79,7 +79,13 @@ class Dataset(Sequence[Throw]):
         plan = Plan.read(path / PLAN, load_config(config_path(path)))
         if not is_there(path / THROWS):
             raise DatasetError("is missing", path=path / THROWS, hint=command("dataset", "rebuild", path))
-        return cls(path, plan, read_throws(path, plan), bag)
+        try:
+            throws = read_throws(path, plan)
+        except DatasetError as error:
+            # The table follows from the recordings, so one that is damaged is mended as one that is missing.
+            error.hint = error.hint or command("dataset", "rebuild", path)
+            raise
+        return cls(path, plan, throws, bag)
 
     def __len__(self) -> int:
         return len(self.throws)

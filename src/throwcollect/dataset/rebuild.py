@@ -12,7 +12,7 @@ import pyarrow as pa
 
 from throwcollect.config.loader import load
 from throwcollect.config.schema import Config
-from throwcollect.dataset.bag import FileSummary
+from throwcollect.dataset.bag import FileSummary, refuse_other_directory
 from throwcollect.dataset.data_card import data_card, outcome_lines
 from throwcollect.dataset.description import WRITTEN, write_description
 from throwcollect.dataset.directory import CARD, CONFIG, MANIFEST, PLAN, THROWS, config_path
@@ -84,6 +84,7 @@ def rebuild(directory: Path) -> Rebuilt:
             another process changes the dataset, it is not collected to its end, or a file cannot be written.
         ConfigError: If the ``config.yaml`` is wrong.
     """
+    refuse_other_directory(directory)
     with hold_lock(directory):
         return _rebuild(directory)
 

@@ -12,6 +12,7 @@ from throwcollect.config.loader import load
 from throwcollect.config.schema import Config
 from throwcollect.config.target import is_target
 from throwcollect.config.values import reason_not_sweepable
+from throwcollect.dataset.bag import refuse_other_directory
 from throwcollect.dataset.directory import CONFIG, PLAN, SHARD_SUFFIX, THROWS, TRIALS, config_path
 from throwcollect.dataset.misses import read_targets
 from throwcollect.dataset.rebuild import read_earlier_rows, reason_lost
@@ -100,6 +101,7 @@ def repair(directory: Path, output: Path, *, remake: Remake) -> Repaired:
         ConfigError: If `output` holds something already.
         DatasetError: If there is no way to configuration or plan, or files cannot be read or written.
     """
+    refuse_other_directory(directory)
     config = _configuration(directory)
     remarks: list[str] = []
     plan = _plan(directory, config, remake, remarks)

@@ -143,8 +143,11 @@ def resume(
                 load_locating_errors(Path(config) if config else config_path(directory), overrides)
             )
         except ConfigError as error:
+            # A problem without a place in a file is one of the overrides, which another file would not help.
+            if config or all(problem.path is None for problem in error.problems):
+                raise
             hint = f"{command('up', 'CONFIG', '--resume', directory)}, if the dataset's own file is damaged"
-            raise ConfigError(error.problems, hint=error.hint if config else hint) from error
+            raise ConfigError(error.problems, hint=hint) from error
         records = Records()
         own = None if run is None else run.run
         if (left := _take_over(records, directory, read, onlooker, own=own)) is not None:

@@ -182,7 +182,7 @@ TABLE_DEFECTS: dict[Callable[[Path], None], tuple[str, str, str]] = {
     plan_gone: ("plan.parquet", "", "is missing"),
     config_value: ("config.yaml", "", "not the configuration that plan.parquet was made for"),
     config_height: ("config.yaml", "", "one of the two was changed"),
-    bag_no_yaml: ("metadata.yaml", "", "cannot be read"),
+    bag_no_yaml: ("metadata.yaml", "line 1", "cannot be read: [^\n]*$"),
     bag_files: ("metadata.yaml", "relative_file_paths", "the files give"),
     bag_file_count: ("metadata.yaml", "files", "the files give"),
     bag_format: ("metadata.yaml", "throwcollect.format", "is '7'"),

@@ -259,6 +259,13 @@ def test_a_damaged_file_is_named(dataset: Path, name: str) -> None:
         Dataset.open(dataset)
 
 
+def test_a_damaged_table_of_throws_is_made_again_as_a_missing_one_is(dataset: Path) -> None:
+    (dataset / "throws.parquet").write_bytes(b"")
+    with pytest.raises(DatasetError, match="is damaged") as caught:
+        throwcollect.load(dataset)
+    assert caught.value.hint == f"throwcollect dataset rebuild {dataset}"
+
+
 def test_a_missing_shard_is_named(dataset: Path) -> None:
     loaded = Dataset.open(dataset)
     (dataset / "quick_00001.mcap").unlink()

@@ -139,3 +139,12 @@ def test_an_unfinished_collection_is_refused(spoiled: Path) -> None:
     (spoiled / "quick_00002.mcap.part").write_bytes(b"")
     with pytest.raises(DatasetError, match=r"not collected to its end\n  try: throwcollect resume"):
         rebuild(spoiled)
+
+
+def test_a_directory_of_something_else_is_named_as_such(mixed: Path, tmp_path: Path) -> None:
+    (tmp_path / "notes.txt").write_text("none of it")
+    for place in (tmp_path, tmp_path / "gone"):
+        with pytest.raises(DatasetError, match=r": holds no dataset$"):
+            rebuild(place)
+    with pytest.raises(DatasetError, match=r"throws\.parquet: holds no dataset\n  try: .*mixed"):
+        rebuild(mixed / "throws.parquet")

@@ -268,6 +268,12 @@ def test_a_plan_that_cannot_be_had_is_said(dataset: Path, output: Path) -> None:
     assert not output.exists()
 
 
+def test_a_directory_of_something_else_is_not_told_to_get_a_configuration(tmp_path: Path, output: Path) -> None:
+    for place in (tmp_path, tmp_path / "gone"):
+        with pytest.raises(DatasetError, match=r": holds no dataset$"):
+            repair(place, output, remake=never)
+
+
 def test_a_configuration_that_cannot_be_had_is_said(dataset: Path, output: Path) -> None:
     (dataset / "config.yaml").write_text("trials: many\n")
     with pytest.raises(DatasetError, match=r"nothing else holds the configuration[^$]*copy the YAML file"):

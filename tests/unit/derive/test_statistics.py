@@ -1,4 +1,5 @@
 import json
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,6 +10,7 @@ from tests.unit.dataset.conftest import Collection
 from throwcollect.dataset.reader import Dataset
 from throwcollect.derive.statistics import statistics
 from throwcollect.episode.record import EpisodeHeader, Samples
+from throwcollect.errors import DatasetError
 from throwcollect.robots.talos import TALOS
 
 
@@ -31,6 +33,17 @@ def test_signals_are_those_of_all_samples_together(collected: Path) -> None:
             assert signal.std == pytest.approx(column.std(), rel=1e-9, abs=1e-12)
     # Who normalises divides by it, or not at all.
     assert found.signals["position_rad"]["leg_left_4_joint"].std == 0
+
+
+def test_a_damaged_episode_is_named(collected: Path, tmp_path: Path) -> None:
+    directory = Path(shutil.copytree(collected, tmp_path / "damaged"))
+    row = Dataset.open(directory).throws.slice(3, 1).to_pylist()[0]
+    shard = directory / row["shard"]
+    data = bytearray(shard.read_bytes())
+    data[row["chunk_offset"] + 200] ^= 1
+    shard.write_bytes(data)
+    with pytest.raises(DatasetError, match=r"damaged: trial 3: chunk: "):
+        statistics(directory)
 
 
 def test_columns_are_those_of_the_rows_that_have_a_number(collection: Collection, tmp_path: Path) -> None:

@@ -12,7 +12,7 @@ import pytest
 from throwcollect import load, runs
 from throwcollect.coordinator.progress import Progress
 from throwcollect.dataset.inspect import digest, info
-from throwcollect.errors import Interrupted, WorkerError
+from throwcollect.errors import ConfigError, Interrupted, WorkerError
 from throwcollect.replay.throw import Replayer
 from throwcollect.runs.records import Records
 from throwcollect.runs.state_directory import STATE_VARIABLE
@@ -139,3 +139,17 @@ def test_a_run_that_is_prepared_and_not_launched_leaves_nothing(yaml: Path) -> N
         assert Records().ids() == [run.record.run]
     assert not (yaml.parent / "data").exists()
     assert Records().ids() == []
+
+
+def test_only_a_mistake_in_the_file_of_a_dataset_is_blamed_on_it(tmp_path: Path) -> None:
+    directory = tmp_path / "data"
+    directory.mkdir()
+    (directory / "plan.parquet").write_bytes(b"")
+    (directory / "config.yaml").write_text("seed: 1\n")
+    with pytest.raises(ConfigError) as caught:
+        runs.resume(directory, overrides=["foo=1"])
+    assert caught.value.hint is None
+    (directory / "config.yaml").write_text("seed: many\n")
+    with pytest.raises(ConfigError) as caught:
+        runs.resume(directory, overrides=["foo=1"])
+    assert "own file is damaged" in (caught.value.hint or "")
