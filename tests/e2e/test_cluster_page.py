@@ -14,7 +14,8 @@ PAGE = Path(__file__).parents[2] / "docs" / "cluster.md"
 
 
 def test_a_loop_is_a_scheduler(tmp_path: Path) -> None:
-    (script,) = re.findall(r"```sh\n(.*?)```", PAGE.read_text(encoding="utf-8"), flags=re.DOTALL)
+    marked = rf"<!-- run by tests/e2e/{Path(__file__).name} -->\n```sh\n(.*?)```"
+    (script,) = re.findall(marked, PAGE.read_text(encoding="utf-8"), flags=re.DOTALL)
     text = CONFIG.replace("local", "inprocess") + "record: {{trials_per_shard: 2}}\n"
     config = write_config(tmp_path, trials=10, text=text, sim=FAST).rename(tmp_path / "throws.yaml")
     environment = {**os.environ, "PATH": f"{Path(sys.executable).parent}:{os.environ['PATH']}"}
