@@ -198,7 +198,8 @@ class _Evaluation:
         known = self._table.column_names
         if name not in known:
             near = get_close_matches(name, known, 1)
-            raise self._error(node, f"no column {name!r}" + (f"; did you mean {near[0]!r}?" if near else ""))
+            other = f"did you mean {near[0]!r}?" if near else "a text needs quotes"
+            raise self._error(node, f"no column {name!r}; {other}")
         column = self._table[name]
         if pa.types.is_string(column.type):
             return _Value("text", column)

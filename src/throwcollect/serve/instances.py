@@ -16,6 +16,7 @@ from pydantic import JsonValue
 from throwcollect.config.containers import ContainerSpec
 from throwcollect.config.loader import load
 from throwcollect.coordinator.resume import is_complete
+from throwcollect.dataset.creation import refuse_taken
 from throwcollect.dataset.directory import config_path
 from throwcollect.errors import ConfigError, ConflictError, NotFoundError, Problem, WorkerError
 from throwcollect.robots.appearance import check_appearance
@@ -79,8 +80,8 @@ class Instances:
 
         Raises:
             NotFoundError: If there is no such component.
-            ConflictError: If there is another run of that id, or as many instances live as may, or a container cannot
-                join the run that the request names.
+            ConflictError: If there is another run of that id, or a dataset of one that was forgotten, or as many
+                instances live as may, or a container cannot join the run that the request names.
             ConfigError: If the configuration cannot be used, or the request does not fit such a component.
             WorkerError: If it cannot be begun.
         """
@@ -99,10 +100,13 @@ class Instances:
             if isinstance(component.source, ContainerSpec):
                 order = ContainerOrder(component.name, component.source, origin.joins)
                 return begin_container(order, run=instance, origin=origin, urdf=component.urdf), True
+            directory = self.datasets / instance
+            if component.kind == "collection":
+                _refuse_taken(directory)
             run = begin_run(
                 component.source,
                 overrides=overrides,
-                output=self.datasets / instance,
+                output=directory,
                 run=instance,
                 origin=origin,
                 kind="session" if component.kind == "session" else "collection",
@@ -205,6 +209,18 @@ class Instances:
         for result in control.set_parameter(run, nodes, "robot_description", urdf or own):
             if not result.successful:
                 raise ConflictError(f"run {run.id}: {result.reason}")
+
+
+def _refuse_taken(directory: Path) -> None:
+    """Refuse a directory that holds anything, as the run would do, but only after the client was told that it begins.
+
+    Raises:
+        ConflictError: If it does.
+    """
+    try:
+        refuse_taken(directory)
+    except ConfigError as error:
+        raise ConflictError(error.problems, hint="choose another id") from error
 
 
 def _check_simulations(run: Run) -> None:

@@ -59,6 +59,19 @@ def test_the_same_request_again_changes_nothing(
     assert len(begun) == 1
 
 
+def test_an_id_whose_dataset_is_still_there_is_taken(
+    client: TestClient, begun: list[dict[str, Any]], tmp_path: Path
+) -> None:
+    left = tmp_path / "datasets" / "a"
+    left.mkdir(parents=True)
+    (left / "throws.parquet").touch()
+    said = put(client, "a")
+    assert (said.status_code, said.json()["title"]) == (409, f"{left}: holds throws.parquet")
+    assert said.json()["hint"] == "choose another id"
+    assert not begun
+    assert put(client, "b").status_code == 202
+
+
 def test_there_are_never_more_than_may_live(client: TestClient, remember: Remember) -> None:
     remember("old", **ended(origin=Origin("throws")))
     assert [put(client, name).status_code for name in ("a", "b", "c")] == [202, 202, 409]
