@@ -46,7 +46,8 @@ test("a panel goes to the nearest place where it covers no other one", () => {
   const second = { ...box, top: 108 };
   assert.deepEqual(placeApart(box, [first, second], stage), { left: 100, top: 212 });
   assert.deepEqual(placeApart(box, [first], { most: 500, lowest: 50 }), { left: 324, top: 4 });
-  assert.deepEqual(placeApart(box, [first], { most: 150, lowest: 50 }), { left: 100, top: 4 });
+  assert.equal(placeApart(box, [first], { most: 150, lowest: 50 }), null);
+  assert.deepEqual(placeApart(box, [], { most: 50, lowest: 0 }), { left: 100, top: 4 });
 });
 
 test("velocities are slopes, and efforts are not made up", () => {

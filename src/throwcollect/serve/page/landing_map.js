@@ -229,7 +229,9 @@ function drawGrid(pen, style, at, scale, { width, height }) {
   };
   lines(width, left, (value, x) => {
     stroke(pen, [x, 0], [x, height]);
-    pen.fillText(`${(-value).toFixed(1)}`, x + 3, height - 4);
+    const text = (-value).toFixed(1);
+    // At the edge there may be no room for it.
+    if (x + 3 + pen.measureText(text).width <= width) pen.fillText(text, x + 3, height - 4);
   });
   lines(height, bottom, (value, y) => {
     stroke(pen, [0, y], [width, y]);

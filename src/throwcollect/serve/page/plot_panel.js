@@ -75,11 +75,11 @@ export class PlotPanel {
   }
 
   /**
-   * Move the panel to its link, beside other panels.
+   * Move the panel to its link, beside other panels; dock it if there is no room for it, as on a phone.
    * @param {{x: number, y: number}} at on the stage [px]
    * @param {Element} stage
    * @param {import("./places.js").Box[]} taken where other panels are; where this one is, is added
-   * @returns {{x1: number, y1: number, x2: number, y2: number}} line from the panel to the link
+   * @returns {{x1: number, y1: number, x2: number, y2: number} | null} line from the panel to the link, unless it was docked
    */
   follow(at, stage, taken) {
     const { offsetWidth: width, offsetHeight: height } = this.element;
@@ -90,7 +90,12 @@ export class PlotPanel {
       left: Math.max(EDGE_PX, Math.min(isRight ? at.x + gap : at.x - gap - width, most)),
       top: Math.max(EDGE_PX, Math.min(at.y - height - gap, lowest)),
     };
-    const { left, top } = placeApart({ ...wanted, width, height }, taken, { most, lowest });
+    const place = placeApart({ ...wanted, width, height }, taken, { most, lowest });
+    if (!place) {
+      this.#place(false);
+      return null;
+    }
+    const { left, top } = place;
     taken.push({ left, top, width, height });
     this.element.style.transform = `translate(${left.toFixed(1)}px, ${top.toFixed(1)}px)`;
     const x1 = Math.max(left, Math.min(at.x, left + width));

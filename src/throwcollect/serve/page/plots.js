@@ -59,7 +59,7 @@ export class Plots {
       const at = panel.follows ? this.view.project(simulation, link) : null;
       if (at) lines.push(panel.follow(at, get("stage"), taken));
     }
-    this.#drawLeaders(lines);
+    this.#drawLeaders(lines.filter(Boolean));
   }
 
   #ask() {
