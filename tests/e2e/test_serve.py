@@ -165,14 +165,21 @@ def test_clients_who_ask_at_once_never_get_one_too_many(server: Server) -> None:
         assert server.ask("DELETE", f"/instances/{name}")[0] == 409
 
 
-def test_what_the_preparation_fails_of_is_told(place: Place, server: Server) -> None:
+def test_what_the_preparation_fails_of_is_told(server: Server) -> None:
+    # Faster than the robot can move, which only the plan finds out.
+    wish = {"component": "throws", "set": {"sweep.parameters": {"task.duration_s": {"min": 0.1, "max": 0.12}}}}
+    assert server.ask("PUT", "/instances/hasty", wish)[0] == 202
+    end = server.wait_until("hasty", "ended")
+    assert end["exit_code"] == 2
+    assert "trials, all refused: " in end["message"]
+
+
+def test_an_id_whose_dataset_was_left_is_refused(place: Place, server: Server) -> None:
     taken = place.directory / "datasets" / "taken"
     taken.mkdir(parents=True)
     (taken / "mine").touch()
-    assert server.ask("PUT", "/instances/taken", {"component": "throws"})[0] == 202
-    end = server.wait_until("taken", "ended")
-    assert end["exit_code"] == 2
-    assert end["message"].startswith(f"{taken}: ")
+    status, said = server.ask("PUT", "/instances/taken", {"component": "throws"})
+    assert (status, said["title"]) == (409, f"{taken}: holds mine")
     assert [path.name for path in taken.iterdir()] == ["mine"]
 
 
