@@ -30,6 +30,9 @@ from throwcollect.version import __version__
 if TYPE_CHECKING:
     from throwcollect.dataset.reader import Dataset
 
+_LARGEST = 1e6
+"""Largest number of a target [m, rad, ...]: no robot reaches that far, and powers of it do not overflow."""
+
 _Word = TypeVar("_Word", bound=Enum)
 
 
@@ -110,7 +113,8 @@ class Model:
             choose: Which of several parameters are taken: ``nearest``, ``least-effort`` or ``least-sensitive``.
 
         Raises:
-            ConfigError: If a target has another number of values, or one is not finite, or there is no such choice.
+            ConfigError: If a target has another number of values, or one is not finite or above 1e6, or there is no
+                such choice.
         """
         names = (*self.targets, *self.given)
         rows = np.array([self._check_target(target, names) for target in targets], np.float64).reshape(-1, len(names))
@@ -293,11 +297,13 @@ class Model:
         """Read the numbers of a target.
 
         Raises:
-            ConfigError: If there are not as many as names, or one is not finite.
+            ConfigError: If there are not as many as names, or one is not finite, or so large that powers of it are not.
         """
         row = [float(value) for value in values]
         if len(row) != len(names) or not np.isfinite(row).all():
             raise ConfigError(f"got {', '.join(map(str, row))}", expected=f"finite numbers: {', '.join(names)}")
+        if max(map(abs, row)) > _LARGEST:
+            raise ConfigError(f"got {', '.join(map(str, row))}", expected=f"numbers from {-_LARGEST:g} to {_LARGEST:g}")
         return row
 
 

@@ -159,6 +159,16 @@ def test_a_target_that_is_none_is_refused(model: Model, target: tuple[float, ...
     assert caught.value.expected == "finite numbers: landing_x_m, landing_y_m"
 
 
+def test_a_target_is_refused_before_numbers_overflow(model: Model) -> None:
+    (far,) = model.aim([(1e6, -1e6)])
+    assert not far.reachable
+    assert np.isfinite([*far.parameters.values(), *far.predicted]).all()
+    for target in ((1e306, 0.0), (0.0, -1.1e6)):
+        with pytest.raises(ConfigError) as caught:
+            model.aim([target])
+        assert caught.value.expected == "numbers from -1e+06 to 1e+06"
+
+
 def test_points_without_all_parameters_are_refused(model: Model) -> None:
     with pytest.raises(ConfigError, match=r"throw 0: task\.duration_s is missing"):
         model.predict([{KEYS[1]: 0.0, KEYS[2]: 0.0}])
