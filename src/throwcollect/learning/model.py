@@ -113,8 +113,7 @@ class Model:
             choose: Which of several parameters are taken: ``nearest``, ``least-effort`` or ``least-sensitive``.
 
         Raises:
-            ConfigError: If a target has another number of values, or one is not finite or above 1e6, or there is no
-                such choice.
+            ConfigError: If a target has another number of values, one is not finite or above 1e6, or the choice is none.
         """
         names = (*self.targets, *self.given)
         rows = np.array([self._check_target(target, names) for target in targets], np.float64).reshape(-1, len(names))
@@ -300,10 +299,9 @@ class Model:
             ConfigError: If there are not as many as names, or one is not finite, or so large that powers of it are not.
         """
         row = [float(value) for value in values]
-        if len(row) != len(names) or not np.isfinite(row).all():
-            raise ConfigError(f"got {', '.join(map(str, row))}", expected=f"finite numbers: {', '.join(names)}")
-        if max(map(abs, row)) > _LARGEST:
-            raise ConfigError(f"got {', '.join(map(str, row))}", expected=f"numbers from {-_LARGEST:g} to {_LARGEST:g}")
+        if len(row) != len(names) or not (np.abs(row) <= _LARGEST).all():
+            wanted = f"finite numbers of at most {_LARGEST:g}: {', '.join(names)}"
+            raise ConfigError(f"got {', '.join(map(str, row))}", expected=wanted)
         return row
 
 
