@@ -81,7 +81,9 @@ def load_member(family: str, name: str) -> Any:
     what = f"the {family.removesuffix('s')} {name} of {' and '.join(sorted(map(_owner, namesakes)))}"
     if len({each.value for each in namesakes}) > 1:
         raise ConfigError(f"{what}: a name has to be that of one", hint="uninstall all of these packages but one")
-    found, kind, where = _import(entry.value, what), load_object(_KINDS[family]), f"{what}: {entry.value}"
+    found = _import(entry.value, what)
+    kind = load_object(_KINDS[family])
+    where = f"{what}: {entry.value}"
     if family != "robots":
         return _check_class(found, kind, where)
     if not isinstance(found, kind):
@@ -103,14 +105,19 @@ def load_object(path: str, kind: type | None = None) -> Any:
 
 
 def _import(path: str, what: str) -> Any:
-    """Import an object of another package, whose mistakes are told as such: they are none of ours.
+    """Import an object of another package, and report a mistake in there as one of that package.
+
+    Args:
+        path: The object, as ``module:name``.
+        what: What it is, as the beginning of a message.
 
     Raises:
         ConfigError: If it cannot be imported.
     """
     try:
         with explain_missing():
-            return EntryPoint(what, path, "").load()
+            # Unlike `getattr`, it also finds an attribute of an attribute.
+            return EntryPoint("", path, "").load()
     except ThrowcollectError:
         raise
     except Exception as error:
@@ -128,16 +135,13 @@ def _check_class(found: Any, kind: type, where: str) -> Any:
     """
     if not (isinstance(found, type) and issubclass(found, kind)):
         raise ConfigError(f"{where} should be a class derived from {kind.__module__}.{kind.__name__}, is {found!r}")
-    # What is declared without a value is there for each derived class to set.
-    declared = {name for each in kind.__mro__ for name, text in _annotations(each) if "ClassVar" in text}
-    lacking = {name for name in declared if not hasattr(found, name)}
+    # A class variable that is declared without a value has to be set by each derived class.
+    declared = [vars(each).get("__annotations__", {}) for each in kind.__mro__]
+    variables = {name for annotations in declared for name, text in annotations.items() if "ClassVar" in str(text)}
+    lacking = {name for name in variables if not hasattr(found, name)}
     if lacking := lacking | getattr(found, "__abstractmethods__", frozenset()):
         raise ConfigError(f"{where} lacks {', '.join(sorted(lacking))}")
     return found
-
-
-def _annotations(kind: type) -> list[tuple[str, str]]:
-    return [(name, str(text)) for name, text in vars(kind).get("__annotations__", {}).items()]
 
 
 def _owner(entry: EntryPoint) -> str:

@@ -125,7 +125,8 @@ def test_ctrl_c_before_any_simulation_is_ready(config: Path, tmp_path: Path, sta
 
 
 _HANGUP = pytest.param(
-    *(signal.SIGHUP, 0.7),
+    signal.SIGHUP,
+    0.7,
     marks=pytest.mark.skipif(signal.SIGHUP not in stop_signals(), reason="SIGHUP is ignored here, as below nohup"),
 )
 

@@ -127,9 +127,10 @@ def aim(
         for aim in aims:
             typer.echo(" ".join(f"--set {key}={value!r}" for key, value in aim.parameters.items()))
     if output is not None:
-        write_aims(output, aims, names, load_config(directory / CONFIG).task)
+        task = load_config(directory / CONFIG).task
+        write_aims(output, aims, names, task)
         if not json:
-            typer.echo(f"{output}: {format_count(len(aims), 'throw')}")
+            typer.echo(f"{output}: {format_count(len(aims), task.noun)}")
     for number, aim in enumerate(aims, start=1):
         if not aim.reachable:
             tell(

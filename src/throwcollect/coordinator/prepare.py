@@ -80,7 +80,7 @@ def _check_trials(config: Config, points: Points, *, processes: int, say: Say, u
     """Make the plan of points, and refuse the trials that the robot cannot do (see `draw_plan`)."""
     if sentence := find_sunken_robot(config):
         say(sentence)
-    # A task of another package may be broken. Trials would be refused for it one by one, or their results would be.
+    # The table checks the task, which may be of another package and broken: without this, each trial would be refused.
     ThrowsTable((), config)
     count = len(points.values)
     size = max(_TRIALS_A_PIECE, count // _MOST_PIECES)

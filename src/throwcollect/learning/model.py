@@ -113,7 +113,7 @@ class Model:
             choose: Which of several parameters are taken: ``nearest``, ``least-effort`` or ``least-sensitive``.
 
         Raises:
-            ConfigError: If a target has another number of values, one is not finite or above 1e6, or no such choice.
+            ConfigError: If a target has another number of values, is no number or beyond 1e6, or the choice is unknown.
         """
         names = (*self.targets, *self.given)
         rows = np.array([self._check_target(target, names) for target in targets], np.float64).reshape(-1, len(names))

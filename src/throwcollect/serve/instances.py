@@ -212,7 +212,7 @@ class Instances:
 
 
 def _refuse_taken(directory: Path) -> None:
-    """Refuse a directory that holds anything, as the run would do, but only after the client was told that it begins.
+    """Refuse a directory that holds anything; the run would refuse it when the client was already told that it begins.
 
     Raises:
         ConflictError: If it does.

@@ -5,7 +5,7 @@ export const EDGE_PX = 4;
 /** @typedef {{left: number, top: number, width: number, height: number}} Box */
 
 /**
- * The free place that is nearest to where a panel wants to be; null if none is free, unless it is the only one.
+ * The free place that is nearest to where a panel wants to be; null if none is free. The first panel gets what it wants.
  * @param {Box} box where it wants to be [px]
  * @param {Box[]} taken where others are
  * @param {{most: number, lowest: number}} stage up to where its left and its top may be
