@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from throwcollect.derive.split import split as split_dataset
     from throwcollect.derive.statistics import statistics as compute_statistics
     from throwcollect.errors import ConfigError, DatasetError, PlanError, ThrowcollectError, WorkerError
-    from throwcollect.export.formats import export as export_dataset
+    from throwcollect.export.export import export as export_dataset
     from throwcollect.extras import MissingExtraError
     from throwcollect.learning.model import Aim, Model, fit, load_model
     from throwcollect.learning.score import Score
@@ -72,7 +72,7 @@ _PLACES = {
     "UnfinishedDatasetWarning": "dataset.unfinished:UnfinishedDatasetWarning",
     "WorkerError": "errors:WorkerError",
     "compute_statistics": "derive.statistics:statistics",
-    "export_dataset": "export.formats:export",
+    "export_dataset": "export.export:export",
     "filter_dataset": "derive.selection:filter_trials",
     "fit": "learning.model:fit",
     "load": "dataset.unfinished:load",

@@ -1,4 +1,4 @@
-"""Families of parts of a collection, such as robots and tools, and their members by name.
+"""Families of parts, such as robots, tools and formats of exports, and their members by name.
 
 A family has members of our own, and those that other installed packages add by an entry point of the group
 ``throwcollect.<family>``. The name of the entry point is that of the member, and its object is of the same kind as the
@@ -38,6 +38,13 @@ _OWN = MappingProxyType(
             "docker": "throwcollect.runtimes.docker.runtime:DockerRuntime",
             "inprocess": "throwcollect.runtimes.in_process:InProcessRuntime",
         },
+        "exporters": {
+            "parquet": "throwcollect.export.parquet:PARQUET",
+            "npz": "throwcollect.export.npz:NPZ",
+            "lerobot": "throwcollect.export.lerobot:LEROBOT",
+            "hdf5": "throwcollect.export.hdf5:HDF5",
+            "mat": "throwcollect.export.mat:MAT",
+        },
     }
 )
 
@@ -48,9 +55,13 @@ _KINDS = MappingProxyType(
         "engines": "throwcollect.engines.engine:Engine",
         "tasks": "throwcollect.config.task:TaskConfig",
         "runtimes": "throwcollect.runtimes.runtime:Runtime",
+        "exporters": "throwcollect.export.exporter:Exporter",
     }
 )
-"""What the members of a family are: a robot is a value, all others are classes derived from this one."""
+"""What the members of a family are: values of this class, or else classes derived from it."""
+
+_VALUES = frozenset({"robots", "exporters"})
+"""The families whose members are values."""
 
 
 def names_of(family: str) -> tuple[str, ...]:
@@ -63,11 +74,11 @@ def load_member(family: str, name: str) -> Any:
     """Import a member of a family; the cache is for callers that ask with every trial.
 
     Args:
-        family: ``robots``, ``tools``, ``engines``, ``tasks`` or ``runtimes``.
+        family: ``robots``, ``tools``, ``engines``, ``tasks``, ``runtimes`` or ``exporters``.
         name: Name of the member.
 
     Returns:
-        A `Robot`; the class of an engine or a runtime; for a tool or a task, the class of its section.
+        A `Robot` or an `Exporter`; the class of an engine or a runtime; for a tool or a task, the class of its section.
 
     Raises:
         KeyError: If the family has no such member.
@@ -84,7 +95,7 @@ def load_member(family: str, name: str) -> Any:
     found = _import(entry.value, what)
     kind = load_object(_KINDS[family])
     where = f"{what}: {entry.value}"
-    if family != "robots":
+    if family not in _VALUES:
         return _check_class(found, kind, where)
     if not isinstance(found, kind):
         raise ConfigError(f"{where} should be a {kind.__module__}.{kind.__name__}, is {found!r}")

@@ -35,7 +35,7 @@ def with_plugins(*arguments: str) -> subprocess.CompletedProcess[str]:
     )
 
 
-@pytest.mark.parametrize("family", ["robots", "tools", "engines", "tasks", "runtimes"])
+@pytest.mark.parametrize("family", ["robots", "tools", "engines", "tasks", "runtimes", "exporters"])
 def test_every_member_can_be_loaded(family: str) -> None:
     assert names_of(family)
     for name in names_of(family):
@@ -108,6 +108,7 @@ class Aimless(TaskConfig):
         ("robots", "broken:ARM", "cannot be loaded: AttributeError: module 'broken' has no attribute 'ARM'"),
         ("robots", "not_there:ARM", "cannot be loaded: ModuleNotFoundError: No module named 'not_there'"),
         ("robots", "broken:NUMBER", ": broken:NUMBER should be a throwcollect.robots.robot.Robot, is 3"),
+        ("exporters", "broken:NUMBER", ": broken:NUMBER should be a throwcollect.export.exporter.Exporter, is 3"),
         ("engines", "broken:NUMBER", "should be a class derived from throwcollect.engines.engine.Engine, is 3"),
         ("engines", "broken:Stopped", ": broken:Stopped lacks ball_boxes, configure, is_as_loaded, load, place_ball"),
         ("tasks", "broken:Aimless", ": broken:Aimless lacks until"),

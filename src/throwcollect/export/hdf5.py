@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 
+from throwcollect.export.exporter import Exporter
 from throwcollect.export.npz import to_array
 from throwcollect.export.readme import Layout, tabulate_signals
 from throwcollect.export.throw_source import Source, Throw, read_metadata
@@ -56,7 +57,7 @@ ball_position_m = file["data/demo_{source.entries[0].trial}/obs/ball_position_m"
 
 
 def write(source: Source, directory: Path) -> None:
-    """Write a dataset as one HDF5 file; see `formats.Format.write`."""
+    """Write a dataset as one HDF5 file; see `Exporter.write`."""
     config = source.dataset.config
     with _Output(directory / "throws.hdf5") as output, h5py.File(output, "w") as file:
         file.attrs["digest_of_dataset"] = source.dataset.digest
@@ -135,3 +136,6 @@ def _add_table(group: Any, table: pa.Table, text: Any) -> None:
             dtype=text if values.dtype.kind == "U" else None,
         )  # fmt: skip
         stored.attrs.update(read_metadata(field))
+
+
+HDF5 = Exporter(describe, write, packages=("h5py",))

@@ -17,6 +17,7 @@ import pyarrow.parquet as pq
 from throwcollect.config.target import TargetColumn
 from throwcollect.dataset.directory import THROWS
 from throwcollect.dataset.moments import Moments
+from throwcollect.export.exporter import Exporter
 from throwcollect.export.lerobot_statistics import Frames, summarise_all, summarise_episode
 from throwcollect.export.parquet_series import FILES_PER_CHUNK, MEGABYTES_PER_FILE, PATH, ParquetSeries
 from throwcollect.export.readme import Layout, list_joints
@@ -118,7 +119,7 @@ dataset = LeRobotDataset("me/throws", root=".")
 
 
 def write(source: Source, directory: Path) -> None:
-    """Write a dataset in LeRobot's format; see `formats.Format.write`."""
+    """Write a dataset in LeRobot's format; see `Exporter.write`."""
     features = list_features(source.dataset.moving_joints, source.targets)
     tasks: dict[str, int] = {}
     table = _number_episodes(source)
@@ -286,3 +287,6 @@ def _tabulate_tasks(tasks: Mapping[str, int]) -> pa.Table:
 
 def _write_json(path: Path, value: object) -> None:
     path.write_text(json.dumps(value, indent=4) + "\n", encoding="utf-8")
+
+
+LEROBOT = Exporter(describe, write)

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from throwcollect.config.schema import Config, DynamicMovementPrimitive
 from throwcollect.config.task import TaskConfig
 from throwcollect.errors import ConfigError, DatasetError
+from throwcollect.export.exporter import Exporter
 from throwcollect.export.npz import to_array
 from throwcollect.export.readme import Layout, list_joints
 from throwcollect.export.throw_source import Entry, Source, Throw, read_metadata
@@ -80,7 +81,7 @@ _FIELDS = (
 
 
 def write(source: Source, directory: Path) -> None:
-    """Write a dataset as MATLAB files of version 5; see `formats.Format.write`.
+    """Write a dataset as MATLAB files of version 5; see `Exporter.write`.
 
     Raises:
         ConfigError: If the dataset is not one of throws.
@@ -263,3 +264,6 @@ def _describe_primitive(
         "fitted": float(fitted),
         "error": np.abs(motion - positions).max(axis=0)[np.newaxis],
     }
+
+
+MAT = Exporter(describe, write, packages=("scipy",))

@@ -13,6 +13,7 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
+from throwcollect.export.exporter import Exporter
 from throwcollect.export.readme import Layout, tabulate_signals
 from throwcollect.export.throw_source import Entry, Source
 
@@ -43,7 +44,7 @@ time_s, ball_position_m = archive["time_s"][rows], archive["ball_position_m"][ro
 
 
 def write(source: Source, directory: Path) -> None:
-    """Write a dataset as NumPy archives; see `formats.Format.write`."""
+    """Write a dataset as NumPy archives; see `Exporter.write`."""
     columns = {field.name: to_array(source.table[field.name]) for field in source.table.schema}
     with _open_archive(directory / "throws.npz") as archive:
         for name, values in {**columns, "digest_of_dataset": np.array(source.dataset.digest)}.items():
@@ -104,3 +105,6 @@ def _make_member(name: str) -> zipfile.ZipInfo:
     member = zipfile.ZipInfo(f"{name}.npy", _EPOCH)
     member.compress_type = zipfile.ZIP_DEFLATED
     return member
+
+
+NPZ = Exporter(describe, write)

@@ -9,6 +9,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from throwcollect.dataset.directory import THROWS
+from throwcollect.export.exporter import Exporter
 from throwcollect.export.readme import Layout, tabulate_signals
 from throwcollect.export.throw_source import Source, Throw
 from throwcollect.sweep.parquet_file import encode_table
@@ -48,7 +49,7 @@ samples = pd.read_parquet("{_TRAJECTORIES}", filters=[("trial", "==", {source.en
 
 
 def write(source: Source, directory: Path) -> None:
-    """Write a dataset as Parquet; see `formats.Format.write`."""
+    """Write a dataset as Parquet; see `Exporter.write`."""
     facts = {"throwcollect.digest": source.dataset.digest}
     table = source.table.replace_schema_metadata(facts)
     (directory / THROWS).write_bytes(encode_table(table))
@@ -81,3 +82,6 @@ def _make_batch(throw: Throw, source: Source, schema: pa.Schema) -> pa.RecordBat
         # One transposed copy is faster than columns one by one, whose numbers lie far apart in the recorded messages.
         columns += list(np.ascontiguousarray(throw.signals[signal.name].T.reshape(-1, len(throw))))
     return pa.record_batch(columns, schema)
+
+
+PARQUET = Exporter(describe, write)

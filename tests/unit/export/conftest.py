@@ -14,7 +14,7 @@ from tests.unit.dataset.conftest import make_collection as make_collection
 
 from throwcollect.dataset.reader import Dataset
 from throwcollect.episode.record import EpisodeHeader, Samples
-from throwcollect.export.formats import export
+from throwcollect.export.export import export
 from throwcollect.robots.quintic_curve import sample_quintic
 from throwcollect.robots.talos import TALOS
 from throwcollect.tasks.task import task_of

@@ -3,6 +3,7 @@ from __future__ import annotations
 import resource
 import shutil
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -10,14 +11,19 @@ import pyarrow.parquet as pq
 import pytest
 from ruamel.yaml import YAML
 from tests.unit.export.conftest import MOVING, Export
+from typer.testing import CliRunner
 
+from throwcollect import members
+from throwcollect.cli.main import app
 from throwcollect.dataset.inspect import info
 from throwcollect.errors import ConfigError, DatasetError
-from throwcollect.export.formats import FORMATS, export
+from throwcollect.export.export import export
 from throwcollect.export.signals import unit_of
 from throwcollect.extras import MissingExtraError
+from throwcollect.members import load_member, names_of
 
-ALL = list(FORMATS)
+ALL = names_of("exporters")
+PLUGINS = Path(__file__).parents[2] / "plugins"
 
 
 @pytest.mark.parametrize("to", ALL)
@@ -172,3 +178,26 @@ def test_without_h5py_the_message_says_what_to_install(
 )
 def test_units_follow_from_names(column: str, unit: str) -> None:
     assert unit_of(column) == unit
+
+
+@pytest.fixture
+def with_csv(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """The package of `tests/plugins/csv_export` is installed."""
+    for cached in (members._table, load_member):
+        cached.cache_clear()
+    monkeypatch.syspath_prepend(PLUGINS)
+    yield
+    monkeypatch.undo()
+    members._table.cache_clear()
+
+
+@pytest.mark.usefixtures("with_csv")
+def test_a_format_of_another_package_is_exported_to_as_ours_are(source: Path, tmp_path: Path) -> None:
+    done = CliRunner().invoke(app, ["dataset", "export", str(source), str(tmp_path / "text"), "--to", "csv"])
+    assert (done.exit_code, done.stderr) == (0, "")
+    assert "4 throws of 6 trials" in done.stdout
+    assert len((tmp_path / "text" / "throws.csv").read_text().splitlines()) == 1 + 6
+    assert len(list((tmp_path / "text").glob("trial_*.csv"))) == 4
+    assert 'pd.read_csv("throws.csv")' in (tmp_path / "text" / "README.md").read_text()
+    with pytest.raises(ConfigError, match="one of parquet, npz, lerobot, hdf5, mat, csv"):
+        export(source, tmp_path / "other", to="zarr")

@@ -23,7 +23,7 @@ from tests.unit.export.conftest import (
 
 from throwcollect.dataset.inspect import info
 from throwcollect.export import parquet_series
-from throwcollect.export.formats import export
+from throwcollect.export.export import export
 
 POSITIONS = [f"{joint}.pos" for joint in MOVING]
 FLOATS = {

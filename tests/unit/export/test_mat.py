@@ -13,7 +13,7 @@ from throwcollect.dataset.inspect import info
 from throwcollect.dataset.reader import Dataset
 from throwcollect.errors import DatasetError
 from throwcollect.export import mat
-from throwcollect.export.formats import export
+from throwcollect.export.export import export
 
 FIELDS = ["N", "dt", "a_z", "a_x", "c", "sigma_2", "w", "tau", "goal", "y0", "fitted", "error"]
 WEIGHTS = [-758.2, -994.1, -1122.1, -1231.2, -1231.1, -1114.2, -858.3, -508.7, -155.7, 74.0, 57.6, -56.9]

@@ -9,7 +9,7 @@ from tests.unit.export.conftest import MOVING, WITH_EPISODE, Export, table_of, t
 
 from throwcollect.dataset.inspect import info
 from throwcollect.export import parquet
-from throwcollect.export.formats import export
+from throwcollect.export.export import export
 from throwcollect.robots.talos import TALOS
 
 COLUMNS = {

@@ -12,7 +12,8 @@ import pytest
 from scipy.io import loadmat
 from tests.unit.dataset.targeted import LIST, collect_targeted
 
-from throwcollect.export.formats import FORMATS, export
+from throwcollect.export.export import export
+from throwcollect.members import names_of
 
 WANTED = [[1.4, -0.1], [1.5, 0.2], [1.6, 0.1]]
 TEXTS = [
@@ -34,7 +35,7 @@ def partly(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return collect_targeted(tmp_path_factory.mktemp("some") / "data")
 
 
-@pytest.mark.parametrize("to", list(FORMATS))
+@pytest.mark.parametrize("to", names_of("exporters"))
 def test_every_format_says_whether_all_throws_have_targets(
     targeted: Path, partly: Path, tmp_path: Path, to: str
 ) -> None:

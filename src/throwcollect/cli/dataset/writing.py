@@ -19,14 +19,17 @@ from throwcollect.wording import format_count
 def export_dataset(
     directory: DatasetArgument,
     output: OutputArgument,
-    to: Annotated[str, typer.Option("--to", metavar="parquet|npz|lerobot|hdf5|mat", help="Format.")],
+    to: Annotated[
+        str,
+        typer.Option("--to", metavar="FORMAT", help="parquet, npz, lerobot, hdf5, mat, or one of another package."),
+    ],
     rate: Annotated[
         int | None, typer.Option("--rate", metavar="HZ", help="Samples per second; as recorded if not given.")
     ] = None,
     json: JsonOption = False,
 ) -> None:
     """Write a dataset in another format, with a data card."""
-    from throwcollect.export.formats import export
+    from throwcollect.export.export import export
 
     exported = export(directory, output, to=to, rate_hz=rate)
     text = (

@@ -1,40 +1,19 @@
-"""The formats that datasets are exported to, and the one way to do it."""
+"""Writes a dataset in another format."""
 
 from __future__ import annotations
 
 import shutil
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
 
 from throwcollect.dataset.directory import CARD, CONFIG
 from throwcollect.errors import ConfigError
-from throwcollect.export import hdf5, lerobot, mat, npz, parquet
-from throwcollect.export.readme import Layout, render_card
+from throwcollect.export.exporter import Exporter
+from throwcollect.export.readme import render_card
 from throwcollect.export.throw_source import Source
 from throwcollect.extras import require
 from throwcollect.files import StrPath, new_directory
-
-
-class Format(Protocol):
-    """One format: a module of this room."""
-
-    def write(self, source: Source, directory: Path) -> None:
-        """Write the data files of a source into a directory that exists and is empty.
-
-        Raises:
-            DatasetError: If an episode is damaged, or a file would be too large for the format.
-            OSError: If a file cannot be written.
-        """
-
-    def describe(self, source: Source) -> Layout:
-        """Say how these files are laid out."""
-
-
-FORMATS: Mapping[str, Format] = {"parquet": parquet, "npz": npz, "lerobot": lerobot, "hdf5": hdf5, "mat": mat}
-_NEEDS = {"hdf5": ("h5py",), "mat": ("scipy",)}
-"""Packages of the extra ``export`` that a format imports."""
+from throwcollect.members import load_member, names_of
 
 
 @dataclass(frozen=True)
@@ -68,7 +47,7 @@ def export(directory: StrPath, output: StrPath, *, to: str, rate_hz: int | None 
     Args:
         directory: The dataset.
         output: Directory to write; must be new or empty. Nothing is left there on failure.
-        to: One of `FORMATS`.
+        to: Name of the format: ``parquet``, ``npz``, ``lerobot``, ``hdf5``, ``mat``, or one of another package.
         rate_hz: Samples per second; the recorded ones when None.
 
     Raises:
@@ -76,10 +55,11 @@ def export(directory: StrPath, output: StrPath, *, to: str, rate_hz: int | None 
         MissingExtraError: If a library that the format needs is not installed.
         DatasetError: If the dataset is unfinished, damaged or without episodes, or `output` cannot be written.
     """
-    if to not in FORMATS:
-        raise ConfigError(f"--to: unknown format {to!r}", expected=f"one of {', '.join(FORMATS)}")
-    chosen = FORMATS[to]
-    require(*_NEEDS.get(to, ()), extra="export")
+    formats = names_of("exporters")
+    if to not in formats:
+        raise ConfigError(f"--to: unknown format {to!r}", expected=f"one of {', '.join(formats)}")
+    chosen: Exporter = load_member("exporters", to)
+    require(*chosen.packages, extra="export")
     directory, output = Path(directory), Path(output)
     source = Source.open(directory, rate_hz=rate_hz)
     with new_directory(output) as beside:

@@ -1,0 +1,27 @@
+"""What a format that datasets are exported to consists of."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from throwcollect.export.readme import Layout
+from throwcollect.export.throw_source import Source
+
+
+@dataclass(frozen=True)
+class Exporter:
+    """One format.
+
+    Attributes:
+        describe: Says how `write` lays a source out, for the data card.
+        write: Writes the data files of a source into a directory that exists and is empty. It raises a `ConfigError` if
+            the format does not suit the dataset, a `DatasetError` if an episode is damaged or a file would be too large
+            for the format, and an `OSError` if a file cannot be written.
+        packages: Packages of the extra ``export`` that the format needs, by their names in imports.
+    """
+
+    describe: Callable[[Source], Layout]
+    write: Callable[[Source, Path], None]
+    packages: tuple[str, ...] = ()

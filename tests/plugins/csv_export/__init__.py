@@ -1,0 +1,1 @@
+"""A format of exports: text files with commas."""

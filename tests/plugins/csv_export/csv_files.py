@@ -1,0 +1,35 @@
+"""The table of throws and the time series of each throw, as text with commas."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pyarrow as pa
+from pyarrow.csv import write_csv
+
+from throwcollect.export.exporter import Exporter
+from throwcollect.export.readme import Layout, tabulate_signals
+from throwcollect.export.throw_source import Source
+
+
+def describe(source: Source) -> Layout:
+    """Say how `write` lays a source out."""
+    return Layout(
+        files={"throws.csv": "one row a trial.", "trial_N.csv": "the time series of trial N."},
+        loading='import pandas as pd\n\nthrows = pd.read_csv("throws.csv")',
+        over_time=tabulate_signals(source, columns=True),
+    )
+
+
+def write(source: Source, directory: Path) -> None:
+    """Write a dataset as text; see `Exporter.write`."""
+    write_csv(source.table, directory / "throws.csv")
+    for throw in source.throws(source.entries):
+        columns: dict[str, pa.Array] = {}
+        for signal in source.signals:
+            rows = throw.signals[signal.name].reshape(len(throw), -1)
+            columns |= dict(zip(signal.columns, map(pa.array, rows.T), strict=True))
+        write_csv(pa.table(columns), directory / f"trial_{throw.trial}.csv")
+
+
+CSV = Exporter(describe, write)
