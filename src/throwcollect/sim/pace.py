@@ -35,6 +35,17 @@ def slice_steps(factor: float, hz: int, period: int, phase: int) -> int:
     return steps if steps <= phase else steps - phase
 
 
+def unwatched_steps(factor: float, hz: int, most_s: float) -> int:
+    """Physics steps of one slice while nobody listens, so that no message has to leave on time.
+
+    Args:
+        factor: Simulated over real time [-].
+        hz: Physics steps per simulated second.
+        most_s: Longest simulated time of a slice [s].
+    """
+    return max(1, round(min(_LONGEST_S * factor, most_s) * hz))
+
+
 class Pace:
     """Ends each slice on a schedule that goes on from slice to slice, so that delays do not add up."""
 

@@ -320,6 +320,22 @@ def test_a_real_time_factor_holds_the_clock_back(simulation: Simulation) -> None
     assert told == [1] * 20, "a sample waits for those after it"
 
 
+@pytest.mark.parametrize(("leased", "watched", "samples"), [(True, False, 12), (True, True, 1), (False, False, 1)])
+def test_slices_of_real_time_are_long_where_nobody_waits_for_messages(
+    simulation: Simulation, *, leased: bool, watched: bool, samples: int
+) -> None:
+    if leased:
+        simulation.lease(0, CONFIG, {ARM: swing()})
+    else:
+        trial(simulation)
+    simulation.real_time_factor = 1.0
+    simulation.fresh_samples()
+    simulation.advance(watched=watched)
+    simulation.real_time_factor = None
+    assert len(simulation.fresh_samples()) == samples
+    simulation.end_lease()
+
+
 def test_samples_are_told_one_by_one_also_after_steps_that_ended_between_them(simulation: Simulation) -> None:
     simulation.state = State.PAUSED
     simulation.request_steps(3)
