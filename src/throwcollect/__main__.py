@@ -2,19 +2,12 @@
 
 from __future__ import annotations
 
-import os
-import signal
-from types import FrameType
-from typing import NoReturn
-
-from throwcollect.interruption import stop_signals
+from throwcollect.interruption import leave_when_stopped
 
 
 def main() -> None:
     """Run the command line of this process and exit with its code."""
-    for number in stop_signals():
-        if signal.getsignal(number) is not signal.SIG_IGN:
-            signal.signal(number, _leave)
+    leave_when_stopped()
     from throwcollect.cli.streams import open_streams
     from throwcollect.own_process import claim_process
 
@@ -23,11 +16,6 @@ def main() -> None:
     from throwcollect.cli.main import main as run_command
 
     run_command()
-
-
-def _leave(_number: int, _frame: FrameType | None) -> NoReturn:
-    """End at once: nothing has begun that has to end in order, and a library that loads may ignore exceptions."""
-    os._exit(130)
 
 
 if __name__ == "__main__":

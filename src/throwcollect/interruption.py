@@ -5,6 +5,8 @@ from __future__ import annotations
 import ctypes
 import os
 import signal
+from types import FrameType
+from typing import NoReturn
 
 _PR_SET_PDEATHSIG = 1
 """prctl(2): the signal that a process gets when its parent dies."""
@@ -16,6 +18,20 @@ def stop_signals() -> tuple[signal.Signals, ...]:
     if signal.getsignal(signal.SIGHUP) is signal.SIG_IGN:
         return (signal.SIGINT, signal.SIGTERM)
     return (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+
+
+def leave_when_stopped() -> None:
+    """Have this process end at once when a signal asks for it, as it has begun nothing yet that has to end in order.
+
+    A handler that raises an exception would not do, because a library that is being imported may ignore it.
+    """
+    for number in stop_signals():
+        if signal.getsignal(number) is not signal.SIG_IGN:
+            signal.signal(number, _leave)
+
+
+def _leave(_number: int, _frame: FrameType | None) -> NoReturn:
+    os._exit(130)
 
 
 def die_with_parent(parent: int) -> None:

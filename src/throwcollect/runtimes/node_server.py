@@ -30,7 +30,7 @@ from typing import Any, BinaryIO, NoReturn
 from throwcollect.config import shape
 from throwcollect.config.schema import Config
 from throwcollect.errors import ThrowcollectError
-from throwcollect.interruption import die_with_parent
+from throwcollect.interruption import die_with_parent, leave_when_stopped, stop_signals
 from throwcollect.members import load_member
 from throwcollect.ros.middleware import Middleware
 from throwcollect.runtimes.forked_process import ForkedProcess
@@ -270,6 +270,8 @@ def serve(connection: socket.socket) -> list[str]:
             _prepare_for(json.loads(packet)["configuration"])
             gc.freeze()
             continue
+        # The node may be asked to stop before it has run at all, and Python forgets signals that come while it forks.
+        held = signal.pthread_sigmask(signal.SIG_BLOCK, stop_signals())
         if (pid := os.fork()) == 0:
             # The node is killed without notice: the coordinator could not wait for router and simulations anyway.
             die_with_parent(server)
@@ -278,7 +280,10 @@ def serve(connection: socket.socket) -> list[str]:
             request = json.loads(packet)
             os.environ.update(request["environment"])
             _become_node(logs[0], request["core"])
+            leave_when_stopped()
+            signal.pthread_sigmask(signal.SIG_SETMASK, held)
             return list(request["arguments"])
+        signal.pthread_sigmask(signal.SIG_SETMASK, held)
         os.close(logs[0])
         _send(connection, started=pid)
 

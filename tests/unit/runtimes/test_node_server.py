@@ -87,6 +87,19 @@ def test_nodes_are_processes_like_those_that_are_started_by_themselves(start_the
     assert node.wait(WAIT_S) == 0
 
 
+def test_a_signal_that_comes_with_the_fork_ends_the_node(tmp_path: Path) -> None:
+    # While Python prepares a forked process, it forgets signals that have come, and ignores exceptions of handlers.
+    early = "import os, signal\nos.register_at_fork(after_in_child=lambda: os.kill(os.getpid(), signal.SIGINT))\n"
+    (tmp_path / "sitecustomize.py").write_text(early)
+    server = NodeServer({**ENVIRONMENT, "PYTHONPATH": str(tmp_path)})
+    start = starting(server, tmp_path / "log")
+    try:
+        assert [start("--version").wait(WAIT_S) for _ in range(2)] == [130, 130]
+    finally:
+        server.close()
+    assert (tmp_path / "log").read_text() == ""
+
+
 def test_a_node_that_is_killed_is_told_apart_from_the_others(start_there) -> None:
     killed, other = start_there(*router()), start_there(*router())
     killed.send_signal(signal.SIGKILL)
