@@ -35,7 +35,7 @@ def slice_steps(factor: float, hz: int, period: int, phase: int) -> int:
     return steps if steps <= phase else steps - phase
 
 
-def unwatched_steps(factor: float, hz: int, most_s: float) -> int:
+def long_slice_steps(factor: float, hz: int, most_s: float) -> int:
     """Physics steps of one slice while nobody listens, so that no message has to leave on time.
 
     Args:

@@ -20,7 +20,7 @@ from throwcollect.errors import RequestError, ThrowcollectError
 from throwcollect.robots.description import robot_of, start_posture
 from throwcollect.sim.entities import Entities
 from throwcollect.sim.limb_controller import LimbController
-from throwcollect.sim.pace import Pace, longest_steps, slice_steps, unwatched_steps
+from throwcollect.sim.pace import Pace, long_slice_steps, longest_steps, slice_steps
 from throwcollect.sim.present_trial import PresentTrial, TrialSetup
 from throwcollect.sim.world import World
 
@@ -241,7 +241,7 @@ class Simulation:
             return
         if factor and self.trial.leased and not watched:
             # Every slice costs time besides physics, so there are as few as requests can wait for.
-            steps = unwatched_steps(factor, self.config.sim.physics_hz, _SLICE_S)
+            steps = long_slice_steps(factor, self.config.sim.physics_hz, _SLICE_S)
         elif factor:
             steps = slice_steps(factor, self.config.sim.physics_hz, self._stride, self.world.steps % self._stride)
         self.step(steps)

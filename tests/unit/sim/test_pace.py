@@ -3,7 +3,7 @@
 import pytest
 
 from throwcollect.sim import pace
-from throwcollect.sim.pace import Pace, slice_steps, unwatched_steps
+from throwcollect.sim.pace import Pace, long_slice_steps, slice_steps
 
 
 class Clock:
@@ -45,7 +45,7 @@ def test_a_slice_is_as_long_as_there_is_nothing_to_tell(factor: float, hz: int, 
 
 @pytest.mark.parametrize(("factor", "steps"), [(1.0, 25), (0.2, 5), (0.001, 1), (5.0, 125), (1e300, 250)])
 def test_while_nobody_listens_a_slice_is_as_long_as_requests_can_wait(factor: float, steps: int) -> None:
-    assert unwatched_steps(factor, 500, 0.5) == steps
+    assert long_slice_steps(factor, 500, 0.5) == steps
 
 
 def test_a_slice_ends_with_the_period() -> None:
