@@ -13,12 +13,14 @@ from tests.unit.serve.rosbridge.conftest import PATIENCE_S, wait_for, wait_for_l
 from websockets.exceptions import ConnectionClosedError
 from websockets.sync.client import ClientConnection, connect
 
-from throwcollect.ros import Node, get_message, get_service
+from throwcollect.ros import HistoryPolicy, Node, QoSProfile, get_message, get_service
 from throwcollect.serve.rosbridge import websocket
 from throwcollect.serve.rosbridge.websocket import Outbox
 
 String: Any = get_message("std_msgs/msg/String")
 Trigger: Any = get_service("std_srvs/srv/Trigger")
+WHOLE = QoSProfile(history=HistoryPolicy.KEEP_ALL)
+"""Other publishers drop long messages on the way to the bridge when the machine is busy."""
 
 
 def hear(socket: ClientConnection) -> Any:
@@ -70,7 +72,7 @@ def test_a_frame_that_is_too_long_ends_the_connection(url: str) -> None:
 
 
 def test_who_does_not_read_loses_the_oldest_frames_and_holds_up_nobody(url: str, node: Node) -> None:
-    publisher = node.create_publisher(String, "/many", 10)
+    publisher = node.create_publisher(String, "/many", WHOLE)
     subscribe = json.dumps({"op": "subscribe", "topic": "/many", "type": "std_msgs/String"})
     with connect(url, max_queue=1) as slow, connect(url) as quick:
         for each in (slow, quick):
@@ -96,7 +98,7 @@ def test_who_does_not_read_loses_the_oldest_frames_and_holds_up_nobody(url: str,
 
 def test_memory_for_who_never_reads_is_bounded(url: str, node: Node) -> None:
     """Far more is published than may wait; this process is publisher, bridge and both clients."""
-    publisher = node.create_publisher(String, "/much", 10)
+    publisher = node.create_publisher(String, "/much", WHOLE)
     subscribe = json.dumps({"op": "subscribe", "topic": "/much", "type": "std_msgs/String"})
     process, text, memory = psutil.Process(), "x" * 2**20, []
     with connect(url, max_queue=1, max_size=None) as stalled, connect(url, max_size=None) as quick:
