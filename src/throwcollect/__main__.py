@@ -12,7 +12,9 @@ from throwcollect.interruption import stop_signals
 
 def main() -> None:
     """Run the command line of this process and exit with its code."""
+    # The handlers come before all other imports: these take a while, and Ctrl-C within them would end in a traceback.
     for number in stop_signals():
+        # What is ignored stays ignored: scripts start commands with `&` so that Ctrl-C does not end them, for example.
         if signal.getsignal(number) is not signal.SIG_IGN:
             signal.signal(number, _leave)
     from throwcollect.cli.streams import open_streams

@@ -8,6 +8,7 @@ import signal
 
 _PR_SET_PDEATHSIG = 1
 """prctl(2): the signal that a process gets when its parent dies."""
+# The C library that this process has loaded already; Python itself has no `prctl`.
 _LIBC = ctypes.CDLL(None)
 
 

@@ -168,6 +168,7 @@ class Simulator:
         keys = tuple(trial.values)
         table = ThrowsTable(keys, self.config, tuple(trial.target))
         row = table.row(trial, judge_episode(with_values(self.config, trial.values), episode), None)
+        # The row is made without a place in a shard, from which these two come in a dataset.
         row |= {"samples": episode.header.samples, "digest": episode.digest}
         return Throw(table.table([row]), 0, keys, _Simulated(episode), self._source)
 
