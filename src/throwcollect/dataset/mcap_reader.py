@@ -288,6 +288,7 @@ def map_file(path: Path) -> Iterator[McapContents]:
             # An empty file cannot be mapped.
             data = mmap.mmap(descriptor, 0, access=mmap.ACCESS_READ) if size else b""
         finally:
+            # The mapping keeps the file open by itself.
             os.close(descriptor)
     except OSError as error:
         raise unreadable(path, error) from error
