@@ -169,6 +169,7 @@ def _topics(config: Config, frames: FrameTree) -> dict[int, Topic]:
         topics[_TF_ID] = transforms(frames.moving, robot.joints)
     if "controller_state" in chosen:
         moved = {robot.controller_of(joint) for joint in config.task.end}
+        # All controllers count, so that one has the same number in each dataset, whichever others are recorded.
         for number, name in enumerate(robot.controllers, start=_FIRST_CONTROLLER_ID):
             if name in moved:
                 topics[number] = controller_state(robot, name)
