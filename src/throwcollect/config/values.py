@@ -134,6 +134,7 @@ def _replace(value: Any, change: Any, location: Location) -> Any:
         return change
     if isinstance(value, Section):
         return _change(value, change, location)
+    # A list is changed as a mapping from index to item; of any other value, each part is an unknown key.
     copy: Any = dict(enumerate(value)) if isinstance(value, list) else dict(value) if isinstance(value, dict) else {}
     for part, inner in change.items():
         index = int(part) if isinstance(value, list) and part.isdecimal() else part
