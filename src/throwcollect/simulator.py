@@ -109,6 +109,7 @@ class Simulator:
         }
         if wrong:
             raise ConfigError([Problem(reason, key=name) for name, reason in wrong.items()])
+        # This checks the keys, too, which `make_trials` takes as they are.
         refused = self.find_refusal(point)
         wanted = None if target is None else Targets(tuple(target), _row(target))
         points = Points(tuple(point), _row(point), wanted)
