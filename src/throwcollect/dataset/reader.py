@@ -147,6 +147,7 @@ class Dataset(Sequence[Throw]):
         swept = self.config.sweep.parameters
         bounds: list[Bounds] = []
         for index, key in enumerate(self.plan.keys):
+            # A list of points has keys, and no ranges.
             match swept.get(key):
                 case Range(min=low, max=high):
                     bounds.append((low, high))
