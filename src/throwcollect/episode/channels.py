@@ -73,6 +73,7 @@ class Qos:
         return "- " + "\n  ".join(lines)
 
 
+# Depths are those of ROS 2: 10 is usual, 1 that of latched topics, and 100 that of the broadcaster of tf2_ros.
 _SAMPLED = Qos("volatile", 10)
 _LATCHED = Qos("transient_local", 1)
 _TRANSFORMS = Qos("volatile", 100)
