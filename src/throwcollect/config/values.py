@@ -104,6 +104,7 @@ def _leaves(value: Any, location: Location, key: Key, default: Any) -> Iterator[
     if isinstance(value, Section):
         for name, inner in value.__dict__.items():
             own = key.overlay(key_of_field(type(value), name))
+            # The default may be another task or another family, which need not have this key.
             yield from _leaves(inner, (*location, name), own, getattr(default, name, None))
     elif isinstance(value, dict) and value:
         for name, inner in value.items():
