@@ -176,6 +176,7 @@ class DatasetError(ThrowcollectError):
             path: The file of the bytes; None if the caller does not know it either.
             place: Place of the bytes in the file, which comes before the place of the error in the bytes.
         """
+        # The message is made with the error, so another place makes another error.
         whole = ": ".join(filter(None, (place, self.place)))
         facts = {"expected": self.expected, "evidence": self.evidence, "hint": self.hint}
         return type(self)(self.problem, path=path or self.path, place=whole, **facts)

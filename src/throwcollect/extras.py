@@ -197,6 +197,7 @@ class _LazyModule:
                 if _lacks_library(self._name):
                     raise MissingLibraryError(self._name) from error
                 raise
+        # This is outside of the block above: a missing attribute is an error of the caller, and no missing package.
         value = getattr(module, attribute)
         # The next look-up finds the value in the instance, and does not call this function.
         setattr(self, attribute, value)

@@ -71,6 +71,7 @@ def open_regular(path: Path, flags: int = os.O_RDONLY, *, folder: int | None = N
         OSError: If it cannot be opened; see `unwritable` and `unreadable`.
     """
     descriptor = os.open(path, flags | os.O_NOFOLLOW | os.O_NONBLOCK, 0o666, dir_fd=folder)
+    # The open file is examined, and not its name, which may stand for another file by now.
     status = os.fstat(descriptor)
     wrong = 0 if stat.S_ISREG(status.st_mode) else errno.ENXIO
     if flags & os.O_ACCMODE != os.O_RDONLY and status.st_nlink > 1:
@@ -138,6 +139,7 @@ def beside(path: Path, *, mode: int = 0o666) -> Iterator[int]:
     """
     new = path.with_name(f"{path.name}.new")
     new.unlink(missing_ok=True)
+    # O_EXCL fails if somebody has put a file or a link there since the removal.
     descriptor = os.open(new, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW, mode)
     try:
         try:
@@ -145,6 +147,7 @@ def beside(path: Path, *, mode: int = 0o666) -> Iterator[int]:
         finally:
             os.close(descriptor)
         os.replace(new, path)
+    # Also after Ctrl-C, which is no `Exception`, no half-written file shall stay.
     except BaseException:
         with suppress(OSError):
             new.unlink()
@@ -189,16 +192,19 @@ def new_directory(path: Path) -> Iterator[Path]:
             raise ConfigError(f"{path}: exists", expected="a directory that is new or empty")
         if not path.parent.exists():
             path.parent.mkdir(parents=True)
+        # The directory beside is on the same file system, so one rename can give it its name.
         beside = Path(tempfile.mkdtemp(prefix=f".{path.name}.", dir=path.parent))
     except OSError as error:
         raise unwritable(path, error) from error
     try:
         yield beside
+        # `mkdtemp` lets nobody but the owner in.
         beside.chmod(_DIRECTORY_PERMISSIONS)
         os.rename(beside, path)
     except OSError as error:
         raise unwritable(path, error) from error
     finally:
+        # After the rename, nothing has this name any more.
         shutil.rmtree(beside, ignore_errors=True)
 
 
@@ -246,6 +252,7 @@ def read_text(path: Path, *, most_bytes: int) -> str:
     """
     try:
         with open(open_regular(path), "rb") as file:
+            # One byte more than allowed shows that the file is too large, however large it is.
             data = file.read(most_bytes + 1)
         if len(data) > most_bytes:
             raise DatasetError(f"cannot be read: larger than {most_bytes} bytes", path=path)
@@ -273,6 +280,7 @@ def write_secret(path: Path, data: bytes) -> None:
         DatasetError: If it cannot be written.
     """
     try:
+        # The permissions are set when the file is made, so it can be read by others at no moment.
         with beside(path, mode=0o600) as descriptor:
             write_all(descriptor, data)
     except OSError as error:

@@ -33,6 +33,7 @@ class Heartbeat:
 
     def beat(self) -> None:
         """Touch the file, at most once a second, so that the loop may call this each time."""
+        # Unlike the time of day, this clock cannot be set back, after which no beat would be due for long.
         now = time.monotonic()
         if self._path is not None and now >= self._due:
             self._due = now + _PERIOD_S
@@ -42,6 +43,7 @@ class Heartbeat:
 def is_beating() -> bool:
     """Whether the node of this container has touched its file within the last seconds."""
     try:
+        # Times of files are times of day, so they cannot be compared with the monotonic clock.
         return time.time() - Path(os.environ[VARIABLE]).stat().st_mtime < SILENT_S
     except (KeyError, OSError):
         return False

@@ -10,6 +10,7 @@ from typing import NoReturn
 
 _PR_SET_PDEATHSIG = 1
 """prctl(2): the signal that a process gets when its parent dies."""
+# The C library that this process has loaded already; Python itself has no `prctl`.
 _LIBC = ctypes.CDLL(None)
 
 
@@ -26,6 +27,7 @@ def leave_when_stopped() -> None:
     A handler that raises an exception would not do, because a library that is being imported may ignore it.
     """
     for number in stop_signals():
+        # What is ignored stays ignored: scripts start commands with `&` so that Ctrl-C does not end them, for example.
         if signal.getsignal(number) is not signal.SIG_IGN:
             signal.signal(number, _leave)
 

@@ -88,6 +88,7 @@ def load_member(family: str, name: str) -> Any:
     entry = _table(family)[name]
     if name in _OWN[family]:
         return entry.load()
+    # The table has only one entry for each name, so all packages that bring this name are looked up.
     namesakes = [each for each in entry_points(group=entry.group) if each.name == name]
     what = f"the {family.removesuffix('s')} {name} of {' and '.join(sorted(map(_owner, namesakes)))}"
     if len({each.value for each in namesakes}) > 1:
@@ -164,4 +165,5 @@ def _table(family: str) -> Mapping[str, EntryPoint]:
     group = f"throwcollect.{family}"
     own = {name: EntryPoint(name, path, group) for name, path in _OWN[family].items()}
     others = {entry.name: entry for entry in sorted(entry_points(group=group), key=lambda entry: entry.name)}
+    # No package may replace a member of our own, or a configuration would mean something else where it is installed.
     return MappingProxyType(own | {name: entry for name, entry in others.items() if name not in own})

@@ -79,6 +79,7 @@ def matmul(left: Array, right: Array) -> Array:
     Returns:
         Shape ``(..., n, m)``.
     """
+    # Each step adds one outer product to all elements, which fixes the order of additions within each element.
     product: Array = left[..., :, :1] * right[..., :1, :]
     for inner in range(1, left.shape[-1]):
         product += left[..., :, inner, np.newaxis] * right[..., np.newaxis, inner, :]
@@ -99,6 +100,7 @@ def solve(matrices: Array, right: Array) -> Array:
     rows = np.concatenate([matrices, right], axis=-1)
     for pivot in range(size):
         chosen = rows[..., pivot : pivot + 1, :] / rows[..., pivot : pivot + 1, pivot : pivot + 1]
+        # This turns the pivot's own row into zeros, too, and the next line puts it back.
         rows -= rows[..., :, pivot : pivot + 1] * chosen
         rows[..., pivot : pivot + 1, :] = chosen
     return rows[..., size:]

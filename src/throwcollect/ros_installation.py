@@ -62,9 +62,11 @@ def missing() -> list[str]:
 
 def rmws() -> list[str]:
     """Names of the RMW implementations that are installed, in alphabetical order."""
+    # Setup scripts of ROS set AMENT_PREFIX_PATH; wheels install below the prefix of Python, and set no variable.
     prefixes = [*filter(None, os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep)), sys.prefix]
     index = Path("share", "ament_index", "resource_index", "rmw_typesupport")
     names = {path.name for prefix in prefixes for path in (Path(prefix) / index).glob("rmw_*")}
+    # That package only loads one of the others.
     return sorted(names - {"rmw_implementation"})
 
 
@@ -91,6 +93,7 @@ def how_to_install() -> str:
 
 def module_name(interface: str) -> str:
     """Name of the module of an interface, without its leading underscore: ``SpawnEntity`` is in ``spawn_entity``."""
+    # These are the two substitutions of rosidl_pycommon, with which ROS' own generators name the modules.
     words = re.sub(r"(.)([A-Z][a-z]+)", r"\1_\2", interface)
     return re.sub(r"([a-z0-9])([A-Z])", r"\1_\2", words).lower()
 

@@ -135,6 +135,7 @@ class Signer:
         Raises:
             ConfigError: If its key cannot be read.
         """
+        # The purpose is hashed along, so that the secret for signatures is that of nothing else made of the key.
         return cls(hashlib.sha256(_PURPOSE + _read(key.private_key)).digest())
 
     def sign(self, *parts: bytes | memoryview) -> str:
@@ -146,6 +147,7 @@ class Signer:
 
     def has_signed(self, signature: str, *parts: bytes | memoryview) -> bool:
         """Whether a signature is that of the parts."""
+        # How long `==` takes would tell how many characters of a forged signature are right.
         return hmac.compare_digest(signature.encode(), self.sign(*parts).encode())
 
 
@@ -195,6 +197,7 @@ def _make_pair(secret: bytes | None) -> tuple[bytes, bytes]:
         .not_valid_before(now - _CLOCKS_DIFFER_BY)
         .not_valid_after(now + _LASTS)
         .add_extension(x509.SubjectAlternativeName([x509.DNSName(_NAME)]), critical=False)
+        # The TLS library of Zenoh (rustls) takes no certificate of a CA as that of a peer.
         .add_extension(x509.BasicConstraints(ca=False, path_length=None), critical=True)
         .sign(key, hashes.SHA256())
     )

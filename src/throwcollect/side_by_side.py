@@ -86,6 +86,7 @@ def working_side_by_side(
     if processes <= 1:
         yield _do_here(pieces, begin, arguments)
         return
+    # The calling program may have children of its own, which must not be killed at the end.
     others = set(multiprocessing.active_children())
     # With several threads, new interpreters are started: a fork could wait for ever for a lock of another thread.
     context = multiprocessing.get_context("fork" if fork and threading.active_count() == 1 else "spawn")
@@ -106,6 +107,7 @@ def working_side_by_side(
             f"a process that {doing} was killed", hint="the kernel's log may say why: memory may be short"
         ) from error
     finally:
+        # `shutdown` waits for pieces that are being worked on, so the processes are killed first.
         for process in set(multiprocessing.active_children()) - others:
             process.kill()
         pool.shutdown(cancel_futures=True)

@@ -109,6 +109,7 @@ class Simulator:
         }
         if wrong:
             raise ConfigError([Problem(reason, key=name) for name, reason in wrong.items()])
+        # This checks the keys, too, which `make_trials` takes as they are.
         refused = self.find_refusal(point)
         wanted = None if target is None else Targets(tuple(target), _row(target))
         points = Points(tuple(point), _row(point), wanted)
@@ -168,6 +169,7 @@ class Simulator:
         keys = tuple(trial.values)
         table = ThrowsTable(keys, self.config, tuple(trial.target))
         row = table.row(trial, judge_episode(with_values(self.config, trial.values), episode), None)
+        # The row is made without a place in a shard, from which these two come in a dataset.
         row |= {"samples": episode.header.samples, "digest": episode.digest}
         return Throw(table.table([row]), 0, keys, _Simulated(episode), self._source)
 

@@ -46,6 +46,7 @@ def _printable_line(line: str) -> str:
         line = f"{line[: _LONGEST_LINE // 2]} [...] {line[-_LONGEST_LINE // 2 :]}"
     if line.isprintable():
         return line
+    # `ascii` writes the escape between two quotes.
     return "".join(each if each.isprintable() else ascii(each)[1:-1] for each in line)
 
 

@@ -64,6 +64,7 @@ def _is_own_path(text: str) -> bool:
 def _mount(text: str) -> str:
     source, _, rest = text.partition(":")
     target, _, mode = rest.partition(":")
+    # With `..` in it, the path that is checked would not be the one that is mounted.
     if not (source.startswith("/") and target.startswith("/")) or ".." in text.split("/") or mode not in ("", "ro"):
         raise ValueError(f"should be HOST:CONTAINER or HOST:CONTAINER:ro with absolute paths, got '{text}'")
     if normal_path(source).endswith(_SOCKETS):

@@ -61,6 +61,7 @@ Name = Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9_-]*$", max_length=64)]
 
 
 def _make_text(value: object) -> object:
+    # Not by `isinstance`, as `true` is an `int` in Python.
     return str(value) if type(value) is int else value
 
 

@@ -25,6 +25,7 @@ _PARAMETERS = ("sweep", "parameters")
 _SHALLOWEST_MAPPING = 2
 """Least number of parts in the key of a mapping: keys of the first level are sections or single values."""
 _PLAIN_WORD = re.compile(r"[A-Za-z_][A-Za-z0-9_./-]*")
+# Without quotes, these words are no text: the first three in YAML 1.2, the others for readers of YAML 1.1.
 _NOT_PLAIN = {"true", "false", "null", "yes", "no", "on", "off", "y", "n"}
 
 
@@ -99,6 +100,7 @@ def _find_default(values: dict[str, Any], location: Location) -> Mapping[str, Pl
     """Find the default of a mapping that is no section, such as ``task.end``; empty if there is no such mapping."""
     if len(location) < _SHALLOWEST_MAPPING:
         return {}
+    # Other keys may still be wrong; `_check` puts defaults in their places, and gives None if that does not help.
     holder: Any = _check(values)[0]
     for part in location:
         holder = getattr(holder, str(part), None)
@@ -111,6 +113,7 @@ def _check(values: dict[str, Any]) -> tuple[Config | None, list[Finding], int]:
     Returns:
         The configuration, or None; the findings; and the number of further problems, which are only counted.
     """
+    # What is wrong is removed below, and the caller needs the values of the user.
     values = deepcopy(values)
     robot = _robot_of(values)
     found: list[Finding] = []
@@ -125,6 +128,7 @@ def _check(values: dict[str, Any]) -> tuple[Config | None, list[Finding], int]:
             fresh = findings(error, values)
             more += max(0, error.error_count() - MOST_EXAMINED)
         found += [finding for finding in fresh if not any(_about(finding, location) for location in replaced)]
+        # Two parts are a key in a section; three are a swept key, so that the others stay.
         places = {finding.location[: 3 if finding.location[:2] == _PARAMETERS else 2] for finding in fresh}
         removed = {place for place in places if _remove(values, place)}
         replaced |= places

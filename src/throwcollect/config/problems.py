@@ -93,6 +93,7 @@ def findings(error: ValidationError, values: Any, *, above: Location = (), shape
         # A union reports the errors of every branch. The deepest is of the branch that the user meant.
         found.pop(location, None)
     unknown = [finding for finding in found.values() if finding.unknown]
+    # A misspelt key is also missing under its right name, which is no second mistake.
     meant = {(*finding.location[:-1], _nearest(finding)) for finding in unknown}
     rest = [finding for finding in found.values() if not finding.unknown and finding.location not in meant]
     return [*unknown, *rest]

@@ -200,6 +200,7 @@ class Config(Section):
 
     def _find_contradictions(self) -> Iterator[tuple[str, str]]:
         yield from self._find_strange_joints()
+        # Samples are taken at physics steps, with as many steps between each two.
         if self.sim.physics_hz % self.record.rate_hz:
             yield "record.rate_hz", f"should divide sim.physics_hz, {self.sim.physics_hz}, got {self.record.rate_hz}"
         if isinstance(self.robot.locked, list) and (moving := [j for j in self.robot.locked if j in self.task.end]):

@@ -59,10 +59,12 @@ def any_of(sections: Mapping[str, type[Section]], choose: Callable[[Any], Any]) 
         choose: Finds that name in the value; anything else is an error.
     """
     kinds = list(dict.fromkeys(sections.values()))
+    # Pydantic takes a discriminator for unions alone.
     if len(kinds) == 1:
         return kinds[0]
 
     def find_tag(value: Any) -> str | None:
+        # Defaults, and sections that are validated again as a part of another, are objects already.
         if isinstance(value, Section):
             return type(value).__name__
         name = choose(value)

@@ -59,6 +59,7 @@ class Shape:
         for shape in self.alternatives:
             rest = shape.node.get("items" if isinstance(part, int) else "additionalProperties")
             if node := shape.node.get("properties", {}).get(part) or rest:
+                # The numbers of a mapping or a list have the unit of the key that holds it, such as angles by joint.
                 inherited = self.unit if node.get("type") in ("number", "array", "object") else ""
                 return Shape(_resolve(node), node.get("unit") or unit_of_name(str(part)) or inherited)
         return Shape({})
@@ -93,6 +94,7 @@ def _resolve(node: dict[str, Any]) -> dict[str, Any]:
     if "$ref" not in node:
         return node
     target = json_schema()["$defs"][node["$ref"].rpartition("/")[2]]
+    # What stands beside a reference belongs to the key, such as its default, and wins.
     return {**target, **{key: value for key, value in node.items() if key != "$ref"}}
 
 

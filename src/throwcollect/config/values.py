@@ -104,6 +104,7 @@ def _leaves(value: Any, location: Location, key: Key, default: Any) -> Iterator[
     if isinstance(value, Section):
         for name, inner in value.__dict__.items():
             own = key.overlay(key_of_field(type(value), name))
+            # The default may be another task or another family, which need not have this key.
             yield from _leaves(inner, (*location, name), own, getattr(default, name, None))
     elif isinstance(value, dict) and value:
         for name, inner in value.items():
@@ -134,6 +135,7 @@ def _replace(value: Any, change: Any, location: Location) -> Any:
         return change
     if isinstance(value, Section):
         return _change(value, change, location)
+    # A list is changed as a mapping from index to item; of any other value, each part is an unknown key.
     copy: Any = dict(enumerate(value)) if isinstance(value, list) else dict(value) if isinstance(value, dict) else {}
     for part, inner in change.items():
         index = int(part) if isinstance(value, list) and part.isdecimal() else part

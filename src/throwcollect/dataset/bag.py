@@ -86,6 +86,7 @@ def bag_information(
             }
             for channel in channels
         ],
+        # This means rosbag2's own compression, of messages or files, and not that of the chunks in MCAP files.
         "compression_format": "",
         "compression_mode": "",
         "relative_file_paths": [file.path for file in files],
@@ -180,7 +181,9 @@ def _name_nearby(directory: Path) -> str | None:
 def to_yaml(data: Mapping[str, Any]) -> str:
     """Encode a mapping as YAML in block style, with the keys in their order."""
     yaml = YAML()
+    # By default, long values would be broken at 80 characters.
     yaml.width = 4096
+    # A mapping that occurs twice, such as an infinite duration, would become an alias, which `from_yaml` refuses.
     yaml.representer.ignore_aliases = lambda *_: True
     stream = io.StringIO()
     yaml.dump(data, stream)

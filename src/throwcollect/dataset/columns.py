@@ -203,11 +203,13 @@ def fill(
     Raises:
         DatasetError: Whatever `tables` raises.
     """
+    # Times follow from stamps, and velocities in world from orientations, so these are read even if nobody asks.
     lengths, known = [place.samples for place in throws], throws[0].joints
     velocities = [name for name in BALL_VELOCITIES if name in columns]
     needed = {TIMES: STAMPS, **dict.fromkeys(velocities, BALL_ORIENTATION)}
     missing = {source for name, source in needed.items() if name in columns} - columns.keys()
     recorded = {**columns, **empty_columns(missing, sum(lengths), len(known))}
+    # Whole columns are copied as bytes; those of only some joints go through `every`, out of which `take` picks them.
     chosen = [] if joints == known else [name for name in JOINT_COLUMNS if name in columns]
     targets = [(view_as_bytes(recorded[name]), name) for name in recorded if name != TIMES and name not in chosen]
     indexes = np.array([known.index(joint) for joint in joints], np.intp)
@@ -219,6 +221,7 @@ def fill(
             target[span] = rows[name]
         for name in chosen:
             view_as_bytes(every)[: len(rows)] = rows[name]
+            # With the default mode, NumPy would write to a buffer first. All indexes are valid, so nothing is clipped.
             np.take(every[: len(rows)], indexes, axis=1, out=columns[name][span], mode="clip")
         filled += len(rows)
         del rows  # the next ones then take its place in the caches

@@ -29,6 +29,7 @@ def create(directory: Path, plan: Plan, *, listed: Points | None = None) -> None
         DatasetError: If the files cannot be written; nothing is left behind then.
     """
     try:
+        # A directory that the user made before is left in place if this fails.
         made = not directory.exists()
         directory.mkdir(parents=True, exist_ok=True)
     except (OSError, RecursionError) as error:
@@ -66,6 +67,7 @@ def _fill(directory: Path, plan: Plan, listed: Points | None, *, made: bool) -> 
         if listed is not None:
             write_file(directory / TRIALS, encode_points(listed))
         plan.write(directory / PLAN)
+        # Everything is written, so nothing is undone.
         undo.pop_all()
 
 

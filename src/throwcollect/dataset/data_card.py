@@ -99,6 +99,7 @@ def _limits(engine: str) -> str:
 
 def _ranges(config: Config, throws: pa.Table) -> list[str]:
     rows = []
+    # Only swept keys have dots.
     for name in (name for name in throws.column_names if "." in name):
         limits = pc.min_max(throws[name]).as_py()
         rows.append(f"| `{name}` | {limits['min']:g} | {limits['max']:g} |")

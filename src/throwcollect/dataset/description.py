@@ -47,6 +47,7 @@ def write_description(
     digest = combine_digests(_digests(throws, on_piece), read_targets(throws))
     custom = {"throwcollect.format": FORMAT, "throwcollect.digest": digest}
     bag = bag_information([summary for summary, _ in recordings], channels.all, custom)
+    # The manifest covers metadata.yaml, which is written after it, so the entry is made of these bytes.
     metadata = to_yaml({"rosbag2_bagfile_information": bag}).encode()
     with replacing(directory / THROWS) as descriptor:
         waiting = bytearray()

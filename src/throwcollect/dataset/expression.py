@@ -151,6 +151,7 @@ class _Evaluation:
             case ast.Name() | ast.Attribute() | ast.Subscript():
                 return self._column(node)
             case ast.BoolOp():
+                # As in SQL, `null and False` is false, and `null or True` is true.
                 combine = pc.and_kleene if isinstance(node.op, ast.And) else pc.or_kleene
                 return _Value("a condition", reduce(combine, [self._of(part, "a condition") for part in node.values]))
             case ast.UnaryOp(op=ast.Not()):
@@ -180,10 +181,12 @@ class _Evaluation:
 
     def _constant(self, node: ast.Constant) -> _Value:
         match node.value:
+            # This comes before numbers, as True is an `int` in Python.
             case bool():
                 return _Value("a condition", pa.scalar(node.value))
             case int() | float():
                 try:
+                    # Whole numbers, too: Arrow's division of integers drops the remainder, and fails at 0.
                     return _Value("a number", pa.scalar(float(node.value)))
                 except OverflowError as error:
                     raise self._error(node, "too large a number") from error
@@ -218,6 +221,7 @@ class _Evaluation:
     def _comparison(self, node: ast.Compare) -> _Value:
         parts = []
         operands = [node.left, *node.comparators]
+        # `a < b < c` is `a < b and b < c`, as in Python.
         for left, operator, right in zip(operands, node.ops, operands[1:], strict=False):
             if isinstance(operator, ast.In | ast.NotIn):
                 found = self._membership(left, right)

@@ -54,6 +54,7 @@ def summary(dataset: Dataset) -> Info:
         wanted=dataset.config.until.wanted if dataset.config.until else None,
         landing=_find_landing_area(dataset.throws) if dataset.config.task.throws else None,
         samples=samples,
+        # An episode of n samples lasts n - 1 intervals.
         duration_s=(samples - episodes) / dataset.config.record.rate_hz,
         shards=len(shards),
         size_bytes=sum(sizes.values()),

@@ -95,10 +95,12 @@ def _take(directory: Path, part: Plan, slice: Slice, writer: DatasetWriter) -> N
         )
     throws = read_throws(place, part)
     per_shard = part.config.record.trials_per_shard
+    # A slice consists of whole shards, so each of these trials is the first of one.
     for first in part.trials.numbers[::per_shard]:
         number = first // per_shard
         name = shard_name(part.config.name, number)
         entry = entries.get(name)
+        # A shard of which all trials were refused or lost has no file.
         recording = None if entry is None else (_move(place / name, directory / name, entry), entry)
         writer.take_shard(number, recording, throws.slice(first - part.trials.first, per_shard))
 
@@ -117,6 +119,7 @@ def _move(source: Path, target: Path, entry: FileEntry) -> FileSummary:
     try:
         with open(open_regular(target), "rb") as file:
             size = os.fstat(file.fileno()).st_size
+            # To hash it again would mean to read all recordings of the dataset in one process.
             if size != entry.bytes:
                 raise DatasetError(f"has {size} bytes", path=target, expected=f"{entry.bytes}, as its slice says")
             summary = make_reader(file).get_summary()

@@ -134,6 +134,7 @@ def read_commits(
         with open(open_log(path, os.O_RDONLY), "rb") as file:
             file.seek(first)
             data = file.read(most_bytes)
+            # One byte more tells whether another part follows.
             rest = file.read(1)
     except FileNotFoundError:
         return [], first, False

@@ -49,6 +49,7 @@ def hold_lock(directory: Path, *, alone: bool = True, needed: bool = True) -> It
         DatasetError: If another process changes it, or it cannot be locked.
     """
     try:
+        # A directory cannot be opened for writing, and flock does not ask for that.
         descriptor = os.open(directory, os.O_RDONLY | os.O_DIRECTORY)
     except OSError as error:
         raise unreadable(directory, error) from error
@@ -56,6 +57,7 @@ def hold_lock(directory: Path, *, alone: bool = True, needed: bool = True) -> It
         lock(descriptor, directory, alone=alone, needed=needed)
         yield
     finally:
+        # This also releases the lock.
         os.close(descriptor)
 
 

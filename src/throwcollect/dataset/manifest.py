@@ -107,6 +107,7 @@ class RunningHash:
     def _hand_over(self) -> None:
         if self._pool is None:
             self._pool = ThreadPoolExecutor(1)
+        # Blocks are hashed in order, and while one is, at most one other is held in memory.
         if self._running is not None:
             self._running.result()
         self._running = self._pool.submit(self._add, self._held)
@@ -158,6 +159,7 @@ def read_named_manifest(directory: Path) -> tuple[str, tuple[FileEntry, ...]]:
         name, entries = str(document["name"]), tuple(map(_entry, document["resources"]))
     except (ValueError, KeyError, TypeError, RecursionError) as error:
         raise DatasetError("is not the manifest of a dataset", path=path) from error
+    # No digest covers the manifest itself, so a changed byte of it shows only by this comparison.
     if text != manifest_text(name, entries) or len({entry.path for entry in entries}) < len(entries):
         raise DatasetError("is not written as the manifest of a dataset is", path=path)
     return name, entries
@@ -230,6 +232,7 @@ def _entry(resource: Any) -> FileEntry:
     path, size, digest = resource["path"], resource["bytes"], str(resource["hash"]).removeprefix(_HASH)
     if not isinstance(path, str) or not _NAME.fullmatch(path):
         raise ValueError(path)
+    # Not by `isinstance`, as `true` is an `int` in Python.
     if type(size) is not int or not is_digest(digest):
         raise ValueError(size, digest)
     return FileEntry(path, size, digest)

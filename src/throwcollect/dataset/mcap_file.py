@@ -43,6 +43,7 @@ def declarations(channels: Sequence[Channel]) -> tuple[list[records.Schema], lis
     types = list(dict.fromkeys(channel.type_name for channel in channels))
     schemas = [
         records.Schema(id=number, data=message_definition(name).encode(), encoding="ros2msg", name=name)
+        # In MCAP, schema 0 means no schema.
         for number, name in enumerate(types, start=1)
     ]
     return schemas, [
@@ -193,6 +194,7 @@ class McapFile:
         bag = encode_records(records.Metadata(BAG, metadata))
         self._metadata_indexes.append(records.MetadataIndex(self.size, len(bag), BAG))
         self._put(bag)
+        # This CRC covers everything from the first byte of the file to this record (MCAP specification, Data End).
         self._put(encode_records(records.DataEnd(self._crc)))
         self._put(self._encode_summary_section(summary) + MAGIC)
         return summary
@@ -226,6 +228,7 @@ class McapFile:
             offset += len(part)
             parts.append(part)
         contents = b"".join((*parts, encode_records(*offsets)))
+        # The CRC of the summary also covers the footer up to the CRC itself (MCAP specification, Footer).
         footer = struct.pack("<BQQQ", Opcode.FOOTER, 8 + 8 + 4, self.size, offset)
         crc = zlib.crc32(footer, zlib.crc32(contents))
         return contents + encode_records(records.Footer(self.size, offset, crc))
@@ -245,6 +248,7 @@ def encode_latched_run(channels: Channels, stamp_ns: int) -> Run:
     starts = itertools.accumulate(map(len, messages), initial=0)
     indexes = {
         channel.id: encode_message_index(channel.id, np.array([stamp_ns], np.uint64), np.array([start]))
+        # `starts` has the end of the last message, too.
         for channel, start in zip(channels.latched, starts, strict=False)
     }
     contents = b"".join(messages)

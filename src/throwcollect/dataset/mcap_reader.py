@@ -60,6 +60,7 @@ class Record(NamedTuple):
     @property
     def kind(self) -> str:
         """Its kind in words."""
+        # Before Python 3.12, to look for a number in the enumeration itself is an error.
         return Opcode(self.opcode).name.lower() if self.opcode in set(Opcode) else f"record 0x{self.opcode:02x}"
 
     def parse(self, kind: _Kind[_R]) -> _R:
@@ -288,6 +289,7 @@ def map_file(path: Path) -> Iterator[McapContents]:
             # An empty file cannot be mapped.
             data = mmap.mmap(descriptor, 0, access=mmap.ACCESS_READ) if size else b""
         finally:
+            # The mapping keeps the file open by itself.
             os.close(descriptor)
     except OSError as error:
         raise unreadable(path, error) from error

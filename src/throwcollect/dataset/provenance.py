@@ -139,6 +139,7 @@ def _read_revision() -> str | None:
         return None
     # The configuration of a foreign clone may name programs that git would run.
     words = ["git", "-C", str(root), "-c", "core.fsmonitor=false", "describe"]
+    # Without tags, `--always` gives the whole hash of the revision.
     words += ["--always", "--abbrev=40", "--dirty", "--exclude=*"]
     with suppress(OSError, subprocess.SubprocessError):
         said = subprocess.run(words, capture_output=True, text=True, timeout=_GIT_S, check=True)

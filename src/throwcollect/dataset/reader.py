@@ -132,6 +132,7 @@ class Dataset(Sequence[Throw]):
         """Its configuration; that of a single trial has `Throw.parameters` in it."""
         return self.plan.config
 
+    # Type checkers would take any attribute for known if they saw this function.
     if not TYPE_CHECKING:
 
         def __getattr__(self, name: str) -> Any:
@@ -146,6 +147,7 @@ class Dataset(Sequence[Throw]):
         swept = self.config.sweep.parameters
         bounds: list[Bounds] = []
         for index, key in enumerate(self.plan.keys):
+            # A list of points has keys, and no ranges.
             match swept.get(key):
                 case Range(min=low, max=high):
                     bounds.append((low, high))
@@ -376,6 +378,7 @@ def _as_array(which: Any) -> pa.Array:
         values = which if isinstance(which, pa.Array) else pa.array(which if hasattr(which, "__len__") else list(which))
     except (pa.ArrowException, TypeError) as error:
         raise ConfigError(f"select: {error}", expected=_SELECTION) from error
+    # An empty list becomes an array of the type null, which is neither boolean nor integer.
     if not len(values):
         return pa.array([], pa.int64())
     if not (pa.types.is_boolean(values.type) or pa.types.is_integer(values.type)):

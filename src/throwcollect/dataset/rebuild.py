@@ -127,6 +127,7 @@ def _rebuild(directory: Path) -> Rebuilt:
     config = _read_config(directory)
     repair = command("dataset", "repair", directory, "OUTPUT")
     plan = _read_plan(directory, config, repair)
+    # This comes before `*.part` is looked for: earlier versions called an unfinished plan so, and it can be removed.
     remove_unfinished(directory)
     if unfinished := sorted(path.name for path in directory.glob("*.part")):
         raise DatasetError(
@@ -143,6 +144,7 @@ def _rebuild(directory: Path) -> Rebuilt:
     recordings = _Recordings(plan)
     for name in list_shards(plan):
         if (directory / name).exists():
+            # A new table and a new manifest would make the damage look as if it had been collected.
             if findings := recordings.read(directory / name):
                 raise DatasetError(str(findings[0]), path=directory, hint=repair)
         # A file that no row names may be missing: all of its trials were refused, or lost.

@@ -61,6 +61,7 @@ class RecordedTrial:
         """The step that ends at an instant [ns]; None if none of the trial does."""
         hz = self.config.sim.physics_hz
         step = round((instant_ns - self.header.start_ns) * hz / NS_PER_S)
+        # The simulation's clock is rounded down like this, so a true instant of a step is hit to the nanosecond.
         on_step = self.header.start_ns + step * NS_PER_S // hz == instant_ns
         return step if on_step and 0 <= step <= self.last_step else None
 

@@ -113,6 +113,7 @@ def find_left(parts: Sequence[Part], channels: Channels, *, processes: int = 1) 
 def _look_with(channels: Channels) -> Callable[[Part], LeftOfShard]:
     def look(part: Part) -> LeftOfShard:
         final = find_episodes(part.path, part.plan, channels)
+        # Only a file with an episode of each trial can be finished, so others are not compared byte by byte.
         if part.settled and final and final.keys() == set(part.plan.trials.numbers_to_run):
             finished = _check_finished(part.path, channels, final)
             if finished is not None:
@@ -136,6 +137,7 @@ def recover_shard(shard: OpenShard, left: LeftOfShard) -> list[RecoveredEpisode]
     if left.finished is not None:
         remove(shard.part)
         return [final[trial] for trial in sorted(final)]
+    # `adopt` cuts off what follows the last episode, so a final file can become the unfinished one as it is.
     if final and not begun:
         try:
             os.replace(shard.path, shard.part)
@@ -146,11 +148,13 @@ def recover_shard(shard: OpenShard, left: LeftOfShard) -> list[RecoveredEpisode]
         shard.adopt({trial: (found.place.chunk_offset, found.run) for trial, found in begun.items()})
     else:
         remove(shard.part)
+    # Both files have episodes if an earlier process was killed before it had removed one of them.
     only_final = {trial: found for trial, found in final.items() if trial not in begun}
     if only_final:
         with map_file(shard.path) as contents:
             for found in only_final.values():
                 shard.append(contents.episode(found.place.chunk_offset).episode)
+    # The final file goes last: if this process is killed before, the next one finds these episodes in it again.
     remove(shard.path)
     episodes = {**begun, **only_final}
     return [episodes[trial] for trial in sorted(episodes)]
@@ -195,6 +199,7 @@ def _check_finished(path: Path, channels: Channels, episodes: Mapping[int, Recov
 
         def compare(data: bytes) -> None:
             nonlocal written, same
+            # After a difference, the rest is only counted: the writer that calls this cannot be stopped from here.
             same = same and contents.slice(written, written + len(data)) == data
             written += len(data)
 

@@ -237,6 +237,7 @@ class _Sorting:
             for found in scan_whole(path):
                 self._take(path.name, found)
         except DatasetError as error:
+            # An error of the new dataset, such as a full disk, is no damage of this file.
             if error.path != path:
                 raise
             self.remarks.append(str(error.locate(Path(path.name))))
@@ -285,6 +286,7 @@ class _Sorting:
             if trial.refused is not None or trial.number in self.taken:
                 continue
             reason = reason_lost(earlier.get(trial.number))
+            # A trial that the collection itself had lost keeps its reason, and is not reported as lost by the damage.
             if reason is None:
                 reason = self.rejected.get(trial.number, "no whole episode of it was left")
                 lost.append(LostTrial(trial.number, reason))

@@ -52,6 +52,7 @@ class _NamelessFile:
     def _write(self, data: pa.Buffer | bytes) -> None:
         try:
             if self._file is None:
+                # It lies beside the dataset, as the directory for temporary files may be in memory.
                 self._file = tempfile.TemporaryFile(dir=self._path.parent, buffering=0)  # noqa: SIM115
             write_all(self._file.fileno(), data)
         except OSError as error:
@@ -136,6 +137,7 @@ class RowStore:
         if chunks[0].type == pa.string():
             places.insert(0, self._by_columns.append([pa.py_buffer(np.concatenate(ends))]))
         all_valid = np.concatenate(valid)
+        # Arrow has one bit a row, the lowest bit of a byte first, and leaves the bitmap out where nothing is null.
         bits = None if all_valid.all() else pa.py_buffer(np.packbits(all_valid, bitorder="little"))
         return (None if bits is None else self._by_columns.append([bits]), *places)
 
@@ -167,6 +169,7 @@ class Digests(Mapping[int, str]):
         Raises:
             KeyError: If it has none.
         """
+        # Trials are in order, so this needs no table of places in memory.
         place = int(np.searchsorted(self._trials, trial))
         if place == len(self) or self._trials[place] != trial:
             raise KeyError(trial)

@@ -57,6 +57,7 @@ def scan(contents: McapContents, start: int = 0) -> Iterator[Found]:
         start: Where to begin [bytes].
     """
     effort = _EFFORT * len(contents)
+    # The place of the next metadata of an episode: looked up once for all chunks before it; -1 if there is none.
     facts = 0
     offset = contents.next_chunk(start)
     while offset >= 0 and effort > 0:
@@ -67,6 +68,7 @@ def scan(contents: McapContents, start: int = 0) -> Iterator[Found]:
         if found is not None:
             yield found
         if found is None or found.damage is not None:
+            # The effort counts the bytes that were read, and those that were decompressed from them at most.
             size = Chunk.parse(record.data).uncompressed_size
             effort -= len(record.data) + min(size, MOST_RATIO * len(record.data))
         whole = found is not None and found.damage is None
@@ -92,6 +94,7 @@ def _find(contents: McapContents, first: Record, facts: int) -> Found | None:
         stored, readable = contents.episode(first.offset), True
     except DatasetError:
         try:
+            # The records around the chunk may be damaged, while the chunk and the metadata behind it are not.
             stored, readable = _gather(contents, first, contents.record(facts)), False
             stored.check_whole()
         except DatasetError:
@@ -113,6 +116,7 @@ def _gather(contents: McapContents, first: Record, facts: Record) -> StoredEpiso
     """
     chunks = [StoredChunk(first, {})]
     said = facts.parse(records.Metadata).metadata
+    # A forged file may name any number of hashes.
     for _ in said.get(SENSORS_SHA256, "").split()[:MOST_CHUNKS]:
         offset = contents.next_chunk(chunks[-1].record.end)
         if not 0 <= offset < facts.offset:

@@ -142,6 +142,7 @@ class OpenShard:
             if self._descriptor is None:
                 self._descriptor = open_regular(self.part, os.O_RDWR | os.O_CREAT | os.O_EXCL)
             if not start:
+                # To make it writes the beginning of the file, and an unfinished file needs no more of it.
                 McapFile(self._write, self._channels, start_ns=episode.chunk.start_ns)
             offset = self._size
             self._write(run.data)
@@ -166,6 +167,7 @@ class OpenShard:
             self.close()
             self.part.unlink(missing_ok=True)
             return FinishedShard(None, {})
+        # The final file is on the disk before the unfinished one is removed, so no moment is without all episodes.
         with replacing(self.path) as descriptor:
             write = partial(write_all, descriptor)
             finished = write_in_order(write, self._channels, self._runs, self._read, name=self.path.name)

@@ -85,6 +85,7 @@ def take_recordings(earlier: Sequence[Path], attempt: Path) -> None:
         DatasetError: If something cannot be copied.
     """
     most: dict[str, Path] = {}
+    # The longest copy comes last, and takes the place of the shorter ones.
     for path in sorted((each / name for each in earlier for name in _list(each)), key=_how_much):
         if path.name.endswith((SHARD_SUFFIX, _UNFINISHED)):
             most[path.name.removesuffix(".part")] = path
@@ -142,6 +143,7 @@ def publish(attempt: Path, directory: Path, slice: Slice) -> bool:
         for name in (*shards, THROWS, MANIFEST):
             _move(attempt / name, packed / name)
         try:
+            # A rename replaces no directory with files in it, so the first attempt wins.
             packed.rename(place)
             first = True
         except OSError:
@@ -157,6 +159,7 @@ def publish(attempt: Path, directory: Path, slice: Slice) -> bool:
 
 def _move(source: Path, target: Path) -> None:
     """Rename a file, or copy it where it lies on another file system; then it is on disk before this returns."""
+    # A rename to another file system fails, and then the file is copied below.
     with suppress(OSError):
         os.rename(source, target)
         return

@@ -263,6 +263,7 @@ class Throw:
             text += f" at x = {x:.3f} m, y = {y:.3f} m after {landing.time_s:.3f} s"
         return f"{text}; {self._episode.samples} samples)" if self._episode else f"{text}; not recorded)"
 
+    # Type checkers would take any attribute for known if they saw this function.
     if not TYPE_CHECKING:
 
         def __getattr__(self, name: str) -> Any:

@@ -61,6 +61,7 @@ def _describe_swept(key: str) -> pa.Field:
 def name_alias(key: str) -> str:
     """Name of a swept key without dots and with its unit at the end, for SQL and formulas."""
     name = key.replace(".", "_")
+    # The unit is written as names of keys have it: m/s² is mps2.
     unit = unit_of_key(key).replace("/", "p").replace("²", "2").replace("³", "3").replace(" ", "")
     return name if not unit or unit_of_name(key) else f"{name}_{unit.lower()}"
 
@@ -177,6 +178,7 @@ def read_throws_table(path: Path, plan: Plan) -> pa.Table:
     expected = ThrowsTable.of(plan)
     lacking = expected.later - set(table.schema.names)
     schema = pa.schema([field for field in expected.schema if field.name not in lacking])
+    # Metadata are not compared: descriptions of columns may have been worded otherwise when the table was written.
     if not table.schema.equals(schema):
         wrong = sorted(set(table.schema.names) ^ set(schema.names)) or "types of columns"
         raise DatasetError(f"not the table of this plan: differs in {wrong}", path=path)

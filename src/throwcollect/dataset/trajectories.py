@@ -64,6 +64,7 @@ class Trajectories:
         """
         if isinstance(which, str):
             return self.columns[which]
+        # A range takes negative positions, and raises the IndexError.
         number = range(len(self))[which]
         rows = slice(self.offsets[number], self.offsets[number + 1])
         return {name: column[rows] for name, column in self.columns.items()}
@@ -87,6 +88,7 @@ class Trajectories:
         values, lengths = self.columns[column], self.lengths
         longest = int(lengths.max(initial=0))
         padded = np.full((len(self), longest, *values.shape[1:]), fill)
+        # The chosen places are filled row by row, and in this order the samples lie in `values`.
         padded[np.arange(longest) < lengths[:, np.newaxis]] = values
         return padded
 

@@ -36,6 +36,7 @@ def load(directory: StrPath) -> Dataset:
         UnfinishedDatasetWarning: If it is not finished.
     """
     path = Path(directory)
+    # Of a directory that is no dataset at all, `open` says what is wrong.
     if is_there(path / METADATA) or not is_there(path / PLAN):
         return Dataset.open(path)
     plan = Plan.read(path / PLAN, load_config(config_path(path)))

@@ -81,6 +81,7 @@ def verify(
             raise
         findings.append(Finding.of(METADATA, error))
     tables = check_tables(directory)
+    # Other processes check the recordings, while this one hashes files and draws the plan again.
     with _checking_shards(directory, tables, processes, say) as reports:
         findings += find_manifest_problems(directory, tables.config.name if tables.config else None)
         findings += tables.findings
@@ -191,6 +192,7 @@ def _trials_by_file(directory: Path, tables: Tables) -> dict[str, list[int]] | N
         return None
     names, expected = _list_shards(directory), dict[str, list[int]]()
     refused = tables.plan.trials.refused
+    # The table may have rows of trials that the plan has not, and lack others.
     for trial in sorted({*range(len(tables.plan.trials)), *tables.rows}):
         name, row = shard_of(tables.plan, trial), tables.rows.get(trial)
         # If the row of a trial is missing, its episode is most likely in its file all the same.

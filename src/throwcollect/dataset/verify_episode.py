@@ -39,6 +39,7 @@ class _TrialsOf:
     def __init__(self, plan: Plan) -> None:
         self.plan = plan
         self.table = ThrowsTable.of(plan)
+        # One trial is enough, as all checks of an episode come before those of the next one.
         self.trial = lru_cache(maxsize=1)(plan.trial)
         self.config = lru_cache(maxsize=1)(lambda number: plan.config_of(self.trial(number)))
         self.trajectory = lru_cache(maxsize=1)(lambda number: task_of(self.config(number)).trajectory())
@@ -233,6 +234,7 @@ def _find_stamp_problems(episode: Episode, samples: Samples, config: Config) -> 
     if stamps[0] != config.trial_start_ns(header.trial):
         yield f"starts at {stamps[0]} ns, the trial's slot of time at {config.trial_start_ns(header.trial)} ns"
     steps = np.diff(stamps)
+    # Stamps are whole nanoseconds, so their distances may differ by one.
     if len(steps) and np.abs(steps - NS_PER_S / config.record.rate_hz).max() > 1:
         yield f"stamps are not spaced by 1/{config.record.rate_hz} s: {steps.min()} to {steps.max()} ns"
 

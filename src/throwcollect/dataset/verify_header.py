@@ -47,6 +47,7 @@ def _find_contact_problems(trial: RecordedTrial, bodies: Collection[str] | None)
         if interval is None:
             yield f"{what} to {contact.end_ns} ns does not begin and end, in this order, on physics steps of the trial"
         else:
+            # In the step at which a contact ends, the body is not touched, so the next one begins later.
             if interval[0] <= ends.get(contact.body, -1):
                 yield f"{what} begins before the one before it has ended"
             ends[contact.body] = interval[1]
@@ -74,11 +75,13 @@ def _find_goal_problems(trial: RecordedTrial) -> Iterator[str]:
 
 def _find_end_problems(trial: RecordedTrial) -> Iterator[str]:
     samples, header, config = trial.samples, trial.header, trial.config
+    # The bounds and conditions here are those by which `World` in `sim` ends a trial.
     last = len(samples) - 1
     most = math.ceil(math.ceil(config.sim.max_trial_s * config.sim.physics_hz) / trial.stride)
     if last > most:
         yield f"has {last + 1} samples; the longest trial has {most + 1}"
     height = samples.ball_position[:, 2] - config.scene.landing_height_m - config.ball.radius_m
+    # A ball that lies in the tool may be carried through the plane, which is no landing.
     held = trial.find_pressed([contact for contact in header.contacts if contact.body == config.tool.name])
     crossings = np.flatnonzero((height[1:] < 0) & (height[:-1] >= 0) & ~held[1:]) + 1
     if len(crossings) and crossings[0] < last:

@@ -84,6 +84,7 @@ def _where_motors_should_be(trial: RecordedTrial) -> NDArray[np.float64]:
         times = (trial.times_s - config.sim.command_delay_s) * speed
         return sample_positions(trajectory, np.maximum(times, 0.0))
     stride = hz // config.record.rate_hz
+    # The lag acts in each physics step, so all steps are computed, and those of the samples chosen from them.
     times = (np.arange(1, stride * (len(trial.samples) - 1) + 1) / hz - config.sim.command_delay_s) * speed
     start = sample_positions(trajectory, np.zeros(1))
     reached = lag_behind(sample_positions(trajectory, np.maximum(times, 0.0)), start[0], hz=hz, lag_s=lag_s)
@@ -108,6 +109,7 @@ def find_ball_problems(trial: RecordedTrial) -> Iterator[str]:
     """
     samples = trial.samples
     off_unit = np.abs(_measure_lengths(samples.ball_orientation_xyzw) - 1).max()
+    # Unlike `>`, `not <=` is true of NaN, too.
     if not off_unit <= _UNIT:
         yield f"the ball's orientation is no unit quaternion: its length is off by {off_unit:.3g}"
         return
@@ -144,6 +146,7 @@ def _find_intervals(contact: tuple[int, int], trial: RecordedTrial) -> tuple[int
     Interval k has the steps after sample k, up to and with that of sample k + 1.
     """
     stride = trial.stride
+    # Step 0 is the first sample itself and in no interval, so a contact counts from step 1 on.
     first, end = max(contact[0], 1), max(contact[1], 2)
     last = trial.last_step // stride
     touched = slice((first - 1) // stride, min(last, (end - 2) // stride + 1))
@@ -193,6 +196,7 @@ def _turn(orientation: NDArray[np.float64], spin: NDArray[np.float64], duration_
     axis = spin * (duration_s / 2 * np.sinc(half / np.pi))
     vector, scalar = orientation[:, :3], orientation[:, 3:]
     turn = np.cos(half)
+    # This is the product of two quaternions, that of the turn and the orientation.
     turned = turn * vector + scalar * axis + np.cross(axis, vector)
     return np.hstack([turned, turn * scalar - _multiply_rows(axis, vector)[:, np.newaxis]])
 

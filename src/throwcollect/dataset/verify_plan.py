@@ -82,6 +82,7 @@ def find_refusal_problems(plan: Plan, doubtful: Collection[int], check_of: Check
     """
     refused = plan.trials.refused
     others = [number for number in plan.trials.numbers if number not in refused]
+    # Each verification checks the same ones again, so that two of them agree.
     chosen = np.random.default_rng(plan.config.seed).permutation(len(others))[:CHECKED_AGAIN]
     check = check_of(plan.config)
     for number in sorted({*refused, *(others[index] for index in chosen)} - set(doubtful)):
@@ -128,6 +129,7 @@ def _draw_rounds(plan: Plan, rows: Mapping[int, Row] | None) -> _Drawing:
     values: list[NDArray[np.float64]] = []
     while rounds.due and not rounds.over and rounds.planned < there:
         points = rounds.draw()
+        # The sampler has only learned from a round that is known already.
         if points is None:
             continue
         values.append(_of_keys(points, plan).values)

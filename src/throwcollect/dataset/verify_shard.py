@@ -127,6 +127,7 @@ class _ShardCheck:
             if self._damaged or self._model is None:
                 self._check_footer(contents)
             else:
+                # From here on, the model writes what follows the last episode.
                 self._expected.clear()
                 summary = self._model.finish(self._path.name)
                 self._compare(contents, end, bytes(self._expected[: -len(MAGIC)]))
@@ -173,6 +174,7 @@ class _ShardCheck:
         """
         offset = start
         for wanted in McapContents(expected).records(0):
+            # The closing magic is no record and cannot be read as one.
             if wanted.opcode == Opcode.FOOTER and offset >= len(contents) - len(MAGIC):
                 self._report("summary", f"a {wanted.kind} is missing")
                 return offset
@@ -235,6 +237,7 @@ class _ShardCheck:
             if stored.offset > expected:
                 self._report_gap(contents, expected, resumed=stored.offset)
             if self._model is not None:
+                # The model gets the bytes as they lie here, as its indexes and its CRC are compared with those here.
                 self._model.append(replace(stored.run(), data=contents.slice(stored.offset, stored.end)))
                 # The bytes of episodes are checked elsewhere, so here only those before and behind them are kept.
                 self._expected.clear()
@@ -305,6 +308,7 @@ class _ShardCheck:
         if footer.opcode != Opcode.FOOTER or len(footer.data) != len(_FOOTER):
             raise DatasetError(f"a {footer.kind} where the footer should be", place=f"byte {footer.offset}")
         said = footer.parse(records.Footer)
+        # The CRC does not cover its own four bytes.
         if said.summary_crc != _crc(contents, said.summary_start, footer.end - 4):
             self._report(f"byte {footer.offset}", "summary: its CRC differs from its contents")
 

@@ -140,6 +140,7 @@ def _plan_findings(plan: Plan, rows: Mapping[int, Row], doubtful: Collection[int
             continue
         place = f"trial {trial.number}"
         for key, value in trial.values.items():
+            # Of a doubtful trial, the plan itself is known to be wrong.
             if row[key] != value and trial.number not in doubtful:
                 yield Finding(THROWS, place, f"has {key} = {row[key]!r}, the plan {value!r}")
         for name in plan.trials.target_names:

@@ -123,6 +123,7 @@ class DatasetWriter:
             if not (directory / name).is_file():
                 raise DatasetError(f"holds no {name}", path=directory, expected="a dataset that was created")
         with ExitStack() as held:
+            # Plan and configuration are read after this, when nobody else can change them any more.
             held.enter_context(hold_lock(directory, alone=False))
             journal = held.enter_context(closing(Journal(directory)))
             plan = Plan.read(directory / PLAN, load(config_path(directory)))
@@ -148,6 +149,7 @@ class DatasetWriter:
             WorkerError: If a process that looks through recordings is killed.
         """
         remove_unfinished(self._directory)
+        # metadata.yaml goes first, as it marks a finished dataset, which this is not without the others.
         for name in (METADATA, MANIFEST, THROWS):
             remove(self._directory / name)
         count = 0
@@ -192,6 +194,7 @@ class DatasetWriter:
         """
         self._growing = False
         self.plan.take_in_rounds(self._directory / PLAN)
+        # A copy, as shards that are finished leave the dictionary.
         for number in list(self._shards):
             self._finish_shard_if_complete(number)
 
@@ -222,6 +225,7 @@ class DatasetWriter:
         number = self._waiting_shard(trial)
         shard = self._shard(number)
         shard.append(episode)
+        # The offset is not known before the shard is written in order of trials; `_close_shard` puts it in.
         place = Place(shard.path.name, -1, episode.header.samples, episode.digest)
         row = self._rows[number][trial] = self._row(trial, result, place)
         ends = {name: row[name] for name in self._config.task.targets if row.get(name) is not None}
@@ -314,6 +318,7 @@ class DatasetWriter:
             self._unfinished.add(number)
             if number in self._shards:
                 self._shards[number].expect(each for each in self._to_run(number) if each in trials.numbers)
+            # A shard of refused trials alone waits for no episode, and nothing would finish it later.
             if number in self._shards or next(self._to_run(number), None) is None:
                 self._finish_shard_if_complete(number)
 

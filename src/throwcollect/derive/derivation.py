@@ -106,6 +106,7 @@ def write(sources: Sequence[Source], directory: Path, *, name: str | None = None
                 result = judge_episode(plan.config_of(plan.trial(episode.header.trial)), episode)
             writer.append(episode, result)
         writer.finish(wall_s=time.monotonic() - began)
+    # The manifest does not cover the card, so it may grow after the dataset is finished.
     card = (directory / CARD).read_text(encoding="utf-8")
     write_file(directory / CARD, (card + sources_section(sources)).encode())
     without = sum((Counter(each.without_episode) for each in sources), Counter[str]())
@@ -124,6 +125,7 @@ def _episodes(sources: Sequence[Source], restamper: Restamper) -> Iterator[tuple
     with ThreadPoolExecutor(threads) as pool:
         for number, (dataset, row) in enumerate(_rows(sources)):
             pending.append((pool.submit(_restamp, restamper, dataset, row, number), row))
+            # More episodes than this would only wait in memory, as they are written in order by one thread.
             if len(pending) > 2 * threads:
                 yield _result(pending)
         while pending:

@@ -116,6 +116,7 @@ def assign(
     shares = _read_shares(fractions)
     places = _find_cells(cells, everything.dataset.throws.take(everything.trials))
     config, points = list_of_trials([everything])
+    # Seeds follow from the numbers of trials, on which the part of a trial must not depend.
     contents = trial_digests(config, points, [0] * len(points.values))
     members: dict[str, dict[int, Cell | None]] = {name: {} for name in shares}
     for trial, cell, digest in zip(everything.trials, places, contents, strict=True):
@@ -151,6 +152,7 @@ def _number_along(value: float | None, width: float) -> int | None:
 
 
 def _choose_part(hashed: str, shares: Mapping[str, Fraction], seed: int) -> str:
+    # Fractions are exact, so shares such as 0.1 add up to 1, and no place is beyond the last part.
     place = Fraction(int.from_bytes(hashlib.sha256(f"{seed} {hashed}".encode()).digest()[:8], "big"), _HASHES)
     return next(name for name, end in zip(shares, accumulate(shares.values()), strict=True) if place < end)
 
@@ -179,6 +181,7 @@ def _read_shares(text: str) -> dict[str, Fraction]:
 
 
 def _read_pair(text: str, option: str, what: str) -> tuple[str, Fraction]:
+    # The expression itself may have `=` in it, such as `==`.
     name, _, number = text.rpartition("=")
     try:
         value = Fraction(number) if _NUMBER.fullmatch(number) else None

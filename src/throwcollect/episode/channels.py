@@ -73,6 +73,7 @@ class Qos:
         return "- " + "\n  ".join(lines)
 
 
+# Depths are those of ROS 2: 10 is usual, 1 that of latched topics, and 100 that of the broadcaster of tf2_ros.
 _SAMPLED = Qos("volatile", 10)
 _LATCHED = Qos("transient_local", 1)
 _TRANSFORMS = Qos("volatile", 100)
@@ -169,6 +170,7 @@ def _topics(config: Config, frames: FrameTree) -> dict[int, Topic]:
         topics[_TF_ID] = transforms(frames.moving, robot.joints)
     if "controller_state" in chosen:
         moved = {robot.controller_of(joint) for joint in config.task.end}
+        # All controllers count, so that one has the same number in each dataset, whichever others are recorded.
         for number, name in enumerate(robot.controllers, start=_FIRST_CONTROLLER_ID):
             if name in moved:
                 topics[number] = controller_state(robot, name)

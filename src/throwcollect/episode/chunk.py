@@ -147,6 +147,7 @@ class Chunk:
         """
         chunks: list[Chunk] = []
         while records or not chunks:
+            # Bytes that announce no size are taken as a whole, and `parse` refuses them.
             size = cls.read_announced_size(bytes(records[:CHUNK_HEADER_BYTES])) or len(records)
             chunks.append(cls.parse(records[:size]))
             records = records[size:]
@@ -207,6 +208,7 @@ class ChunkEncoder:
         self._compressor = zstandard.ZstdCompressor(level=level)
         layouts = {channel.id: topic.layout for channel, topic in channels.recorded.items()}
         self._template = np.frombuffer(
+            # The length of a record counts what is behind it: 22 bytes of channel, sequence and times, and the message.
             b"".join(MESSAGE_HEADER.pack(Opcode.MESSAGE, 22 + len(layout.template), number, 0, 0, 0) + layout.template
                      for number, layout in layouts.items()),
             dtype=np.uint8,
@@ -232,6 +234,7 @@ class ChunkEncoder:
             column["sequence"] = np.arange(len(samples))
             column["log_time"] = column["publish_time"] = samples.stamps_ns
             topic.fill(column["message"], recording)
+        # The hash and the compressor take a run of bytes, and this makes one without a copy.
         return table.data.cast("B")
 
     def compress(self, contents: memoryview, samples: Samples) -> Chunk:
@@ -259,6 +262,7 @@ def _row_type(layouts: Mapping[str, MessageLayout]) -> np.dtype[np.void]:
             {
                 "names": ["sequence", "log_time", "publish_time", "message"],
                 "formats": ["<u4", "<u8", "<u8", layout.dtype],
+                # The sequence follows opcode (1), length (8) and channel (2), the log time the sequence (4), and so on.
                 "offsets": [11, 15, 23, MESSAGE_HEADER.size],
                 "itemsize": MESSAGE_HEADER.size + len(layout.template),
             }

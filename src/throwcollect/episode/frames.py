@@ -50,6 +50,7 @@ class MovingFrame(Frame):
         """Compute unit quaternions (x, y, z, w), frame to parent, ``(n, 4)``, at angles [rad] of shape ``(n,)``."""
         half = angle / 2
         sine, w2 = sin(half), cos(half)
+        # This is the product of two quaternions: that of the frame at angle 0, and the turn about the joint's axis.
         x2, y2, z2 = (component * sine for component in self.axis)
         x1, y1, z1, w1 = self.rotation_xyzw
         return np.stack(
@@ -111,6 +112,7 @@ def _read_joint(joint: ElementTree.Element) -> Frame:
         rotation = _quaternion(*_vector(joint, "origin", "rpy", "0 0 0"))
         if kind == "fixed":
             return Frame(parent, child, translation, rotation)
+        # The default is that of the URDF specification, and so are those of the origin.
         x, y, z = _vector(joint, "axis", "xyz", "1 0 0")
         length = math.hypot(x, y, z)
         return MovingFrame(parent, child, translation, rotation, name, (x / length, y / length, z / length))

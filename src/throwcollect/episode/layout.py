@@ -42,6 +42,7 @@ def _walk(message: Message, path: str, offset: int) -> Generator[_Numbers, None,
     """Find the places of all numbers of a message, in order; returns the place of its end."""
     for field in message.FIELDS:
         if field.sequence:
+            # The number of elements comes first, as uint32.
             offset = _align(offset, 4) + 4
         offset = yield from _walk_field(field, getattr(message, field.name), f"{path}{field.name}", offset)
     return offset
@@ -51,6 +52,7 @@ def _walk_field(field: Field, value: Any, path: str, offset: int) -> Generator[_
     is_array = field.sequence or field.length is not None
     if field.type in DTYPES:
         shape = (len(value),) if is_array else ()
+        # Of a sequence without elements there is no padding for the alignment of elements either.
         if 0 in shape:
             return offset
         dtype = DTYPES[field.type].newbyteorder("<")
@@ -98,6 +100,7 @@ class MessageLayout:
         varies = np.zeros(len(self.template), bool)
         for place in places:
             varies[_ENCAPSULATION_BYTES + place.offset : _ENCAPSULATION_BYTES + place.end] = True
+        # A fixed part begins and ends where this changes; beyond the message, everything counts as variable.
         changes = np.flatnonzero(np.diff(varies, prepend=True, append=True)).tolist()
         self._fixed_parts = [slice(start, end) for start, end in zip(changes[::2], changes[1::2], strict=True)]
         self._fixed_bits = int.from_bytes(np.where(varies, 0, 255).astype(np.uint8).tobytes(), "little")

@@ -214,6 +214,7 @@ def _prefix(sizes: list[int]) -> bytes:
     """Encode everything before the data: the layout, and at the end the size of the data."""
     prefix = bytearray(_layout().template)
     np.frombuffer(prefix, _layout().dtype)[0] = tuple(size for size in sizes for _ in ("size", "stride"))
+    # The sizes may be those of a stranger's message, whose sum need not fit; such a message is refused by its length.
     _COUNT.pack_into(prefix, len(prefix) - _COUNT.size, sum(sizes) % 2**32)
     return bytes(prefix)
 
@@ -229,6 +230,7 @@ def unpack(message: bytes, signer: Signer) -> Delivery | Refusal:
     if len(message) < length:
         raise DatasetError(f"episode: a message of {len(message)} bytes", expected=f"at least {length}")
     sizes = list(np.frombuffer(message, layout.dtype, count=1)[0].item()[::2])
+    # Names of the parts, strides and the size of the data follow from the sizes, so one comparison checks them all.
     if message[:length] != _prefix(sizes):
         raise DatasetError(f"episode: not a UInt8MultiArray of the parts {', '.join(_PARTS)}")
     # Some RMWs hand over messages with padding behind them.

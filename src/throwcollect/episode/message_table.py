@@ -202,6 +202,7 @@ class MessageList:
 
     def __init__(self, contents: bytes | bytearray | memoryview) -> None:
         offsets, offset = [], 0
+        # A message has to hold a stamp at least, as its place is read without another check.
         shortest = MESSAGE_HEADER.size - RECORD_PREFIX_BYTES + _STAMP_OFFSET + _STAMP.itemsize
         while offset < len(contents):
             if len(contents) - offset < MESSAGE_HEADER.size:
@@ -243,6 +244,7 @@ class MessageList:
         stamps = self._gather(MESSAGE_HEADER.size + _STAMP_OFFSET, _STAMP)
         stamps["sec"], stamps["nanosec"] = np.divmod(self.stamps_ns + by_ns, NS_PER_S)
         for time in ("log_time", "publish_time"):
+            # Times are unsigned, and the way may be negative.
             self.headers[time] = self.headers[time].astype(np.int64) + by_ns
         self._scatter(MESSAGE_HEADER.size + _STAMP_OFFSET, stamps)
         self._scatter(0, self.headers)

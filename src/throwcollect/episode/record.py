@@ -131,5 +131,6 @@ def find_infinite_columns(samples: Samples) -> Iterator[str]:
     for field in fields(samples):
         finite = np.isfinite(getattr(samples, field.name))
         if not finite.all():
+            # `argmin` finds the first False.
             row = int(np.argmin(finite.reshape(len(samples), -1).all(axis=1)))
             yield f"{field.name} holds numbers that are not finite, first in sample {row}"

@@ -51,6 +51,7 @@ class Restamper:
             DatasetError: If the episode is damaged, its hash is wrong, or its messages are not those that the
                 configuration records.
         """
+        # The copy gets a hash of its own, which would make damage look as if it had been recorded.
         episode.check_records()
         by_ns = self._config.trial_start_ns(trial) - episode.header.start_ns
         contents = bytearray(episode.state.contents)
@@ -83,6 +84,7 @@ class Restamper:
                 raise DatasetError(f"chunk: messages of {topic.name} are not laid out as {topic.type_name} is here")
             headers = table.headers(channel)
             for time in ("log_time", "publish_time"):
+                # Times are unsigned, and the way to an earlier slot is negative.
                 headers[time] = headers[time].astype(np.int64) + by_ns
             rows = messages.view(topic.layout.dtype)[:, 0]
             for seconds in fields:

@@ -199,6 +199,7 @@ def transforms(frames: tuple[MovingFrame, ...], joints: Sequence[str]) -> Topic:
         samples = recording.samples
         for number in range(len(pairs)):
             _put_stamps(rows, f"transforms.{number}.header.stamp", samples.stamps_ns)
+        # Only the ball changes its place; the translations of frames that joints turn stand in the template.
         rows["transforms.0.transform.translation"] = samples.ball_position
         rows["transforms.0.transform.rotation"] = samples.ball_orientation_xyzw
         for number, (frame, column) in enumerate(zip(frames, columns, strict=True), start=1):
@@ -261,6 +262,7 @@ def controller_state(robot: Robot, controller: str) -> Topic:
         rows["reference.positions"], rows["reference.velocities"] = target.position, target.velocity
         rows["reference.accelerations"] = target.acceleration
         rows["feedback.positions"], rows["feedback.velocities"] = position, velocity
+        # As in ros2_controllers, the error is the reference minus the feedback.
         rows["error.positions"], rows["error.velocities"] = target.position - position, target.velocity - velocity
         rows["output.positions"] = target.output
 

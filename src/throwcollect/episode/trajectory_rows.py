@@ -60,6 +60,7 @@ def _row_type(joints: tuple[str, ...], starts: tuple[int, ...], size: int) -> np
         for name, field in columns.items():
             kind, offset = places[field][:2]
             names.append(name)
+            # The nanoseconds lie right behind the seconds, so both are one run of bytes.
             formats.append(f"V{_STAMP_BYTES if name == STAMPS else kind.itemsize}")
             offsets.append(start + MESSAGE_HEADER.size + offset)
     return np.dtype({"names": names, "formats": formats, "offsets": offsets, "itemsize": size})
@@ -96,4 +97,5 @@ def view_as_bytes(array: NDArray[np.float64] | NDArray[np.int64]) -> NDArray[np.
 def to_nanoseconds(stamps: NDArray[np.int64]) -> None:
     """Turn recorded stamps into numbers [ns], in place."""
     pairs = stamps.view([("sec", "<i4"), ("nanosec", "<u4")])
+    # Both sides are the same memory, which is written only when the right side is computed.
     stamps[:] = pairs["sec"].astype(np.int64) * NS_PER_S + pairs["nanosec"]

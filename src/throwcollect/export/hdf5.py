@@ -78,6 +78,7 @@ class _Output(io.FileIO):
     """A file that keeps write errors until `check` raises them: the HDF5 library crashes if a write raises one."""
 
     def __init__(self, path: Path) -> None:
+        # HDF5 also reads what it has written.
         super().__init__(path, "w+")
         self._error: OSError | None = None
 

@@ -51,6 +51,7 @@ class Feature:
     def as_dict(self) -> dict[str, object]:
         """Its entry in ``meta/info.json``."""
         names = None if self.names is None else list(self.names)
+        # In LeRobot, a scalar has the shape (1,), although its column in the file is no list.
         return {"dtype": self.dtype, "shape": [len(self.names or ("",))], "names": names}
 
 
@@ -138,6 +139,7 @@ def write(source: Source, directory: Path) -> None:
                 task = _say_task(source, throw.target)
                 index = tasks.setdefault(task, len(tasks))
                 frames = _compute_frames(throw, source, features, episode=number, first=first, task=index)
+                # This comes before the frames are appended, and says in which file they will be.
                 chunk, file = data.place()
                 data.append(_tabulate_frames(frames, features, source))
                 rows.append(_describe_episode(frames, task, number=number, first=first, chunk=chunk, file=file))

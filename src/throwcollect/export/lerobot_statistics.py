@@ -33,7 +33,9 @@ def summarise_all(moments: Moments, portions: Iterable[Frames]) -> Statistics:
     """
     low, span = moments.minimum, moments.maximum - moments.minimum
     histogram = np.zeros((len(span), _BINS), np.int64)
+    # All values of a constant component are in the first bin.
     scale = np.divide(_BINS, span, out=np.zeros_like(span), where=span > 0)
+    # Each component has numbers of bins of its own, so that one count serves all of them.
     rows = np.arange(len(span)) * _BINS
     for frames in portions:
         bins = np.minimum(((frames - low) * scale).astype(np.int64), _BINS - 1)
@@ -42,6 +44,7 @@ def summarise_all(moments: Moments, portions: Iterable[Frames]) -> Statistics:
     quantiles = []
     for share in QUANTILES.values():
         target = share * moments.count
+        # Within the bin that a quantile is in, values count as evenly spread.
         index = (below < target).sum(axis=1)[:, np.newaxis]
         inside = np.take_along_axis(histogram, index, axis=1)[:, 0]
         before = np.take_along_axis(below, index, axis=1)[:, 0] - inside

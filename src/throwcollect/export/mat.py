@@ -134,11 +134,13 @@ def _name_field(column: str) -> str:
 
 def _to_column(values: pa.ChunkedArray) -> NDArray[Any]:
     array = to_array(values)
+    # An array of objects becomes a cell array; one of texts would become a matrix of characters.
     return (array.astype(object) if array.dtype.kind == "U" else array)[:, np.newaxis]
 
 
 def _to_cell(values: Sequence[Any]) -> NDArray[np.object_]:
     cell = np.empty((1, len(values)), dtype=object)
+    # NumPy would make a matrix of arrays with equal shapes, if it were given all of them at once.
     for index, value in enumerate(values):
         cell[0, index] = value
     return cell

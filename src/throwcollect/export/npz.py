@@ -87,6 +87,7 @@ def _write_shard(source: Source, entries: tuple[Entry, ...], path: Path) -> None
         for name, values in names.items():
             _add(archive, name, values)
         for name, file_of_signal in unpacked.items():
+            # `zipfile` does not know the size beforehand, and fails at 2 GiB unless it is told to expect more.
             with file_of_signal.open("rb") as array, archive.open(_make_member(name), "w", force_zip64=True) as packed:
                 shutil.copyfileobj(array, packed)
             file_of_signal.unlink()

@@ -66,6 +66,7 @@ def _cubic(
 
 def _without_flips(quaternions: NDArray[np.float64]) -> NDArray[np.float64]:
     """Choose, of the two quaternions of each orientation, the one that is near the quaternion before."""
+    # Each flip turns the sign of all quaternions that follow, so that two flips cancel out.
     turns = np.sum(quaternions[1:] * quaternions[:-1], axis=1) < 0
     signs = np.where(np.cumsum(turns) % 2, -1.0, 1.0)
     return np.vstack([quaternions[:1], quaternions[1:] * signs[:, np.newaxis]])

@@ -36,6 +36,7 @@ def compare(stored: Episode, again: Episode) -> Comparison:
     """
     stored.check_records()
     differences: tuple[str, ...] = ()
+    # Contents are compared and not chunks, as the same messages may be compressed in another way.
     if (stored.state.contents, stored.header_json) != (again.state.contents, again.header_json):
         differences = tuple(_differences(stored, again)) or ("other channels than joint states and ball differ",)
     return Comparison(stored.header.trial, stored.digest, again.digest, differences)

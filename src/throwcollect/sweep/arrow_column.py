@@ -57,6 +57,7 @@ def read_numbers(column: pa.Array) -> NDArray[Any]:
     Where the column is null, the number is arbitrary.
     """
     dtype = np.dtype(_CODES[column.type])
+    # A column may be a part of a longer one, whose buffers it shares.
     return np.frombuffer(column.buffers()[1], dtype, len(column), dtype.itemsize * column.offset)
 
 

@@ -87,18 +87,23 @@ class InverseModel:
             land at their goal, or clearly nearer to it than any throw before.
         """
         flat = goals.reshape(-1, goals.shape[-1])
+        # Several goals share bases, so the model around each base is made once.
         bases = self._landings.find(flat, _BASES)[1]
         distinct, which = np.unique(bases, return_inverse=True)
+        # NumPy before version 2 returns a flat array.
         which = which.reshape(bases.shape)
         slopes, inverses = self._linear_models(distinct)
         slope, inverse = slopes[which], inverses[which]
         start, landing, goal = self._landed.points[bases], self._landings.points[bases], flat[:, np.newaxis]
         step = _product(inverse, goal - landing)
         length = np.sqrt((step**2).sum(axis=-1, keepdims=True))
+        # A linear model says little about places far from its neighbours.
         step *= _LONGEST_STEP / np.maximum(length, _LONGEST_STEP)
         along = _ALONG_NOISE * randomness.standard_normal(step.shape)
+        # This takes away the part of the noise that moves the landing, by the model.
         along -= _product(inverse, _product(slope, along))
         ends = start + step + along + _NOISE * randomness.standard_normal(step.shape)
+        # `spread` takes places below 1.
         ends = np.clip(ends, 0.0, 1.0 - 1e-9)
         missing = landing + _product(slope, ends - start) - goal
         error = np.sqrt((missing**2).sum(axis=-1))
@@ -123,10 +128,12 @@ class InverseModel:
         moved = parameters[neighbours] - parameters[bases][:, np.newaxis]
         caused = landings[neighbours] - landings[bases][:, np.newaxis]
         transposed = np.swapaxes(moved, 1, 2)
+        # This is ridge regression, solved by its normal equations: (M'M + r I) S' = M'C.
         spread = matmul(transposed, moved)
         ridge = _RIDGE * np.trace(spread, axis1=1, axis2=2) / dimensions + _LEAST
         ridged = spread + ridge[:, np.newaxis, np.newaxis] * np.eye(dimensions)
         slopes = np.swapaxes(solve(ridged, matmul(transposed, caused)), 1, 2)
+        # The damped inverse is S'(SS' + d² I)⁻¹: as the bracket is symmetric, the transpose of a solution.
         damped = matmul(slopes, np.swapaxes(slopes, 1, 2)) + _DAMPING_BINS**2 * np.eye(slopes.shape[1])
         return slopes, np.swapaxes(solve(damped, slopes), 1, 2)
 

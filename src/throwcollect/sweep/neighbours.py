@@ -55,12 +55,14 @@ class Neighbours:
         """
         distances, indices = [], []
         for (first, stop), tree in self._trees.items():
+            # With numbers of neighbours in place of how many, SciPy keeps the second axis for a single neighbour, too.
             far, which = tree.query(places, range(1, min(count, stop - first) + 1))
             distances.append(far)
             indices.append(which + first)
         if len(distances) == 1:
             return distances[0], indices[0]
         far, which = np.concatenate(distances, axis=1), np.concatenate(indices, axis=1)
+        # A stable order takes the earlier tree where distances are equal, on every machine.
         nearest = np.argsort(far, axis=1, kind="stable")[:, :count]
         return np.take_along_axis(far, nearest, axis=1), np.take_along_axis(which, nearest, axis=1)
 

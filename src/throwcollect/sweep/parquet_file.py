@@ -32,6 +32,7 @@ def encode_pieces(table: Any, put: Callable[[bytes], object]) -> None:
     """
     import pyarrow.parquet as pq
 
+    # Where a column was cut into pieces must not show in the bytes.
     pq.write_table(table.combine_chunks(), _Sink(put), compression="zstd", write_page_checksum=True)
 
 

@@ -113,6 +113,7 @@ class Plan:
         trials = self.trials
         columns: list[Any] = [
             np.arange(trials.first, trials.numbers.stop),
+            # All digests are written out at once, and then cut into texts of one length.
             np.frombuffer(trials.digests.tobytes().hex().encode(), f"S{2 * DIGEST_BYTES}"),
             trials.seeds,
             [trials.refused.get(number) for number in trials.numbers],
@@ -211,6 +212,7 @@ def make_trials(config: Config, points: Points, *, first: int = 0) -> Trials:
 
 
 def _seed(root: int, number: int) -> int:
+    # The seed of a trial depends on no other trial, so a plan can be made longer, or in parts.
     return int(np.random.SeedSequence(root, spawn_key=(number,)).generate_state(1, np.uint64)[0])
 
 
@@ -233,6 +235,7 @@ def check_some_left(trials: Trials) -> None:
         return
     # Reasons that differ only in their numbers count as one, and the first of them is shown.
     kinds = [blank_numbers(reason) for reason in reasons]
+    # A dictionary keeps the last reason of a kind, which in reversed order is the first one.
     examples = dict(zip(reversed(kinds), reversed(reasons), strict=True))
     listed = [f"{count} × {examples[kind]}" for kind, count in Counter(kinds).most_common(_MOST_REASONS)]
     raise PlanError(
@@ -272,6 +275,7 @@ def _trials_of(rows: Any, keys: tuple[str, ...], targets: tuple[str, ...], first
     digests = rows["digest"].to_pylist()
     if wrong := [number for number, digest in enumerate(digests, first) if not is_digest(digest)]:
         raise DatasetError("is damaged: has a digest that is no SHA-256", path=path, place=f"trial {wrong[0]}")
+    # The empty array gives the result its shape where no key is swept.
     values = np.column_stack([np.empty((len(rows), 0)), *(read_numbers(rows[key]) for key in keys)])
     aims = Targets(targets, np.column_stack([nan_where_null(rows[name]) for name in targets])) if targets else None
     reasons = enumerate(rows["refused"].to_pylist(), first)

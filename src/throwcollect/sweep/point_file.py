@@ -86,6 +86,7 @@ def _read_csv(path: Path, config: Config) -> _Rows:
     rows: list[list[float]] = []
     lines: list[int] = []
     try:
+        # Spreadsheets write a byte order mark, and `csv` wants line ends as they are.
         with path.open(encoding="utf-8-sig", newline="") as file:
             reader = csv.reader(file)
             names = tuple(name.strip() for name in next(reader, []))
@@ -194,6 +195,7 @@ def _find_target_problems(rows: _Rows, path: Path, config: Config) -> Iterator[P
     if (targets := rows.points.targets) is None or not len(rows.numbers):
         return
     there = ~np.isnan(targets.values)
+    # Rows differ in few ways, so each way is checked once, however many rows there are.
     for pattern in np.unique(there, axis=0):
         names = [name for name, has in zip(targets.names, pattern.tolist(), strict=True) if has]
         wrong = config.task.find_wrong_targets(names)

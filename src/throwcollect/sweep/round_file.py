@@ -40,6 +40,7 @@ def append_round(plan: Path, trials: Trials) -> None:
     }
     try:
         exists = is_there(path)
+        # No incomplete line can be at the end: who opens a dataset first takes such a file into the plan.
         descriptor = open_regular(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND)
         try:
             write_all(descriptor, json.dumps(line).encode() + b"\n")
@@ -47,6 +48,7 @@ def append_round(plan: Path, trials: Trials) -> None:
         finally:
             os.close(descriptor)
         if not exists:
+            # A new file survives a power cut only if the directory with its name does.
             sync_directory(path.parent)
     except OSError as error:
         raise unwritable(path, error) from error
@@ -73,6 +75,7 @@ def read_rounds(plan: Path, trials: Trials) -> None:
 def _take(line: bytes, trials: Trials, path: Path, number: int) -> None:
     try:
         added = _parse(line, trials.keys)
+        # A process that wrote the whole plan, and was killed before it removed this file, has left rounds that it has.
         if added.numbers.stop > trials.numbers.stop:
             trials.extend(added)
     except (ValueError, KeyError, TypeError, OverflowError, RecursionError) as error:

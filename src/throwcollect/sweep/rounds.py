@@ -65,6 +65,7 @@ class Rounds:
         """No trial will follow."""
         if self.planned >= self.limit:
             return True
+        # Only the rounds that are decisive count, or the end would depend on which results have arrived by now.
         return self._wanted is not None and self._decisive > 0 and self.due and self._succeeded_in_ended >= self._wanted
 
     @property
@@ -82,6 +83,7 @@ class Rounds:
     @property
     def _decisive(self) -> int:
         """Number of rounds whose results determine the next trials."""
+        # The next round is number `planned // ROUND_TRIALS`, and the results of all up to two before it determine it.
         return max(0, self.planned // ROUND_TRIALS - 1)
 
     def add(self, trials: Trials) -> None:

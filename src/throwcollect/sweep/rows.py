@@ -30,9 +30,11 @@ class Rows(Generic[_Element]):
         """Append rows, shape ``(n_added, ...)``."""
         count = self._count + len(rows)
         if count > len(self._room):
+            # With room for twice as many, a row is copied only a few times in all.
             room = np.empty((max(count, 2 * self._count), *self._room.shape[1:]), self._room.dtype)
             room[: self._count] = self.all
             self._room = room
+        # Without new rows, the array may still be the caller's, which is never written to, and may be read-only.
         if count > self._count:
             self._room[self._count : count] = rows
         self._count = count

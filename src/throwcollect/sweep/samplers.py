@@ -63,6 +63,7 @@ def _uniform(count: int, dimensions: int, randomness: np.random.Generator) -> ND
 
 def _latin_hypercube(count: int, dimensions: int, randomness: np.random.Generator) -> NDArray[np.float64]:
     """Draw points so that each of `count` equal strips along each key holds one; they are the points of SciPy."""
+    # SciPy's samplers draw from a generator that they spawn, and not from the one that they are given.
     (own,) = randomness.spawn(1)
     places = own.uniform(size=(count, dimensions))
     strips = np.tile(np.arange(1, count + 1), (dimensions, 1))
@@ -93,6 +94,7 @@ def spread(parameter: Parameter, unit: NDArray[np.float64]) -> NDArray[np.float6
         return np.array(parameter.values)[(unit * len(parameter.values)).astype(np.int64)]
     if parameter.scale == "log":
         low, high = math.log(parameter.min), math.log(parameter.max)
+        # Rounding may lead beyond the upper bound, and the exponential of that may be too large for a float.
         spread = exp(np.minimum(low + unit * (high - low), high))
     else:
         spread = parameter.min + unit * (parameter.max - parameter.min)
@@ -121,6 +123,7 @@ def _grid(parameters: dict[str, Parameter], trials: int | None) -> Points:
         )
     places = np.arange(_check_count(trials, size))
     columns = []
+    # The number of a point is read like one with a digit for each key, the last key being the lowest digit.
     for parameter in reversed(parameters.values()):
         axis = _axis(parameter)
         columns.append(axis[places % len(axis)])
@@ -134,6 +137,7 @@ def _axis(parameter: Parameter) -> NDArray[np.float64]:
     if parameter.scale == "linear":
         return np.linspace(parameter.min, parameter.max, _count(parameter))
     axis = spread(parameter, np.linspace(0, 1, _count(parameter)))
+    # The exponential of a logarithm is not always the very number.
     axis[[0, -1]] = parameter.min, parameter.max
     return axis
 

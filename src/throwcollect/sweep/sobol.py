@@ -33,6 +33,7 @@ def draw_sobol(count: int, dimensions: int, randomness: np.random.Generator) -> 
     """
     places = np.arange(BITS, dtype=np.uint32)
     shift = _pack(randomness.integers(2, size=(dimensions, BITS), dtype=np.uint32), places)
+    # A triangular matrix with ones on its diagonal can be inverted, so that scrambled points stay evenly spread.
     below = np.tril(randomness.integers(2, size=(dimensions, BITS, BITS), dtype=np.uint32), -1)
     matrices = _pack(below + np.eye(BITS, dtype=np.uint32), places[::-1])
     numbers = _multiply(matrices, _direction_numbers(dimensions))
@@ -62,6 +63,7 @@ def _multiply(matrices: NDArray[np.uint32], numbers: NDArray[np.uint32]) -> NDAr
         numbers: Shape ``(dimensions, count)``.
     """
     common = matrices[:, None, :] & numbers[:, :, None]
+    # This folds each number onto its lowest bit, which is then the parity of its bits: the sum of products modulo 2.
     for half in (16, 8, 4, 2, 1):
         common ^= common >> np.uint32(half)
     return _pack(common & np.uint32(1), np.arange(BITS, dtype=np.uint32)[::-1])
@@ -69,6 +71,7 @@ def _multiply(matrices: NDArray[np.uint32], numbers: NDArray[np.uint32]) -> NDAr
 
 def _direction_numbers(dimensions: int) -> NDArray[np.uint32]:
     """Compute direction numbers, shape ``(dimensions, BITS)``, by the recurrence of Bratley and Fox (1988)."""
+    # The first coordinate has no polynomial in the table: its numbers before the shift are all 1 (van der Corput).
     numbers = np.ones((dimensions, BITS), dtype=np.int64)
     with open(_TABLE, encoding="ascii") as lines:
         entries = (line.split() for line in lines if not line.startswith("#"))

@@ -80,6 +80,7 @@ class TargetSampler:
         thinness = self._thinness(randomness)
         aims = np.empty(0, dtype=np.int64)
         unit = np.empty((0, tried.shape[1]))
+        # Cells without a promising throw are given back once, so the loop ends: the second time, they keep theirs.
         while len(aims) < ROUND_TRIALS:
             cells = thinness.take(ROUND_TRIALS - len(aims))
             corners = self._cells.corners(cells)[:, np.newaxis]
@@ -96,6 +97,7 @@ class TargetSampler:
 
     def _learn(self, tried: NDArray[np.float64], ended: NDArray[np.float64]) -> None:
         """Take in the results of further trials, whose parameters are places in the unit cube."""
+        # Results arrive in order of trials, so the first aims are those of the trials that have ended.
         aimed, self._aims = self._aims[: len(ended)], self._aims[len(ended) :]
         self._known += len(ended)
         landed = np.isfinite(ended[:, 0])

@@ -95,6 +95,7 @@ class Thinness:
         self._missed = missed
         self._doubted = np.zeros(len(missed), dtype=np.bool_)
         self._score = landed + asked + _futile(missed) + np.maximum(away - 1, 0) ** 2
+        # Whole throws count 1, so this decides between equal scores and never between others.
         self._score += _TIE * randomness.permutation(len(missed)) / len(missed)
 
     def take(self, count: int) -> NDArray[np.int64]:
@@ -112,6 +113,7 @@ class Thinness:
             True for cells that are given back: `take` may choose a cell again after a doubt, which then keeps it.
         """
         fresh = ~self._doubted[cells]
+        # A cell may be here more than once, and `-=` would count it once.
         np.subtract.at(self._score, cells[fresh], 1)
         doubted = np.unique(cells[fresh])
         self._doubted[doubted] = True
@@ -120,4 +122,5 @@ class Thinness:
 
 
 def _futile(missed: NDArray[np.int64]) -> NDArray[np.float64]:
+    # Powers of two by `ldexp` are exact on all machines; the bound keeps them finite.
     return np.ldexp(1.0, np.clip(missed - 1, 0, _MOST_DOUBLINGS)) - 1

@@ -124,6 +124,7 @@ class Trials(Sequence[Trial]):
             IndexError: If there are not so many.
             ValueError: If the slice has gaps.
         """
+        # A range takes negative positions and slices, and raises the IndexError.
         chosen = self.numbers[which]
         if isinstance(chosen, int):
             return self._trial(chosen)
