@@ -29,6 +29,11 @@ SETTINGS: dict[str, dict[str, Any]] = {
     "steps of no whole nanoseconds": {"sim": {"physics_hz": 300}, "record": {"rate_hz": 100}},
     "not settled": {"sim": {"settle_s": 0, "command_delay_s": 0.05}},
     "weak motors": {"robot": {"position_gain_per_s": 10, "velocity_gain": 0.2}},
+    "faster than planned": {"robot": {"speed_scale": 1.9}},
+    "slower than planned, lagging and late": {
+        "robot": {"speed_scale": 0.6, "motor_lag_s": 0.05, "joint_offsets": {"arm_right_4_joint": 0.02}},
+        "sim": {"command_delay_s": 0.05},
+    },
     "loose solver": {"sim": {"solver_iterations": 1}},
     "cut by the clock": {"sim": {"max_trial_s": 1.1}},
     "small ball that spins fast": {"ball": {"radius_m": 0.01, "mass_kg": 0.002, "friction": 2, "restitution": 0.9}},

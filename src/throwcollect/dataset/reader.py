@@ -303,7 +303,8 @@ class Dataset(Sequence[Throw]):
                     f"select: a mask of {len(values)}", expected=f"one boolean for each of {len(self)} throws"
                 )
             return self._with(self.throws.filter(values))
-        rows = pc.index_in(values.cast(pa.int64()), value_set=self.throws["trial"].combine_chunks())
+        # A number above the largest int64 becomes a negative one, which no trial has.
+        rows = pc.index_in(values.cast(pa.int64(), safe=False), value_set=self.throws["trial"].combine_chunks())
         if rows.null_count:
             missing = values.filter(pc.is_null(rows))[0]
             raise DatasetError(f"no trial {missing} among the {len(self)} throws", path=self.directory)

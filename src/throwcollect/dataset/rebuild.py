@@ -75,9 +75,8 @@ def rebuild(directory: Path) -> Rebuilt:
     """Write ``throws.parquet``, the manifest and ``metadata.yaml`` anew, and the data card if it is missing.
 
     They follow from the configuration, the plan and the recordings, which are checked as `verify` does. The earlier
-    table,
-    if it can be read, says why trials are lost and which recordings there should be. Where the recordings are judged
-    otherwise than it says, the data card gets the new numbers of outcomes.
+    table, if it can be read, says why trials are lost and which recordings there should be. Where the recordings are
+    judged otherwise than it says, the data card gets the new numbers of outcomes.
 
     Raises:
         DatasetError: If the plan or a recording is missing or damaged, ``config.yaml`` is not as the manifest says,

@@ -53,6 +53,11 @@ class RecordedTrial:
         return times
 
     @cached_property
+    def motion_s(self) -> float:
+        """How long the motion lasts by the clock of the controllers, which may be faster or slower than planned [s]."""
+        return float(self.trajectory.times[-1]) / self.config.robot.speed_scale
+
+    @cached_property
     def has_failed_goal(self) -> bool:
         """Whether a goal was canceled or aborted; then the joints need not have followed their trajectory."""
         return any(goal.status in (CANCELED, ABORTED) for goal in self.header.goals)

@@ -87,10 +87,8 @@ def repair(directory: Path, output: Path, *, remake: Remake) -> Repaired:
 
     Episodes are looked for in all MCAP files, finished or not, and judged anew. Where the table of throws can be read,
     its digest says which episode of a trial is the right one. If no file has that one, another one that passes all
-    other
-    checks is kept and reported: only a replay can tell whether the episode or the table was changed. All other files
-    are
-    made from the configuration and the plan. Trials without an episode are `lost` in them.
+    other checks is kept and reported: only a replay can tell whether the episode or the table was changed. All other
+    files are made from the configuration and the plan. Trials without an episode are `lost` in them.
 
     Args:
         directory: Directory of the damaged dataset; it stays as it is.

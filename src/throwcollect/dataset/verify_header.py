@@ -69,7 +69,7 @@ def _find_goal_problems(trial: RecordedTrial) -> Iterator[str]:
             yield f"{what} has the unknown error code {goal.error_code}"
         if goal.status in (EXECUTING, SUCCEEDED) and goal.error_code:
             yield f"{what} has status {goal.status} and an error code all the same"
-        if goal.status == SUCCEEDED and duration_s < trajectory.times[-1] - _ROUNDING:
+        if goal.status == SUCCEEDED and duration_s < trial.motion_s - _ROUNDING:
             yield f"{what} succeeded, but the trial ended at {duration_s:.3f} s, before its trajectory"
 
 
@@ -110,7 +110,7 @@ def _explain_unrest(trial: RecordedTrial) -> str | None:
         return f"the ball moved at {speed:.3g} m/s in the last {_REST_S} s"
     if not trial.find_pressed(trial.header.contacts)[resting].all():
         return f"nothing held the ball in the last {_REST_S} s"
-    moves_s = float(trial.trajectory.times[-1]) + trial.config.sim.command_delay_s
+    moves_s = trial.motion_s + trial.config.sim.command_delay_s
     # A goal that was given up ends the motion at another time.
     if not trial.has_failed_goal and since / physics_hz < moves_s - 1 / physics_hz:
         return f"the arm moved until {moves_s:.3f} s, less than {_REST_S} s before"

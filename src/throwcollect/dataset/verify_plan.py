@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Callable, Collection, Iterator, Mapping
 from pathlib import Path
 from typing import NamedTuple
@@ -21,14 +20,13 @@ from throwcollect.sweep.plan import Check, Plan, make_trials, refusal
 from throwcollect.sweep.points import Points
 from throwcollect.sweep.rounds import Rounds
 from throwcollect.sweep.samplers import draw_points
-from throwcollect.wording import format_count
+from throwcollect.wording import blank_numbers, format_count
 
 CHECKED_AGAIN = 100
 """How many of the trials that the plan does not refuse are checked again as a sample; each takes 1 to 5 ms."""
 
 _RELATIVE_TOLERANCE = 1e-9
 """Values that are drawn again on another machine may differ in their last bits."""
-_NUMBER = re.compile(r"-?\d[\d.]*(?:e[-+]?\d+)?")
 
 CheckOf = Callable[[Config], Check]
 """Makes the check of the trials of a configuration."""
@@ -43,8 +41,7 @@ def find_drawing_problems(directory: Path, plan: Plan, rows: Mapping[int, Row] |
     """Find trials that are not those that the configuration draws.
 
     The rounds of a plan that grows are drawn from the results in the table of throws, which other checks compare with
-    the
-    episodes. A plan that cannot be drawn here (see `can_draw`) is not compared.
+    the episodes. A plan that cannot be drawn here (see `can_draw`) is not compared.
 
     Args:
         directory: Directory of the dataset.
@@ -155,7 +152,7 @@ def _of_keys(points: Points, plan: Plan) -> Points:
 
 def _kind(reason: str | None) -> str | None:
     """Replace the numbers of a reason, whose last digits may differ on another machine."""
-    return None if reason is None else _NUMBER.sub("#", reason)
+    return None if reason is None else blank_numbers(reason)
 
 
 def _of_trial(number: int, problem: str) -> Finding:

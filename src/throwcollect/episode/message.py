@@ -142,7 +142,7 @@ def header_to_json(header: EpisodeHeader) -> str:
 
 
 def header_from_json(text: bytes | str) -> EpisodeHeader:
-    """Read the text that `header_to_json` writes.
+    """Read the text that `header_to_json` writes, also with other blanks.
 
     Raises:
         DatasetError: If the text is anything else.
@@ -256,8 +256,8 @@ def make_episode(header: bytes | str, hashes: Sequence[str], chunks: Sequence[Ch
     """Make an episode of its header in JSON, its chunks, the state chunk first, and the SHA-256 of their records.
 
     Raises:
-        DatasetError: If the header has other JSON than `header_to_json` writes, a hash is no SHA-256 in hexadecimal, or
-            there are not as many hashes as chunks.
+        DatasetError: If the header cannot be read, a hash is no SHA-256 in hexadecimal, or there are not as many hashes
+            as chunks.
     """
     for said in hashes:
         if not _SHA256.fullmatch(said):

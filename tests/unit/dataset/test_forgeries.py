@@ -217,6 +217,11 @@ def test_refusals_that_are_invented_or_dropped_are_found(tmp_path: Path) -> None
     dropped, invented = find_refusal_problems(forged, (), feasibility_check)
     assert dropped.problem.startswith("is refused as None, the check says 'arm_right_7_joint moves at")
     assert invented.problem == "is refused as 'too fast', the check says None"
+    reason = honest.trials[0].refused
+    assert reason is not None
+    renamed = replace(honest, trials=honest.trials.refuse([reason.replace("_7_", "_4_"), None]))
+    (found,) = find_refusal_problems(renamed, (), feasibility_check)
+    assert found.problem.startswith("is refused as 'arm_right_4_joint moves at")
 
 
 def test_what_depends_on_results_is_not_judged_without_them(tmp_path: Path) -> None:

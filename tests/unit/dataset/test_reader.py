@@ -111,6 +111,8 @@ def test_selecting_from_a_selection_goes_by_trial_and_slices_by_position(loaded:
     assert trials(loaded[::-3]) == [6, 3, 0]
     with pytest.raises(DatasetError, match="no trial 3 among the 3 throws"):
         some.select([4, 3])
+    with pytest.raises(DatasetError, match="no trial 18446744073709551615 among the 3 throws"):
+        some.select(np.array([4, 2**64 - 1], np.uint64))
 
 
 @pytest.mark.parametrize(
