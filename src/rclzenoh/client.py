@@ -37,6 +37,8 @@ class Client(Receiver):
         self._sequence = 0
         self._lock = threading.Lock()
         self._endpoint = Endpoint(node, EntityKind.CLIENT, srv_name, srv_type.TYPE, qos_profile)
+        # As rmw_zenoh_cpp does: every complete queryable of this key is asked, and Zenoh must not merge or drop
+        # replies.
         self._querier: Any = self._endpoint.session.declare_querier(
             self._endpoint.key,
             target=zenoh.QueryTarget.ALL_COMPLETE,
@@ -90,7 +92,9 @@ class Client(Receiver):
             sequence = self._sequence
         if self._querier is None:
             raise InvalidHandle(f"{self.service_name}: the client was destroyed")
+        # The future is noted before the request leaves, because the thread that spins may have the response at once.
         self._pending[sequence] = future, convert
+        # Zenoh drops the handler after the last reply, so the number comes into the queue after all of them.
         handler = zenoh.handlers.Callback(self.deliver, drop=lambda: self.deliver(sequence), indirect=False)
         attachment = Attachment(sequence, time.time_ns(), self._endpoint.gid).pack()
         try:

@@ -155,6 +155,7 @@ def init(*, context: Context | None = None, domain_id: int | None = None, config
         NoRouterError: If there is no router.
     """
     (context or get_default_context()).init(domain_id=domain_id, config=config)
+    # Python allows handlers of signals to be set in the main thread alone. One that the program has set stays.
     in_main_thread = threading.current_thread() is threading.main_thread()
     if context is None and in_main_thread and signal.getsignal(signal.SIGTERM) is signal.SIG_DFL:
         signal.signal(signal.SIGTERM, _on_sigterm)

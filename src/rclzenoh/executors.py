@@ -147,6 +147,7 @@ class Executor:
         for node in self._nodes:
             for timer in node.timers:
                 left = timer.time_until_next_call()
+                # It is no use to wait for a clock that messages alone advance: they wake the executor.
                 if (left <= 0 or not timer.clock.is_driven) and left / S_TO_NS < least:
                     first, least = timer, left / S_TO_NS
         return first, least

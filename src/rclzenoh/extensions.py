@@ -39,6 +39,7 @@ def spin_some(executor: Executor, timeout_sec: float) -> None:
 
 def stop_waiting(executor: Executor) -> None:
     """End the wait of `spin_some`, if there is one; for handlers of signals, which run in the thread that spins."""
+    # This is a task and not `wake`, because `spin_once` would only look for work after that, and wait on.
     executor.create_task(_nothing)
 
 

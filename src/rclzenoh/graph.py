@@ -25,6 +25,7 @@ class Graph:
     """Nodes and endpoints that are known in one domain."""
 
     def __init__(self, session: zenoh.Session, domain: int) -> None:
+        # Its lock may be taken twice by one thread, as `_on_change` does when it reads.
         self._changed = threading.Condition()
         self._unread: deque[tuple[bool, str]] = deque()
         self._tokens: dict[str, Token] = {}
@@ -64,6 +65,7 @@ class Graph:
     def tokens(self, *kinds: EntityKind) -> Iterator[Token]:
         """All nodes and endpoints of some kinds."""
         self._read()
+        # The values are copied, because threads of Zenoh may change the dictionary while somebody goes through it.
         return (token for token in list(self._tokens.values()) if token.kind in kinds)
 
     def count(self, kind: EntityKind, name: str, dds_type: str | None = None) -> int:
@@ -104,10 +106,13 @@ class Graph:
         limited = timeout_s is not None and timeout_s >= 0
         deadline = time.monotonic() + (timeout_s or 0.0)
         while not condition():
+            # The wait is cut into slices, because nothing notifies this thread when the context is shut down.
             left = deadline - time.monotonic() if limited else _POLL_S
             if left <= 0 or not alive():
                 return False
             with self._changed:
+                # A change may have come since the condition was asked. It must be asked again then, and not wait for
+                # the next change.
                 if not self._unread:
                     self._changed.wait(min(left, _POLL_S))
         return True

@@ -54,6 +54,7 @@ class Logger:
             if last is not None and now - last < throttle_duration_sec:
                 return False
             self._seen[text] = now
+        # The caller is the first frame outside of this module: `info` and the like come before it.
         caller = sys._getframe(1)
         while caller.f_back is not None and caller.f_code.co_filename == __file__:
             caller = caller.f_back

@@ -37,6 +37,7 @@ class Mailbox:
     def __init__(self) -> None:
         # Reentrant: the garbage collector may close a query, and with it deliver, while the lock is held.
         self.lock = threading.RLock()
+        # It is no `Queue`, because a handler of a signal may wake the executor in the middle of another `put`.
         self.queue: WorkQueue = SimpleQueue()
 
     def submit(self, work: Work | None) -> None:
@@ -90,6 +91,7 @@ class Receiver(ABC):
                 self.mailbox.queue.put(self)
             self._items.append(item)
         if surplus is not None:
+            # The lock is free again here, because refusing sends an answer.
             self.refuse(surplus)
 
     def run(self) -> bool:

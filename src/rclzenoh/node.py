@@ -41,6 +41,7 @@ class Node(NodeEndpoints, NodeGraph, NodeParameters):
     ) -> None:
         NodeEndpoints.__init__(self, node_name, namespace or "", context)
         NodeParameters.__init__(self, self._publish_parameter_event)
+        # The graph is asked before the token of this node is declared, because it would tell of that one, too.
         is_taken = (node_name, self._namespace) in self.get_node_names_and_namespaces()
         self._declared_token: Any = self.context.session.liveliness().declare_token(self.token.key())
         if enable_rosout:

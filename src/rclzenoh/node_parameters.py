@@ -56,6 +56,7 @@ class NodeParameters:
         """
         if name in self._parameters:
             raise ParameterAlreadyDeclaredException(f"parameter {name!r} is declared already")
+        # The descriptor is copied, because one may be used for several parameters, and name and type are set here.
         described = ParameterDescriptor() if descriptor is None else copy.copy(descriptor)
         described.name = name
         if isinstance(value, ParameterKind):

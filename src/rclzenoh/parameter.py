@@ -39,6 +39,7 @@ class ParameterKind(Enum):
             if isinstance(value, python):
                 return cls(type_)
         if isinstance(value, (list, tuple, array.array)):
+            # An empty list fits all kinds of elements. It is an array of bytes, as in rclpy, because these come first.
             for type_, python in _ELEMENTS.items():
                 if all(isinstance(element, python) for element in value):
                     return cls(type_)

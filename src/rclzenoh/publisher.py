@@ -79,6 +79,7 @@ class Publisher:
 
 
 def _declare(endpoint: Endpoint, qos: QoSProfile) -> Any:
+    # As rmw_zenoh_cpp does: only such a topic waits for subscribers that are slow.
     keeps_all = qos.is_reliable and qos.history is HistoryPolicy.KEEP_ALL
     congestion = zenoh.CongestionControl.BLOCK if keeps_all else zenoh.CongestionControl.DROP
     reliability = zenoh.Reliability.RELIABLE if qos.is_reliable else zenoh.Reliability.BEST_EFFORT
@@ -90,6 +91,7 @@ def _declare(endpoint: Endpoint, qos: QoSProfile) -> Any:
         congestion_control=congestion,
         reliability=reliability,
         cache=CacheConfig(max_samples=qos.queue_length or _ENDLESS),
+        # By this, subscribers that were there before notice the publisher, and ask for what it has published already.
         publisher_detection=True,
         sample_miss_detection=MissDetectionConfig(heartbeat=None, sporadic_heartbeat=HEARTBEAT_S)
         if qos.is_reliable

@@ -97,6 +97,7 @@ class QoSProfile:
         return self.durability is DurabilityPolicy.TRANSIENT_LOCAL
 
 
+# The first is the depth of rmw's default profile, the second that of rmw_zenoh_cpp for profiles that leave it open.
 _RCL_DEPTH, _MIDDLEWARE_DEPTH = 10, 42
 
 

@@ -38,6 +38,7 @@ class Subscription(Receiver):
         self.qos_profile = qos_profile
         self.raw = raw
         self.callback = callback
+        # As in rclpy, a callback whose second argument is optional gets the message alone.
         self._wants_info = _takes(callback, 2) and not _takes(callback, 1)
         if not self._wants_info and not _takes(callback, 1):
             raise RuntimeError(f"{topic}: the callback must take a message, or a message and its info")

@@ -94,6 +94,7 @@ class Future:
             self._result, self._exception, self._state = result, exception, state
             callbacks, self._callbacks = self._callbacks, []
             waiting, self._waiting = self._waiting, []
+        # The lock is free again here, because a callback may use this future.
         for task in waiting:
             task.schedule()
         for callback in callbacks:

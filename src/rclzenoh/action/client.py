@@ -58,6 +58,7 @@ class ActionClient:
     def __init__(self, node: NodeEndpoints, action_type: type[Action], action_name: str) -> None:
         self._node = node
         self._action_type = action_type
+        # The references are weak, because the status of a goal is of interest only to whoever holds its handle.
         self._handles: weakref.WeakValueDictionary[bytes, ClientGoalHandle] = weakref.WeakValueDictionary()
         self._feedback_callbacks: dict[bytes, FeedbackCallback] = {}
         protocol, prefix = action_type.Impl, f"{action_name}/_action"

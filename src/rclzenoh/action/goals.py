@@ -103,6 +103,8 @@ class GoalTable(dict[bytes, TrackedGoal]):
         Returns:
             Return code of action_msgs/srv/CancelGoal, and the identifiers of the goals.
         """
+        # action_msgs/srv/CancelGoal has four cases: one goal, all goals, all up to a time, and these together with one
+        # goal.
         has_key = any(key)
         if has_key and not stamp_ns:
             if key not in self:

@@ -230,6 +230,7 @@ class ActionServer:
             self._logger.warning(
                 f"the execute callback {how} without ending goal {_key(handle.goal_id).hex()}: aborted"
             )
+            # The state machine has no way from accepted to aborted.
             if handle.status == GoalStatus.STATUS_ACCEPTED:
                 self.change(handle, GoalEvent.EXECUTE)
             handle.abort()
@@ -243,6 +244,7 @@ class ActionServer:
             answer = await _outcome(self._goal_callback(request.goal))
             if not isinstance(answer, GoalResponse):
                 raise TypeError(f"the goal callback must return a GoalResponse, got {answer!r:.80}")
+        # Another goal of the same identifier may have been accepted while the callback was waiting.
         response.accepted = answer is GoalResponse.ACCEPT and key not in self._goals
         if response.accepted:
             response.stamp = now.to_msg()

@@ -176,6 +176,7 @@ def _require(name: str) -> None:
         return
     package, _, rest = name.partition("/")
     kind, _, type_name = rest.partition("/")
+    # In ROS, names of interfaces have no underscore, and those of their parts have one, such as Trigger_Request.
     whole = type_name.split("_")[0]
     path = DEFINITIONS / package / kind / f"{whole}.{kind}"
     is_plausible = kind in ("msg", "srv", "action") and type_name.isidentifier()

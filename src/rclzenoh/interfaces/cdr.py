@@ -37,6 +37,7 @@ def deserialize(data: bytes, message_class: type[_M]) -> _M:
         ValueError: If the data is malformed or too short.
     """
     name = message_class.TYPE
+    # Only the first two bytes of the header name the encoding. The others are options (DDSI-RTPS, serialized payload).
     if data[:2] != HEADER[:2] or len(data) < len(HEADER):
         raise ValueError(f"{name}: not little-endian CDR: begins with {bytes(data[:4]).hex(' ') or 'nothing'}")
     size = len(data) - 4

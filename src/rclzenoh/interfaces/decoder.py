@@ -121,6 +121,7 @@ class _Reader(FunctionWriter):
         self.line(depth + 1, f"at += {count} << {shift}" if shift else f"at += {count}")
         self.line(depth, "else:")
         self.line(depth + 1, f"{operand} = {empty}")
+        # Padding stands before the first number and not after the count, so an empty sequence has none.
         self.at = before.either(Alignment(size, 0))
 
     def elements(self, field: Field, operand: str, depth: int) -> None:

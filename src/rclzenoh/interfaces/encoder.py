@@ -108,6 +108,7 @@ class _Writer(FunctionWriter):
         self.line(depth, f"{array} = {operand}")
         if field.length is not None:
             self.align(size, depth)
+            # The memory can be copied as it is, because `as_numbers` has made it contiguous and of the field's type.
             self.line(depth, f"out += {array}.data")
             self.at = self.at.after(size * field.length)
             return

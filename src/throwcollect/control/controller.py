@@ -166,6 +166,7 @@ class JointTrajectoryController:
             return reason
         if self._topic_aborts_goal:
             self._finish(Decision.invalid("Current goal preempted by a trajectory on the topic."))
+        # An open goal keeps its own tolerances, which the new trajectory has to meet.
         self._follow(trajectory, self._judge if self.goal_id is not None else self._judge_with(self._defaults))
         return None
 
@@ -203,6 +204,8 @@ class JointTrajectoryController:
         else:
             self._motion.advance()
         decision = None if self._holding else self._decide(first=begins)
+        # As upstream does: positions are written only while tolerances are met. So the last command stays until the
+        # stop begins.
         if decision is None or decision.status is not GoalStatus.ABORTED:
             self.command = self._motion.command
         return self.command
@@ -308,6 +311,7 @@ class JointTrajectoryController:
             holds = "" if self.goal_id is not None else " (no goal is open; the trajectory of the topic ends)"
             self.logger.warning("%s: %s%s", self.name, decision.text, holds)
             self._stop()
+        # An end that no goal waits for is judged again in each update until its goal time is over.
         elif self.goal_id is not None or self._judge.settled(motion):
             self._hold(Waypoints.single(*motion.curve.state(motion.curve.end_ns)))
         self._finish(decision)

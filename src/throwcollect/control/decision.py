@@ -65,6 +65,7 @@ class Judge:
         if not past_end:
             return None
         # As ros2_controllers do: a timeout of 0, and a tolerance of time of 0, mean that there is none.
+        # The timeout comes before the goal, because joints that are stopped are no success (upstream reports one).
         late_ns = motion.since_end_ns
         if 0 < self.timeout_ns < late_ns:
             text = f"Aborted due to command timeout: {late_ns / 1e9:f} seconds after the end"
@@ -90,6 +91,7 @@ class Judge:
             return 0
         if goal:
             return max(0, motion.updates_until_end())
+        # Without a goal, nothing is decided when the end is reached, but only when one of these limits has passed.
         limits = [self.timeout_ns, tolerances.goal_time_ns if tolerances.goal.any() else 0]
         late = [motion.updates_until_late(limit_ns) for limit_ns in limits if limit_ns]
         return max(0, min(late)) if late else None

@@ -68,6 +68,8 @@ class Curve:
     def _evaluate(self, coefficients: NDArray[np.float64], times_ns: NDArray[np.int64]) -> NDArray[np.float64]:
         segment = np.searchsorted(self.knots_ns, times_ns, side="right") - 1
         share = ((times_ns - self.knots_ns[segment]) / self.durations_ns[segment])[:, np.newaxis]
+        # Horner's scheme works in place, because indexing by an array has made a copy and the coefficients stay as they
+        # are.
         value: NDArray[np.float64] = coefficients[-1][segment]
         for coefficient in coefficients[-2::-1]:
             value *= share
@@ -134,6 +136,7 @@ def _lead_in(waypoints: Waypoints, start: JointState, start_ns: int) -> Waypoint
 def _splines(waypoints: Waypoints, durations_ns: NDArray[np.int64]) -> Curve:
     content = np.minimum(waypoints.content[:-1], waypoints.content[1:])
     seconds = (durations_ns / 1e9)[:, np.newaxis]
+    # The highest degree of any segment decides the size of the tables. Lower ones leave their higher coefficients at 0.
     degree = (1, 3, 5)[int(content.max(initial=LINE))]
     position = np.zeros((degree + 1, *waypoints.positions.shape))
     position[0] = waypoints.positions
@@ -144,12 +147,15 @@ def _splines(waypoints: Waypoints, durations_ns: NDArray[np.int64]) -> Curve:
     position[1, lines] = step[lines]
     if len(cubics):
         d, v, w = step[cubics], v0[cubics], v1[cubics]
+        # These are the coefficients of the cubic Hermite polynomial.
         position[1:4, cubics] = v, 3 * d - 2 * v - w, v + w - 2 * d
     if len(quintics):
         d, v, w, a, b = step[quintics], v0[quintics], v1[quintics], a0[quintics], a1[quintics]
         position[1:6, quintics] = quintic(d, v, w, a, b)
     velocity = _derivative(position, seconds)
     acceleration = _derivative(velocity, seconds)
+    # After the end the position is constant, but velocity and acceleration are held at those of the last point, as
+    # upstream does.
     velocity[0, -1], acceleration[0, -1] = waypoints.velocities[-1], waypoints.accelerations[-1]
     return Curve(waypoints.times_ns, durations_ns, position, velocity, acceleration)
 
@@ -157,5 +163,7 @@ def _splines(waypoints: Waypoints, durations_ns: NDArray[np.int64]) -> Curve:
 def _derivative(coefficients: NDArray[np.float64], seconds: NDArray[np.float64]) -> NDArray[np.float64]:
     if len(coefficients) == 1:
         return np.zeros_like(coefficients)
+    # The polynomials are in the share of the segment and their derivatives in seconds, so each one is divided once
+    # more.
     powers = np.arange(1.0, len(coefficients))[:, np.newaxis, np.newaxis]
     return powers * coefficients[1:] / seconds

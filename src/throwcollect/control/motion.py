@@ -84,6 +84,7 @@ class Motion:
         left_ns = tolerance_ns - self.since_end_ns
         if left_ns < 0:
             return -1
+        # This rounds down, because an update exactly at the tolerance is not late.
         return left_ns // self._step_ns if self._step_ns else sys.maxsize
 
     def _rebase(self, clock_ns: int) -> None:

@@ -29,6 +29,7 @@ class Grid:
         self.end_index = first_index_at(curve.end_ns - origin_ns, step_ns)
         self._block_start = 0
         self._block = np.empty((0, 0))
+        # A clock that stands still never gets to the end, so its last position is that of the origin.
         self._last = self._compute(self.end_index if step_ns else 0, 1)[0]
 
     def time_ns(self, index: int) -> int:
@@ -67,4 +68,5 @@ def first_index_at(distance_ns: int, step_ns: int) -> int:
     """Index of the first point that is at least this far from the origin; `sys.maxsize` if there is none."""
     if distance_ns <= 0:
         return 0
+    # This rounds up in whole numbers, because a float cannot tell single nanoseconds of a year.
     return -(-distance_ns // step_ns) if step_ns else sys.maxsize

@@ -76,6 +76,7 @@ def violations(error: NDArray[np.float64], limits: Limits, joints: Sequence[str]
 
 def _describe(error: float, tolerance: float) -> str:
     """Write an error and the tolerance below it with as many digits as it takes to see which is larger."""
+    # Six digits are what `%g` writes, and 17 tell any two numbers of double precision apart.
     digits = next((n for n in range(6, 17) if f"{abs(error):.{n}g}" != f"{tolerance:.{n}g}"), 17)
     return f"error {error:.{digits}g} rad, tolerance {tolerance:.{digits}g} rad"
 

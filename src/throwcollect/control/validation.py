@@ -81,6 +81,7 @@ def _wrong_sizes(trajectory: Trajectory, parameters: ControllerParameters) -> st
             ("velocities", point.velocities),
             ("accelerations", point.accelerations),
         ]
+        # `len` is asked for, because fields of a message may be NumPy arrays, which have no truth value.
         if integrates and not any(len(values) for _, values in fields):
             return f"The given trajectory has no position, velocity, or acceleration points. (point #{index})"
         for field, values in fields:
@@ -93,6 +94,7 @@ def _wrong_sizes(trajectory: Trajectory, parameters: ControllerParameters) -> st
 def _not_finite(trajectory: Trajectory) -> str | None:
     for field, values_of in _FIELDS:
         present = [(index, values) for index, point in enumerate(trajectory.points) if len(values := values_of(point))]
+        # Their sizes have been checked, so these rows make a table.
         table = np.array([values for _, values in present], dtype=np.float64)
         if not np.isfinite(table).all():
             row, column = np.argwhere(~np.isfinite(table))[0]

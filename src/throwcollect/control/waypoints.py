@@ -70,6 +70,7 @@ def arrange(
     accelerations, accelerating = _table([point.accelerations for point in points], positions.shape, columns)
     content = np.zeros(len(points), np.int64)
     content[moving] = CUBIC
+    # Accelerations without velocities do not count, as upstream's quintic needs both.
     content[[index for index in accelerating if content[index] == CUBIC]] = QUINTIC
     waypoints = Waypoints(times_ns, positions, velocities, accelerations, content)
     return waypoints if len(placed) == len(points) else _integrate(waypoints, points, columns, start, start_ns)
@@ -91,6 +92,7 @@ def _integrate(
     """Fill in positions, and velocities too where a point has accelerations alone, by the trapezoidal rule."""
     positions, velocities, content = waypoints.positions.copy(), waypoints.velocities.copy(), waypoints.content.copy()
     still = np.zeros(positions.shape[1])
+    # If the time of the first point is over, the joints are taken to be there, so nothing is integrated backwards.
     time_ns = min(start_ns, int(waypoints.times_ns[0]))
     p = start.positions
     v, a = still if start.velocities is None else start.velocities, still

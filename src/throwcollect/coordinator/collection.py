@@ -71,6 +71,8 @@ class TrialCollection:
         self._backlog: deque[tuple[Episode, Result]] = deque()
         self._set_aside: dict[str, str] = {}
         self._outcomes: Counter[str] = Counter()
+        # Each time has the number of trials that had ended by then. One is there from the start, so that `_rate` has
+        # two ends.
         self._ends: deque[tuple[float, int]] = deque([(time.monotonic(), 0)])
         self._draining = False
         self._drain_deadline = math.inf
@@ -130,6 +132,8 @@ class TrialCollection:
             return False
         if self.complete:
             return True
+        # `grow_plan` still has to close the plan. Otherwise a drain at this moment would have a complete collection
+        # count as interrupted.
         if self._growth is not None and self._growth.over:
             return False
         return self._draining and (self._leases.leased == 0 or time.monotonic() > self._drain_deadline)
@@ -144,6 +148,7 @@ class TrialCollection:
         if not self._draining:
             self._draining = True
             self._drain_deadline = time.monotonic() + self._config.run.grace_s
+            # Of the trials that a simulation holds only the first one runs. The others go back, and it is told so.
             for simulation in self._names:
                 self._leases.release(simulation)
             self.on_change()
@@ -152,6 +157,7 @@ class TrialCollection:
         """Count a trial as ended whose episode is in the dataset already; only before anything is leased."""
         self._leases.recall(trial)
         self._note(trial, result)
+        # Trials of an earlier collection must not count as speed of this one.
         self._ends = deque([(time.monotonic(), self._leases.ended)])
 
     def join(self, simulation: str, name: str) -> None:
@@ -172,8 +178,11 @@ class TrialCollection:
         count = self._lookahead.count_for(
             simulation, waiting=self._leases.waiting + len(held), simulations=len(self._names)
         )
+        # A list is filled up when half of it is done, and not trial by trial: each request takes time of the one
+        # process that all simulations wait for.
         if self._draining or len(held) > count // 2:
             return held
+        # The time in which the simulation had nothing to do is no part of the next trial's duration.
         if not held:
             self._lookahead.begin(simulation)
         while len(held) < count and (trial := self._leases.lease(simulation, others=self._names)) is not None:
@@ -245,6 +254,8 @@ class TrialCollection:
             return True
         trials = None if self._draining else self._growth.step()
         if trials:
+            # The plan is on the disk before its trials are leased, so that no crash can leave an episode of a trial
+            # that no plan has.
             self.writer.extend(trials)
             self._leases.add(trials.numbers_to_run)
             self.on_change()
@@ -263,6 +274,7 @@ class TrialCollection:
             self._synced_at = time.monotonic()
             self.writer.sync()
         remaining = self._leases.total - self._leases.ended
+        # The guess is made from all trials of the plan, so it is worth nothing while some may be added or left out.
         settled = self._growth is None and not self._draining
         if settled and not self._replay.begun and remaining <= _REPLAY_AHEAD_S * self._rate:
             self._replay.begin(list(self.writer.plan.trials.numbers_to_run))
@@ -312,6 +324,7 @@ class TrialCollection:
                 f"interrupted; what is finished is in {known or 'the volume'}",
                 hint=command("resume", known) if known else None,
             )
+        # The comparison comes first, because what is written next makes the dataset count as finished.
         if (sentence := self._replay.compare(self.writer.digests(), meanwhile=meanwhile)) is not None:
             say(sentence)
         outcomes = self.writer.finish(simulations=len(self._took_part) or None)
@@ -321,6 +334,7 @@ class TrialCollection:
 
     def name_of(self, simulation: str) -> str:
         """Name of a simulation's node, also after the simulation has left."""
+        # Unless it was told otherwise, a simulation lives in a namespace that has the name of its node.
         return self._names.get(simulation, simulation.strip("/"))
 
     @property

@@ -77,6 +77,7 @@ class Leases:
     def add(self, trials: Iterable[int]) -> None:
         """Take in further trials, with numbers above those that were handed out."""
         for trial in trials:
+            # Numbers have gaps, because trials that the plan refuses are left out.
             self._fresh.extend(bytes(max(0, trial + 1 - len(self._fresh))))
             self._waiting_fresh += not self._fresh[trial]
             self.total += not self._fresh[trial]
@@ -93,6 +94,7 @@ class Leases:
             simulation: Name of a simulation.
             others: Names of the other simulations that there are.
         """
+        # Where nobody is free of doubt, doubted simulations go on, because the trials may be to blame and not they.
         rivals = [other for other in others if other != simulation and not self._is_doubted(other)]
         if self.why_set_aside(simulation) is not None or (rivals and self._is_doubted(simulation)):
             return None
@@ -157,6 +159,8 @@ class Leases:
             self._returned.append(trial)
             return None
         self.ended += 1
+        # While no trial was ever done, refusals are kept whatever becomes of their trials, because `hopeless` counts
+        # them.
         if self._completed:
             # No simulation could do the trial, so its refusals are not held against them.
             for name, refusals in self._refusals.items():

@@ -53,4 +53,5 @@ class Lookahead:
             return 1
         # Towards the end each gets less, so that all have work until then.
         share = math.ceil(waiting / (2 * max(simulations, 1)))
+        # Two episodes may arrive together, with no time between them, so a duration counts as 1 ms at least.
         return max(1, min(_MOST, share, math.ceil(_AHEAD_S / max(duration, 1e-3))))

@@ -39,6 +39,7 @@ def run(directory: Path) -> None:
     # The dataset is opened before the node exists, because opening a large one takes long and a node has to answer.
     with TrialCollection.open(directory, say=_say, processes=count_cores()) as collection:
         ros.init()
+        # The journal keeps that anybody could join this run, because the dataset has to say so later on.
         if not ros.joins_protected():
             collection.writer.note("exposed")
         node = Coordinator(collection)

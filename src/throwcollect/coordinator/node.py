@@ -78,6 +78,8 @@ class Coordinator(Node):
                 self._take_back(namespace, f"no episode within {self._patience_s:g} s{besides}")
             elif (missing := simulation.remind()) is not None:
                 self.get_logger().warning(f"{namespace}: no answer to the lease of {missing}, which is sent again")
+            # This is done each time, because trials of others may have come back, or the simulation may have become
+            # reachable.
             self._lease(namespace)
         self._notice_unreached(now)
 
@@ -151,6 +153,7 @@ class Coordinator(Node):
         simulation = self._simulations.get(namespace)
         if simulation is None or simulation.hung or not simulation.ready():
             return
+        # A deadline that is set is that of the trial that runs, which a longer list must not postpone.
         if simulation.ask(self._collection.lease(namespace)) and simulation.deadline == math.inf:
             simulation.deadline = time.monotonic() + self._patience_s
 
@@ -173,6 +176,7 @@ class Coordinator(Node):
         if trial is None:
             self.get_logger().warning(f"{namespace}: an episode came too late and was dropped")
             return
+        # The next trial of its list begins with the end of this one.
         simulation.deadline = time.monotonic() + self._patience_s if simulation.trials else math.inf
         if isinstance(handed, Refusal):
             self._collection.refuse(namespace, trial, handed.reason)

@@ -196,6 +196,7 @@ def _check_room(directory: Path, trials: int) -> None:
     Raises:
         ConfigError: If it is too large.
     """
+    # The directory need not exist yet, so its disk is that of the nearest one above it that does.
     parent = next(path for path in (directory, *directory.absolute().parents) if path.is_dir())
     least, free = trials * _LEAST_BYTES, shutil.disk_usage(parent).free
     if free < least:
@@ -236,6 +237,7 @@ def prepare(
     points = _draw_points(config, sweep_directory, say)
     _check_room(directory, len(points.values))
     plan = _check_trials(config, points, processes=processes, say=say, update_plan=update_plan)
+    # This comes after the plan is drawn, because the configuration as it was given names the place of its list.
     plan = replace(plan, config=make_self_contained(config))
     try:
         create(directory, plan, listed=read_listed_points(config, directory=sweep_directory))

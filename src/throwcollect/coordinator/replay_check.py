@@ -64,6 +64,7 @@ class ReplayCheck:
             DatasetError: If an episode came out otherwise.
             WorkerError: If the process failed.
         """
+        # The choice goes by places in the list, so the order must not depend on which episode came first.
         trials = choose_trials(sorted(digests), count=self._count, seed=self._seed)
         again: dict[int, str] = {}
         if self._early is not None:
@@ -127,12 +128,14 @@ class _Process:
 
     def end(self) -> None:
         """Kill it; a second call does no harm."""
+        # It is not left to end by itself, which takes time: all that is wanted of it stands in the files.
         self._process.kill()
         self.exit_code = self._process.wait()
         if not self._printed.closed:
             with self._printed, self._said:
                 lines = _contents(self._printed).splitlines(keepends=True)
                 self.errors = _contents(self._said).strip()
+            # The kill may have cut off the last line.
             whole = (json.loads(line) for line in lines if line[-1] == "\n")
             self.digests = {printed["trial"]: printed["digest"] for printed in whole}
 

@@ -62,7 +62,9 @@ def resume(
             refuse_changes(directory, stored, make_self_contained(config))
         old = _read_stored_plan(directory, stored, make_self_contained(config))
         damaged = _find_damaged(directory, old, check=check, say=say)
+        # The list may be read and written below, and a link in its place could lead to any file of the user.
         check_regular(directory / TRIALS)
+        # A configuration from another directory names a list of its own, from which the damaged one is made again.
         if TRIALS in damaged and sweep_directory.samefile(directory):
             raise DatasetError(
                 f"{directory / TRIALS}: is missing or damaged, and nothing else holds the list of trials",
@@ -157,6 +159,7 @@ def finished(directory: Path, plan: Plan) -> bool:
     try:
         return LOST not in read_throws(directory, plan)["outcome"].to_pylist()
     except DatasetError:
+        # A table that cannot be read leaves open whether a trial was lost.
         return False
 
 
@@ -174,6 +177,8 @@ def _read_stored_config(directory: Path) -> Config | None:
     try:
         path = config_path(directory)
         config = load(path)
+        # The text is compared as a whole: a file that a power cut has shortened may still be valid, with defaults for
+        # what is gone.
         # A finished dataset of an earlier version has fewer keys, and counts as complete if its manifest says so.
         complete = path.read_text(encoding="utf-8") == dump_yaml(config) or is_as_written(directory, CONFIG)
     except (ConfigError, OSError):
@@ -250,6 +255,8 @@ def _extend(directory: Path, old: Plan | None, new: Plan) -> Plan:
             expected=f"{len(old.trials)}, as {directory} was begun with",
             hint="sobol and uniform go on where they ended; or merge datasets: throwcollect dataset merge",
         )
+    # A plan that grows is drawn anew up to its first rounds only. What was added by results cannot be drawn again and
+    # is kept.
     if count < len(old.trials):
         trials = new.trials[:]
         trials.extend(old.trials[count:])

@@ -34,6 +34,7 @@ class Showing:
             message: Serialised message of the episode.
         """
         if simulation not in self._publishers:
+            # The publisher is made before anybody watches, because onlookers find the topic by it.
             topic = make_shown_topic(simulation)
             self._publishers[simulation] = self._node.create_publisher(UInt8MultiArray, topic, SHOWN_QOS)
         if simulation in self._watched:

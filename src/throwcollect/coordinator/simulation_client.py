@@ -90,6 +90,7 @@ class SimulationClient:
         """
         if tuple(trials) == self.trials:
             return False
+        # A trial that stays in the list keeps its lease, because the simulation may be running it under that token.
         self._leases = {trial: self._leases.get(trial) or self._make_lease(self.namespace, trial) for trial in trials}
         self._patience_s = _ANSWER_S
         self._send()

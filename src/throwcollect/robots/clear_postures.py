@@ -59,9 +59,12 @@ class ClearPostures:
     def find_unknown(self, postures: NDArray[np.float64]) -> NDArray[np.bool_]:
         """Find the postures [rad], shape ``(n, n_joints)``, that are not known to be clear, shape ``(n,)``."""
         lowest, highest = postures.min(axis=0), postures.max(axis=0)
+        # Known postures that are too far from the box around all of these cannot show that any of them is clear.
         gaps = np.maximum(np.maximum(lowest - self._postures, self._postures - highest), 0.0)
         near = np.flatnonzero((gaps * self._steepness).sum(axis=1) < 1)
         known, steepness = self._postures[near], self._steepness[near]
+        # Slack keeps a known posture clear, and the way to another posture uses up a share of it. Joints that are the
+        # same in all of them need none.
         spent = np.zeros((len(postures), len(near)))
         for joint in np.flatnonzero((known != lowest).any(axis=0) | (lowest != highest)):
             spent += np.abs(postures[:, joint, np.newaxis] - known[:, joint]) * steepness[:, joint]
@@ -74,6 +77,8 @@ class ClearPostures:
         """
         unknown: NDArray[np.bool_] = np.ones(len(postures), bool)
         if not self._tries:
+            # No further posture is kept, but the distances of few pairs decide about this one at less cost than the
+            # tree.
             unknown[0] = len(self._pairs) > _FEW_PAIRS or self._compute_distances(postures[0]).min() <= self._needed
             return unknown
         self._tries -= 1
@@ -81,6 +86,7 @@ class ClearPostures:
         slack = distances - self._needed
         if slack.min() <= 0:
             return unknown
+        # Of each joint the steepest pair counts, so that the bound holds for all pairs at once.
         steepness = (self._reaches / slack[:, np.newaxis]).max(axis=0)
         unknown = np.greater_equal(np.abs(postures - postures[0]) @ steepness, 1)
         if np.count_nonzero(~unknown) >= _LEAST_WORTH:
@@ -128,6 +134,7 @@ def find_reaches(model: pinocchio.Model, geometry: pinocchio.GeometryModel) -> N
     """
     shapes = np.array([_find_reach(model, shape) for shape in geometry.geometryObjects])
     one, other = np.array([(pair.first, pair.second) for pair in geometry.collisionPairs]).T
+    # A joint that carries both links, or neither, does not move them against each other.
     between = (shapes[one] > 0) != (shapes[other] > 0)
     reaches: NDArray[np.float64] = between * (shapes[one] + shapes[other])
     return reaches
@@ -141,9 +148,11 @@ def _find_reach(model: pinocchio.Model, shape: pinocchio.GeometryObject) -> NDAr
     reaches = np.zeros(model.nq)
     joint, reach = shape.parentJoint, max(float(np.linalg.norm(corner)) for corner in corners)
     while joint > 0:
+        # In Pinocchio the names of all joints that turn about an axis begin like that, such as JointModelRX.
         if not model.joints[joint].shortname().startswith("JointModelR"):
             reach = _UNBOUNDED_M
         reaches[model.idx_qs[joint]] = reach
+        # Whatever the angles are, a point is no farther away than the lengths of the links up to it, added up.
         reach += float(np.linalg.norm(model.jointPlacements[joint].translation))
         joint = model.parents[joint]
     return reaches

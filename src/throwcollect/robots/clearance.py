@@ -95,6 +95,7 @@ class Clearance:
         for index, configuration in enumerate(configurations):
             if self._is_clear(configurations[index:], [rows[index:] for rows in unknown]):
                 continue
+            # The tree tells quickly whether anything is too close, and no more. The message has to say what it is.
             if pinocchio.computeCollisions(self._model, self._data, self._broadphase, configuration, True):
                 pinocchio.computeDistances(self._model, self._data, self.geometry, self._distances, configuration)
                 distances = [result.min_distance for result in self._distances.distanceResults]

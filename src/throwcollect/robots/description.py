@@ -203,6 +203,7 @@ def _whole(robot: Robot, source: ElementTree.Element) -> pinocchio.Model:
         model = pinocchio.buildModelFromXML(ElementTree.tostring(source, encoding="unicode"))
     except (ValueError, RuntimeError) as error:
         raise ConfigError(f"{robot.urdf_path}: cannot be read as robot description: {error}") from error
+    # Pinocchio's first joint is the universe.
     if missing := set(robot.joints) ^ set(model.names[1:]):
         raise ConfigError(
             f"{robot.urdf_path}: has other movable joints than {robot.title}: {', '.join(sorted(missing))}"

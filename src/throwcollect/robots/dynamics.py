@@ -52,11 +52,13 @@ class Dynamics:
         seat = np.array(tool.ball_seat(config.ball.radius_m))
         ball = pinocchio.Inertia.FromSphere(config.ball.mass_kg, config.ball.radius_m)
         load = tool.inertia + pinocchio.SE3(np.eye(3), seat).act(ball)
+        # The sum begins with the bare hand, because the load of the trial before is still in the model.
         self._model.inertias[self._hand] = self._bare_hand + (self._hand_placement * tool.mount).act(load)
         self._model.gravity.linear = np.array([0.0, 0.0, -config.scene.gravity_mps2])
         positions, velocities, accelerations = (np.ascontiguousarray(array[:, self._columns]) for array in motion)
         rows = zip(positions, velocities, accelerations, strict=True)
         torques = np.array([pinocchio.rnea(self._model, self._data, *row) for row in rows])
         needed = np.zeros_like(motion[0])
+        # Inverse dynamics know no friction.
         needed[:, self._columns] = torques + self._damping * velocities
         return needed

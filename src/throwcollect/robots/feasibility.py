@@ -140,6 +140,7 @@ class Feasibility:
         """Explain why the ball does not stay in the tool of the still robot."""
         pinocchio.forwardKinematics(self._model, self._data, self._model_order(posture))
         tool, radius = self._tool_of(config), config.ball.radius_m
+        # The last row of a rotation into world is the vertical of the world, along the axes of the frame.
         up = (self._data.oMi[self._hand] * self._hand_placement * tool.mount).rotation[2]
         slope = tool.way_out(radius, up)
         if slope >= _LOWEST_WAY_OUT_RAD:
@@ -179,6 +180,7 @@ def _whole_body(
     offsets, speed = joint_offsets(config)[columns], config.robot.speed_scale
     whole = tuple(np.tile(rest, (len(times), 1)) for rest in (posture, np.zeros_like(posture), np.zeros_like(posture)))
     position, velocity, acceleration = sample_quintic(trajectory, times)
+    # At another speed the same angles are passed, so each derivative by time has one more factor of it.
     for array, sampled in zip(whole, (position + offsets, velocity * speed, acceleration * speed**2), strict=True):
         array[:, columns] = sampled
     return whole[0], whole[1], whole[2]

@@ -56,5 +56,6 @@ def joint_limits(robot: Robot) -> JointLimits:
         except (KeyError, ValueError) as error:
             raise ConfigError(f"{path}: joint {name}: limit is not readable: {error}") from error
     table = np.array(rows)
+    # The result is cached, so all who ask for it have the same arrays.
     table.flags.writeable = False
     return JointLimits(*table.T)

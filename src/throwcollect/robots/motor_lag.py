@@ -24,6 +24,7 @@ def lag_behind(
     Returns:
         Positions at the end of each step [rad], shape ``(n_steps, n_joints)``.
     """
+    # `expm1` is used, because `1 - exp` would lose the digits of a small share.
     share = -math.expm1(-1.0 / (hz * lag_s))
     reached = np.empty_like(commands)
     last = start

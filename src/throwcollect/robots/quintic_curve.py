@@ -66,6 +66,7 @@ def _polynomials_at(
     v0, v1 = trajectory.velocities[:-1] * scale, trajectory.velocities[1:] * scale
     a0, a1 = trajectory.accelerations[:-1] * scale**2, trajectory.accelerations[1:] * scale**2
     coefficients = np.stack([origin, *quintic(moved, v0, v1, a0, a1)], axis=1)
+    # Only the inner knots are searched, so that times outside of the trajectory belong to its first or last segment.
     segments = knots[1:-1].searchsorted(times, side="right")
     spans = spans[segments]
     u = np.minimum(np.maximum((times - knots[segments]) / spans, 0.0), 1.0)

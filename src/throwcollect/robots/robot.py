@@ -12,6 +12,7 @@ from types import MappingProxyType
 from throwcollect.errors import ConfigError
 
 
+# Caches are keyed by robots. With `eq` a robot would be hashed by its fields, of which mappings have no hash.
 @dataclass(frozen=True, eq=False)
 class Robot:
     """A robot with a fixed base whose joints are all revolute, and the hand that holds the tool.

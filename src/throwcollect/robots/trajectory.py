@@ -31,6 +31,8 @@ class JointTrajectory:
     @cached_property
     def digest(self) -> str:
         """SHA-256 over names, times and all numbers, in hexadecimal: equal trajectories give equal digests."""
+        # No name holds a zero byte, so names cannot run into each other. Numbers are little-endian, so that the digest
+        # is the same on every machine.
         digest = hashlib.sha256("\0".join(self.joints).encode())
         for values in (self.times, self.positions, self.velocities, self.accelerations):
             digest.update(np.asarray(values, "<f8").tobytes())

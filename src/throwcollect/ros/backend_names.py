@@ -10,9 +10,11 @@ _EDGE = "throwcollect.ros"
 
 
 def __getattr__(name: str) -> Any:
+    # Python itself asks a module for such names, which must not load a backend.
     if name.startswith("__"):
         raise AttributeError(name)
     value = backend_name(name)
+    # Python asks `__getattr__` only for what a module does not have, so it does not come here for this name again.
     setattr(sys.modules[_EDGE], name, value)
     return value
 

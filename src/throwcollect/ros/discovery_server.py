@@ -81,6 +81,7 @@ def _accept_connections(endpoint: str) -> Iterator[None]:
     try:
         yield
     finally:
+        # `close` alone would leave the thread in `accept`.
         server.shutdown(socket.SHUT_RDWR)
         server.close()
 
@@ -95,6 +96,7 @@ def _wait_until_it_runs(process: subprocess.Popen[bytes], endpoint: str) -> None
 
 
 def _program() -> str:
+    # Where ROS is installed by pip, the program lies beside this Python, and that directory need not be in PATH.
     beside_python = Path(sys.prefix, "bin", _PROGRAM)
     program = str(beside_python) if beside_python.is_file() else shutil.which(_PROGRAM)
     if program is None:

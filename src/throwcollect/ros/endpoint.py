@@ -15,6 +15,7 @@ def split_address(endpoint: str) -> tuple[str, int]:
     Raises:
         ValueError: If the port is no number.
     """
+    # The last colon is that of the port: addresses of IPv6 have others, and stand in brackets because of them.
     host, _, port = endpoint.partition("/")[2].rpartition(":")
     return host.strip("[]"), int(port)
 

@@ -43,6 +43,8 @@ def client_profile(endpoint: str) -> str:
         ConfigError: If the endpoint has no address.
     """
     address, port = _place(endpoint)
+    # A plain client would hear only of nodes with which it has topics in common, and the ROS graph would be full of
+    # gaps.
     discovery = f"""<discoveryProtocol>SUPER_CLIENT</discoveryProtocol>
           <discoveryServersList><RemoteServer prefix="{_SERVER}"><metatrafficUnicastLocatorList>
             {_locator(address, port)}
@@ -59,6 +61,7 @@ def server_profile(endpoint: str) -> str:
 
 def write_temporarily(profile: str) -> Path:
     """Write a profile into a file that is deleted when this process ends."""
+    # `mkstemp` makes a file that its owner alone can read.
     descriptor, name = tempfile.mkstemp(prefix="throwcollect-", suffix=".xml")
     with open(descriptor, "w", encoding="utf-8") as file:
         file.write(profile)

@@ -32,6 +32,7 @@ def check_answers(node: ros.Node, executor: ros.Executor) -> None:
             now = time.monotonic()
             if now > deadline:
                 raise _silent(node)
+            # A request that leaves before client and service have found each other is lost, so it is repeated.
             if now >= asked_at + _AGAIN_S:
                 asked_at = now
                 answers.append(client.call_async(service.Request()))

@@ -62,6 +62,7 @@ def fill(message: Any, values: object, where: str = "") -> None:
             continue
         try:
             setattr(message, name, _convert(types[name], value, path, current))
+        # Classes that rosidl generates check what a field is set to by assertions.
         except (TypeError, ValueError, AssertionError) as error:
             raise ConfigError(f"{path}: should be {types[name]}, got {value!r:.80}") from error
 
@@ -86,6 +87,7 @@ def _plain(value: Any, kind: str, numbers: Numbers) -> Any:
     if isinstance(value, array.array):
         return numbers(np.frombuffer(value, value.typecode), _element(kind))
     if isinstance(value, bytes):
+        # On rclpy a single octet is bytes of length 1.
         return value[0] if kind == "octet" else list(value)
     if isinstance(value, Sequence) and not isinstance(value, str):
         element = _element(kind)
@@ -159,6 +161,7 @@ def _numbers(element: str, value: object, current: Any) -> Any:
         numbers = np.array(_check_numbers(element, value if isinstance(value, list) else value.tolist()), dtype)
     else:
         raise TypeError
+    # Fields are `array.array` or lists on rclpy, and arrays of NumPy on the embedded backend.
     if isinstance(current, array.array):
         return array.array(current.typecode, numbers.tobytes())
     if isinstance(current, list):
@@ -173,6 +176,7 @@ def _check_numbers(kind: str, values: list[Any]) -> list[Any]:
         TypeError: If one is something else.
         ValueError: If one is too large or too small.
     """
+    # Types are compared exactly, because `isinstance` would take truth values for whole numbers.
     kinds = set(map(type, values))
     allowed: set[type] = {bool} if kind == "boolean" else {int}
     if kind in _FLOATS:

@@ -36,5 +36,6 @@ class ContactLog:
         lasting = [(start, body, None) for body, start in self._open.items()]
         return tuple(
             Contact(body=body, start_ns=stamp_ns(start), end_ns=end_ns)
+            # Only start and body are compared, because an interval that lasts has None as its end, which has no order.
             for start, body, end_ns in sorted([*ended, *lasting], key=lambda interval: interval[:2])
         )

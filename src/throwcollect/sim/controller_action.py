@@ -78,6 +78,7 @@ class ControllerAction:
     def owes_feedback(self) -> bool:
         """Whether feedback has subscribers, and enough simulated time has passed since the last message."""
         passed_ns = self._simulation.now_ns - self._told_ns
+        # After a reset the clock may be behind the last message, and feedback is due then, too.
         return passed_ns != 0 and not 0 < passed_ns < self._simulation.feedback_ns and self.watched
 
     def publish_feedback(self, state: ControllerState) -> None:

@@ -86,6 +86,7 @@ class ControllerNode(Node):
 
     def destroy_node(self) -> None:
         """Withdraw the node."""
+        # Loggers of Python live as long as the process, so this one would go on to write to a node that is gone.
         self._limb.controller.logger.removeHandler(self._log)
         super().destroy_node()
 

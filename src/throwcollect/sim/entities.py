@@ -148,6 +148,8 @@ class Entities:
             RequestError: ``INVALID_POSE`` if the frame is not known or the pose makes no sense.
         """
         norm = math.hypot(*state.orientation_xyzw)
+        # The condition is written as `not ... <=`, here and below, because no comparison holds for NaN, which is
+        # refused so, too.
         if not abs(norm - 1.0) <= _NORM_TOLERANCE:
             message = f"orientation {state.orientation_xyzw}: a quaternion of norm {norm:g}"
             raise RequestError("INVALID_POSE", message, expected="norm 1")

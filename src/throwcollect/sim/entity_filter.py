@@ -62,6 +62,8 @@ def _region(bounds: Bounds) -> Callable[[Box], bool] | None:
         raise RequestError("RESULT_FEATURE_UNSUPPORTED", message)
     if len(bounds.points) != _CORNERS:
         raise _senseless(f"bounds with {len(bounds.points)} points; a box and a sphere have {_CORNERS}")
+    # simulation_interfaces/msg/Bounds has the upper corner of a box first, and the radius of a sphere in x of its
+    # second point.
     first, second = ((float(point.x), float(point.y), float(point.z)) for point in bounds.points)
     if bounds.type == Bounds.TYPE_SPHERE:
         radius = second[0]

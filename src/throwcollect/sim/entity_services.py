@@ -79,6 +79,7 @@ class EntityServices:
         box = self._entities.bounds(request.entity)
         if box is not None:
             response.bounds.type = Bounds.TYPE_BOX
+            # In simulation_interfaces/msg/Bounds the upper corner comes first.
             response.bounds.points = [Vector3(x=x, y=y, z=z) for x, y, z in reversed(box)]
 
     def _delete(self, request: DeleteEntity.Request, _response: DeleteEntity.Response) -> None:

@@ -63,6 +63,7 @@ class LeaseQueue:
             # Only episodes of leased trials are judged, and can so be refused.
             lease, self._running = self._running, None
             return self._refuse(lease, error) if lease else None
+        # The episode of a trial that a client has set up by hand belongs to no lease.
         if delivery is not None and self._running is not None:
             self._done.append(self._running.token)
             self._running = None

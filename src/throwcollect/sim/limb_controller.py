@@ -113,6 +113,7 @@ class LimbController:
                 continue
             held = self._posture[self._joints.index(joint)]
             for point in trajectory.points:
+                # A point of the wrong size is left to the controller, which refuses it in the next check.
                 target = point.positions[column] if column < len(point.positions) else held
                 if not abs(target - held) <= _LOCKED_TOLERANCE_RAD:
                     text = f"{joint} is locked at {held:.6g} rad (robot.locked) and cannot go to {target:.6g} rad"

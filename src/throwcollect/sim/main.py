@@ -48,6 +48,7 @@ def run(config: Path, *, name: str, namespace: str | None = None) -> None:
     def stop(number: int, _frame: FrameType | None) -> None:
         nonlocal stopped
         stopped = number
+        # The loop may be waiting for messages, and would see `stopped` only after that.
         ros.stop_waiting(executor)
 
     for number in stop_signals():
@@ -60,6 +61,7 @@ def run(config: Path, *, name: str, namespace: str | None = None) -> None:
     try:
         while not stopped and not node.quitting:
             heartbeat.beat()
+            # Messages come first, so that a cancel or a reset has its effect before time goes on.
             ros.spin_some(executor, timeout_sec=0.0 if simulation.running else node.patience_s)
             if simulation.running:
                 simulation.advance(watched=node.watched)

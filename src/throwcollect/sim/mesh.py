@@ -66,6 +66,7 @@ def check_mesh(path: Path) -> None:
 
 def _read_stl(content: bytes) -> Triangles:
     count = int.from_bytes(content[_HEADER - 4 : _HEADER], "little")
+    # The length decides, because titles of some binary files begin with `solid`, as all files in text do.
     if len(content) >= _HEADER and len(content) == _HEADER + count * _RECORD:
         corners: Triangles = np.frombuffer(content, _STL, count, _HEADER)["corners"]
         return corners

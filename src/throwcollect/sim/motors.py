@@ -47,6 +47,8 @@ class Motors:
         """
         count = len(commands)
         self._planned = np.concatenate((self._acting, commands))
+        # `_planned` begins as many rows back as the delay has whole steps, so row i + 1 acts at the end of step i. What
+        # is left of the delay is a fraction of the way to the row before.
         targets = self._planned[1 : count + 1]
         if self._fraction:
             targets = (1 - self._fraction) * targets + self._fraction * self._planned[:count]

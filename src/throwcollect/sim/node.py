@@ -271,6 +271,8 @@ class SimulationNode(Node):
             if DESCRIPTION in values:
                 check_appearance(self._description, values[DESCRIPTION])
             if values.get(LEASES):
+                # Trials begin in `_take_leases` only, because a callback that is asked after this one may still refuse
+                # the parameters.
                 self._asked = self._read_leases(values)
             elif not self._restoring:
                 self._prepare(values)
@@ -344,6 +346,7 @@ class SimulationNode(Node):
         """Show the physics of the configuration in the parameters again, in case a client has set another one."""
         stray = [key for key, value in self._physics.items() if self._get_value(key) != value]
         if stray:
+            # Setting parameters calls `_set_up` again, which must not prepare a trial by hand from these.
             self._restoring = True
             self.set_parameters([Parameter(key, value=self._physics[key]) for key in stray])
             self._restoring = False

@@ -32,6 +32,8 @@ def slice_steps(factor: float, hz: int, period: int, phase: int) -> int:
     """
     periods = math.ceil(_SHORTEST_S * factor * hz / period)
     steps = min(periods * period, longest_steps(factor, hz))
+    # The steps since the last sample count as the beginning of the slice, so that it ends with a sample. In slow motion
+    # a slice may be no longer than these, and is taken in full.
     return steps if steps <= phase else steps - phase
 
 

@@ -108,6 +108,7 @@ def _search(directory: Path, uri_of: Callable[[Path], str], robot: Robot) -> dic
                 if path.is_file() and path.stat().st_size <= _LARGEST_FILE:
                     names[uri_of(path)] = _spawnable_name(path, robot)
             except (RequestError, OSError):
+                # What cannot be spawned is left out of the list. Who spawns it all the same is told why.
                 continue
     return names
 

@@ -123,6 +123,7 @@ class Simulation:
             ConfigError: If there is no such start state.
             ThrowcollectError: If a controller refuses its goal.
         """
+        # A leased trial takes no goals, so this one counts as leased only when its controllers have theirs.
         self.trial.leased = False
         for limb in self.limbs.values():
             limb.restore()
@@ -249,6 +250,7 @@ class Simulation:
         if self._in_trial and self.world.end_reason is not None:
             self._running = False
         elif not self._in_trial and not any(limb.moves for limb in self.limbs.values()):
+            # The ball may still be on its way then, so the clock runs on until it has landed or rests.
             self._running = self.world.end_reason is None
         if factor:
             self._pace.wait(factor, began_s=began_s, since_ns=since_ns, until_ns=self.now_ns)
@@ -327,6 +329,7 @@ class Simulation:
         )
         states = {}
         if self._keeps_states:
+            # The last sample came after the last look, so no controller has seen it yet.
             self._look(self.limbs.values())
             self._collect_results()
             states = {name: limb.collect_states() for name, limb in self.limbs.items()}
@@ -344,6 +347,7 @@ class Simulation:
         for limb in self.limbs.values():
             limb.watched = limb in self._watched
             if not limb.watched:
+                # Whoever watches this limb later must not get states of before.
                 limb.pop_states()
 
     def _interrupt_steps(self, reason: str) -> None:

@@ -102,6 +102,7 @@ class SpawnServices:
         taken = {WORLD_FRAME, *self._entities.names}
         if stem not in taken:
             return stem
+        # An underscore and three digits have room: there are never more than 200 entities beside ball and robot.
         return next(name for number in count(1) if (name := f"{stem[: _LONGEST_NAME - 4]}_{number}") not in taken)
 
     def _list_spawnables(self, request: GetSpawnables.Request, response: GetSpawnables.Response) -> None:

@@ -41,6 +41,7 @@ class SpawnedBodies:
     def remove(self, name: str) -> None:
         """Take a body out of the world."""
         del self._spawned[name]
+        # The world has lost it if loading it anew has failed.
         if name in self._bodies:
             self._bodies.remove(name)
 

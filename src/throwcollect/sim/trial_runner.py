@@ -63,6 +63,7 @@ class TrialRunner:
             ConfigError: If the values make no motion, or no start state.
             ThrowcollectError: If a controller refuses its goal.
         """
+        # A trial that cannot begin must leave nothing behind that the next episode could be judged by.
         self._begun = None
         config = with_values(self._simulation.config, values)
         trajectory = task_of(config).trajectory()

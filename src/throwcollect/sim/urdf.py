@@ -79,6 +79,7 @@ def _parse(content: str | bytes) -> ElementTree.Element:
         parser.feed(content)
         root: ElementTree.Element = parser.close()
     except (ElementTree.ParseError, LookupError, ValueError) as error:
+        # An encoding that Python does not know is a LookupError.
         raise _malformed(f"not well-formed XML: {error}") from error
     if root.tag != "robot":
         kind = _OTHER_FORMATS.get(root.tag, f"<{root.tag:.40}>")
@@ -105,6 +106,8 @@ class _Reader:
             raise _malformed(f"{len(masses)} links; 1 to {_MOST_LINKS} can be simulated")
         joints = [_joint(joint) for joint in self._root.findall("joint")]
         rigid = _find_rigid_links(masses, joints)
+        # URDF has no word for a body that is attached to the world: such a description calls its root `world`, or gives
+        # it no mass.
         is_fixed = rigid[0] == "world" or sum(masses[link] for link in rigid) == 0
         robot = ElementTree.Element("robot", name="entity")
         for link in self._root.findall("link"):
@@ -221,6 +224,7 @@ def _find_rigid_links(links: Collection[str], joints: Sequence[_Joint]) -> list[
     roots = [link for link in links if link not in carriers]
     if len(roots) > 1:
         raise _malformed(f"links {roots[0]} and {roots[1]} are not connected")
+    # Without a root each link hangs on another one, and the sorter below finds the ring.
     rigid = roots
     try:
         # Parents come before what they carry.
@@ -247,6 +251,8 @@ def _add_motion(clean: ElementTree.Element, joint: ElementTree.Element) -> None:
     if limit is None and clean.get("type") != "continuous":
         raise _malformed(f"joint {name}: it has no limit")
     if limit is not None:
+        # Some descriptions write infinity where there is no limit. `_text` makes the largest number of it that an
+        # engine gets.
         values = {key: _numbers(limit, key, 1, of=joint, default=[0.0], largest=math.inf)[0] for key in _LIMITS}
         if values["lower"] > values["upper"] or values["effort"] < 0 or values["velocity"] < 0:
             raise _malformed(f"joint {name}: its limits contradict each other: {values}")

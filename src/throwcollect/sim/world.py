@@ -118,8 +118,10 @@ class World(Observer):
             ConfigError: If the posture or the choice of locked joints is wrong, the ball falls through the tool, or
                 the robot's files cannot be read.
         """
+        # Only the names count of `task.end`, because they say which joints are locked.
         key = (trial.robot, trial.tool, trial.ball, trial.scene, trial.sim, trial.task.start, tuple(trial.task.end))
         if key != self._start_key or not self.engine.is_as_loaded:
+            # If this fails, the next trial must not take the present state for its start state.
             self._start_key = None
             self._settle(trial)
             self._start_key = key
@@ -166,6 +168,7 @@ class World(Observer):
             return 0
         first, self._first_step = self._steps, self._steps
         self._stops_at_end = stop_at_end
+        # Commands are what sensors should show, and motors go by true angles.
         self._targets, velocities = self._motors.plan(commands + self._offsets)
         steps = Steps(
             self._targets,
@@ -200,12 +203,15 @@ class World(Observer):
         """
         numbers = range(self.recorded)[max(first, self._forgotten) : last]
         steps = np.arange(numbers.start, numbers.stop, dtype=np.int64) * self._stride
+        # Each stamp is divided once, because a period may be no whole number of nanoseconds, and sums of it would
+        # drift.
         stamps = self._start_ns + steps * NS_PER_S // self._hz
         rows = self._rows[numbers.start - self._forgotten : numbers.stop - self._forgotten]
         return to_samples(rows, stamps, self._joints, self._moving, self._locked, self._offsets)
 
     def forget_samples(self) -> None:
         """Drop the recorded samples but the last two, so that a world can go on for ever; their numbers stay."""
+        # `_judge` compares the last two.
         self._forgotten += len(self._rows[:-2])
         self._rows = self._rows[-2:]
 
@@ -271,9 +277,12 @@ class World(Observer):
             # One step is always taken, because contact forces and motor torques are those of the last step.
             steps = max(1, round(trial.sim.settle_s * trial.sim.physics_hz))
             targets, velocities = self._make_motors(trial).plan(np.tile(self._start, (steps, 1)))
+            # The first sample would be due one step after the end, so there is none.
             self.engine.run(Steps(targets, velocities, first_sample=steps + 1, stride=1), Observer())
             self._settled = self.engine.state
         finally:
+            # This happens after an error, too: loading may have emptied the world, and what clients have spawned stays
+            # in it.
             self.spawned.load()
 
     def _description(self, trial: Config) -> Description:

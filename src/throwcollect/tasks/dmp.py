@@ -74,6 +74,7 @@ def dmp_trajectory(
             expected=f"within {_SETTLED_RAD:g} rad and {_SETTLED_RADPS:g} rad/s",
             hint="give its last basis functions weights near 0, or set a larger task.trajectory.alpha_x",
         )
+    # Points are kept up to the first one at which all joints have settled.
     kept = min(len(times), int(np.flatnonzero(moving.any(axis=1))[-1]) + 2) if moving.any() else 1
     rest = np.zeros((1, len(goal)))
     return JointTrajectory(
@@ -115,6 +116,7 @@ def roll_out(
     spacing = float(times[1] - times[0])
     rate = max(250.0, 5 * family.alpha_z, 8 * family.basis_functions)
     substeps = refinement * math.ceil(spacing / tau * rate)
+    # A step of Runge-Kutta takes the forcing term at its beginning, its middle and its end.
     halves = np.arange(2.0 * substeps * (len(times) - 1) + 1) * (spacing / (2 * substeps))
     phase = exp(-family.alpha_x / tau * halves)
     forcing = matmul(basis(phase, count=family.basis_functions, alpha_x=family.alpha_x), weights.T)
@@ -124,7 +126,10 @@ def roll_out(
     square = matmul(step, step)
     cube, fourth = matmul(square, step), matmul(square, square)
     unit = np.eye(2)
+    # On a linear system, Runge-Kutta is the Taylor polynomial of the matrix exponential to the fourth order.
     transition = unit + step + square / 2 + cube / 6 + fourth / 24
+    # These are the effects on the state of the forcing term at the beginning, the middle and the end of a step. It
+    # pushes the second number of the state alone, hence the last column.
     inputs = np.stack([unit + step + square / 2 + cube / 4, 4 * unit + 2 * step + square / 2, unit], axis=1)[..., 1]
     samples = np.stack([forcing[:-1:2], forcing[1::2], forcing[2::2]], axis=1)
     drive = matmul(inputs * (spacing / tau / substeps / 6), samples)
@@ -138,6 +143,7 @@ def roll_out(
     drives = zip(drive.transpose(2, 0, 1).tolist(), (start - goal).tolist(), strict=True)
     states = np.array([list(accumulate(pushes, following, initial=(offset, 0.0))) for pushes, offset in drives])
     offsets, speeds = np.moveaxis(states[:, ::substeps], (0, 1, 2), (2, 1, 0))
+    # This is the equation for tau z', in which y - g and z are the two numbers of the state.
     push = forcing[:: 2 * substeps] - family.alpha_z * (family.alpha_z / 4 * offsets + speeds)
     return goal + offsets, speeds / tau, push / tau**2
 
@@ -186,6 +192,7 @@ def fit_dmp(
     """
     family = DynamicMovementPrimitive(family="dmp", basis_functions=basis_functions)
     alpha_z, tau = family.alpha_z, times[-1]
+    # These are the equations above, solved for the forcing term that the demonstration needs.
     target = tau**2 * accelerations - alpha_z * (alpha_z / 4 * (positions[-1] - positions) - tau * velocities)
     features = basis(exp(-family.alpha_x / tau * times), count=basis_functions, alpha_x=family.alpha_x)
     weights = np.linalg.lstsq(features, target, rcond=None)[0]

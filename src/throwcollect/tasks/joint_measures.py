@@ -20,6 +20,7 @@ from throwcollect.units import NS_PER_S
 
 _SLACK = 1e-3
 _AT_LIMIT = 1 - _SLACK
+# The numbers are those of action_msgs/msg/GoalStatus.
 _FAILED_GOALS = {5: "canceled", 6: "aborted"}
 
 
@@ -36,6 +37,7 @@ def measure_joints(
     effort_limits = limits.effort * config.robot.effort_scale
     velocity_peak = _peak(np.abs(samples.velocity).max(axis=0) / limits.velocity, robot.joints)
     effort_peak = _peak(np.abs(samples.effort).max(axis=0) / effort_limits, robot.joints)
+    # A sum is not finite if any of its terms is not.
     if not math.isfinite(velocity_peak.share + effort_peak.share + samples.position.sum()):
         return None
     moving = [robot.joints.index(joint) for joint in trajectory.joints]
@@ -46,6 +48,7 @@ def measure_joints(
     desired = sample_positions(trajectory, (samples.stamps_ns - start_ns) / NS_PER_S).T
     errors = np.abs(measured - desired).max(axis=1)
     saturated = 0.0
+    # In most trials no torque gets to its limit, and the samples need not be searched.
     if effort_peak.share >= _AT_LIMIT:
         saturated = float((np.abs(samples.effort) / effort_limits >= _AT_LIMIT).any(axis=1).mean())
     return replace(

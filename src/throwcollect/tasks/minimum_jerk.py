@@ -33,6 +33,8 @@ def minimum_jerk_trajectory(
     u = times / duration_s
     x = power(u, gamma)
     path = x * x * x * (10 + x * (6 * x - 15))
+    # These are the derivatives of s(u^gamma) by u. Powers of u are drawn together, because u^(gamma - 1) alone may be
+    # infinite at the start.
     speed = 30 * gamma * power(u, exponent + 1) * (1 - x) ** 2
     acceleration = 30 * gamma * power(u, exponent) * (1 - x) * ((3 * gamma - 1) * (1 - x) - 2 * gamma * x)
     origin = np.array([start[joint] for joint in end])

@@ -31,6 +31,7 @@ def _goal(trajectory: JointTrajectory, joints: tuple[str, ...], posture: Mapping
     still = [0.0] * len(joints)
     velocities = _columns(trajectory.joints, trajectory.velocities, joints, still)
     accelerations = _columns(trajectory.joints, trajectory.accelerations, joints, still)
+    # Times are rounded and not cut off, because a product may lie just below the whole number that is meant.
     stamps = np.rint(trajectory.times * 1e9).astype(np.int64).tolist()
     points = map(TrajectoryPoint, stamps, positions, velocities, accelerations)
     return TrajectoryGoal(Trajectory(joints, tuple(points)))

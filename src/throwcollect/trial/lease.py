@@ -56,6 +56,7 @@ class Lease:
 
     @cached_property
     def _text(self) -> bytes:
+        # The values are sorted, because the same ones in another order must have the same signature.
         return json.dumps([self.nonce, self.simulation, self.trial, sorted(self.values.items())]).encode()
 
 

@@ -160,6 +160,7 @@ class BallisticEngine(Engine):
         push = np.diff(velocities, axis=0) * hz
         # The tool has to give the ball the acceleration of its path, less that of gravity.
         push[:, 2] += self._physics.gravity_mps2
+        # The components are added here and not by a matrix product, whose rounding depends on the processor.
         x, y, z = (push * matmul(turn, self._opening)[:, :, 0]).T
         pulled = np.flatnonzero(x + y + z <= 0)
         last = int(pulled[0]) if len(pulled) else len(push)
@@ -171,6 +172,7 @@ class BallisticEngine(Engine):
         dt = 1 / self._physics.hz
         (x, y, z), (vx, vy, vz) = position, velocity
         braking = drag_per_m * math.sqrt(vx * vx + vy * vy + vz * vz)
+        # Bullet takes these operations in this order, and so does `tasks.free_flight`, with which flights are compared.
         vx -= braking * vx * dt
         vy -= braking * vy * dt
         vz -= (self._physics.gravity_mps2 + braking * vz) * dt

@@ -79,6 +79,8 @@ def _read(joint: ElementTree.Element, moving: Sequence[str]) -> _Joint:
     place = _numbers(joint, "origin", "xyz", (0.0, 0.0, 0.0))
     angles = _numbers(joint, "origin", "rpy", (0.0, 0.0, 0.0))
     turn = np.eye(3)
+    # URDF's roll, pitch and yaw turn about the axes of the link before, roll first: the matrix of yaw times that of
+    # pitch times that of roll.
     for axis, angle in zip(((0, 0, 1), (0, 1, 0), (1, 0, 0)), angles[::-1], strict=True):
         turn = matmul(turn, _rotations(axis, np.array([angle]))[0])
     x, y, z = _numbers(joint, "axis", "xyz", (1.0, 0.0, 0.0))

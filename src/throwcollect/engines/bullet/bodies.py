@@ -12,6 +12,7 @@ from throwcollect.engines.bullet.scenery import BASE, Surface, boxes, collide_wi
 from throwcollect.engines.engine import Bodies, BodyModel, BodyState, Box, Quaternion, Vector
 from throwcollect.errors import RequestError
 
+# These are places in what `getJointInfo` and `getDynamicsInfo` return (PyBullet Quickstart Guide).
 _JOINT_TYPE, _LARGEST_EFFORT, _LINK_NAME = 2, 10, 12
 _INERTIAL_POSITION, _INERTIAL_ORIENTATION = 3, 4
 
@@ -44,6 +45,7 @@ class BulletBodies(Bodies):
     def add(self, name: str, model: BodyModel, start: BodyState) -> None:
         """Put a body into the world; see `Bodies.add`."""
         client = self._client
+        # This is noted before the body is loaded, because one that Bullet refuses may leave something behind, too.
         self.leave_traces = True
         body = _load(client, model, start)
         self._bodies[name] = body, model
@@ -64,6 +66,7 @@ class BulletBodies(Bodies):
             if link != BASE:
                 info = pybullet.getJointInfo(body, link, physicsClientId=client)
                 self._names[body, link] = f"{name}/{info[_LINK_NAME].decode()}"
+                # A velocity motor whose target is not named holds a joint at 0 rad/s, with this torque at most.
                 if info[_JOINT_TYPE] != pybullet.JOINT_FIXED:
                     pybullet.setJointMotorControl2(
                         body, link, pybullet.VELOCITY_CONTROL, force=info[_LARGEST_EFFORT], physicsClientId=client
@@ -101,6 +104,8 @@ class BulletBodies(Bodies):
         """Find the boxes around the links of a body, along the axes of its root link."""
         body, model = self._bodies[name]
         angles = [pybullet.getJointState(body, joint, self._client)[0] for joint in links(self._client, body)[1:]]
+        # In a world of its own, where the copy stands unturned at the origin, the axes of the world are those of the
+        # root link.
         aside = connect()
         try:
             # Bullet measures along its own axes of a link; those are the link's axes unless an inertia is given.
@@ -120,6 +125,7 @@ class BulletBodies(Bodies):
 
 
 def _load(client: int, model: BodyModel, start: BodyState, *, flags: int = pybullet.URDF_USE_INERTIA_FROM_FILE) -> int:
+    # Bullet reads descriptions and meshes from files alone. Meshes are named relative to the description.
     with tempfile.TemporaryDirectory(prefix="throwcollect-") as directory:
         path = Path(directory, "entity.urdf")
         path.write_text(model.urdf, encoding="utf-8")

@@ -71,6 +71,7 @@ class BulletEngine(Engine):
 
     def load(self, scene: Scene) -> None:
         """Make the world of a scene; if nothing but the ball's radius differs, only the ball changes."""
+        # The engine has no scene meanwhile, because a world that could not be loaded must not be kept the next time.
         kept, self._scene = self._scene, None
         if (
             kept is None
@@ -92,6 +93,7 @@ class BulletEngine(Engine):
         set_physics(self._client, self._scenery, self._ball, physics)
         self.bodies.friction = physics.surface_friction
         self._forces = list(physics.efforts)
+        # Bullet divides the error of a position by the time step before it multiplies it by the gain.
         self._position_gains = [physics.position_gain_per_s / physics.hz] * len(physics.efforts)
         self._velocity_gains = [physics.velocity_gain] * len(physics.efforts)
 
@@ -101,6 +103,7 @@ class BulletEngine(Engine):
         for joint, angle in zip(scenery.joints, joints, strict=True):
             pybullet.resetJointState(scenery.robot, joint, angle, physicsClientId=client)
         tool = pybullet.getLinkState(scenery.robot, scenery.tool, computeForwardKinematics=True, physicsClientId=client)
+        # Fields 4 and 5 are the pose of the link's frame. Those before are of its centre of mass.
         centre, _ = pybullet.multiplyTransforms(tool[4], tool[5], seat, _UPRIGHT)
         still = (0.0,) * len(joints)
         self.reset(State((*joints, *still, *still, *centre, *_UPRIGHT, *(0.0,) * 6), frozenset()))
@@ -113,6 +116,7 @@ class BulletEngine(Engine):
         """
         client, joints = self._client, self._scenery.joints
         positions, velocities = state.sample[: len(joints)], state.sample[len(joints) :]
+        # Torques and ball follow the velocities in a sample, and `zip` stops before them.
         for joint, position, velocity in zip(joints, positions, velocities, strict=False):
             pybullet.resetJointState(self._scenery.robot, joint, position, velocity, physicsClientId=client)
         renew_pairs(client, self._ball)
@@ -144,6 +148,7 @@ class BulletEngine(Engine):
             # target, so that it follows without lag.
             aim(robot, joints, mode, position, velocity, forces, position_gains, velocity_gains, client)
             if drag:
+                # Drag is applied before every step, because Bullet forgets external forces after each.
                 self._apply_drag(drag)
             take_step(client)
             number += 1

@@ -69,6 +69,7 @@ def load_scenery(client: int, scene: Scene) -> Scenery:
     names = {(ground, BASE): GROUND, (robot, BASE): root}
     for number in links(client, robot)[1:]:
         info = pybullet.getJointInfo(robot, number, physicsClientId=client)
+        # Field 1 is the name of the joint, field 12 that of the link which it moves.
         joints[info[1].decode()] = number
         names[robot, number] = info[12].decode()
     tool = next(link for (_, link), name in names.items() if name == scene.tool.link)
@@ -91,6 +92,7 @@ def _load_robot(client: int, scene: Scene) -> int:
                     file.name,
                     basePosition=[0, 0, scene.base_height_m],
                     useFixedBase=True,
+                    # By default Bullet computes inertias from the collision shapes.
                     flags=pybullet.URDF_USE_INERTIA_FROM_FILE,
                     physicsClientId=client,
                 )
@@ -142,6 +144,7 @@ def set_physics(client: int, scenery: Scenery, ball: int, physics: Physics) -> N
         fixedTimeStep=1 / physics.hz,
         numSolverIterations=physics.solver_iterations,
         enableConeFriction=0,
+        # Bullet sorts the pairs of shapes, so that contacts are solved in the same order each time.
         deterministicOverlappingPairs=1,
         physicsClientId=client,
     )

@@ -4,6 +4,7 @@ import os
 
 
 def _import_bullet() -> None:
+    # The descriptor is redirected and not `sys.stderr`, because Bullet prints from C.
     stderr, devnull = os.dup(2), os.open(os.devnull, os.O_WRONLY)
     os.dup2(devnull, 2)
     try:

@@ -99,6 +99,8 @@ class MujocoBodies(Bodies):
             text, body.links = _rename_links(body.model.urdf)
             child = read_urdf(text, body.model.encode_meshes())
             for joint in child.joints:
+                # MuJoCo reads the effort of a URDF's limit as a range of motor torques. It brakes the joint once it is
+                # dry friction.
                 joint.frictionloss = max(joint.actfrcrange[1], 0.0)
                 joint.actfrclimited = mujoco.mjtLimited.mjLIMITED_FALSE
             if not body.model.is_fixed:
@@ -122,6 +124,8 @@ class MujocoBodies(Bodies):
         if body.model.is_fixed:
             return body.state
         joint = self._world()[1].joint(f"{name}/{_FREE_JOINT}")
+        # MuJoCo has the real part of a quaternion first, and the angular velocity of a free body in the frame of that
+        # body.
         x, y, z, w, i, j, k = joint.qpos.tolist()
         vx, vy, vz, *spin = joint.qvel.tolist()
         return BodyState((x, y, z), (i, j, k, w), (vx, vy, vz), turn((i, j, k, w), spin))
@@ -143,6 +147,7 @@ class MujocoBodies(Bodies):
     def boxes(self, name: str) -> list[Box]:
         """Find the boxes around the links of a body, along the axes of the world."""
         model, data = self._world()
+        # MuJoCo computes the poses of shapes at the beginning of a step, so those of now are not known yet.
         mujoco.mj_kinematics(model, data)
         return boxes(model, data, self._numbers(name))
 

@@ -47,4 +47,6 @@ def aim_contacts(data: mujoco.MjData, hz: float, restitutions: NDArray[np.float6
         if restitutions is not None and speed < -_LEAST_BOUNCE_MPS and speed + away < 0.0:
             one, other = restitutions[data.contact.geom[data.efc_id[row]]].tolist()
             wanted = one * other * speed
+        # Surfaces part at positive speeds. As the solver reaches the share `HARDNESS` of this acceleration, the speed
+        # after the step is about `-wanted`.
         targets[row] = (wanted + speed) * (-hz / HARDNESS)

@@ -169,6 +169,7 @@ class MujocoEngine(Engine):
         count, hz = len(self._columns), float(physics.hz)
         pull = np.full(count, hz * physics.position_gain_per_s)
         brake = np.full(count, hz * physics.velocity_gain)
+        # These are views: what is written into `acceleration` and `torque` is what MuJoCo computes with.
         position, velocity = data.qpos[:count], data.qvel[:count]
         acceleration, torque = data.qacc[:count], data.qfrc_applied[:count]
         passive, pushed = data.qfrc_passive[:count], data.qfrc_constraint[:count]
@@ -183,9 +184,12 @@ class MujocoEngine(Engine):
         drag, due, stride = steps.drag_kgpm, steps.first_sample, steps.stride
         restitutions = self._restitutions
         untouched = presses.tobytes()
+        # This equals no state of the surfaces, so that the first step is compared with what pressed before.
         last_presses, number = b"", 0
         for want in list(pull * steps.targets[:-1, self._columns] + brake * steps.velocities[:, self._columns]):
             begin_step(model, data)
+            # This acceleration leads in one step to the velocity of Bullet's motor: it is hz (gain (target - position)
+            # + share (target velocity - velocity)).
             subtract(want, multiply(position, pull, work), work)
             subtract(work, multiply(velocity, brake, other), acceleration)
             inverse(model, data, 1, needed)
@@ -209,6 +213,7 @@ class MujocoEngine(Engine):
                 due += stride
                 if observer.on_sample(number, self._sample()):
                     break
+        # Forces that are applied stay until they are replaced, and the next steps may have no drag.
         data.qfrc_applied[count : count + 3] = 0.0
         return number
 

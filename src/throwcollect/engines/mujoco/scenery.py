@@ -32,6 +32,8 @@ _REACH_M = 0.02
 _BALL_PRIORITY = 1
 """The highest priority: friction and restitution of a contact are those of the ball, whatever it touches."""
 
+# Without these options MuJoCo cuts the directories off the names of meshes, and merges links that are fixed to their
+# parents.
 _COMPILER = '<mujoco><compiler strippath="false" discardvisual="true" fusestatic="false"/></mujoco>'
 _ROOT_TAG_END = ">"
 
@@ -90,6 +92,7 @@ def make_spec(scene: Scene) -> tuple[mujoco.MjSpec, list[Surface]]:
             geom.contype, geom.conaffinity = _ROBOT_BIT, 0
     world.add_geom(
         type=mujoco.mjtGeom.mjGEOM_PLANE,
+        # Half sizes of 0 make the plane infinite. The third number is the spacing of its grid in pictures.
         size=(0.0, 0.0, 1.0),
         contype=_GROUND_BIT if scene.ground_is_solid else _FLOOR_BIT,
         conaffinity=0,
@@ -98,7 +101,9 @@ def make_spec(scene: Scene) -> tuple[mujoco.MjSpec, list[Surface]]:
     for surface in surfaces:
         watch(spec, surface)
     option = spec.option
+    # `MujocoEngine.run` relies on damping that acts on the velocity after the step.
     option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    # `aim_contacts` relies on one row for each direction of a contact, which pyramidal cones do not have.
     option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
     # MuJoCo would reset a world that diverges. Without that, its numbers are not finite, and the trial is refused.
     option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
@@ -136,6 +141,7 @@ def _add_ball(spec: mujoco.MjSpec, radius: float) -> None:
 
 def watch(spec: mujoco.MjSpec, surface: Surface) -> None:
     """Add a sensor of the force with which a surface presses on the ball; its first number is the normal force."""
+    # The sensor reports the force of one contact: of all between the two bodies, the strongest.
     force, strongest, one = 1 << int(mujoco.mjtConDataField.mjCONDATA_FORCE), 2, 1
     spec.add_sensor(
         type=mujoco.mjtSensor.mjSENS_CONTACT,
@@ -175,6 +181,7 @@ def set_physics(model: mujoco.MjModel, physics: Physics) -> None:
     model.opt.gravity[:] = (0.0, 0.0, -physics.gravity_mps2)
     ball, sphere = model.body(BALL).id, model.geom(BALL).id
     model.body_mass[ball] = physics.ball_mass_kg
+    # This is the inertia of a solid sphere.
     model.body_inertia[ball] = 0.4 * physics.ball_mass_kg * model.geom_size[sphere, 0] ** 2
     # Frictions are multiplied, as in Bullet. There is no rolling and no torsional friction.
     model.geom_friction[:] = (physics.surface_friction**2, 0.0, 0.0)
@@ -193,6 +200,7 @@ def restitutions_of(model: mujoco.MjModel, physics: Physics) -> NDArray[np.float
         return None
     # The ball does not bounce off added bodies that can move, as in Bullet; it does bounce off the robot.
     added = model.geom_contype == _ADDED_BIT
+    # Bodies that are attached to the world have the number of the world, which is 0.
     moves = model.body_weldid[model.geom_bodyid] != 0
     factors = np.where(added & moves, 0.0, 1.0)
     factors[model.geom(BALL).id] = physics.ball_restitution
@@ -233,6 +241,7 @@ def _reach(
     """Find the lowest and highest corner of the box around a shape's own box."""
     origin, axes = frame
     turned = matmul(axes.T, data.geom_xmat[geom].reshape(3, 3))
+    # MuJoCo has the box of a shape as its centre and its half sizes.
     box = model.geom_aabb[geom].reshape(2, 3, 1)
     centre = matmul(axes.T, (data.geom_xpos[geom] - origin).reshape(3, 1)) + matmul(turned, box[0])
     half = matmul(np.abs(turned), box[1])

@@ -62,6 +62,7 @@ def explain_drop(samples: Samples, header: EpisodeHeader, release: BallState, *,
     last = min(int(np.searchsorted(samples.stamps_ns, release_ns)), len(samples) - 1)
     tool = ToolMotion(config)
     fastest = -math.inf
+    # The search goes backwards, because most throws are told by the last samples before the release.
     for row in range(last, -1, -1):
         velocity = tool.velocity(samples.position[row], samples.velocity[row]).tolist()
         fastest = max(fastest, add_up(map(operator.mul, direction, velocity)))

@@ -41,6 +41,8 @@ class Flight:
         before, after = self.times[knot : knot + 2].tolist()
         span = after - before
         u = (time_s - before) / span
+        # This is the cubic Hermite polynomial: `smooth` leads from place to place, `bump` adds what the velocities ask
+        # for.
         smooth, bump = u * u * (3 - 2 * u), span * u * (1 - u)
         # For three numbers, plain Python is faster than an array.
         axes = list(
@@ -69,6 +71,7 @@ class Flight:
         span = float(self.times[knot + 1] - self.times[knot])
         z0, z1 = map(float, above[knot : knot + 2])
         m0, m1 = (float(speed) * span for speed in self.velocities[knot : knot + 2, 2])
+        # These are the coefficients, by powers of u, of the height on the cubic of `state_at`.
         u = _root((2 * z0 - 2 * z1 + m0 + m1, -3 * z0 + 3 * z1 - 2 * m0 - m1, m0, z0))
         return knot, self.state_at(float(self.times[knot]) + u * span, knot=knot)
 
@@ -76,6 +79,7 @@ class Flight:
         """Find the highest point of the first `knots` knots, at least one, and between them."""
         top = int(np.argmax(self.positions[:knots, 2]))
         speeds = self.velocities[:, 2]
+        # The highest point lies beside the highest knot, on the side on which the ball changes from rising to falling.
         for knot in (top - 1, top):
             if 0 <= knot < len(self.times) - 1 and speeds[knot] > 0 > speeds[knot + 1]:
                 share = speeds[knot] / (speeds[knot] - speeds[knot + 1])
@@ -192,6 +196,8 @@ def _root(cubic: tuple[float, float, float, float]) -> float:
         else:
             high = u
         slope = (3 * a * u + 2 * b) * u + c
+        # Newton's method is used where it stays in the interval that holds the root. Elsewhere the interval is halved,
+        # which alone comes to the end of double precision in 60 rounds.
         newton = u - value / slope if slope else math.inf
         following = newton if low < newton < high else (low + high) / 2
         if abs(following - u) < 1e-15:

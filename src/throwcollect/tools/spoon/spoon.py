@@ -70,6 +70,8 @@ class Spoon(Tool):
     @property
     def inertia(self) -> pinocchio.Inertia:
         """Its inertia in ``spoon_link``, its mass spread evenly over the volume of its boxes."""
+        # `add_up` is used, because `sum` rounds otherwise from Python 3.12 on, and the bytes of a throw depend on the
+        # inertia.
         density = self._config.mass_kg / add_up(math.prod(box.size) for box in self.boxes)
         total = pinocchio.Inertia.Zero()
         for box in self.boxes:
@@ -89,11 +91,14 @@ class Spoon(Tool):
             required = f"it must be above tool.cup_floor_radius_m = {floor}"
             raise ConfigError([Problem(f"{problem}; {required}", "ball.radius_m")])
         length, angle = self._slant
+        # A ball on the walls touches them at this distance from the cup's axis. Beyond the rim, or below the floor, it
+        # lies on that edge instead.
         if radius * math.cos(angle) > rim:
             height = depth + math.sqrt(radius**2 - rim**2)
         elif radius * math.cos(angle) < floor:
             height = math.sqrt(radius**2 - floor**2)
         else:
+            # Seen from the side, the centre is as far from the wall, a straight line, as the radius is long.
             height = (radius * length - floor * depth) / (rim - floor)
         return (height, 0.0, float(self._cup.translation[2]))
 
@@ -110,8 +115,11 @@ class Spoon(Tool):
         _, lean = self._slant
         # The edges of floor and rim hold a ball that lies on them as walls along its surface would.
         sine = min(max(math.cos(lean), config.cup_floor_radius_m / radius), config.cup_rim_radius_m / radius)
+        # Along the edge between two walls the way is less steep than up a wall.
         steepness = math.tan(math.asin(min(sine, 1.0))) * math.cos(math.pi / config.cup_walls)
         along, across, sideways = map(float, up)
+        # One way out leads along each edge between two walls. Its direction has the lengths `steepness` along the axis
+        # and 1 across it, so the component along `up` is by how much it climbs.
         climbs = []
         for number in range(config.cup_walls):
             turn = math.pi * (2 * number + 1) / config.cup_walls
