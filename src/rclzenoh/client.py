@@ -90,7 +90,8 @@ class Client(Receiver):
         with self._lock:
             self._sequence += 1
             sequence = self._sequence
-        if self._querier is None:
+        # Another thread may destroy the client meanwhile.
+        if (querier := self._querier) is None:
             raise InvalidHandle(f"{self.service_name}: the client was destroyed")
         # The future is noted before the request leaves, because the thread that spins may have the response at once.
         self._pending[sequence] = future, convert
@@ -98,7 +99,7 @@ class Client(Receiver):
         handler = zenoh.handlers.Callback(self.deliver, drop=lambda: self.deliver(sequence), indirect=False)
         attachment = Attachment(sequence, time.time_ns(), self._endpoint.gid).pack()
         try:
-            self._querier.get(handler, payload=payload, attachment=attachment)
+            querier.get(handler, payload=payload, attachment=attachment)
         except zenoh.ZError as error:
             del self._pending[sequence]
             raise self._endpoint.invalid(error) from error

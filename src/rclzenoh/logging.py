@@ -25,6 +25,8 @@ class LoggingSeverity(IntEnum):
 
 
 _writing = threading.Lock()
+_MOST_SEEN = 1000
+"""Most texts that a logger remembers so as not to repeat them."""
 
 
 class Logger:
@@ -53,6 +55,9 @@ class Logger:
             now, last = time.monotonic(), self._seen.get(text)
             if last is not None and now - last < throttle_duration_sec:
                 return False
+            if len(self._seen) >= _MOST_SEEN:
+                # A text may hold what somebody else has sent, and be another one each time.
+                self._seen.clear()
             self._seen[text] = now
         # The caller is the first frame outside of this module: `info` and the like come before it.
         caller = sys._getframe(1)

@@ -134,7 +134,9 @@ def as_numbers(value: Any, field: Field, where: str) -> NDArray[Any]:
             raise TypeError(f"{where}.{field.name}: expected numbers of type {field.type}, got {value!r:.80}")
         with np.errstate(all="ignore"):
             array = given.astype(dtype)
-        if dtype.kind in "biu" and not np.array_equal(array, given):
+        # Too large a number becomes another integer, or an infinite float.
+        fits = np.array_equal(array, given) if dtype.kind in "biu" else (np.isfinite(array) == np.isfinite(given)).all()
+        if not fits:
             raise ValueError(f"{where}.{field.name}: {value!r:.80} does not fit {field.type}")
     if array.ndim != 1:
         raise TypeError(f"{where}.{field.name}: expected one dimension, got shape {array.shape}")

@@ -190,13 +190,16 @@ class TrialCollection:
             held = (*held, trial)
         return held
 
-    def take_in(self, simulation: str, delivery: Delivery, token: str = "") -> None:
+    def take_in(self, simulation: str, delivery: Delivery, token: str = "") -> bool:
         """Take in an episode, which `write_one` writes later; refuse one that is not what was asked for.
 
         Args:
             simulation: The simulation that has handed it over, which holds its trial.
             delivery: The episode, with its result and its conditions.
             token: Token of the lease; empty if there was none.
+
+        Returns:
+            Whether it was taken in.
         """
         episode = delivery.episode
         trial = episode.header.trial
@@ -208,11 +211,12 @@ class TrialCollection:
             reason = error.message
         if reason is not None:
             self.refuse(simulation, trial, f"its episode is refused: {reason}")
-            return
+            return False
         self._lookahead.end(simulation)
         self._leases.complete(simulation, trial)
         self._tell_set_aside()
         self._backlog.append((episode, result))
+        return True
 
     def refuse(self, simulation: str, trial: int, reason: str) -> None:
         """Take back a trial that a simulation could not do, or did otherwise; it may refuse all others, too."""

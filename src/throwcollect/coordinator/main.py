@@ -5,6 +5,7 @@ from __future__ import annotations
 import gc
 import signal
 import time
+from collections.abc import Callable
 from pathlib import Path
 from types import FrameType
 
@@ -44,13 +45,18 @@ def run(directory: Path) -> None:
             collection.writer.note("exposed")
         node = Coordinator(collection)
 
-        def drain(_number: int, _frame: FrameType | None) -> None:
-            collection.drain()
-
-        for number in stop_signals():
-            signal.signal(number, drain)
         executor = ros.SingleThreadedExecutor()
         executor.add_node(node)
+        asked = False
+
+        def ask_to_drain(_number: int, _frame: FrameType | None) -> None:
+            # The loop drains, because this may come in the middle of anything, also of what draining does itself.
+            nonlocal asked
+            asked = True
+            ros.stop_waiting(executor)
+
+        for number in stop_signals():
+            signal.signal(number, ask_to_drain)
         check_answers(node, executor)
         # The present objects stay until the end, so the garbage collector need not go through them again and again.
         gc.freeze()
@@ -62,14 +68,21 @@ def run(directory: Path) -> None:
             executor.spin_once(timeout_sec=_IDLE_S)
 
         try:
-            _collect(node, collection, executor, heartbeat)
+            _collect(node, collection, executor, heartbeat, is_to_drain=lambda: asked)
             collection.finish(meanwhile=go_on, say=_say)
         finally:
             node.destroy_node()
             ros.shutdown()
 
 
-def _collect(node: Coordinator, collection: TrialCollection, executor: ros.Executor, heartbeat: Heartbeat) -> None:
+def _collect(
+    node: Coordinator,
+    collection: TrialCollection,
+    executor: ros.Executor,
+    heartbeat: Heartbeat,
+    *,
+    is_to_drain: Callable[[], bool],
+) -> None:
     """Collect until all trials have ended, or those that run when it drains.
 
     Raises:
@@ -79,6 +92,8 @@ def _collect(node: Coordinator, collection: TrialCollection, executor: ros.Execu
     told = time.monotonic()
     while not collection.finished:
         heartbeat.beat()
+        if is_to_drain():
+            collection.drain()
         # Messages of simulations come first; other work is done when there is none.
         waiting = collection.backlog or collection.grow_plan()
         ros.spin_some(executor, timeout_sec=0.0 if waiting else _IDLE_S)

@@ -180,8 +180,7 @@ class Coordinator(Node):
         simulation.deadline = time.monotonic() + self._patience_s if simulation.trials else math.inf
         if isinstance(handed, Refusal):
             self._collection.refuse(namespace, trial, handed.reason)
-        else:
-            self._collection.take_in(namespace, handed, token)
+        elif self._collection.take_in(namespace, handed, token):
             self._showing.offer(simulation.name, message)
         self._lease(namespace)
 

@@ -9,10 +9,13 @@ import socket
 import subprocess
 import sys
 import threading
+import time
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
+from tempfile import TemporaryFile
+from typing import IO
 
 from throwcollect.errors import ConfigError, WorkerError
 from throwcollect.interruption import die_with_parent
@@ -23,6 +26,7 @@ from throwcollect.ros_installation import how_to_install
 _PROGRAM = "fast-discovery-server"
 _RUNNING = b"Server is running"
 _STOP_S = 3.0
+_LOOK_S = 0.02
 
 
 @contextmanager
@@ -38,16 +42,18 @@ def discovery_server(endpoint: str) -> Iterator[None]:
     command = [_program(), "-i", "0", "-x", str(write_temporarily(server_profile(endpoint)))]
     with (
         _accept_connections(endpoint),
+        # A file instead of a pipe, because nobody reads on once it runs, and a full pipe would stop it.
+        TemporaryFile() as output,
         subprocess.Popen(
             command,
             stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE,
+            stdout=output,
             stderr=subprocess.STDOUT,
             preexec_fn=partial(die_with_parent, os.getpid()),  # noqa: PLW1509 - it calls nothing that takes a lock
         ) as process,
     ):
         try:
-            _wait_until_it_runs(process, endpoint)
+            _wait_until_it_runs(process, output, endpoint)
             yield
         finally:
             process.send_signal(signal.SIGINT)
@@ -73,9 +79,12 @@ def _accept_connections(endpoint: str) -> Iterator[None]:
         ) from error
 
     def accept() -> None:
-        with suppress(OSError):
-            while True:
+        while server.fileno() != -1:
+            try:
                 server.accept()[0].close()
+            except OSError:
+                # It is about to be closed, or the process has too many files open for the moment.
+                time.sleep(_LOOK_S)
 
     threading.Thread(target=accept, daemon=True).start()
     try:
@@ -86,13 +95,17 @@ def _accept_connections(endpoint: str) -> Iterator[None]:
         server.close()
 
 
-def _wait_until_it_runs(process: subprocess.Popen[bytes], endpoint: str) -> None:
-    output = []
-    for line in process.stdout or ():
-        if _RUNNING in line:
+def _wait_until_it_runs(process: subprocess.Popen[bytes], output: IO[bytes], endpoint: str) -> None:
+    while True:
+        # The end comes before the output, so that all is read that led to it.
+        has_ended = process.poll() is not None
+        said = os.pread(output.fileno(), os.fstat(output.fileno()).st_size, 0)
+        if _RUNNING in said:
             return
-        output.append(line.decode(errors="replace"))
-    raise WorkerError(f"the discovery server at {endpoint} has ended", evidence="".join(output).strip() or None)
+        if has_ended:
+            evidence = said.decode(errors="replace").strip()
+            raise WorkerError(f"the discovery server at {endpoint} has ended", evidence=evidence or None)
+        time.sleep(_LOOK_S)
 
 
 def _program() -> str:

@@ -93,8 +93,7 @@ def choose_middleware(backend: Literal["auto", "embedded", "rclpy"]) -> Middlewa
 
     Args:
         backend: The one that the configuration asks for; ``auto`` leaves it to the environment, and to the packages
-        that
-            are installed.
+            that are installed.
 
     Raises:
         ConfigError: If the backend is not there.

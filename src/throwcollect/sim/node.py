@@ -348,8 +348,10 @@ class SimulationNode(Node):
         if stray:
             # Setting parameters calls `_set_up` again, which must not prepare a trial by hand from these.
             self._restoring = True
-            self.set_parameters([Parameter(key, value=self._physics[key]) for key in stray])
-            self._restoring = False
+            try:
+                self.set_parameters([Parameter(key, value=self._physics[key]) for key in stray])
+            finally:
+                self._restoring = False
 
     def _get_value(self, key: str) -> Any:
         return self.get_parameter(key).value

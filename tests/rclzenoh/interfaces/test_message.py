@@ -9,6 +9,7 @@ from rclzenoh.interfaces import get_message
 JointState = get_message("sensor_msgs/msg/JointState")
 Pose = get_message("geometry_msgs/msg/Pose")
 Uuid = get_message("unique_identifier_msgs/msg/UUID")
+Float32MultiArray = get_message("std_msgs/msg/Float32MultiArray")
 UInt64MultiArray = get_message("std_msgs/msg/UInt64MultiArray")
 
 
@@ -57,6 +58,14 @@ def test_what_is_no_sequence_of_numbers_is_refused(value, error, match):
 def test_numbers_that_do_not_fit_are_refused(value, match):
     with pytest.raises(ValueError, match=match):
         Uuid(uuid=value)
+
+
+@pytest.mark.parametrize("value", [[1e300], np.array([0.0, -1e39])])
+def test_floats_that_would_become_infinite_are_refused(value):
+    with pytest.raises(ValueError, match="does not fit float32"):
+        Float32MultiArray(data=value)
+    data = Float32MultiArray(data=[np.inf, np.nan, 1e-300]).data
+    assert (data[0], np.isnan(data[1]), data[2]) == (np.inf, True, 0)
 
 
 def test_small_and_very_large_numbers_stand_beside_one_another():

@@ -56,7 +56,7 @@ def test_a_simulation_that_dies_costs_the_trial_that_ran_and_no_other(
     collection: TrialCollection, deliveries: list[Delivery], tmp_path: Path
 ) -> None:
     assert collection.lease("/sim_0") == (0, 1, 2, 3)
-    collection.take_in("/sim_0", deliveries[0])
+    assert collection.take_in("/sim_0", deliveries[0])
     collection.leave("/sim_0", "left the ROS graph")
     assert [(event["trial"], event["reason"]) for event in events(tmp_path, "fail")] == [(1, "left the ROS graph")]
     assert [event["trial"] for event in events(tmp_path, "lost")] == [1]
@@ -102,8 +102,8 @@ def test_an_episode_that_is_another_one_goes_back(collection: TrialCollection, d
     said: list[str] = []
     collection.warn = said.append
     collection.lease("/sim_0")
-    collection.take_in("/sim_0", deliveries[0]._replace(conditions=deliveries[1].conditions))
-    collection.take_in("/sim_0", deliveries[1]._replace(result="{}"))
+    assert not collection.take_in("/sim_0", deliveries[0]._replace(conditions=deliveries[1].conditions))
+    assert not collection.take_in("/sim_0", deliveries[1]._replace(result="{}"))
     assert "trial 0 is given to another simulation: its episode is refused: ball.mass_kg was" in said[0]
     assert "trial 1 is given to another simulation: its episode is refused: result of a trial: " in said[1]
     assert not collection.backlog

@@ -4,6 +4,7 @@ import re
 import stat
 import subprocess
 import sys
+import time
 import xml.etree.ElementTree as ET
 
 import pytest
@@ -110,3 +111,13 @@ def test_a_server_that_ends_at_once_says_why(program):
         discovery_server("udp/127.0.0.1:0"),
     ):
         pass
+
+
+def test_a_server_that_says_a_lot_while_it_runs_goes_on(program, tmp_path):
+    # More than a pipe holds that nobody reads.
+    program(f"echo Server is running; head -c 1000000 /dev/zero; echo > {tmp_path}/said; exec sleep 60")
+    with discovery_server("udp/127.0.0.1:0"):
+        deadline = time.monotonic() + 10
+        while not (tmp_path / "said").exists():
+            assert time.monotonic() < deadline
+            time.sleep(0.02)

@@ -36,8 +36,9 @@ class Renderer:
     def __init__(
         self, urdf: str, base_height_m: float, ball_radius_m: float, ball_rgba: tuple[float, float, float, float]
     ) -> None:
+        heavy = _with_masses(urdf)
         self._client = connect()
-        self._robot = self._load(urdf, base_height_m)
+        self._robot = self._load(heavy, base_height_m)
         self._joints = {
             pybullet.getJointInfo(self._robot, number, physicsClientId=self._client)[1].decode(): number
             for number in links(self._client, self._robot)
@@ -58,7 +59,7 @@ class Renderer:
 
     def _load(self, urdf: str, base_height_m: float) -> int:
         with tempfile.NamedTemporaryFile("w", prefix="throwcollect-", suffix=".urdf", encoding="utf-8") as file:
-            file.write(_with_masses(urdf))
+            file.write(urdf)
             file.flush()
             try:
                 position = [0, 0, base_height_m]
