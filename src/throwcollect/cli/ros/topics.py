@@ -110,7 +110,7 @@ def show_rate(
     end_with_reader()
     with join_graph(run) as session:
         name, message_type = _find_message_type(session, topic, None)
-        # So many gaps lie between one arrival more.
+        # A gap lies between two arrivals, so one arrival more is kept.
         arrivals: deque[int] = deque(maxlen=window + 1)
         # A subscription that asks for less than the publisher offers is served; the other way round, nothing arrives.
         qos = ros.QoSProfile(depth=_DEPTH, reliability=ros.ReliabilityPolicy.BEST_EFFORT)

@@ -125,7 +125,7 @@ def confine(place: RunPlace, image: str) -> dict[str, Any]:
         "labels": place.labels(),
         "environment": {"HOME": "/tmp"},  # noqa: S108 - the one place in the container that can be written
         "user": f"{os.getuid()}:{os.getgid()}",
-        # As process 1 of a container, throwcollect would not get signals without a handler, nor reap orphans.
+        # The kernel keeps signals without a handler from process 1, which also has to reap orphans. An init does both.
         "init": True,
         "read_only": True,
         "tmpfs": {"/tmp": _TMPFS},  # noqa: S108
