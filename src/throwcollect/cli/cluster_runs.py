@@ -60,6 +60,7 @@ def print_events(run: ClusterRun, *, as_json: bool) -> None:
         states = {task.index: f"{task.state.lower()}{f' on {task.node}' if task.node else ''}" for task in look.tasks}
         for index in sorted(states.keys() | before.keys(), key=lambda each: each or 0):
             now = states.get(index, "ended")
+            # Slurm forgets tasks some minutes after their end, which is no event if their end was told.
             if before.get(index) != now and (index in states or before.get(index) != "ended"):
                 who = "all tasks" if index is None else f"task {index}"
                 tell(f"{who}: {now}", event="task", task=index, state=now)

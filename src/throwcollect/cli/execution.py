@@ -33,6 +33,7 @@ def execute(command: Callable[..., Any]) -> NoReturn:
         _check_surroundings()
         with explain_missing():
             code = command(prog_name="throwcollect", standalone_mode=False) or 0
+        # typer turns KeyboardInterrupt into this code, and prints nothing.
         if code == Interrupted.exit_code:
             raise Interrupted("interrupted")
         ensure_written(reader_may_leave=True)

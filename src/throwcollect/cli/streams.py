@@ -45,6 +45,8 @@ class _Stream(io.FileIO):
                 self.failure = error
                 if self.kind == "lines" and self.reader_is_gone:
                     raise ReaderGone from error
+        # The buffer has to believe that all was written; it would keep the rest, and try again at the end of the
+        # process.
         return memoryview(data).nbytes
 
     @property
@@ -84,6 +86,7 @@ def has_reader() -> bool:
     """
     poll = select.poll()
     poll.register(1, 0)
+    # A pipe without a reader is reported as POLLERR, for which nobody has to ask (poll(2)).
     return not any(happened & select.POLLERR for _, happened in poll.poll(0))
 
 
@@ -123,6 +126,7 @@ def _set_kind(kind: Literal["lines", "log"]) -> None:
 
 def _open_text(number: int, as_started: TextIO | None) -> TextIO:
     """Open a descriptor for text, with the encoding and the buffering that Python has chosen for it."""
+    # Standard error and a terminal get each line at once, and so does everything with `python -u` (write_through).
     chosen = as_started if isinstance(as_started, io.TextIOWrapper) else None
     prompt = (
         number == 2 or os.isatty(number) or (chosen is not None and (chosen.line_buffering or chosen.write_through))

@@ -181,6 +181,7 @@ class Look:
     @property
     def lives(self) -> bool:
         """Whether a job of it runs, or waits to run."""
+        # With this reason a job waits for ever, as the one that it depends on can no longer end as it should.
         joins = self.joining is not None and self.joining.lives and self.joining.reason != "DependencyNeverSatisfied"
         return any(task.lives for task in self.tasks) or joins
 

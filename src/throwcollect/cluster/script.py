@@ -102,7 +102,9 @@ class BatchScripts:
             f"Collects a dataset of throwcollect in one run on {nodes} nodes.",
             directives,
             ("--no-kill", self._requeue_flag),
+            # By its number, each job has a port of its own, as several jobs may share a node.
             "export PORT=$((20000 + SLURM_JOB_ID % 20000))",
+            # A token of an earlier start of this job would lead the other tasks to a router that is gone.
             f"rm -f {token}",
             "# The first task begins the run; the others go on without one that is lost.",
             f"srun --no-kill --kill-on-bad-exit=0 --cpus-per-task={cluster.cores} bash -c '",
@@ -146,6 +148,7 @@ class BatchScripts:
         return f"TERM@{math.ceil(self.config.run.grace_s) + _ENDING_S}"
 
     def _output(self, name: str) -> str:
+        # Slurm replaces patterns such as %j in names of logs, and takes %% for a percent sign.
         return f"{str(self.logs).replace('%', '%%')}/{name}"
 
     def _directives(self, own: dict[str, object]) -> Iterator[str]:

@@ -82,6 +82,7 @@ def submit(script: Path, *options: str) -> str:
         ConfigError: If there is no Slurm here.
         WorkerError: If Slurm refuses the script.
     """
+    # With several clusters, sbatch prints NUMBER;CLUSTER.
     return _run("sbatch", "--parsable", *options, str(script)).strip().partition(";")[0]
 
 
@@ -109,6 +110,7 @@ def find_tasks(job: str) -> tuple[Task, ...]:
         WorkerError: If it does not answer.
     """
     # squeue fails if it is asked for a job that Slurm has forgotten, and not if it is asked for all jobs of this user.
+    # Number of the array, index in it, state, node, and reason.
     format_ = "%F|%K|%T|%N|%r"
     lines = _run("squeue", "--noheader", "--array", "--me", "--states=all", f"--format={format_}").splitlines()
     rows = (line.strip().split("|") for line in lines)
@@ -146,6 +148,7 @@ def _find_accounted(job: str) -> dict[int | None, Task]:
     found = {}
     for line in text.splitlines():
         name, state, node, code = line.split("|")
+        # A task is called ARRAY_INDEX, and a cancelled one has the state `CANCELLED by UID`.
         task = Task(_index(name.partition("_")[2]), state.partition(" ")[0], node, code)
         if not task.lives:
             found[task.index] = task

@@ -147,6 +147,7 @@ def submit_missing(directory: Path, *, overrides: Sequence[str] = (), say: Say) 
     config = read_changed_config(directory, overrides)
     scripts = replace(
         _make_scripts(config, directory),
+        # All slices go on with the installation and the image of the first submission; this one may be another.
         program=submission.program,
         image=None if submission.image is None else Path(submission.image),
     )
@@ -214,6 +215,7 @@ def _make_scripts(config: Config, directory: Path) -> BatchScripts:
                 f"{directory}: Apptainer binds no directory with {' or '.join(wrong)} in its name",
                 expected="another directory, or cluster.image: null",
             )
+        # Many login nodes have no Apptainer, though the nodes of tasks have.
         if shutil.which("apptainer") is not None:
             check_sif(image)
     return BatchScripts(config, directory, directory / CLUSTER / _LOGS, (sys.executable, "-m", "throwcollect"), image)

@@ -179,6 +179,7 @@ def _find(
         slopes = np.zeros((len(places), targets, len(found)))
         if width:
             slopes[:, :, :width] = current.forward.slopes(inputs, columns)
+        # An offset moves its own target alone, by as much.
         slopes[:, :, width:] = np.eye(targets)
         flat = slopes.reshape(-1, len(found))
         transposed = np.ascontiguousarray(flat.T)
@@ -188,6 +189,7 @@ def _find(
         before, found = found, _step_inside(normal, right, found, low, high)
         if np.abs(found - before).max() < _SMALL_STEP:
             break
+    # With the prior in it, the inverse of the normal matrix is the covariance of the most probable difference.
     covariance = solve(normal, np.eye(len(found)))
     return found, np.sqrt(np.diagonal(covariance))
 

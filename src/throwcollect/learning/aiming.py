@@ -82,12 +82,15 @@ def _aim_at(learned: LearnedMap, target: Array, context: Array, choice: Choice) 
     starts = np.argsort(squares, kind="stable")[: _STARTS if choice is Choice.NEAREST else _MANY_STARTS]
     begun = np.clip(learned.inputs[starts][:, learned.columns_of(Role.PARAMETER)], -1.0, 1.0)
     given = np.tile(context, (len(starts), 1))
+    # On its way, a candidate keeps the residual of the throw at which it begins, so only the polynomial has to be
+    # inverted.
     shift = learned.residuals[starts] + learned.correction.offset
     parameters = _walk(learned, begun, given, target - shift)
     inputs = learned.in_world(parameters, given)
     predicted = learned.forward.predict(inputs) + shift
     missed = np.linalg.norm(predicted - target, axis=1)
     costs = _weigh(learned, choice, inputs, parameters - begun)
+    # The last key counts first: the misses, of which all small ones are equal, and among equal ones the cost.
     best = int(np.lexsort((costs, np.maximum(missed, _CLOSE)))[0])
     return parameters[best], predicted[best], landings[starts[0]]
 
@@ -112,6 +115,7 @@ def _walk(learned: LearnedMap, parameters: Array, context: Array, goals: Array) 
 def _step(slopes: Array, missing: Array) -> Array:
     """The shortest step of the parameters that closes the distance to the goals, shape ``(n, n_parameters)``."""
     transposed = np.swapaxes(slopes, 1, 2)
+    # The damped step of least norm: Jᵀ (J Jᵀ + λ² I)⁻¹ r, with J for the slopes and r for what is missing.
     squares = matmul(slopes, transposed) + _DAMPING**2 * np.eye(slopes.shape[1])
     return matmul(transposed, solve(squares, missing[..., np.newaxis]))[..., 0]
 

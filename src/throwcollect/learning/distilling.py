@@ -74,6 +74,7 @@ def distil(learned: LearnedMap) -> DistilledMap:
     terms = np.ascontiguousarray(list_terms(inputs, exponents))
     linear = fit_polynomial(inputs, parameters, 1).coefficients
     coefficients = np.zeros((len(exponents), parameters.shape[1]))
+    # The terms of the first degree come first in every list of exponents.
     coefficients[: len(linear)] = linear
     squares = matmul(np.ascontiguousarray(terms.T), terms)
     best, least = coefficients, np.inf
@@ -91,10 +92,12 @@ def _step(learned: LearnedMap, terms: Array, squares: Array, raw: Array, context
     """The Gauss-Newton step of the coefficients, shape ``(n_terms, n_parameters)``."""
     clipped = np.clip(raw, -1.0, 1.0)
     slopes = learned.forward.slopes(learned.in_world(clipped, context), learned.columns_of(Role.PARAMETER))
+    # A parameter beyond its range is clipped, so no coefficient moves it.
     slopes = slopes * (clipped == raw)[:, np.newaxis]
     wide = (slopes[:, :, np.newaxis, :] * terms[:, np.newaxis, :, np.newaxis]).reshape(missing.size, -1)
     transposed = np.ascontiguousarray(wide.T)
     size = raw.shape[1]
+    # The unknowns are ordered by term and then by parameter, as the columns of `wide` are.
     middle = _TO_THE_MIDDLE**2 * np.kron(squares, np.eye(size)) + _SMALL * np.eye(len(transposed))
     pull = _TO_THE_MIDDLE**2 * matmul(np.ascontiguousarray(terms.T), raw).reshape(-1, 1)
     right = matmul(transposed, missing.reshape(-1, 1)) - pull

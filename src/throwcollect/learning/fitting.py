@@ -159,6 +159,7 @@ def _find_axes(
                 raise ConfigError(f"{key} has the value {low:g} in all throws", expected="a key that varies")
             continue
         axes.append(Axis(key, role, low, high, float(nominal[key])))
+    # The axes of a role stand side by side, on which `LearnedMap.columns_of` relies.
     return tuple(sorted(axes, key=lambda axis: list(Role).index(axis.role)))
 
 

@@ -165,6 +165,7 @@ class LearnedMap:
         """
         parameters = self.inputs[:, self.columns_of(Role.PARAMETER)]
         moved = self.in_world(parameters, np.tile(context, (len(parameters), 1)))
+        # Each throw keeps its own residual, as only the world around it changes.
         return self.residuals + self.forward.predict(moved) + self.correction.offset
 
     def correct(self, correction: Correction) -> LearnedMap:
@@ -188,7 +189,9 @@ class LearnedMap:
             # The nearest of all, found among the few that are as near as the last of them.
             last = min(_NEIGHBOURS, len(squares)) - 1
             few = np.flatnonzero(squares <= np.partition(squares, last)[last])
+            # Throws at the same distance are taken in the order of trials, on every machine.
             near = few[np.argsort(squares[few], kind="stable")][:_NEIGHBOURS]
+            # The small number keeps the weight finite where the point is a throw itself.
             weights = 1.0 / (squares[near] + 1e-12)
             predicted[row] = (weights[:, np.newaxis] * self.residuals[near]).sum(axis=0) / weights.sum()
         return predicted

@@ -25,6 +25,7 @@ def read_table(path: Path, names: Sequence[str], *, aliases: dict[str, str] | No
         ConfigError: If it cannot be read, a column is missing, or a cell is no finite number.
     """
     try:
+        # Spreadsheets begin a CSV file with a byte order mark, which would belong to the name of the first column.
         with path.open(encoding="utf-8-sig", newline="") as file:
             reader = csv.DictReader(file)
             header = reader.fieldnames or []
@@ -90,6 +91,7 @@ def write_aims(path: Path, aims: Sequence[Aim], names: Sequence[str], task: Task
         with path.open("w", encoding="utf-8", newline="") as file:
             writer = csv.writer(file, lineterminator="\n")
             writer.writerow(rows[0])
+            # repr writes as many digits as it takes to read the same number again.
             writer.writerows([map(repr, row.values()) for row in rows])
     except OSError as error:
         raise ConfigError(f"{path}: cannot be written: {error.strerror}") from error

@@ -50,6 +50,7 @@ def encode_onnx(learned: LearnedMap, distilled: DistilledMap) -> bytes:
         helper.make_node("Mul", ["moved", "scale"], ["scaled"]),
         helper.make_node("Unsqueeze", ["scaled", "axis"], ["rows"]),
         helper.make_node("Pow", ["rows", "exponents"], ["powers"]),
+        # In this version of the operators, the axes of ReduceProd are an attribute, and those of Unsqueeze an input.
         helper.make_node("ReduceProd", ["powers"], ["terms"], axes=[2], keepdims=0),
         helper.make_node("MatMul", ["terms", "coefficients"], ["raw"]),
         helper.make_node("Clip", ["raw", "minus_one", "one"], ["inside"]),

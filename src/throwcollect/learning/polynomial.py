@@ -61,10 +61,12 @@ class Polynomial:
         slopes = []
         for column in range(inputs.shape[1])[columns]:
             with_it = self.exponents[:, column] > 0
+            # Indexing by a mask makes a copy, so that the exponents of the polynomial stay as they are.
             lowered = self.exponents[with_it]
             factors = lowered[:, column : column + 1] * self.coefficients[with_it]
             lowered[:, column] -= 1
             zero = np.zeros((len(inputs), self.coefficients.shape[1]))
+            # A polynomial may have no term with this input, and then it has no slope along it.
             slopes.append(matmul(list_terms(inputs, lowered), factors) if len(lowered) else zero)
         return np.stack(slopes, axis=-1)
 

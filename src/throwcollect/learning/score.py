@@ -111,7 +111,9 @@ def tell_scatter(scatter: float, targets: Sequence[str]) -> str:
 
 def _sum_up(away: Array, unit: str) -> Misses:
     distances = np.linalg.norm(away, axis=1)
+    # A throw that did not succeed counts as farther away than all others, and has no number.
     ordered = np.sort(np.where(np.isfinite(distances), distances, np.inf))
+    # The places of the lower median, of the least distance that 9 of 10 do not exceed, and of the largest.
     places = (len(ordered) - 1) // 2, int(np.ceil(0.9 * len(ordered))) - 1, len(ordered) - 1
     median, share90, largest = (float(ordered[place]) if np.isfinite(ordered[place]) else None for place in places)
     return Misses(unit=unit, median=median, share90=share90, largest=largest)

@@ -90,6 +90,7 @@ def score_model(
     return Score(
         targets=count,
         seed=seed,
+        # The errors of a distilled map come last, and belong to no size.
         trained=[Trained(trained_on=size, errors=each) for size, each in zip(maps, errors, strict=False)],
         distilled=None if distilled is None else errors[-1],
         throws=_list_throws(targets, places[len(maps) - 1]),
@@ -121,6 +122,7 @@ def _adapt_step_by_step(
     parameters = aim(learned, tries, given).parameters
     [places] = _throw(learned, [parameters], given, world, processes)
     landed = np.isfinite(places).all(axis=1)
+    # The second number makes a sequence of its own, apart from that of the targets.
     noise = scatter * np.random.default_rng((seed, 1)).standard_normal(places.shape)
     parameters, given, measured = parameters[landed], given[landed], (places + noise)[landed]
     found = {0: leave_as_it_is(learned, np.empty(0))}
@@ -175,12 +177,14 @@ def draw_targets(landings: Array, count: int, seed: int) -> Array:
     """
     randomness = np.random.default_rng(seed)
     _, members = np.unique(number_cells(landings), axis=0, return_inverse=True)
+    # In NumPy 2.0, the inverse has a second axis.
     members = members.reshape(-1)
     targets = np.empty((count, landings.shape[1]))
     for number in range(count):
         inside = np.flatnonzero(members == randomness.integers(members.max() + 1))
         chosen = landings[inside[randomness.integers(len(inside))]]
         near = np.argsort(((landings - chosen) ** 2).sum(axis=1), kind="stable")[: landings.shape[1] + 1]
+        # The gaps between sorted random numbers are weights whose sum is 1, spread evenly over all such weights.
         shares = np.diff(np.sort(randomness.random(len(near) - 1)), prepend=0.0, append=1.0)
         targets[number] = (shares[:, np.newaxis] * landings[near]).sum(axis=0)
     return targets

@@ -52,6 +52,7 @@ def draw_parameter_matrix(parameters: Sequence[Parameter], outcomes: Outcomes) -
                     marker={"color": style.colour, "symbol": style.symbol, "size": 4, "opacity": 0.8},
                     name=in_words(name),
                     legendgroup=name,
+                    # The same outcome is in every panel of the matrix, but once in the legend.
                     showlegend=row == 1,
                     hovertemplate=f"trial %{{customdata}}<br>%{{x:.4g}}, %{{y:.4g}}<extra>{in_words(name)}</extra>",
                 )
@@ -179,6 +180,7 @@ def draw_throughput(throughput: Throughput, noun: str) -> go.Figure:
     edges = throughput.edges_s / seconds
     figure = go.Figure(
         go.Scatter(
+            # Each rate is a step from one edge to the next, so all edges but the outer ones are there twice.
             x=np.repeat(edges, 2)[1:-1],
             y=np.repeat(throughput.rate_per_s, 2),
             mode="lines",

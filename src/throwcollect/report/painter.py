@@ -91,6 +91,7 @@ def paint(panels: Sequence[Panel], path: Path) -> None:
         width_in = _BOTH_COLUMNS_IN if panels[0].width_px > _MOST_PX_IN_COLUMN else _COLUMN_IN
         size = width_in, (_FRAME_PX + sum(heights)) / _PX_PER_IN
         painted = Figure(figsize=size, layout="constrained")
+        # `pyplot` would make a canvas, too, but keeps every figure in a global list, and may ask for a screen.
         FigureCanvasAgg(painted)
         if panels[0].small:
             _paint_stack(painted, panels, heights)
@@ -121,6 +122,7 @@ def _paint_cells(painted: Figure, figure: go.Figure) -> None:
         [(_axis_of(figure, x).domain or (0,))[0] for x, _ in pairs],
         [(_axis_of(figure, y).domain or (0,))[0] for _, y in pairs],
     )
+    # The domains of plotly begin at the lower edge, the rows of a grid at the upper one.
     columns, rows = sorted(set(starts[0])), sorted(set(starts[1]), reverse=True)
     grid = painted.add_gridspec(len(rows), len(columns))
     for (x, y), left, bottom in zip(pairs, *starts, strict=True):
@@ -167,6 +169,7 @@ def _set_axis(axes: Axes, letter: Literal["x", "y"], axis: Any, *, has_labels: b
         own.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
         own.set_minor_locator(NullLocator())
     elif axis.nticks and isinstance(own.get_major_locator(), AutoLocator):
+        # plotly limits the number of ticks, and matplotlib that of the intervals between them.
         own.set_major_locator(MaxNLocator(axis.nticks - 1))
     if axis.tickvals is not None:
         own.set_ticks(axis.tickvals, axis.ticktext)
@@ -207,6 +210,7 @@ def _paint_scatter(axes: Axes, trace: Any) -> None:
         elif is_open:
             width = (marker.line.width or 1) * _PT
             colours = {"facecolors": "white", "edgecolors": marker.color, "linewidths": width}
+        # matplotlib takes the square of the size, in printer's points.
         shape, area = MARKERS[symbol], (marker.size * _PT) ** 2
         # Above lines, which matplotlib would put above all markers.
         axes.scatter(x, y, marker=shape, s=area, alpha=marker.opacity, label=label, zorder=3, **colours)

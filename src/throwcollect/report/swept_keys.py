@@ -54,6 +54,7 @@ class Parameter:
 
 def read_parameters(config: Config, throws: pa.Table, outcomes: Outcomes) -> tuple[Parameter, ...]:
     """Read all swept keys of a table of throws, in its order."""
+    # Of all columns, those of swept keys alone have dots in their names.
     return tuple(
         _read_parameter(config, key, read_numbers(throws, key), outcomes) for key in throws.column_names if "." in key
     )
@@ -72,6 +73,7 @@ def _read_parameter(config: Config, key: str, values: NDArray[np.float64], outco
         # Bins have to hold all values, of which some may lie outside of the range of the sweep.
         low, high = min(low, float(distinct[0])), max(high, float(distinct[-1]))
         edges = np.geomspace(low, high, _BINS + 1) if logarithmic else np.linspace(low, high, _BINS + 1)
+        # The largest value lies on the last edge, and belongs to the last bin.
         bins = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, _BINS - 1)
     counts = np.zeros((len(edges) - 1, len(outcomes.names)), dtype=np.intp)
     np.add.at(counts, (bins, outcomes.codes), 1)

@@ -70,6 +70,7 @@ def _draw_share(dataset: Dataset, miss: str) -> go.Figure:
     chosen = choose_points(len(values))
     figure.add_scatter(
         x=values[chosen],
+        # Of sorted values, so large a share is not greater than the one at this place.
         y=(chosen + 1) / len(values),
         mode="lines+markers",
         line={"color": BLUE, "width": 2},

@@ -40,6 +40,7 @@ def measure_throughput(events: Iterable[Entry]) -> Throughput | None:
     elapsed = 0.0
     last: float | None = None
     for event in events:
+        # Until a resumed run opens the journal again, nothing is collected.
         if last is not None and event.event != "opened":
             # A clock may have been set back between two entries.
             elapsed += max(event.time_s - last, 0.0)
@@ -54,6 +55,7 @@ def measure_throughput(events: Iterable[Entry]) -> Throughput | None:
         edges_s=edges,
         rate_per_s=np.histogram(commits, edges)[0] / np.diff(edges),
         commits=len(commits),
+        # The collection began with the first opening.
         resumed_s=tuple(times["opened"][1:]),
         failed_s=tuple(times["fail"]),
         lost_s=tuple(times["lost"]),

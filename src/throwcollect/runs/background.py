@@ -183,6 +183,8 @@ def _begin(opened: OpenRun, record: Record, order: bytes, lay_out: Callable[[], 
         if isinstance(error, OSError):
             raise WorkerError(f"run {opened.run} cannot be begun: {error}") from error
         raise
+    # The new process has inherited the lock. If this one kept it, too, the run would seem to live after its launcher
+    # died.
     opened.close()
     return Records().get(opened.run)
 
@@ -212,6 +214,7 @@ def carry_out(run: str, lock: int, order: bytes, *, onlooker: Onlooker, interrup
             opened.close()
             return
         _move_log(log, NodeLogs(Path(prepared.record.logs)).path(LAUNCHER))
+        # The last steps of the preparation do not ask, and may have taken long.
         planner.end_if_asked()
     except ThrowcollectError as error:
         end = datetime.now(timezone.utc)
@@ -275,6 +278,7 @@ def _move_log(before: Path, after: Path) -> None:
         WorkerError: If the new log cannot be written.
     """
     try:
+        # Nothing is moved if this process prints elsewhere than into the launcher's log, as into a terminal.
         if before == after or not os.path.samestat(os.fstat(1), before.stat()):
             return
         after.parent.mkdir(exist_ok=True)

@@ -76,6 +76,7 @@ def down(named: str | Run | None, *, volumes: bool = False) -> tuple[str, list[s
     else:
         run = named if named in held else id_of(records, named)
     record: Record | None = None
+    # A run whose record is damaged can be removed, too; only its launcher's process id is not known then.
     with suppress(ConfigError):
         record = records.get(run).record
     if record is not None:
@@ -87,6 +88,7 @@ def down(named: str | Run | None, *, volumes: bool = False) -> tuple[str, list[s
     try:
         removed = get_runtime(lived_in).remove(run, volumes=volumes) if lived_in else []
     except ThrowcollectError:
+        # The record stays, so that the command can be repeated.
         taken.close()
         raise
     taken.forget()
@@ -171,6 +173,7 @@ def _end_launcher(records: Records, record: Record) -> None:
 def _signal(records: Records, record: Record, number: signal.Signals) -> None:
     """Send a signal to a launcher, but never to another process that has got its process id later."""
     with suppress(ProcessLookupError):
+        # The order counts: if the run lives after the descriptor was opened, the descriptor names its launcher.
         process = os.pidfd_open(record.launcher)
         try:
             if records.lives(record.run):

@@ -124,6 +124,7 @@ def _changes(before: Sequence[NodeState], after: Sequence[NodeState]) -> list[_C
 def _node_changes(old: NodeState | None, new: NodeState) -> list[_Change]:
     old = old or NodeState(new.name, "starting", 0, None, None)
     changes: list[_Change] = []
+    # A node may have ended and started again between two looks, so ends are seen by the number of restarts.
     if new.restarts > old.restarts or (new.status == "lost" and old.status != "lost"):
         changes.append((new, "lost", None, new.last_end))
         changes.append((new, "given up" if new.status == "lost" else "restarting", None, None))
@@ -131,6 +132,7 @@ def _node_changes(old: NodeState | None, new: NodeState) -> list[_Change]:
         changes.append((new, "started", new.handle, None))
     if new.status == "frozen" and old.status != "frozen":
         changes.append((new, "frozen", None, None))
+    # Router and coordinator count as running as soon as they have a handle, so that they have no event `ready`.
     if new.status == "running" and new.handle == old.handle and old.status in ("starting", "frozen"):
         changes.append((new, "ready" if old.status == "starting" else "continued", None, None))
     return changes

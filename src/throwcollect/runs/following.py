@@ -56,6 +56,7 @@ def follow(run: Run, *, keep_on: Callable[[], bool] = lambda: True) -> Iterator[
         while run.status == "running" and keep_on():
             reports.clear()
             listener.spin(run.connection, _POLL_S)
+            # The launcher writes an event before the record, so after the last record all events are there.
             run = run.now()
             happened = tuple(event for line in events.lines() if (event := parse(line)))
             yield Look(run, reports[-1] if reports else None, happened)
@@ -136,4 +137,5 @@ def _looks(run: Run, *, follow: bool, keep_on: Callable[[], bool]) -> Iterator[b
     while follow and keep_on() and run.now().status == "running":
         yield False
         time.sleep(_READ_S)
+    # The logs are read once more after the end, because nodes may have printed since the last look.
     yield True

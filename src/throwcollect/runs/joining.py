@@ -95,6 +95,7 @@ def _simulate(
         supervisor.start()
         while not reports.over and not interruptions():
             listener.spin(connection, _POLL_S)
+            # There is no main node on this machine, whose end would be the first value.
             _, news = supervisor.poll()
             for line in news:
                 onlooker.warn(line)

@@ -92,12 +92,14 @@ def launch_host(
     """
     session = _Session(run, onlooker, interruptions)
     place = run.place
+    # Errors that are no `ThrowcollectError` leave these values, so that the record tells an end in any case.
     code, summary = 1, None
     failure: Failure | None = Failure("internal error")
     host: Host | None = None
     try:
         host = make_host(place)
         with hold_lock(place.directory, alone=False):
+            # What an earlier launcher has written of its nodes and its router does not hold any more.
             run.update(launcher=os.getpid(), nodes=(), endpoint=None, stopping=False)
             info = host.collect(session)
             summary = None if info is None else Summary(**vars(info), open=is_open)
@@ -114,6 +116,7 @@ def launch_host(
         left = run.record.left if host is None else not host.cleared
         if left:
             onlooker.warn(f"containers of this run may be left: {command('down', '--run', run.run)} ends them")
+        # Before the lock is released, the end has to be in the record; the run would look dead in between.
         session.end(code, failure, summary, left=left)
         run.close()
 
@@ -215,6 +218,8 @@ def start_launcher(records: Records, opened: OpenRun, *, interruptions: Callable
     except OSError as error:
         raise WorkerError(f"the launcher cannot be started: {error}") from error
     finally:
+        # The launcher has inherited the lock. If this process kept it, too, the run would seem to live after its
+        # launcher died.
         opened.close()
     forwarded = 0
     while (run := records.get(opened.run)).status == "running":
@@ -222,6 +227,7 @@ def start_launcher(records: Records, opened: OpenRun, *, interruptions: Callable
             forwarded = interruptions()
             process.terminate()
         nodes = run.record.nodes
+        # After a request to stop, the nodes may still come up, but the caller is to learn how the run ends.
         if nodes and all(node.handle for node in nodes) and not forwarded:
             return run
         time.sleep(_POLL_S)

@@ -55,6 +55,7 @@ def _hold(directory: Path) -> Iterator[None]:
     Raises:
         OSError: If the path is no directory, another process holds the lock, or the file system has no locks.
     """
+    # Everybody may write to /tmp, so a link may lie at this path that leads into a directory of this user.
     descriptor = os.open(directory, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
     try:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)

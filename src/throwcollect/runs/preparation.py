@@ -177,6 +177,7 @@ def _take_over(
     from throwcollect.coordinator.prepare import make_self_contained
 
     kept = load(config_path(left.place.directory))
+    # In a dataset, `sweep.file` names the copy of the list of trials that lies there.
     if kept.without_run() != make_self_contained(config).without_run():
         raise ConfigError(
             f"{left.record.directory}: run {left.id} collects into it, with another configuration",
@@ -207,6 +208,7 @@ def prepare_run(records: Records, request: Request, onlooker: Onlooker, *, run: 
         if run is None:
             run = records.new(config.name)
             undo.callback(run.forget)
+        # The plan may take minutes, so a port that is taken is reported before it is made.
         reserve_port(config.run).close()
         # A runtime may take minutes to get an image, so it is chosen after all other checks. Only where a volume is
         # named it comes first, as it decides whether the dataset goes there.
@@ -223,6 +225,7 @@ def prepare_run(records: Records, request: Request, onlooker: Onlooker, *, run: 
         is_new = not directory.exists()
         plan = plan or _make_plan(request, directory, onlooker)
         held.enter_context(hold_lock(directory, alone=False))
+        # The files of a resumed dataset were there before, so only a new plan is removed.
         if request.plan is None:
             undo.callback(_remove_plan, directory, is_new=is_new)
         choice = choice or choose(config, say=onlooker.say, warn=onlooker.warn, begun=begun)

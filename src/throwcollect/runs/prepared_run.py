@@ -61,6 +61,7 @@ class PreparedRun:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        # Others are kept from the directory until the files that were made in it are gone.
         with self._held:
             self._undo.close()
             self._run.close()
@@ -115,6 +116,7 @@ class PreparedRun:
         """
         from throwcollect.runs.launcher import launch
 
+        # From here on the launcher answers for the run and writes its end, so nothing of the run may be removed here.
         self._undo.pop_all()
         return launch(
             self._run, self.config, onlooker=self._onlooker, interruptions=interruptions, runtime=self._runtime

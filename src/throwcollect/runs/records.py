@@ -200,6 +200,7 @@ class OpenRun:
 
     def forget(self) -> None:
         """Remove the record and the files of the run, but no dataset in a directory, and release the lock."""
+        # The record goes first and the lock last, so that nobody finds or takes a run of which only a part is there.
         for path in (self._runs / f"{self.run}.json", self._runs / f"{self.run}.lock"):
             with suppress(OSError):
                 path.unlink()
@@ -245,6 +246,7 @@ class Records:
                 continue
             except OSError as error:
                 raise unusable(self._runs / f"{chosen}.lock", error) from error
+            # This waits only for `is_locked` of another process, which may have the lock of the new file for a moment.
             fcntl.flock(lock, fcntl.LOCK_EX)
             opened = OpenRun(self._runs, chosen, lock)
             with ExitStack() as undo:
@@ -264,6 +266,7 @@ class Records:
             ConfigError: If the lock of the run cannot be opened.
         """
         try:
+            # The file is made if need be, because `down` also takes runs of which only containers are known.
             lock = os.open(self._runs / f"{run}.lock", os.O_RDWR | os.O_CREAT, 0o600)
         except OSError as error:
             raise unusable(self._runs / f"{run}.lock", error) from error

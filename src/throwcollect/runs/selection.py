@@ -109,6 +109,7 @@ def id_of(records: Records, named: str) -> str:
         ConfigError: If there is no such run, or more than one.
     """
     ids = records.ids()
+    # A whole id comes first, because it may also be the beginning of another one.
     if named in ids:
         return named
     if into := records.into(Path(named)):

@@ -74,6 +74,8 @@ def collect_slice(
     attempt = make_attempt(directory, slice, scratch=scratch)
     create(attempt, plan)
     take_recordings(earlier, attempt)
+    # With a scratch directory, the copies lie on the disk of one machine, and the earlier attempts are the only safe
+    # ones.
     if scratch is None:
         remove_stopped(earlier)
     onlooker.say(f"slice {slice}: trials {plan.trials.first} to {plan.trials.numbers[-1]}")
@@ -85,6 +87,7 @@ def collect_slice(
             mark_stopped(attempt)
             raise Interrupted(f"slice {slice}: {error.message}", hint=f"{again} goes on with it") from error
         finally:
+            # Only a finished dataset has this file; it is published from the scratch directory below.
             if scratch is not None and not (attempt / METADATA).exists():
                 # The next attempt may run on another machine, which does not see the scratch directory of this one.
                 kept = make_attempt(directory, slice)

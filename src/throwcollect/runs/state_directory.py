@@ -65,6 +65,7 @@ def is_locked(path: Path) -> bool:
     except OSError:
         return False
     try:
+        # The lock is shared, so that two processes that look at the same time do not take each other for the launcher.
         fcntl.flock(lock, fcntl.LOCK_SH | fcntl.LOCK_NB)
     except BlockingIOError:
         return True

@@ -67,7 +67,9 @@ def _start_afresh(parent: int, environment: Mapping[str, str], kept: int) -> Non
 
     die_with_parent(parent)
     os.setsid()
+    # A node that is forked off this process later runs these functions at its end, and those here are the parent's.
     atexit._clear()
+    # As after `exec`, handlers are gone, and signals that were ignored are still ignored.
     for number in signal.valid_signals():
         if callable(signal.getsignal(number)):
             signal.signal(number, signal.SIG_DFL)
@@ -76,6 +78,8 @@ def _start_afresh(parent: int, environment: Mapping[str, str], kept: int) -> Non
     setproctitle.getproctitle()
     os.environ.clear()
     os.environ.update(environment)
+    # Nothing may reach the terminal, and files, locks and sockets of the parent must not stay open as long as this
+    # lives.
     nowhere = os.open(os.devnull, os.O_RDWR)
     for stream in (0, 1, 2):
         os.dup2(nowhere, stream)

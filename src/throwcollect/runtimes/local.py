@@ -122,6 +122,8 @@ class LocalNodes(NodeHost):
         Raises:
             WorkerError: If the process cannot be started or its log cannot be written.
         """
+        # The router binds the port by itself. Until now, the reservation has kept other processes of this machine from
+        # it.
         if node.name == ROUTER and self._reserved is not None:
             self._reserved.close()
         try:
@@ -159,6 +161,7 @@ class LocalNodes(NodeHost):
 
     def stop(self, names: Sequence[str], *, grace_s: float = 3.0) -> None:
         """See `NodeHost.stop`."""
+        # All nodes are told first, so that they end at the same time, within one time of grace.
         for name in names:
             self.signal(name, signal.SIGTERM)
         deadline = time.monotonic() + grace_s

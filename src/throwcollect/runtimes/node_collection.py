@@ -138,11 +138,13 @@ class NodeCollection:
                 return None
             self._session.say("interrupted: finishing the running trials; once more ends at once")
             end = self._supervisor.drain(hurry=lambda: self._session.interruptions() > 1)
+        # The last report of the coordinator may have arrived while its end was awaited.
         self._listen()
         return end
 
     def _check(self, end: NodeExit | None) -> None:
         place = self._host.place
+        # The dataset is finished even if trials are lost; the launcher reports the loss from the summary.
         finished = end is not None and end.code in (0, LossError.exit_code)
         if self._session.interruptions() and not finished:
             message = f"interrupted; finished throws are in {place.dataset}, the dataset is not complete"

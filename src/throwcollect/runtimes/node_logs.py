@@ -51,6 +51,7 @@ class NodeLogs:
     def files(self) -> dict[str, Path]:
         """The existing log files by the names of their nodes: launcher, router, coordinator, then simulations."""
         paths = {path.stem: path for path in self._directory.glob("*.log")}
+        # The length of the name puts sim_10 behind sim_9.
         names = sorted(paths, key=lambda name: (_ORDER.get(name, len(_ORDER)), len(name), name))
         return {name: paths[name] for name in names}
 
@@ -58,6 +59,7 @@ class NodeLogs:
         """Whether a simulation has ever printed that it is ready for trials."""
         try:
             with self._open(name) as log:
+                # A file is a sequence of its lines, so only a whole line counts, and not a quotation of it.
                 return f"{ready_line(name)}\n" in log
         except OSError:
             return False
@@ -98,6 +100,7 @@ class Tail:
         with file:
             file.seek(self._offset)
             for line in file:
+                # The node is still writing this line. The offset stays before it, so the next call reads all of it.
                 if not line.endswith(b"\n") and not torn:
                     return
                 self._offset += len(line)

@@ -176,7 +176,10 @@ class NodeServer:
         Raises:
             OSError: If the process cannot be started.
         """
+        # Sockets of this kind keep messages apart, as datagrams do, but also tell when the other side has closed its
+        # end.
         here, there = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        # A copy of the other end that stayed open here would hide that the process has ended.
         with there:
             self._process = start(there)
         self._socket = here
@@ -245,6 +248,7 @@ def serve(connection: socket.socket) -> list[str]:
     Returns:
         In each node, the arguments of the node; in the process that forks, this function does not return.
     """
+    # `select` goes on waiting after a signal (PEP 475), so each signal also writes a byte here, which wakes it.
     awake, wake = socket.socketpair()
     for end in (awake, wake):
         end.setblocking(False)
@@ -266,6 +270,7 @@ def serve(connection: socket.socket) -> list[str]:
         packet, logs, _, _ = socket.recv_fds(connection, _MESSAGE_BYTES, 1)
         if not packet:
             sys.exit()
+        # Only the request for a node has a log file with it.
         if not logs:
             _prepare_for(json.loads(packet)["configuration"])
             gc.freeze()
@@ -291,6 +296,8 @@ def serve(connection: socket.socket) -> list[str]:
 def _report_ends(connection: socket.socket) -> None:
     """Tell the launcher of all nodes that have ended."""
     with contextlib.suppress(ChildProcessError):
+        # One signal may stand for several ended processes, because the kernel keeps no second SIGCHLD while one is
+        # pending.
         while (ended := os.waitpid(-1, os.WNOHANG))[0]:
             _send(connection, ended=ended[0], code=os.waitstatus_to_exitcode(ended[1]))
 

@@ -33,6 +33,7 @@ def format_endpoint(protocol: str, host: str, port: int) -> str:
 
 def _bind(host: str, port: int, key: str, *, hint: str) -> socket.socket:
     probe = socket.socket(socket.AF_INET6 if ":" in host else socket.AF_INET)
+    # Without this, the port counts as taken while closed connections of an earlier router are in the state TIME_WAIT.
     probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:
         probe.bind((host, port))

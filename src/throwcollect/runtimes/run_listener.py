@@ -79,6 +79,7 @@ class RunListener:
         self._context = ros.Context()
         try:
             ros.init(context=self._context, connection=connection)
+        # This is a `ThrowcollectError`, too, but another attempt would not help against it.
         except ConfigError:
             raise
         except ThrowcollectError:

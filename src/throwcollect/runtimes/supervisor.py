@@ -77,6 +77,7 @@ class Supervisor:
                 memory.pop(name, None)
             self._ready.discard(name)
         self.host.stop(removed)
+        # Where no simulation that was ready is left, the deadline of an earlier start would be over at once.
         if not self._ready:
             self._start_deadline = time.monotonic() + self._run.start_timeout_s
         for name in self._roster:
@@ -95,6 +96,8 @@ class Supervisor:
         """
         end = None
         news = self._end_frozen()
+        # Readiness is asked before ends are taken, because a simulation that was ready once may be started again more
+        # often.
         self._ready |= {name for name in self._expendables if name not in self._ready and self.host.ready(name)}
         for node in self.host.exits():
             if node.name not in self._roster:
@@ -113,6 +116,7 @@ class Supervisor:
         for name in [name for name, due in self._due.items() if due <= now]:
             del self._due[name]
             self._start(name)
+        # Once the main node has come to its own end, the run needs no simulation any more.
         if end is None:
             self._check_hope()
         return end, news
@@ -191,6 +195,7 @@ class Supervisor:
                 # Report each frozen node only once.
                 self._frozen_since[name] = math.inf
                 news.append(f"{name} is frozen (paused or stopped) and is ended")
+                # A stopped process gets other signals only when it is continued, but SIGKILL at once.
                 self.host.signal(name, signal.SIGKILL)
         return news
 
@@ -238,6 +243,8 @@ class Supervisor:
 
 def _killed(node: NodeExit) -> bool:
     """Whether a signal ended a node: no node itself returns such an exit code."""
+    # A process has minus the number of the signal, a container 128 plus the number. 130 stands for SIGINT there, and is
+    # also what an interrupted node returns.
     return node.code is not None and (node.code < 0 or node.code > Interrupted.exit_code)
 
 

@@ -63,6 +63,8 @@ class Keys:
 
     def may_change(self, token: str) -> bool | None:
         """Whether the owner of a token may change anything; None if it is no token of this server."""
+        # Both comparisons are always made and take the same time for any token, so that no time tells anything of a
+        # token.
         given = token.encode()
         full = hmac.compare_digest(given, self.full.encode())
         read_only = hmac.compare_digest(given, self.read_only.encode())
@@ -204,6 +206,7 @@ async def _refuse(scope: Scope, receive: Receive, send: Any, status: int, title:
     response = problem(status, title, headers=headers)
     if scope["type"] == "http":
         await response(scope, receive, send)
+    # By this extension of ASGI a refused handshake gets a status and a body; without it, the server answers 403 alone.
     elif "websocket.http.response" in scope.get("extensions", {}):
         start = {"status": status, "headers": response.raw_headers}
         await send({"type": "websocket.http.response.start", **start})

@@ -75,6 +75,7 @@ def make_app(instances: Instances, models: Models, keys: Keys) -> FastAPI:
         app.include_router(routes, prefix=PREFIX, responses=of_runs)
     app.include_router(make_model_routes(models), prefix=PREFIX, responses=describe_problems(*_ALWAYS, 401, 404, 422))
     app.include_router(make_rosbridge_routes(instances, Bridges()))
+    # Routes are tried in their order, and this one takes every path that is left.
     app.mount("/", StaticFiles(directory=_PAGE, html=True))
     return app
 
@@ -128,6 +129,7 @@ def _general(watch: StateWatch, keys: Keys) -> APIRouter:
 
 
 async def _send_states(socket: WebSocket, watch: StateWatch) -> None:
+    # Without this, the generator of a client that has left would listen on until it is collected as garbage.
     async with aclosing(watch.states()) as states:  # type: ignore[type-var]
         async for text in states:
             await socket.send_text(text.decode())

@@ -173,6 +173,7 @@ def _read_landings(directory: Path) -> Landings:
     if not set(_LANDING) <= set(table.column_names):
         return Landings(landings=[], total=0, following=0, is_finished=True, has_more=False)
     landed = table.select([*_LANDING]).drop_null()
+    # The step is rounded up, so that there are never more landings than allowed.
     some = landed.take([*range(0, len(landed), max(1, -(-len(landed) // _MOST_LANDINGS)))])
     rows: Any = zip(*(column.to_pylist() for column in some.columns), strict=True)
     return Landings(landings=list(rows), total=len(landed), following=0, is_finished=True, has_more=False)
@@ -186,6 +187,7 @@ def _read_landings_so_far(directory: Path, first: int) -> Landings:
 
 def _archive(directory: Path, name: str) -> Iterator[bytes]:
     """Write a tar archive of a dataset piece by piece; equal files give equal archives."""
+    # `tarfile` writes to a file, and here the client decides when it takes the next piece.
     for path in _list_names(directory):
         with open(open_regular(directory / path), "rb") as file:
             entry = tarfile.TarInfo(f"{name}/{path}")

@@ -76,6 +76,7 @@ def publish(address: Address) -> Iterator[None]:
         lock = os.open(path.with_name(_LOCK), os.O_RDWR | os.O_CREAT, 0o600)
     except OSError as error:
         raise WorkerError(f"{path}: nobody would find this server: {error.strerror}") from error
+    # The lock may come just when this server ends. `turn` keeps the file from being written after it was removed.
     turn, has_left = threading.Lock(), threading.Event()
 
     def wait() -> None:
@@ -100,6 +101,7 @@ def publish(address: Address) -> Iterator[None]:
     finally:
         with turn:
             has_left.set()
+            # If it is not this server's turn yet, the file is that of the other one.
             if _read() == address:
                 path.unlink(missing_ok=True)
                 os.close(lock)

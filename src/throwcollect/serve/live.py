@@ -44,6 +44,7 @@ class Hold:
     def let_go(self) -> None:
         """Watch no longer; after its last watcher, the simulation gets the speed of its configuration again."""
         try:
+            # The own share becomes the only lock, unless somebody else has a share, too.
             fcntl.flock(self.lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
             # Somebody else still watches it.

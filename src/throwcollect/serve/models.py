@@ -97,6 +97,7 @@ class Models:
             parameters=list(model.parameters),
             targets=list(model.targets),
             given=list(model.given),
+            # The step is rounded up, so that there are never more points than allowed.
             reached=ends[:: max(1, -(-len(ends) // _MOST_POINTS))].tolist(),
             adaptation=model.file.adaptation,
             score=read_score(self.directory / name),

@@ -84,6 +84,7 @@ def _find_config(run: Run) -> Path:
     return path
 
 
+# The time of the last change belongs to the key of the cache, so a file that was changed is read again.
 @lru_cache(maxsize=16)
 def _describe(path: Path, _changed_ns: int) -> str:
     return full_description(load(path))

@@ -18,6 +18,7 @@ FULL = 1013
 """Close code of a socket that is one too many; those who try later may get in."""
 FAILED = 4503
 """Close code of a socket to something that does not answer."""
+# A control frame carries 125 bytes (RFC 6455, 5.5), and the close code takes two of them.
 _MOST_REASON = 123
 """Bytes of a reason that fit into a frame."""
 
@@ -36,6 +37,7 @@ async def refuse(socket: WebSocket, code: int, reason: str) -> None:
 
 def _cut(reason: str) -> str:
     first, _, _ = reason.partition("\n")
+    # The cut may have gone through a character, the rest of which is left out.
     return first.encode()[:_MOST_REASON].decode(errors="ignore")
 
 

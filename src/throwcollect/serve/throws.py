@@ -64,6 +64,7 @@ def encode_throw(delivery: Delivery, simulation: str, values: Mapping[str, float
         "values": dict(values),
     }
     text = json.dumps(header).encode()
+    # A typed array of JavaScript has to begin at a multiple of the size of its numbers.
     padding = b"\0" * (-(_LENGTH.size + len(text)) % _FLOAT_BYTES)
     numbers = (samples.position, samples.ball_position)
     return b"".join((_LENGTH.pack(len(text)), text, padding, *(part.astype("<f4").tobytes() for part in numbers)))

@@ -106,6 +106,7 @@ def make_view_routes(instances: Instances) -> APIRouter:
             return
         try:
             await socket.accept()
+            # Nothing is ever sent: the simulation is held as long as the client is there.
             await keep_telling(socket, asyncio.Event().wait())
         finally:
             await asyncio.to_thread(hold.let_go)

@@ -113,6 +113,7 @@ def _draw_all(config: Config, joints: tuple[str, ...], samples: Samples, row: di
             frames = np.array(renderer.find_frames())
             points += [frames - _ROOM_M, frames + _ROOM_M]
         everything = np.concatenate(points)
+        # The room around the feet reaches below the ground, where nothing is to be seen.
         everything[:, 2] = np.maximum(everything[:, 2], 0)
         camera = camera_on(everything, _WIDTH / _HEIGHT)
         ground = _Ground(camera, everything[:, :2].mean(axis=0))
@@ -126,6 +127,7 @@ def _draw_all(config: Config, joints: tuple[str, ...], samples: Samples, row: di
             ground.trace(picture, ball[released:], _FLOWN)
             seen = renderer.draw(*ground.size, view=camera.view, projection=camera.projection, light=_LIGHT)
             body = images.fromarray(seen)
+            # The drawn robot is its own mask: it is transparent where nothing was drawn.
             picture.paste(body, (0, 0), body)
             pictures.append(picture.resize((_WIDTH, _HEIGHT), images.Resampling.LANCZOS))
     return pictures
@@ -176,6 +178,7 @@ class _Ground:
             for x, y in ((along, across), (across, along)):
                 line = np.column_stack([x, y, np.zeros_like(x)])
                 line[:, :2] += np.round(middle / _GRID_M) * _GRID_M
+                # Points behind the camera would be projected, too, and appear upside down in the picture.
                 pen.line(self._pixels(line[camera.faces(line)]), fill=_LINE, width=1)
 
     def _pixels(self, points: NDArray[np.float64]) -> list[tuple[float, float]]:

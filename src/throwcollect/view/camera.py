@@ -79,6 +79,7 @@ def camera_on(points: NDArray[np.float64], aspect: float) -> Camera:
     back = _OUTWARD / np.linalg.norm(_OUTWARD)
     right = np.cross([0.0, 0.0, 1.0], back)
     right /= np.linalg.norm(right)
+    # From here on the places are in the frame of the camera, whose third axis points backwards.
     axes = np.stack([right, np.cross(back, right), back])
     seen = points @ axes.T
     # A point is in the picture if its distance from the axis is below the tangent times its distance along the axis.
@@ -87,6 +88,7 @@ def camera_on(points: NDArray[np.float64], aspect: float) -> Camera:
     for axis, tangent in ((0, _TANGENT * aspect), (1, _TANGENT)):
         slope = tangent * (1 - 2 * _MARGIN)
         upper, lower = np.max(seen[:, axis] + slope * seen[:, 2]), np.max(-seen[:, axis] + slope * seen[:, 2])
+        # The two outermost lines of this slope, one on each side, meet at the nearest place from which all is seen.
         place[axis] = (upper - lower) / 2
         needed.append((upper + lower) / (2 * slope))
     place[2] = max(needed)

@@ -86,6 +86,7 @@ def _scene() -> dict[str, Any]:
 
 def _plot(paths: Sequence[Mapping[str, Any]], title: str) -> dict[str, Any]:
     return {
+        # Lichtblick, which began as a copy of Foxglove, has a name of its own for the title.
         "foxglovePanelTitle": title,
         "lichtblickPanelTitle": title,
         "paths": list(paths),

@@ -46,6 +46,7 @@ def robot_markers(robot: DrawnRobot, stamp_ns: int) -> Any:
     markers = []
     for number, shape in enumerate(robot.shapes):
         drawn = _marker("robot", kinds[shape.kind], shape.rgba, shape.size, stamp_ns, number=number)
+        # Viewers move a locked marker with its frame, so that the robot is published only once.
         drawn.header.frame_id, drawn.frame_locked = shape.link, True
         drawn.mesh_resource = meshes.get(shape.mesh, "")
         _place(drawn, *shape.position)
@@ -72,6 +73,7 @@ def all_markers(throws: Sequence[ShownThrow]) -> Any:
     """A visualization_msgs/MarkerArray with thin paths of all throws, and the landing plane of the first."""
     array, marker = (get_message(f"visualization_msgs/msg/{name}") for name in ("MarkerArray", "Marker"))
     stamp = throws[0].start_ns
+    # The first corner is the robot's base, so that the plane reaches there, too.
     corners = np.concatenate([np.zeros((1, 2)), *(throw.path[:, :2] for throw in throws)])
     low, high = corners.min(axis=0) - _MARGIN_M, corners.max(axis=0) + _MARGIN_M
     plane = _marker("landing plane", marker.CUBE, _PLANE, (*(high - low), _PLANE_M), stamp)

@@ -118,6 +118,7 @@ def read_drawn_robot(description: str, tool: str, share: Path) -> DrawnRobot:
             if link.get("name") == tool:
                 for shape in link.findall("visual"):
                     shape.append(_material("spoon", _SPOON_RGBA))
+        # A material may be defined in one place of a URDF, and only named in others.
         colors = {name: rgba for material in robot.iter("material") for name, rgba in _color(material).items()}
         shapes = tuple(
             _shape(link.attrib["name"], visual, colors) for link in robot.iter("link") for visual in link.iter("visual")
@@ -169,6 +170,7 @@ def _shape(link: str, visual: ElementTree.Element, colors: Mapping[str, Rgba]) -
         size = (diameter, diameter, float(geometry.attrib["length"]))
     else:
         raise ValueError(f"link {link} has a {geometry.tag}")
+    # URDF turns about fixed axes, for which SciPy has small letters.
     rotation = tuple(transform.Rotation.from_euler("xyz", rpy).as_quat().tolist())
     rgba = _DEFAULT_RGBA if material is None else colors.get(material.get("name", ""), _DEFAULT_RGBA)
     return Shape(link, xyz, rotation, size, geometry.tag, mesh, rgba)

@@ -17,6 +17,7 @@ from throwcollect.units import NS_PER_S
 
 def encode_samples(topic: Topic, recording: Recording) -> NDArray[np.uint8]:
     """CDR messages of a topic, shape ``(n_samples, size)``."""
+    # All messages of a topic have the same size, so one array of them is filled field by field.
     messages = np.empty((len(recording.samples), len(topic.layout.template)), np.uint8)
     messages[:] = np.frombuffer(topic.layout.template, np.uint8)
     topic.fill(messages.view(topic.layout.dtype)[:, 0], recording)

@@ -21,6 +21,7 @@ from throwcollect.view.viewer_recording import ViewRecording
 RECORDING = "throws.mcap"
 LAYOUT = "foxglove.json"
 
+# In ROS, a stamp of 0 asks for the latest transform, and `ViewRecording` takes 0 for no stamp yet.
 _FIRST_NS = 1_000_000_000
 _PAUSE_NS = 1_000_000_000
 

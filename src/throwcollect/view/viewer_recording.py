@@ -114,6 +114,7 @@ class ViewRecording:
         self._times = (self._times[0] or stamp_ns, stamp_ns)
 
     def _put_samples(self, samples: Samples, start_ns: int) -> None:
+        # Throws follow one another here, whatever stamps they have in the dataset.
         stamps = samples.stamps_ns - samples.stamps_ns[0] + start_ns
         recording = Recording(replace(samples, stamps_ns=stamps), {})
         columns = [(self._numbers[topic.name], encode_samples(topic, recording)) for topic in self._topics]

@@ -47,6 +47,7 @@ def replay_dataset(
     for trial in trials or ():
         if not 0 <= trial < len(dataset.throws):
             raise ConfigError(f"{directory}: no trial {trial}", expected=f"0 to {len(dataset.throws) - 1}")
+        # A trial without an episode is refused here, before any throw is simulated.
         dataset.episode(trial)
     chosen = list(dict.fromkeys(trials or ())) or select_trials(dataset, sample=sample)
     if engine is not None:

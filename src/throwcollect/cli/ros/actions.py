@@ -61,6 +61,7 @@ def send_goal(
             print(f"Goal accepted with ID: {bytes(bytearray(handle.goal_id.uuid)).hex()}\n", flush=True)
             response = session.answer(handle.get_result_async(), alive=client.server_is_ready, who=name)
         except KeyboardInterrupt:
+            # Otherwise `join_graph` would only leave the graph, and the goal would go on.
             _cancel(session, client, handle, name)
             raise Interrupted("") from None
         status = _STATUSES[response.status]

@@ -51,6 +51,7 @@ class Session:
             discovered: set[object] = {*nodes, *(name for name, _ in self.node.get_topic_names_and_types())}
             if discovered != known:
                 known, changed = discovered, now
+            # The own node is always among them, so one node means that nobody else was found yet.
             elif len(nodes) > 1 and now > changed + _QUIET_S:
                 return
 

@@ -84,6 +84,7 @@ def echo(
 
         def show(message: Any) -> None:
             nonlocal printed
+            # Further messages may have arrived before the command gets to its end.
             if once and printed:
                 return
             printed = True
@@ -109,7 +110,9 @@ def show_rate(
     end_with_reader()
     with join_graph(run) as session:
         name, message_type = _find_message_type(session, topic, None)
+        # A gap lies between two arrivals, so one arrival more is kept.
         arrivals: deque[int] = deque(maxlen=window + 1)
+        # A subscription that asks for less than the publisher offers is served; the other way round, nothing arrives.
         qos = ros.QoSProfile(depth=_DEPTH, reliability=ros.ReliabilityPolicy.BEST_EFFORT)
         session.node.create_subscription(
             message_type, name, lambda _: arrivals.append(time.monotonic_ns()), qos, raw=True

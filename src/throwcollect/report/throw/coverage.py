@@ -82,11 +82,13 @@ def count_throws(landings: Landings, throws: pa.Table, *, target: TargetConfig |
         edges = {name: _choose_edges(column) for name, column in values.items()}
     else:
         if target.height_m is not None:
+            # Heights are those of all trials, and only the landings count here.
             values["height_m"] = read_numbers(throws, LANDING_HEIGHT)[landings.trial]
         bins = target.dimensions
         values = {name: column for name, column in values.items() if name in bins}
         edges = {name: np.linspace(bins[name].min, bins[name].max, bins[name].bins + 1) for name in values}
         if "hit_angle_rad" in edges:
+            # The configuration has radians, and the values above are degrees, as the axis shows them.
             edges["hit_angle_rad"] = np.degrees(edges["hit_angle_rad"])
     counts, _ = np.histogramdd(np.column_stack(list(values.values())), list(edges.values()))
     axes = tuple(Axis(_LABELS[name], edges[name]) for name in values)
@@ -97,6 +99,7 @@ def _choose_edges(values: NDArray[np.float64]) -> NDArray[np.float64]:
     """Choose edges of cells whose width is a round number, which people can quote."""
     low, high = float(values.min()), float(values.max())
     width = _round_up((high - low) / _BINS) or 0.1
+    # One edge more, as the largest value has to lie inside, and not beyond the last edge.
     first, last = np.floor(low / width), np.floor(high / width) + 1
     edges: NDArray[np.float64] = np.arange(first, last + 1) * width
     return edges
@@ -107,4 +110,5 @@ def _round_up(width: float) -> float:
     if width < 1e-9:
         return 0.0
     power = 10.0 ** np.floor(np.log10(width))
+    # The factor lets a width through that is a round number but for an error of rounding.
     return float(next(step * power for step in (1, 2, 5, 10) if step * power >= width * (1 - 1e-9)))

@@ -148,6 +148,7 @@ def draw_residuals(residuals: Residuals) -> go.Figure:
     shown = np.maximum(residuals.finite_m, FLOOR_M)
     low = np.floor(np.log10(shown.min()))
     high = max(np.ceil(np.log10(max(shown.max(), 10 * FLOOR_M))), low + 1)
+    # There are four bins for each power of ten; 0.1 more includes the last edge in spite of rounding.
     edges = 10 ** np.arange(low, high + 0.1, 0.25)
     counts, _ = np.histogram(np.clip(shown, edges[0], edges[-1]), edges)
     hover = "%{y} flights near %{x:.1e} m<extra></extra>"
@@ -183,6 +184,7 @@ def _draw_paths(paths: Sequence[BallPath], axis: int) -> go.Figure:
         release = len(x) - 1 if path.release is None else path.release
         hover = f"x %{{x:.3f}} m, {letter} %{{y:.3f}} m<extra>{name}</extra>"
         common = {"legendgroup": name, "name": name, "hovertemplate": hover}
+        # Both lines have the sample of the release, so that they meet.
         held, free = slice(release + 1), slice(release, None)
         line = {"color": colour, "width": 1, "dash": "dot"}
         figure.add_scatter(x=x[held], y=y[held], mode="lines", line=line, showlegend=False, **common)

@@ -97,6 +97,7 @@ def check_archive(archive: Path) -> None:
         with tarfile.open(archive) as files:
             images = _read_json(files, "manifest.json")
             configs = [_read_json(files, image["Config"]) for image in images]
+        # `[None]` stands for an image without an entry point. In that of ROS 2, a script comes before the command.
         entry_points = [config["config"].get("Entrypoint") or [None] for config in configs]
     except (FileNotFoundError, IsADirectoryError) as error:
         raise ConfigError(f"{archive}: {error.strerror}", hint=hint) from error
@@ -112,6 +113,7 @@ def check_archive(archive: Path) -> None:
 
 def _read_json(files: tarfile.TarFile, name: str) -> Any:
     file = files.extractfile(name)
+    # `extractfile` returns None for a directory and other members that are no files.
     if file is None:
         raise KeyError(name)
     return json.load(file)

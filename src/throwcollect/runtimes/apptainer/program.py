@@ -67,6 +67,7 @@ def call(what: str, *arguments: str, cwd: Path | None = None, places: Mapping[st
     try:
         printed, said = process.communicate()
     except BaseException:
+        # Ctrl-C in the terminal does not reach programs in another session.
         _end(process)
         raise
     if process.returncode:

@@ -62,6 +62,7 @@ def make_sif(
         DatasetError: If a file cannot be written or read.
         MissingExtraError: If an image of an engine is named, and the package that asks the engine is not installed.
     """
+    # Saving or building an image takes minutes, so a missing Apptainer is reported before.
     find_program()
     with _replacing(output) as new, _working() as work:
         if archive is not None:
@@ -182,6 +183,7 @@ def _replacing(output: Path) -> Iterator[Path]:
         place = Path(os.path.realpath(output))
         new = place.with_name(f"{place.name}.new")
         new.unlink(missing_ok=True)
+        # A directory that cannot be written is found out here, and not after minutes.
         new.touch()
     except OSError as error:
         raise unwritable(output, error) from error

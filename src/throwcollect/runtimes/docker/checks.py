@@ -39,6 +39,7 @@ def check(client: DockerClient, place: RunPlace, config: Config) -> str:
     sections = {f"containers.{kind}": section_of(config, node) for kind, node in _NODES.items()}
     image_id = _check(client, image(config), sections)
     if config.run.router_port and not begun:
+        # The engine binds the port later; trying it here gives an error that names the key of the configuration.
         reserve_port(config.run).close()
     return image_id
 

@@ -145,6 +145,8 @@ class ComponentContainer:
         try:
             self._watch = EngineWatch(self._client, self._place, self._clock)
             session.event("started")
+            # Up to version 1.43 of the engine's API, a container is made in one network, and joins others before it
+            # starts.
             self._container.start(self._options(), networks=self._networks[1:])
             while not session.interruptions():
                 session.nodes([self._look()], endpoint=None, simulations=0)
@@ -169,6 +171,7 @@ class ComponentContainer:
                     self._container.wait_log(LOG_S)
                     self._client.api.remove_container(handle, v=True, force=True)
             with suppress(*ENGINE_ERRORS):
+                # The filter is a regular expression, and names begin with a slash in the engine.
                 name = f"^/{self._place.container(CONTAINER)}$"
                 self.cleared = not self._client.api.containers(all=True, filters={"name": name})
         finally:

@@ -90,6 +90,7 @@ class DockerNodes(NodeHost):
         self._ended_at: dict[str, float] = {}
         with ExitStack() as undo:
             self._clock = EngineClock(warn)
+            # The clock is a thread, which would go on counting and warning for a host that was never made.
             undo.callback(self._clock.close)
             self._client = client or connect(timeout_s=clock.SILENCE_S)
             self._clock.attend(self._client)
@@ -122,6 +123,7 @@ class DockerNodes(NodeHost):
                     self._client.volumes.create(place.source, labels=place.labels())
             # If the network exists, the volume with the key exists, too, and nodes of an earlier launcher use both.
             if not self._client.networks.list(filters={"label": f"{RUN_LABEL}={place.run_id}"}):
+                # Each of the two is a wait for the engine, so they are done side by side.
                 with ThreadPoolExecutor(1) as pool:
                     placing = pool.submit(place_key, self._client, place, self.config, self.place.key)
                     self._create_network()
@@ -166,6 +168,8 @@ class DockerNodes(NodeHost):
                 name = container.labels[NODE_LABEL]
                 # `start` replaces a container that was created but never started.
                 if name not in self._nodes and container.status != "created":
+                    # The state has to be known before the next `exits`: a container that has ended sends no further
+                    # event.
                     self._opened.look(container.id)
                     self._nodes[name] = self._node(name)
                     self._nodes[name].adopt(container)
@@ -247,6 +251,7 @@ class DockerNodes(NodeHost):
     def stop(self, names: Sequence[str], *, grace_s: float = 3.0) -> None:
         """End nodes and remove their containers: with SIGTERM, then after `grace_s`, in whole seconds, by force."""
         nodes = [self._nodes.pop(name) for name in names if name in self._nodes]
+        # A container that the engine is still starting cannot be ended yet; `close` waits for it.
         self._beginning += [node for node in nodes if not node.begun]
         with ThreadPoolExecutor(_AT_ONCE) as pool:
             for node in nodes:

@@ -86,6 +86,7 @@ def remove(client: DockerClient, run_id: str, *, volumes: bool) -> list[str]:
         joined = client.api.containers(all=True, filters={"label": f"{JOINED_LABEL}={run_id}"})
         containers = [*client.api.containers(all=True, filters=filters), *joined]
         networks = client.api.networks(filters=filters)
+        # The engine gives null in the place of an empty list of volumes.
         found_volumes = client.api.volumes(filters=filters)["Volumes"] or []
     # Containers come first, because networks and volumes that are in use cannot be removed.
     with ThreadPoolExecutor(_AT_ONCE) as pool:

@@ -248,6 +248,7 @@ def _run_steps(
                 printed.append(line.rstrip())
             if match := _MISSING_WHEEL.search(line):
                 missing = match[1]
+        # The engine answers with 200 before the first step, so a step that fails is told in the stream.
         if "error" in answer:
             raise _failure(tag, answer["error"].strip(), missing, wheelhouse, "\n".join(printed))
 

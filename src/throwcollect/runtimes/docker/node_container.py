@@ -140,8 +140,10 @@ class NodeContainer:
                     known = log.tell() - offset
                     for chunk in container.logs(stream=True, follow=True):
                         self._clock.note_arrival()
+                        # Each stream begins with the first byte of the output again.
                         log.write(chunk[known:])
                         known = max(0, known - len(chunk))
+                    # A stream also ends when the engine does, so only the state tells whether more can come.
                     container.reload()
                     if container.status not in _LIVELY:
                         return

@@ -125,6 +125,7 @@ def confine(place: RunPlace, image: str) -> dict[str, Any]:
         "labels": place.labels(),
         "environment": {"HOME": "/tmp"},  # noqa: S108 - the one place in the container that can be written
         "user": f"{os.getuid()}:{os.getgid()}",
+        # The kernel keeps signals without a handler from process 1, which also has to reap orphans. An init does both.
         "init": True,
         "read_only": True,
         "tmpfs": {"/tmp": _TMPFS},  # noqa: S108
@@ -202,6 +203,7 @@ def container_options(
         "ports": {port: (LOOPBACK, host_port) for port, host_port in section.ports.items()},
         "nano_cpus": None if section.cpus is None else round(section.cpus * 10**9),
         "mem_limit": section.memory,
+        # This limits memory and swap together; the same value as above leaves no swap.
         "memswap_limit": section.memory,
         "cpuset_cpus": section.cpuset,
     }
@@ -214,6 +216,7 @@ def mount_source(mount: str) -> Path:
 
 def _bind(mount: str) -> Mount:
     source, target, *mode = mount.split(":")
+    # The only mode that the configuration allows is ``ro``.
     return Mount(target=target, source=source, type="bind", read_only=bool(mode))
 
 

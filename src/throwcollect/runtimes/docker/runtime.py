@@ -133,8 +133,10 @@ def _choose_middleware(rmw: str | None, image: str, config: Config, launcher: Mi
     """
     if rmw is None:
         problem = f"the image {image} has no rclpy"
+    # The embedded client understands this middleware, so every launcher can join it, on another machine, too.
     elif (found := Middleware("rclpy", rmw)).joining.backend == "embedded":
         return found if config.run.ros != "embedded" else Middleware()
+    # With another middleware, the launcher has to load the same one, and to be on the machine of the nodes.
     elif not is_local():
         problem = f"with {rmw} nodes talk to each other directly, and those at {engine_address()} cannot be reached"
     else:

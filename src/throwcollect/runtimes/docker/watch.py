@@ -111,6 +111,7 @@ class EngineWatch:
             try:
                 listed = self._client.api.containers(all=True, filters={"label": self._label})
                 now = {container["Id"]: container["State"] for container in listed}
+                # The copy is made because the thread of the events may add a container meanwhile.
                 before = {key: state.status for key, state in self._states.copy().items() if state.status != "removed"}
                 for container in now.keys() | before.keys():
                     if now.get(container) != before.get(container):
@@ -129,6 +130,7 @@ def _state(details: Mapping[str, Any], network: str) -> ContainerState:
     attached = details["NetworkSettings"]["Networks"].get(network, {})
     return ContainerState(
         status=state["Status"],
+        # The engine also gives exit code 0 to a container that runs or has never run.
         code=None if state["Running"] or state["Status"] == "created" else state["ExitCode"],
         out_of_memory=state["OOMKilled"],
         healthy=state.get("Health", {}).get("Status") == "healthy",

@@ -45,6 +45,7 @@ class Bridge:
         self._joined: Connection | None = None
         self._clients: list[Client] = []
         self._work: SimpleQueue[Callable[[], None]] = SimpleQueue()
+        # The number decides between equal times, because functions have no order.
         self._timers: list[tuple[float, int, Callable[[], None]]] = []
         self._numbers = itertools.count()
         self._lock = threading.Lock()
@@ -104,6 +105,7 @@ class Bridge:
         self._work.put(action)
         with self._lock:
             if self._session is not None:
+                # The thread waits in the executor then, which only a task wakes.
                 self._session.executor.create_task(self._do_next)
 
     def forget(self, client: Client) -> None:
@@ -118,6 +120,7 @@ class Bridge:
             if self._session is not None:
                 self._spin(self._session, max(wait_s, 0.0))
             else:
+                # With 0, `_do_next` would not wait at all, and this loop would take a whole core.
                 self._do_next(max(min(wait_s, _RETRY_S), 0.001))
         for client in list(self._clients):
             client.close()
@@ -180,6 +183,7 @@ class Bridge:
         self._joined = connection
         for client in self._clients:
             client.restore()
+        # Work that came without a session has no task in the executor of this one.
         while not self._work.empty():
             self._do_next()
 

@@ -132,6 +132,7 @@ class Client:
         """Make everything that the client had again, in a new session."""
         for part in self._parts:
             part.restore()
+        # This takes back the error that `lose` has told, so clients that only want errors get it, too.
         if self._level != "none":
             self.answer({"op": "status", "level": "info", "msg": "the router of the run is back"}, Form())
         self.work_off()
@@ -176,6 +177,7 @@ class Client:
             operation = self._looking.get(request.op) or self._acting.get(request.op)
             if operation is None:
                 raise ConfigError(f"no operation {request.op}", expected=", ".join([*self._looking, *self._acting]))
+            # Whoever sends a goal waits for a result, so `_send_goal` refuses by a result and not by a status message.
             if request.op in self._acting and request.op != "send_action_goal":
                 self._require_writing(request.op)
             operation(request)

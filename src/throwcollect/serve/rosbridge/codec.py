@@ -74,6 +74,7 @@ def encode(fields: object, compression: str = "none") -> Frame:
 def json_text(fields: object) -> str:
     """Write JSON in one line, in ASCII, because ROS# takes every byte of a frame for a character."""
     text = orjson.dumps(fields, option=orjson.OPT_SERIALIZE_NUMPY).decode()
+    # orjson cannot escape characters beyond ASCII; `json` does, in the form that JSON demands.
     return text if text.isascii() else _NOT_ASCII.sub(lambda found: json.dumps(found[0])[1:-1], text)
 
 

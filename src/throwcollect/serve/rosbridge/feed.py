@@ -39,6 +39,7 @@ class Sample:
         Raises:
             ValueError: If the bytes are malformed.
         """
+        # Clients that ask for the same get the same frame, which is encoded once.
         key = topic, compression
         if key not in self._frames:
             fields = {"op": "publish", "topic": topic, "msg": self._content(compression)}

@@ -128,6 +128,7 @@ class Goals(Errands[Goal]):
             return
         goal.handle = handle
         handle.get_result_async().add_done_callback(partial(self._take_result, goal))
+        # The client has asked to cancel the goal before the action had accepted it.
         if goal.is_cancelled:
             handle.cancel_goal_async()
 

@@ -103,6 +103,7 @@ class OfferedAction:
         handle, future = self._goals.pop(number)
         if status == _SUCCEEDED:
             handle.succeed()
+        # A goal of ROS can only become cancelled after somebody has asked for that; otherwise, it is aborted.
         elif status == _CANCELED and handle.is_cancel_requested:
             handle.canceled()
         else:

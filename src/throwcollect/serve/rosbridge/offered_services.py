@@ -60,11 +60,13 @@ class OfferedService:
             raise ConfigError(f"service_response: no request {request.id} to {self._name} waits for an answer")
         future, response = self._pending[request.id]
         values = request.any("values")
+        # With `result: false`, the values may be a text that says why.
         if isinstance(values, Mapping) or request.flag("result", default=True):
             fill(response, {} if values is None else values)
         else:
             # ROS has no way to say that a service has failed, and without an answer the node would wait for ever.
             self._client.say("warning", f"{self._name}: a failed request is answered with defaults", request.id)
+        # Values of the wrong type have raised an error before, so that the client can still answer.
         del self._pending[request.id]
         future.set_result(response)
 

@@ -42,6 +42,7 @@ class Offers(Belongings[ABelonging]):
         """
         given = request.text(self._kind)
         name = absolute_name(given)
+        # The new offer is made before the old one is withdrawn, so that a wrong request leaves everything as it is.
         offered = self._make(self._client, given, request.text("type"))
         if name in self._by_name:
             self._by_name.pop(name).close()

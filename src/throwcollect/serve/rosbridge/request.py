@@ -72,6 +72,7 @@ class Fields:
         value = self._fields.get(name)
         if value is None:
             return default
+        # Clients in JavaScript have only floats, which are exact up to here. A bool is an int of Python, too.
         if isinstance(value, bool) or not isinstance(value, int | float) or not 0 <= value < 1 << 53:
             raise self._wrong(name, "a number from 0 on", value)
         return int(value)

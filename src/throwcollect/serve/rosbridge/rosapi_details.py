@@ -40,6 +40,7 @@ def _describe(name: str, message_class: Any, seen: list[str]) -> list[Definition
     for field, kind in types.items():
         parts = array_parts(kind)
         kinds.append(parts[0] if parts else kind)
+        # In rosapi, -1 stands for no array, and 0 for an array of any length.
         lengths.append(-1 if parts is None else parts[2] or 0)
         examples.append("[]" if parts else "{}" if "/" in kind else str(getattr(message, field)))
     constants = _constants(name)

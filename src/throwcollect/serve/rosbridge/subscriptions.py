@@ -45,6 +45,7 @@ class Pace:
         """Use another wish from now on."""
         self._wish = wish
         self._queue = deque(self._queue, maxlen=wish.queue_length)
+        # A shorter interval counts at once, and not only after the next sample.
         self._due = min(self._due, time.monotonic() + wish.throttle_s)
 
     def offer(self, sample: Sample) -> None:

@@ -46,11 +46,13 @@ class Outbox:
         with self._lock:
             was_empty = not self._frames
             self._append(frame)
+            # A single frame is sent however long it is, as nothing older could be dropped for it.
             while len(self._frames) > MOST_FRAMES or (self._bytes > MOST_BYTES and len(self._frames) > 1):
                 self._bytes -= len(self._frames.popleft())
                 if not self._is_told:
                     self._is_told = True
                     self._append(_DROPPED)
+        # `take` waits only when there is no frame, so only the first one has to wake it.
         if was_empty:
             # The loop may have ended, and with it the connection.
             with suppress(RuntimeError):
@@ -104,6 +106,7 @@ async def _receive_all(websocket: WebSocket, client: Client) -> None:
             await websocket.close(_TOO_BIG, "a frame is longer than 10 MiB")
             return
         client.receive(frame)
+        # A client that sends faster than the bridge works is not read meanwhile, so that TCP makes it wait.
         while client.waiting > _MOST_WAITING:
             await asyncio.sleep(_POLL_S)
 
