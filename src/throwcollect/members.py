@@ -13,14 +13,17 @@ libraries of simulations.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import os
+import traceback
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from functools import cache
 from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points
 from types import MappingProxyType
 from typing import Any
 
-from throwcollect.errors import ConfigError, ThrowcollectError
+from throwcollect.errors import ConfigError, MemberError, ThrowcollectError
 from throwcollect.extras import explain_missing
 
 _OWN = MappingProxyType(
@@ -63,6 +66,10 @@ _KINDS = MappingProxyType(
 _VALUES = frozenset({"robots", "exporters"})
 """The families whose members are values."""
 
+_DEBUG = "THROWCOLLECT_DEBUG"
+_WAY_OUT = f"mend or uninstall the package that it is of; {_DEBUG}=1 shows where it fails"
+"""The hint where code of another package fails."""
+
 
 def names_of(family: str) -> tuple[str, ...]:
     """List the names of the members of a family: our own first, then those of other packages, by name."""
@@ -88,9 +95,7 @@ def load_member(family: str, name: str) -> Any:
     entry = _table(family)[name]
     if name in _OWN[family]:
         return entry.load()
-    # The table has only one entry for each name, so all packages that bring this name are looked up.
-    namesakes = [each for each in entry_points(group=entry.group) if each.name == name]
-    what = f"the {family.removesuffix('s')} {name} of {' and '.join(sorted(map(_owner, namesakes)))}"
+    what, namesakes = _describe(family, name), _find_namesakes(family, name)
     if len({each.value for each in namesakes}) > 1:
         raise ConfigError(f"{what}: a name has to be that of one", hint="uninstall all of these packages but one")
     found = _import(entry.value, what)
@@ -116,6 +121,39 @@ def load_object(path: str, kind: type | None = None) -> Any:
     return found if kind is None else _check_class(found, kind, path)
 
 
+@contextmanager
+def explain_failure(family: str, name: str, doing: str, *, passing: tuple[type[Exception], ...] = ()) -> Iterator[None]:
+    """Report what a member of another package raises in the block as a fault of that package.
+
+    What our own members raise is let through, because it is a fault of throwcollect.
+
+    Args:
+        family: As `load_member` takes it.
+        name: Name of the member.
+        doing: What the member was asked to do, such as ``judge trial 3``.
+        passing: Exceptions that are let through, because the caller explains them.
+
+    Raises:
+        MemberError: If the block raises anything else that is not raised on purpose.
+    """
+    if name in _OWN[family]:
+        yield
+        return
+    try:
+        with explain_missing():
+            yield
+    except ThrowcollectError:
+        raise
+    except Exception as error:
+        if isinstance(error, passing):
+            raise
+        if os.environ.get(_DEBUG):
+            # Where a simulation fails, the error becomes the reason for which a trial is refused, without its trace.
+            traceback.print_exc()
+        what = _describe(family, name)
+        raise MemberError(f"{what} cannot {doing}: {type(error).__name__}: {error}", hint=_WAY_OUT) from error
+
+
 def _import(path: str, what: str) -> Any:
     """Import an object of another package, and report a mistake in there as one of that package.
 
@@ -135,7 +173,7 @@ def _import(path: str, what: str) -> Any:
     except Exception as error:
         raise ConfigError(
             f"{what} cannot be loaded: {type(error).__name__}: {error}",
-            hint="mend or uninstall the package that it is of; THROWCOLLECT_DEBUG=1 shows where it fails",
+            hint=_WAY_OUT,
         ) from error
 
 
@@ -154,6 +192,17 @@ def _check_class(found: Any, kind: type, where: str) -> Any:
     if lacking := lacking | getattr(found, "__abstractmethods__", frozenset()):
         raise ConfigError(f"{where} lacks {', '.join(sorted(lacking))}")
     return found
+
+
+def _describe(family: str, name: str) -> str:
+    """Name a member of another package and that package, as the beginning of a message."""
+    owners = sorted(map(_owner, _find_namesakes(family, name)))
+    return f"the {family.removesuffix('s')} {name} of {' and '.join(owners)}"
+
+
+def _find_namesakes(family: str, name: str) -> list[EntryPoint]:
+    """Find all members of other packages that have a name."""
+    return [each for each in entry_points(group=f"throwcollect.{family}") if each.name == name]
 
 
 def _owner(entry: EntryPoint) -> str:

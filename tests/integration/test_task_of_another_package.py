@@ -36,6 +36,21 @@ found = {
 }
 """
 
+FEW = REACH.replace("until: {reached: 30}\n", "").replace("trials: 200", "trials: 3")
+FAIL = """
+from reach.reach_task import ReachTask
+
+def fail(*_):
+    {does}
+
+found, ReachTask.kept, ReachTask.{method} = {{}}, ReachTask.{method}, fail
+"""
+MEND = """
+from reach.reach_task import ReachTask
+
+found, ReachTask.{method} = {{}}, ReachTask.kept
+"""
+
 
 @pytest.fixture(scope="module")
 def process() -> Iterator[ProcessPoolExecutor]:
@@ -148,3 +163,57 @@ def test_a_task_that_there_is_not_is_refused_in_words(refusal: Command, tmp_path
     said = refusal("config", path)
     assert f"{path}:1: task.name: should be 'throw' or 'reach', got 'reech'; did you mean 'reach'?" in said
     assert f"{path}:2: until.lands: unknown key; did you mean 'landed'?" in said
+
+
+@pytest.mark.parametrize(
+    ("method", "does", "commands", "said"),
+    [
+        (
+            "assess",
+            "1 / 0",
+            {
+                "up {config} --runtime inprocess --output {new}": 3,
+                "dataset verify {data}": 1,
+                "dataset rebuild {data}": 1,
+                "dataset repair {data} {new}": 1,
+                "dataset replay {data} --trial 1": 1,
+            },
+            "cannot judge trial {trial}: ZeroDivisionError: division by zero",
+        ),
+        (
+            "assess",
+            "return _[0], None",
+            {"up {config} --runtime inprocess --output {new}": 3},
+            "cannot judge trial {trial}: ",
+        ),
+        (
+            "trajectory",
+            "1 / 0",
+            {"plan {config}": 1, "dataset verify {data}": 1, "dataset export {data} {new} --to npz": 1},
+            "cannot plan its motion: ZeroDivisionError: division by zero",
+        ),
+    ],
+)
+def test_where_it_fails_one_sentence_names_it(
+    method: str,
+    does: str,
+    commands: dict[str, int],
+    said: str,
+    process: ProcessPoolExecutor,
+    throwcollect: Command,
+    tmp_path: Path,
+) -> None:
+    config, data = tmp_path / "reach.yaml", tmp_path / "data"
+    config.write_text(FEW)
+    throwcollect("up", config, "--runtime", "inprocess", "--output", data)
+    process.submit(run_program, FAIL.format(method=method, does=does)).result()
+    try:
+        for number, (command, code) in enumerate(commands.items()):
+            words = command.format(config=config, data=data, new=tmp_path / f"new_{number}").split()
+            done = process.submit(call_here, *words).result()
+            sentence = f"the task reach of reach 1.0 {said.format(trial=1 if 'replay' in words else 0)}"
+            assert (done.returncode, sentence in done.stderr) == (code, True), done.stderr
+            assert "internal error" not in done.stderr
+    finally:
+        process.submit(run_program, MEND.format(method=method)).result()
+    assert "nothing wrong" in throwcollect("dataset", "verify", data)

@@ -9,8 +9,8 @@ import pytest
 from throwcollect import members
 from throwcollect.engines.ballistic.ballistic_engine import BallisticEngine
 from throwcollect.engines.bullet.bullet_engine import BulletEngine
-from throwcollect.errors import ConfigError
-from throwcollect.members import load_member, names_of
+from throwcollect.errors import ConfigError, DatasetError, MemberError
+from throwcollect.members import explain_failure, load_member, names_of
 
 PLUGINS = Path(__file__).parents[1] / "plugins"
 BALLISTIC = "throwcollect.engines.ballistic.ballistic_engine:BallisticEngine"
@@ -162,6 +162,28 @@ def test_an_engine_that_is_broken_is_told_before_a_run_begins(tmp_path: Path) ->
     assert done.returncode == 2
     assert "the engine mine of somebodys 1.0 cannot be loaded" in done.stderr
     assert "sim_0" not in done.stderr
+
+
+@pytest.mark.parametrize("debug", ["", "1"])
+def test_what_a_member_of_another_package_raises_is_told_as_a_fault_of_that_package(
+    debug: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    install(tmp_path, "somebodys", "tasks", "some:Task")
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setenv("THROWCOLLECT_DEBUG", debug)
+    with pytest.raises(MemberError) as caught, explain_failure("tasks", "mine", "judge trial 3"):
+        raise KeyError("elbow")
+    assert caught.value.message == "the task mine of somebodys 1.0 cannot judge trial 3: KeyError: 'elbow'"
+    assert ("Traceback" in capsys.readouterr().err) == bool(debug)
+
+
+@pytest.mark.parametrize(
+    ("name", "error"), [("throw", KeyError("elbow")), ("mine", DatasetError("torn")), ("mine", OSError(28, "full"))]
+)
+def test_faults_of_our_own_and_errors_on_purpose_are_let_through(name: str, error: Exception) -> None:
+    with pytest.raises(type(error)) as caught, explain_failure("tasks", name, "write it", passing=(OSError,)):
+        raise error
+    assert caught.value is error
 
 
 def install(directory: Path, package: str, family: str, value: str) -> None:

@@ -2,23 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
-
-from pydantic import ValidationError
+from collections.abc import Callable, Iterable, Iterator, Mapping
 
 from throwcollect.config.default_path import DEFAULT_CONFIG
 from throwcollect.config.loader import value_as_yaml
-from throwcollect.config.schema import Config
 from throwcollect.config.shape import root
 from throwcollect.errors import ConfigError
 from throwcollect.extras import has_wheel
-from throwcollect.members import load_member, names_of
+from throwcollect.members import names_of
 
 POINTS = "throws.csv"
 """The list of points that the sampler `list` reads, beside the configuration."""
 
 _NARROW_RAD = 0.2
-"""Range to either side in which the last angle of a joint is swept."""
+"""Range to either side in which the last angle of a joint is swept, and no more than half of its motion."""
+
+Motion = tuple[Mapping[str, float], Mapping[str, float], float]
+"""Angles at the start and at the end, by joint [rad], and the time in between [s]."""
 
 
 def samplers() -> list[str]:
@@ -26,8 +26,15 @@ def samplers() -> list[str]:
     return root().child("sweep").child("sampler").choices
 
 
-def make_starter(robot: str, task: str, sampler: str) -> dict[str, str]:
+def make_starter(robot: str, task: str, sampler: str, *, find_motion: Callable[[str, str], Motion]) -> dict[str, str]:
     """Write a configuration to begin with, for the robot, the task and the sampler of these names.
+
+    Args:
+        robot: Name of the robot.
+        task: Name of the task.
+        sampler: Name of the sampler.
+        find_motion: Finds a motion for the robot and the task of these names; the end of the joint that moves most may
+            lie half as far again from its start.
 
     Returns:
         The text of the configuration as ``throwcollect.yaml``, and of `POINTS` if the sampler reads it.
@@ -42,11 +49,12 @@ def make_starter(robot: str, task: str, sampler: str) -> dict[str, str]:
     ):
         if name not in known:
             raise ConfigError(f"{option} {name}: no such {option[2:]} is installed", expected=" or ".join(known))
-    motion = _find_motion(robot, task)
+    motion = find_motion(robot, task)
     start, end, duration_s = motion
     joint = max(end, key=lambda name: abs(end[name] - start[name]))
+    half_rad = min(_NARROW_RAD, abs(end[joint] - start[joint]) / 2)
     ranges = {
-        f"task.end.{joint}": (round(end[joint] - _NARROW_RAD, 3), round(end[joint] + _NARROW_RAD, 3)),
+        f"task.end.{joint}": (round(end[joint] - half_rad, 3), round(end[joint] + half_rad, 3)),
         "task.duration_s": (duration_s, round(1.3 * duration_s, 3)),
     }
     texts = {str(DEFAULT_CONFIG): "".join(f"{line}\n" for line in _lines(robot, task, sampler, motion, ranges))}
@@ -56,26 +64,8 @@ def make_starter(robot: str, task: str, sampler: str) -> dict[str, str]:
     return texts
 
 
-_Motion = tuple[Mapping[str, float], Mapping[str, float], float]
-"""Angles at the start and at the end, by joint [rad], and the time in between [s]."""
-
-
-def _find_motion(robot: str, task: str) -> _Motion:
-    """Find a motion for the robot: the default of the task or, if that is for another robot, one from rest."""
-    section: dict[str, object] = {"name": task}
-    values = {"name": "throws", "robot": {"name": robot}, "task": section}
-    try:
-        found = Config.model_validate(values, context=robot).task
-    except ValidationError:
-        rest = dict(load_member("robots", robot).rest_posture)
-        end = {joint: round(angle + 2 * _NARROW_RAD, 3) for joint, angle in rest.items()}
-        section |= {"start": rest, "end": end}
-        found = Config.model_validate(values, context=robot).task
-    return found.start, found.end, found.duration_s
-
-
 def _lines(
-    robot: str, task: str, sampler: str, motion: _Motion, ranges: Mapping[str, tuple[float, float]]
+    robot: str, task: str, sampler: str, motion: Motion, ranges: Mapping[str, tuple[float, float]]
 ) -> Iterator[str]:
     start, end, duration_s = motion
     yield "# What is collected. Angles are in radians, times in seconds; docs/configuration.md lists every key, and"

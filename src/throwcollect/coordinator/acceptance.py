@@ -7,7 +7,7 @@ from throwcollect.config.schema import Config
 from throwcollect.errors import DatasetError
 from throwcollect.sweep.plan import Plan
 from throwcollect.sweep.trials import Trial
-from throwcollect.tasks.task import task_of
+from throwcollect.tasks.task import trajectory_of
 from throwcollect.trial.conditions import Conditions, Settings, conditions_from_json
 
 _MOST_TOLD = 3
@@ -43,7 +43,7 @@ class Acceptance:
             build=self._build,
             settings=self._settings.digest,
             values=self._settings.find_replaced(config),
-            trajectory=task_of(config).trajectory().digest,
+            trajectory=trajectory_of(config).digest,
             lease=token,
         )
         differences = list(conditions.differences(expected))

@@ -22,7 +22,7 @@ from throwcollect.sweep.point_file import read_points
 from throwcollect.sweep.points import Points
 from throwcollect.sweep.rounds import Rounds
 from throwcollect.sweep.trials import Trials
-from throwcollect.tasks.task import task_of
+from throwcollect.tasks.task import trajectory_of
 
 _MANY_TRIALS = 500
 """From here on, checking trials side by side is worth the start of processes."""
@@ -149,8 +149,8 @@ def feasibility_check(config: Config) -> Check:
     """
     feasibility = Feasibility(config)
     if config.sweep.feasibility == "nominal":
-        return lambda trial: feasibility.check(_believe(trial), task_of(trial).trajectory())
-    return lambda trial: feasibility.check(trial, task_of(trial).trajectory())
+        return lambda trial: feasibility.check(_believe(trial), trajectory_of(trial))
+    return lambda trial: feasibility.check(trial, trajectory_of(trial))
 
 
 def _believe(config: Config) -> Config:

@@ -7,10 +7,11 @@ import numpy as np
 from throwcollect.config.schema import Config
 from throwcollect.episode.message import Episode
 from throwcollect.errors import DatasetError
+from throwcollect.members import explain_failure
 from throwcollect.robots.description import robot_of
 from throwcollect.robots.trajectory import JointTrajectory
 from throwcollect.tasks.result import Result
-from throwcollect.tasks.task import task_of
+from throwcollect.tasks.task import task_of, trajectory_of
 
 
 def judge_episode(config: Config, episode: Episode, trajectory: JointTrajectory | None = None) -> Result:
@@ -23,12 +24,13 @@ def judge_episode(config: Config, episode: Episode, trajectory: JointTrajectory 
 
     Raises:
         DatasetError: If the episode is damaged, or another robot's.
+        MemberError: If the task is of another package and fails.
     """
     samples = episode.samples(robot_of(config).joints)
     if (np.diff(samples.stamps_ns) <= 0).any():
         raise DatasetError("chunk: the stamps do not increase")
-    task = task_of(config)
     if trajectory is None:
-        trajectory = task.trajectory()
-    result: Result = task.judge(samples, episode.header, trajectory)
+        trajectory = trajectory_of(config)
+    with explain_failure("tasks", config.task.name, f"judge trial {episode.header.trial}"):
+        result: Result = task_of(config).judge(samples, episode.header, trajectory)
     return result

@@ -23,7 +23,7 @@ from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.robots.description import robot_of, touchable_bodies
 from throwcollect.sweep.plan import Plan
 from throwcollect.tasks.result import Result
-from throwcollect.tasks.task import task_of
+from throwcollect.tasks.task import trajectory_of
 from throwcollect.units import NS_PER_S
 from throwcollect.wording import format_count
 
@@ -42,7 +42,7 @@ class _TrialsOf:
         # One trial is enough, as all checks of an episode come before those of the next one.
         self.trial = lru_cache(maxsize=1)(plan.trial)
         self.config = lru_cache(maxsize=1)(lambda number: plan.config_of(self.trial(number)))
-        self.trajectory = lru_cache(maxsize=1)(lambda number: task_of(self.config(number)).trajectory())
+        self.trajectory = lru_cache(maxsize=1)(lambda number: trajectory_of(self.config(number)))
 
 
 class EpisodeCheck:

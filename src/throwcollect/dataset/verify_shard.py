@@ -23,7 +23,7 @@ from throwcollect.dataset.mcap_reader import McapContents, Record, StoredEpisode
 from throwcollect.dataset.scan import scan
 from throwcollect.episode.channels import Channels
 from throwcollect.episode.chunk import encode_records
-from throwcollect.errors import DatasetError, ThrowcollectError
+from throwcollect.errors import DatasetError, MemberError, ThrowcollectError
 from throwcollect.robots.description import full_description
 
 _CRC_BLOCK = 1 << 20
@@ -88,12 +88,18 @@ class _ShardCheck:
         self._model: McapFile | None = None
 
     def run(self) -> ShardReport:
-        """Check the file and return the findings; everything that is wrong with it is one, and never an error."""
+        """Check the file and return the findings; everything that is wrong with it is one, and never an error.
+
+        Raises:
+            MemberError: If the task is of another package and fails; that says nothing of the file.
+        """
         try:
             with map_file(self._path) as contents:
                 self._check(contents)
         except DatasetError as error:
             self._report(error.place, error.details)
+        except MemberError:
+            raise
         except ThrowcollectError as error:
             self._report("", str(error))
         return self._result

@@ -13,7 +13,7 @@ from throwcollect.export.readme import render_card
 from throwcollect.export.throw_source import Source
 from throwcollect.extras import require
 from throwcollect.files import StrPath, new_directory
-from throwcollect.members import load_member, names_of
+from throwcollect.members import explain_failure, load_member, names_of
 
 
 @dataclass(frozen=True)
@@ -54,6 +54,7 @@ def export(directory: StrPath, output: StrPath, *, to: str, rate_hz: int | None 
         ConfigError: If there is no such format, the rate is above the recorded one, or `output` exists.
         MissingExtraError: If a library that the format needs is not installed.
         DatasetError: If the dataset is unfinished, damaged or without episodes, or `output` cannot be written.
+        MemberError: If the format is of another package and fails.
     """
     formats = names_of("exporters")
     if to not in formats:
@@ -63,9 +64,11 @@ def export(directory: StrPath, output: StrPath, *, to: str, rate_hz: int | None 
     directory, output = Path(directory), Path(output)
     source = Source.open(directory, rate_hz=rate_hz)
     with new_directory(output) as beside:
-        chosen.write(source, beside)
+        with explain_failure("exporters", to, f"write {output}", passing=(OSError,)):
+            chosen.write(source, beside)
+            card = render_card(source, chosen.describe(source))
         shutil.copyfile(directory / CONFIG, beside / CONFIG)
-        (beside / CARD).write_text(render_card(source, chosen.describe(source)), encoding="utf-8")
+        (beside / CARD).write_text(card, encoding="utf-8")
         size = sum(path.stat().st_size for path in beside.rglob("*") if path.is_file())
     return Exported(
         directory=str(output),

@@ -18,7 +18,7 @@ from throwcollect.export.resampling import count_resampled, resample
 from throwcollect.export.signals import Signal, list_signals, unit_of
 from throwcollect.robots.quintic_curve import sample_quintic
 from throwcollect.robots.trajectory import JointTrajectory
-from throwcollect.tasks.task import task_of
+from throwcollect.tasks.task import trajectory_of
 from throwcollect.units import NS_PER_S
 
 _PLACES = ("shard", "chunk_offset")
@@ -144,7 +144,7 @@ class Source:
                 raise DatasetError(f"{dataset.directory}: trial {entry.trial}: {error}") from error
             samples = resample(recorded, recorded_hz=dataset.config.record.rate_hz, rate_hz=self.rate_hz)
             planned = dataset.plan.trial(entry.trial)
-            trajectory = task_of(dataset.plan.config_of(planned)).trajectory()
+            trajectory = trajectory_of(dataset.plan.config_of(planned))
             signals = _compute_signals(samples, trajectory, episode.header.start_ns)
             target = {column.name: planned.target[column.name] for column in self.targets}
             signals |= {name: np.full((len(samples), 1), value) for name, value in target.items()}

@@ -15,10 +15,11 @@ from throwcollect.episode.message import Delivery, Episode
 from throwcollect.episode.message_table import MessageTable
 from throwcollect.episode.record import EpisodeHeader, Samples, find_infinite_columns
 from throwcollect.errors import ThrowcollectError
+from throwcollect.members import explain_failure
 from throwcollect.robots.description import full_description, robot_of, start_posture
 from throwcollect.robots.trajectory import JointTrajectory
 from throwcollect.sim.simulation import Simulation
-from throwcollect.tasks.task import task_of
+from throwcollect.tasks.task import task_of, trajectory_of
 from throwcollect.trial.conditions import Conditions, Settings
 from throwcollect.trial.goals import trial_goals
 
@@ -66,7 +67,7 @@ class TrialRunner:
         # A trial that cannot begin must leave nothing behind that the next episode could be judged by.
         self._begun = None
         config = with_values(self._simulation.config, values)
-        trajectory = task_of(config).trajectory()
+        trajectory = trajectory_of(config)
         self._simulation.lease(trial, config, trial_goals(robot_of(config), trajectory, start_posture(config)))
         self._begun = _Begun(config, trajectory, token)
 
@@ -84,6 +85,7 @@ class TrialRunner:
 
         Raises:
             ThrowcollectError: If it has numbers that are not finite, which no dataset may have.
+            MemberError: If its task is of another package and fails.
         """
         ended = self._simulation.episode()
         if ended is None:
@@ -109,7 +111,11 @@ class TrialRunner:
 
         Raises:
             ThrowcollectError: If its samples hold numbers that are not finite.
+            MemberError: If its task is of another package and fails.
         """
         if (infinite := next(find_infinite_columns(samples), None)) is not None:
             raise ThrowcollectError(f"trial {header.trial}: {infinite}")
-        return self._columns.to_json(task_of(begun.config).judge(samples, header, begun.trajectory))
+        task = begun.config.task
+        # A result of a wrong kind is a fault of the task as well; it is found where the result is written.
+        with explain_failure("tasks", task.name, f"judge trial {header.trial}"):
+            return self._columns.to_json(task_of(begun.config).judge(samples, header, begun.trajectory))

@@ -10,7 +10,7 @@ from typing import Any, ClassVar, Generic
 from throwcollect.config.motion import MinimumJerk
 from throwcollect.config.schema import Config
 from throwcollect.episode.record import EpisodeHeader, Samples
-from throwcollect.members import load_object
+from throwcollect.members import explain_failure, load_object
 from throwcollect.robots.description import robot_of
 from throwcollect.robots.trajectory import JointTrajectory
 from throwcollect.tasks.dmp import dmp_trajectory
@@ -127,3 +127,14 @@ def task_of(config: Config) -> Task[Any]:
     """Make the task that a configuration describes."""
     task: Task[Any] = load_object(config.task.implementation, Task)(config)
     return task
+
+
+def trajectory_of(config: Config) -> JointTrajectory:
+    """Plan the motion of the trial that a configuration describes; see `Task.trajectory`.
+
+    Raises:
+        ConfigError: If there is no usable motion for these parameters.
+        MemberError: If the task is of another package and fails.
+    """
+    with explain_failure("tasks", config.task.name, "plan its motion"):
+        return task_of(config).trajectory()

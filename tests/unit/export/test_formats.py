@@ -16,7 +16,7 @@ from typer.testing import CliRunner
 from throwcollect import members
 from throwcollect.cli.main import app
 from throwcollect.dataset.inspect import info
-from throwcollect.errors import ConfigError, DatasetError
+from throwcollect.errors import ConfigError, DatasetError, MemberError
 from throwcollect.export.export import export
 from throwcollect.export.signals import unit_of
 from throwcollect.extras import MissingExtraError
@@ -201,3 +201,21 @@ def test_a_format_of_another_package_is_exported_to_as_ours_are(source: Path, tm
     assert 'pd.read_csv("throws.csv")' in (tmp_path / "text" / "README.md").read_text()
     with pytest.raises(ConfigError, match="one of parquet, npz, lerobot, hdf5, mat, csv"):
         export(source, tmp_path / "other", to="zarr")
+
+
+@pytest.mark.usefixtures("with_csv")
+@pytest.mark.parametrize("function", ["write_csv", "tabulate_signals"])
+def test_a_format_of_another_package_that_fails_is_named(
+    function: str, source: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_: object, **__: object) -> None:
+        raise ValueError("no such column")
+
+    monkeypatch.setattr(f"csv_export.csv_files.{function}", fail)
+    output = tmp_path / "text"
+    done = CliRunner().invoke(app, ["dataset", "export", str(source), str(output), "--to", "csv"])
+    assert isinstance(done.exception, MemberError)
+    assert done.exception.message == (
+        f"the exporter csv of csv_export 1.0 cannot write {output}: ValueError: no such column"
+    )
+    assert not output.exists()

@@ -14,7 +14,7 @@ from throwcollect.episode.record import EpisodeHeader
 from throwcollect.report.outcomes import LANDED, Outcomes
 from throwcollect.report.throw.landings import Landings
 from throwcollect.robots.quintic_curve import sample_positions
-from throwcollect.tasks.task import task_of
+from throwcollect.tasks.task import trajectory_of
 from throwcollect.tasks.throw.config import throw_section
 from throwcollect.tasks.throw.flight import flight_residual, release_of
 from throwcollect.units import NS_PER_S
@@ -149,7 +149,7 @@ def read_motion(dataset: Dataset, trial: int) -> JointMotion:
     episode = dataset.episode(trial)
     samples = episode.samples(dataset.joints)
     config = dataset.plan.config_of(dataset.plan.trial(trial))
-    trajectory = task_of(config).trajectory()
+    trajectory = trajectory_of(config)
     times = (samples.stamps_ns - episode.header.start_ns) / NS_PER_S
     columns = [dataset.joints.index(joint) for joint in trajectory.joints]
     release_ns = _find_release(episode.header, config)

@@ -1,0 +1,97 @@
+"""Finds the motion of the configuration that `throwcollect init` writes, for any robot and any task."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import ValidationError
+
+from throwcollect.config.schema import Config
+from throwcollect.config.starter import Motion
+from throwcollect.config.task import TaskConfig
+from throwcollect.errors import ConfigError
+from throwcollect.members import load_member
+from throwcollect.robots.limits import joint_limits
+from throwcollect.robots.robot import Robot
+from throwcollect.tasks.task import trajectory_of
+
+_STROKE_RAD = 0.4
+"""How far each joint moves, where its limits let it."""
+_LEAST_RAD = 0.02
+"""A joint that may not move by so much is left at rest."""
+_SWEPT = 1.5
+"""A joint that moves by 1 rad may move by so much [rad], as the end of one joint is swept."""
+_MARGIN_RAD, _MARGIN_SHARE = 0.05, 0.05
+"""Distance from the limits of a position, as measured joints go a little further than commanded: an angle, and a share
+of the range at most."""
+_SPEED_SHARE = 0.95
+"""Share of the limit of a velocity, likewise."""
+
+
+def find_first_motion(robot: str, task: str) -> Motion:
+    """Find a motion: the default of the task or, if that is for another robot, a short one from the posture at rest.
+
+    The short one keeps the limits of positions and velocities; neither torques nor collisions are looked at.
+
+    Args:
+        robot: Name of the robot.
+        task: Name of the task.
+
+    Raises:
+        ConfigError: If the robot's files cannot be read, or none of its joints may move.
+    """
+    try:
+        found = _describe_motion(robot, task).task
+    except ValidationError:
+        found = _find_short_motion(robot, task)
+    return found.start, found.end, found.duration_s
+
+
+def _describe_motion(robot: str, task: str, **motion: Mapping[str, float]) -> Config:
+    """The configuration of a motion; what is not given is the default of the task."""
+    values = {"name": "throws", "robot": {"name": robot}, "task": {"name": task, **motion}}
+    return Config.model_validate(values, context=robot)
+
+
+def _find_short_motion(name: str, task: str) -> TaskConfig:
+    """Find a motion of all joints that may move, each as far as its limits let it.
+
+    Raises:
+        ConfigError: If none of them may, or the robot's files cannot be read.
+    """
+    robot: Robot = load_member("robots", name)
+    limits = joint_limits(robot)
+    margin = np.minimum(_MARGIN_RAD, _MARGIN_SHARE * (limits.upper - limits.lower))
+    lower, upper = limits.lower + margin, limits.upper - margin
+    start = np.clip(list(robot.rest_posture.values()), lower, upper)
+    above, below = upper - start, start - lower
+    is_upward = (above >= _SWEPT * _STROKE_RAD) | (above >= below)
+    room = np.minimum(
+        np.where(is_upward, above, below), _SPEED_SHARE * limits.velocity / _find_speeds(name, robot.joints, task)
+    )
+    stroke = np.minimum(_STROKE_RAD, room / _SWEPT)
+    end = np.round(start + np.where(is_upward, stroke, -stroke), 3)
+    moving = [joint for joint, far in zip(robot.joints, stroke, strict=True) if far >= _LEAST_RAD]
+    if not moving:
+        raise ConfigError(
+            f"{robot.urdf_path}: no joint of {robot.title} may move by {_LEAST_RAD:g} rad, by its limits of position "
+            "and velocity"
+        )
+    angles = dict(zip(robot.joints, end.tolist(), strict=True))
+    found = _describe_motion(
+        name,
+        task,
+        start=dict(zip(robot.joints, np.round(start, 6).tolist(), strict=True)),
+        end={joint: angles[joint] for joint in moving},
+    )
+    return found.task
+
+
+def _find_speeds(robot: str, joints: Sequence[str], task: str) -> NDArray[np.float64]:
+    """Highest speed of each joint for each radian that it moves, in the default time of the task [1/s]."""
+    start, end = dict.fromkeys(joints, 0.0), dict.fromkeys(joints, _STROKE_RAD)
+    trajectory = trajectory_of(_describe_motion(robot, task, start=start, end=end))
+    speeds: NDArray[np.float64] = np.abs(trajectory.velocities).max(axis=0) / _STROKE_RAD
+    return speeds

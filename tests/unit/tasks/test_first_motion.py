@@ -1,0 +1,68 @@
+"""The motion to begin with of a robot of another package keeps the limits of its joints."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from throwcollect.config.default_path import DEFAULT_CONFIG
+
+PLUGINS = Path(__file__).parents[2] / "plugins"
+LIMIT = 'lower="-2.5" upper="2.5" velocity="20"'
+
+
+def limit_joints(directory: Path, *limits: str) -> Path:
+    """Copy the package of the arm, with other limits for its shoulder and its elbow; returns its URDF."""
+    for name in ("planar_arm", "planar_arm-1.0.dist-info"):
+        shutil.copytree(PLUGINS / name, directory / "plugins" / name)
+    path = directory / "plugins" / "planar_arm" / "planar_arm.urdf"
+    text = path.read_text()
+    assert text.count(LIMIT) == len(limits)
+    for limit in limits:
+        text = text.replace(LIMIT, limit, 1)
+    path.write_text(text)
+    return path
+
+
+def call_in(directory: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+    """Run throwcollect where that package is installed."""
+    paths = os.pathsep.join([str(directory / "plugins"), os.environ.get("PYTHONPATH", "")])
+    return subprocess.run(
+        [sys.executable, "-m", "throwcollect", *arguments],
+        cwd=directory,
+        env={**os.environ, "PYTHONPATH": paths},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+@pytest.mark.parametrize(
+    ("shoulder", "elbow"),
+    [
+        # Its posture at rest is beyond the limit; it is slow.
+        ('lower="-1.0" upper="-0.05" velocity="20"', 'lower="-2.5" upper="2.5" velocity="0.3"'),
+        # It has less room than is swept elsewhere; it cannot move.
+        ('lower="-0.1" upper="0.3" velocity="20"', 'lower="0" upper="0" velocity="20"'),
+    ],
+)
+def test_no_trial_of_a_robot_with_narrow_limits_is_refused(shoulder: str, elbow: str, tmp_path: Path) -> None:
+    limit_joints(tmp_path, shoulder, elbow)
+    written = call_in(tmp_path, "init", "--robot", "planar_arm")
+    assert written.returncode == 0, written.stderr
+    planned = call_in(tmp_path, "plan")
+    assert "200 trials, 0 refused" in planned.stderr, (tmp_path / DEFAULT_CONFIG).read_text() + planned.stderr
+
+
+def test_a_robot_whose_joints_cannot_move_is_refused(tmp_path: Path) -> None:
+    path = limit_joints(tmp_path, 'lower="0.5" upper="0.5" velocity="20"', 'lower="-2.5" upper="2.5" velocity="0"')
+    done = call_in(tmp_path, "init", "--robot", "planar_arm")
+    said = (
+        f"throwcollect: {path}: no joint of the planar arm may move by 0.02 rad, by its limits of position and velocity"
+    )
+    assert (done.returncode, done.stderr.strip()) == (2, said)
