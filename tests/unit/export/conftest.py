@@ -19,6 +19,8 @@ from throwcollect.robots.quintic_curve import sample_quintic
 from throwcollect.robots.talos import TALOS
 from throwcollect.tasks.task import task_of
 
+FORMATS = ("parquet", "npz", "lerobot", "hdf5", "mat")
+"""Our own; the packages of `tests/plugins` have another one."""
 SETTINGS: dict[str, Any] = {
     "trials": 6,
     "record": {"trials_per_shard": 3},

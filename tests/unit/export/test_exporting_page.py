@@ -9,11 +9,11 @@ import shutil
 from pathlib import Path
 
 import pytest
+from tests.unit.export.conftest import FORMATS
 from typer.testing import CliRunner
 
 from throwcollect.cli.main import app
 from throwcollect.dataset.inspect import info
-from throwcollect.members import names_of
 
 PAGE = (Path(__file__).parents[3] / "docs" / "exporting.md").read_text(encoding="utf-8")
 COMMANDS = [
@@ -40,7 +40,7 @@ def place(source: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_the_page_has_a_command_for_every_format(place: Path) -> None:
-    assert [command[5] for command in COMMANDS] == list(names_of("exporters"))
+    assert [command[5] for command in COMMANDS] == list(FORMATS)
     assert sorted(path.name for path in (place / "exports").iterdir()) == sorted(
         ["tables", "arrays", "lerobot", "robomimic", "matlab"]
     )

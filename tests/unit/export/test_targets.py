@@ -11,9 +11,9 @@ import pyarrow.parquet as pq
 import pytest
 from scipy.io import loadmat
 from tests.unit.dataset.targeted import LIST, collect_targeted
+from tests.unit.export.conftest import FORMATS
 
 from throwcollect.export.export import export
-from throwcollect.members import names_of
 
 WANTED = [[1.4, -0.1], [1.5, 0.2], [1.6, 0.1]]
 TEXTS = [
@@ -35,7 +35,7 @@ def partly(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return collect_targeted(tmp_path_factory.mktemp("some") / "data")
 
 
-@pytest.mark.parametrize("to", names_of("exporters"))
+@pytest.mark.parametrize("to", FORMATS)
 def test_every_format_says_whether_all_throws_have_targets(
     targeted: Path, partly: Path, tmp_path: Path, to: str
 ) -> None:
