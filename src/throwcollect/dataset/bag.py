@@ -19,7 +19,7 @@ from ruamel.yaml.events import AliasEvent
 
 from rclzenoh.interfaces import type_hash
 from throwcollect.config.yaml_nodes import line, reason
-from throwcollect.dataset.directory import CONFIG, MANIFEST, METADATA, PLAN, SHARD_SUFFIX, THROWS
+from throwcollect.dataset.directory import METADATA, PLAN, has_files
 from throwcollect.episode.channels import Channel
 from throwcollect.errors import DatasetError
 from throwcollect.files import read_text
@@ -164,8 +164,7 @@ def refuse_other_directory(directory: Path) -> None:
     Raises:
         DatasetError: If there is no such directory, or it has no such file.
     """
-    own = (CONFIG, MANIFEST, METADATA, PLAN, THROWS)
-    if not any(path.name in own or SHARD_SUFFIX in path.suffixes for path in directory.glob("*")):
+    if not has_files(directory):
         raise DatasetError("holds no dataset", path=directory, hint=_name_nearby(directory))
 
 

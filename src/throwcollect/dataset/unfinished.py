@@ -6,8 +6,8 @@ import warnings
 from collections.abc import Iterator
 from pathlib import Path
 
-from throwcollect.config.loader import load as load_config
-from throwcollect.dataset.directory import METADATA, PLAN, config_path
+from throwcollect.dataset.configuration import read_config
+from throwcollect.dataset.directory import METADATA, PLAN
 from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.recovery import find_episodes
 from throwcollect.dataset.shard import list_shards, path_of_part
@@ -38,7 +38,7 @@ def load(directory: StrPath) -> Dataset:
     path = Path(directory)
     if is_there(path / METADATA) or not is_there(path / PLAN):
         return Dataset.open(path)
-    plan = Plan.read(path / PLAN, load_config(config_path(path)))
+    plan = Plan.read(path / PLAN, read_config(path))
     rows = sorted(_list_rows(path, plan), key=lambda row: int(row["trial"]))
     warnings.warn(
         f"{path} is not finished: it has {len(rows)} of {format_count(len(plan.trials), 'trial')} so far; "
