@@ -20,10 +20,10 @@ from ruamel.yaml.events import AliasEvent
 from rclzenoh.interfaces import type_hash
 from throwcollect.config.yaml_nodes import line, reason
 from throwcollect.dataset.directory import METADATA, PLAN, has_files
+from throwcollect.dataset.way_on import find_way_on
 from throwcollect.episode.channels import Channel
 from throwcollect.errors import DatasetError
 from throwcollect.files import read_text
-from throwcollect.wording import command
 
 VERSION = 9
 _MOST_BYTES = 10_000_000
@@ -149,8 +149,8 @@ def read_bag_metadata(directory: Path) -> Mapping[str, Any]:
     path = directory / METADATA
     if not path.exists():
         if (directory / PLAN).is_file():
-            hint = command("resume", directory)
-            raise DatasetError(f"the dataset is not finished: it has no {METADATA}", path=directory, hint=hint)
+            on = find_way_on(directory)
+            raise DatasetError(f"the dataset {on.state}: it has no {METADATA}", path=directory, hint=on.command)
         raise DatasetError("holds no dataset", path=directory, hint=_name_nearby(directory))
     bag = from_yaml(path).get("rosbag2_bagfile_information")
     if not isinstance(bag, dict):
