@@ -110,6 +110,36 @@ def test_a_complete_collection_is_not_resumed(
     assert client.post("/api/v1/collections/old/resume").status_code == 202
 
 
+def test_what_can_be_resumed_is_told(
+    client: TestClient, begun: list[dict[str, Any]], collected: Path, remember: Remember, tmp_path: Path
+) -> None:
+    def told() -> dict[str, bool]:
+        listed = {each["id"]: each["can_be_resumed"] for each in client.get("/api/v1/state").json()["instances"]}
+        assert {name: client.get(f"{URL}/{name}").json()["can_be_resumed"] for name in listed} == listed
+        return listed
+
+    directory, left = tmp_path / "datasets" / "whole", tmp_path / "datasets" / "left"
+    shutil.copytree(collected, directory)
+    shutil.copytree(collected, left)
+    (left / "metadata.yaml").unlink()
+    remember("died", lives=False, directory=str(directory))
+    remember("stopped", **ended(directory=str(directory), exit_code=130))
+    remember("left", **ended(directory=str(left), exit_code=130))
+    remember("finished", **ended(directory=str(directory)))
+    remember("unplanned", **ended(exit_code=2))
+    remember("session", **ended(kind="session", exit_code=130))
+    remember("alive")
+    resumable = told()
+    assert {name for name, can in resumable.items() if can} == {"left"}
+    # A later run finishes the one dataset; the other loses a file.
+    shutil.copy(collected / "metadata.yaml", left)
+    next(directory.glob("*.mcap")).unlink()
+    resumable = told()
+    assert {name for name, can in resumable.items() if can} == {"died", "stopped"}
+    for name in sorted(resumable.keys() - {"alive", "finished"}):
+        assert client.post(f"/api/v1/collections/{name}/resume").status_code == (202 if resumable[name] else 409), name
+
+
 def test_a_container_may_join_a_run(
     served: Served, remember: Remember, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
