@@ -13,7 +13,7 @@ from urllib.parse import urlsplit
 import pytest
 
 from tests.e2e.chromium import browse, chromium
-from tests.e2e.collection import FAST, write_config
+from tests.e2e.collection import FAST, collect_here, write_config
 from tests.e2e.page import CHANGED, load, press, served, unexpected
 from tests.unit.serve.made_model import make_model
 from throwcollect.runs.record import Record
@@ -114,6 +114,31 @@ def test_the_address_names_the_run_that_is_seen_also_in_a_tab_that_has_the_page(
         tab.ask("Page.navigate", url=make_page_address(server, over[1]))
         tab.wait_for(f"{watched} === {json.dumps(over[1])}")
         assert tab.evaluate("location.hash") == ""
+        assert unexpected(tab) == []
+
+
+@pytest.fixture
+def died(tmp_path: Path) -> Iterator[tuple[str, str]]:
+    """Two runs whose launchers died: with a complete dataset, and with one that is not finished."""
+    runs, now = [Records().new(name) for name in ("whole", "left")], datetime.now(timezone.utc)
+    for run, name in zip(runs, ("whole", "left"), strict=True):
+        directory = tmp_path / name
+        collect_here(write_config(tmp_path, trials=2, sim=FAST), directory)
+        run.write(Record(run.run, "small", "local", str(directory), None, str(directory / "logs"), 0, now, 1, 1))
+        run.close()
+    (tmp_path / "left" / "metadata.yaml").unlink()
+    yield runs[0].run, runs[1].run
+    for run in runs:
+        run.forget()
+
+
+@pytest.mark.skipif(chromium() is None, reason="needs Chromium: apt-get install chromium")
+def test_only_what_is_not_complete_can_be_resumed_by_the_page(died: tuple[str, str], address: str) -> None:
+    with browse(address, width=800, height=600) as tab:
+        load(tab)
+        button = "document.querySelector('[aria-label=\"Resume {}\"]')"
+        tab.wait_for(" && ".join(f"{button.format(each)} !== null" for each in died))
+        assert [tab.evaluate(f"{button.format(each)}.hidden") for each in died] == [True, False]
         assert unexpected(tab) == []
 
 

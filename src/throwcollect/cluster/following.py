@@ -12,10 +12,10 @@ from pathlib import Path
 from throwcollect.cluster import slurm
 from throwcollect.cluster.slurm import Task
 from throwcollect.cluster.submission import CLUSTER, Submission, is_submitted, read_submission
-from throwcollect.config.loader import load
 from throwcollect.config.schema import Config
 from throwcollect.coordinator.progress import Progress
-from throwcollect.dataset.directory import JOURNAL, METADATA, PLAN, THROWS, config_path
+from throwcollect.dataset.configuration import read_config
+from throwcollect.dataset.directory import JOURNAL, METADATA, PLAN, THROWS
 from throwcollect.dataset.journal import read_journal
 from throwcollect.dataset.slice_directory import find_finished, slice_directory
 from throwcollect.errors import ConfigError, Interrupted, ThrowcollectError, WorkerError
@@ -52,7 +52,7 @@ class ClusterRun:
     @cached_property
     def config(self) -> Config:
         """Configuration of the dataset."""
-        return load(config_path(self.directory))
+        return read_config(self.directory)
 
     @cached_property
     def trials(self) -> int:

@@ -13,6 +13,7 @@ from throwcollect.config.problems import quote
 from throwcollect.config.schema import Config
 from throwcollect.config.values import differences
 from throwcollect.coordinator.prepare import Say, draw_plan, make_self_contained, prepare, read_listed_points
+from throwcollect.dataset.configuration import read_config
 from throwcollect.dataset.directory import CONFIG, METADATA, PLAN, SHARD_SUFFIX, SOURCES, TRIALS, config_path
 from throwcollect.dataset.lock import hold_lock
 from throwcollect.dataset.manifest import is_as_written
@@ -166,7 +167,7 @@ def finished(directory: Path, plan: Plan) -> bool:
 def is_complete(directory: Path) -> bool:
     """Whether a directory holds a dataset in which nothing is left to collect, and no file of it is missing."""
     try:
-        plan = Plan.read(directory / PLAN, load(config_path(directory)))
+        plan = Plan.read(directory / PLAN, read_config(directory))
         return finished(directory, plan) and not find_damage(directory, plan, in_full=False)
     except (ConfigError, DatasetError):
         return False
@@ -181,7 +182,7 @@ def _read_stored_config(directory: Path) -> Config | None:
         # what is gone.
         # A finished dataset of an earlier version has fewer keys, and counts as complete if its manifest says so.
         complete = path.read_text(encoding="utf-8") == dump_yaml(config) or is_as_written(directory, CONFIG)
-    except (ConfigError, OSError):
+    except (ConfigError, DatasetError, OSError):
         return None
     return config if complete else None
 

@@ -19,11 +19,11 @@ from ruamel.yaml.events import AliasEvent
 
 from rclzenoh.interfaces import type_hash
 from throwcollect.config.yaml_nodes import line, reason
-from throwcollect.dataset.directory import CONFIG, MANIFEST, METADATA, PLAN, SHARD_SUFFIX, THROWS
+from throwcollect.dataset.directory import METADATA, PLAN, has_files
+from throwcollect.dataset.way_on import find_way_on
 from throwcollect.episode.channels import Channel
 from throwcollect.errors import DatasetError
 from throwcollect.files import read_text
-from throwcollect.wording import command
 
 VERSION = 9
 _MOST_BYTES = 10_000_000
@@ -150,8 +150,8 @@ def read_bag_metadata(directory: Path) -> Mapping[str, Any]:
     path = directory / METADATA
     if not path.exists():
         if (directory / PLAN).is_file():
-            hint = command("resume", directory)
-            raise DatasetError(f"the dataset is not finished: it has no {METADATA}", path=directory, hint=hint)
+            on = find_way_on(directory)
+            raise DatasetError(f"the dataset {on.state}: it has no {METADATA}", path=directory, hint=on.command)
         raise DatasetError("holds no dataset", path=directory, hint=_name_nearby(directory))
     bag = from_yaml(path).get("rosbag2_bagfile_information")
     if not isinstance(bag, dict):
@@ -165,8 +165,7 @@ def refuse_other_directory(directory: Path) -> None:
     Raises:
         DatasetError: If there is no such directory, or it has no such file.
     """
-    own = (CONFIG, MANIFEST, METADATA, PLAN, THROWS)
-    if not any(path.name in own or SHARD_SUFFIX in path.suffixes for path in directory.glob("*")):
+    if not has_files(directory):
         raise DatasetError("holds no dataset", path=directory, hint=_name_nearby(directory))
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.files import check_regular
 
 DIRECTORY_VARIABLE = "THROWCOLLECT_DIRECTORY"
@@ -38,6 +37,12 @@ def shard_name(collection: str, number: int) -> str:
     return f"{collection}_{number:05d}{SHARD_SUFFIX}"
 
 
+def has_files(directory: Path) -> bool:
+    """Whether any file of a dataset is in a directory."""
+    own = (CONFIG, MANIFEST, METADATA, PLAN, THROWS)
+    return any(path.name in own or SHARD_SUFFIX in path.suffixes for path in directory.glob("*"))
+
+
 def is_attempt(directory: Path) -> bool:
     """Whether a directory is that of an attempt at a slice, which no other process knows (see `slice_directory`)."""
     return ATTEMPT in directory.name
@@ -56,11 +61,8 @@ def config_path(directory: Path) -> Path:
     """Path of the configuration in a dataset's directory.
 
     Raises:
-        ConfigError: If something else than a file of the directory has its name.
+        DatasetError: If something else than a file of the directory has its name.
     """
     path = directory / CONFIG
-    try:
-        check_regular(path)
-    except DatasetError as error:
-        raise ConfigError(error.message, hint=error.hint) from error
+    check_regular(path)
     return path

@@ -15,9 +15,9 @@ from pathlib import Path
 from mcap.exceptions import McapError
 from mcap.reader import make_reader
 
-from throwcollect.config.loader import load
 from throwcollect.dataset.bag import FileSummary
-from throwcollect.dataset.directory import METADATA, PLAN, config_path, shard_name
+from throwcollect.dataset.configuration import read_config
+from throwcollect.dataset.directory import METADATA, PLAN, shard_name
 from throwcollect.dataset.lock import hold_lock
 from throwcollect.dataset.manifest import FileEntry, entry_of, read_manifest
 from throwcollect.dataset.slice_directory import SLICES, find_finished, slice_directory
@@ -65,7 +65,7 @@ def _count_slices(directory: Path, finished: Collection[Slice]) -> int:
 
 
 def _join(directory: Path) -> None:
-    plan = Plan.read(directory / PLAN, load(config_path(directory)))
+    plan = Plan.read(directory / PLAN, read_config(directory))
     finished = find_finished(directory)
     slices = Slice.all_of(_count_slices(directory, finished))
     if missing := [each for each in slices if each not in finished]:

@@ -32,6 +32,8 @@ from throwcollect.files import unreadable
 
 PATIENCE_S = 5.0
 """How long to wait for a lock [s], as a process that was killed a moment ago may still hold it."""
+_GLANCE_S = 0.1
+"""How long a process of a run waits for a lock [s], as `is_locked` of another process may hold it for a moment."""
 _RETRY_S = 0.05
 _NO_LOCKS = frozenset({errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP})
 
@@ -67,8 +69,9 @@ def lock(descriptor: int, directory: Path, *, alone: bool = True, needed: bool =
     Raises:
         DatasetError: If another process holds it, or it cannot be locked.
     """
-    # A process of a run that waited for a preparation would go on with another plan than it was started for.
-    deadline = time.monotonic() + (PATIENCE_S if alone else 0.0)
+    # A process of a run waits only for those that look: if it waited for a preparation, it would go on with another
+    # plan than it was started for.
+    deadline = time.monotonic() + (PATIENCE_S if alone else _GLANCE_S)
     while True:
         try:
             fcntl.flock(descriptor, (fcntl.LOCK_EX if alone else fcntl.LOCK_SH) | fcntl.LOCK_NB)
@@ -90,3 +93,24 @@ def lock(descriptor: int, directory: Path, *, alone: bool = True, needed: bool =
             ) from error
         else:
             return
+
+
+def is_locked(directory: Path) -> bool:
+    """Whether a process collects into a dataset or changes it; no, if nothing tells, as on a file system without locks.
+
+    This function takes the lock for a moment to find out.
+    """
+    try:
+        descriptor = os.open(directory, os.O_RDONLY | os.O_DIRECTORY)
+    except OSError:
+        return False
+    try:
+        # The processes of a run hold the lock together, so only who asks for it alone meets them.
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return True
+    except OSError:
+        return False
+    finally:
+        os.close(descriptor)
+    return False

@@ -13,13 +13,13 @@ import pyarrow as pa
 import pyarrow.compute as pc
 from numpy.typing import NDArray
 
-from throwcollect.config.loader import load as load_config
 from throwcollect.config.schema import Config
 from throwcollect.config.sweep import Range
 from throwcollect.dataset.bag import read_bag_metadata
 from throwcollect.dataset.columns import COLUMNS, StoredThrow
+from throwcollect.dataset.configuration import read_config
 from throwcollect.dataset.data_card import count_outcomes
-from throwcollect.dataset.directory import METADATA, PLAN, THROWS, config_path
+from throwcollect.dataset.directory import METADATA, PLAN, THROWS
 from throwcollect.dataset.expression import Expression
 from throwcollect.dataset.guesses import DATASET, refuse_attribute
 from throwcollect.dataset.mcap_reader import open_mcap
@@ -76,7 +76,7 @@ class Dataset(Sequence[Throw]):
         """
         path = Path(directory)
         bag = read_bag_metadata(path)
-        plan = Plan.read(path / PLAN, load_config(config_path(path)))
+        plan = Plan.read(path / PLAN, read_config(path))
         if not is_there(path / THROWS):
             raise DatasetError("is missing", path=path / THROWS, hint=command("dataset", "rebuild", path))
         try:

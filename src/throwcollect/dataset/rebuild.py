@@ -10,12 +10,12 @@ from typing import Any
 
 import pyarrow as pa
 
-from throwcollect.config.loader import load
 from throwcollect.config.schema import Config
 from throwcollect.dataset.bag import FileSummary, refuse_other_directory
+from throwcollect.dataset.configuration import read_config
 from throwcollect.dataset.data_card import data_card, outcome_lines
 from throwcollect.dataset.description import WRITTEN, write_description
-from throwcollect.dataset.directory import CARD, CONFIG, MANIFEST, PLAN, THROWS, config_path
+from throwcollect.dataset.directory import CARD, CONFIG, MANIFEST, PLAN, THROWS
 from throwcollect.dataset.findings import Finding
 from throwcollect.dataset.journal import was_open
 from throwcollect.dataset.lock import hold_lock
@@ -93,8 +93,9 @@ def _read_config(directory: Path) -> Config:
 
     Raises:
         ConfigError: If it is wrong.
-        DatasetError: If its file is not as the manifest says.
+        DatasetError: If its file is not there, or not as the manifest says.
     """
+    config = read_config(directory)
     # A line that equals its default can be lost without a change of the plan's digest. A new manifest would then hide
     # that the file is not the one that the same collection gives.
     if was_changed(directory, CONFIG):
@@ -103,7 +104,7 @@ def _read_config(directory: Path) -> Config:
             path=directory / CONFIG,
             hint=f"{command('resume', directory)} puts back lines that equal their defaults",
         )
-    return load(config_path(directory))
+    return config
 
 
 def _read_plan(directory: Path, config: Config, repair: str) -> Plan:

@@ -123,7 +123,7 @@ def repair(directory: Path, output: Path, *, remake: Remake) -> Repaired:
 def _configuration(directory: Path) -> Config:
     try:
         return load(config_path(directory))
-    except ConfigError as error:
+    except (ConfigError, DatasetError) as error:
         raise DatasetError(
             f"{CONFIG} cannot be read, and nothing else holds the configuration",
             path=directory,

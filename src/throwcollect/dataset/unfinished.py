@@ -6,15 +6,16 @@ import warnings
 from collections.abc import Iterator
 from pathlib import Path
 
-from throwcollect.config.loader import load as load_config
-from throwcollect.dataset.directory import METADATA, PLAN, config_path
+from throwcollect.dataset.configuration import read_config
+from throwcollect.dataset.directory import METADATA, PLAN
 from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.recovery import find_episodes
 from throwcollect.dataset.shard import list_shards, path_of_part
 from throwcollect.dataset.throws_table import Row, ThrowsTable
+from throwcollect.dataset.way_on import find_way_on
 from throwcollect.files import StrPath, is_there
 from throwcollect.sweep.plan import Plan
-from throwcollect.wording import command, format_count
+from throwcollect.wording import format_count
 
 
 class UnfinishedDatasetWarning(UserWarning):
@@ -39,11 +40,12 @@ def load(directory: StrPath) -> Dataset:
     # Of a directory that is no dataset at all, `open` says what is wrong.
     if is_there(path / METADATA) or not is_there(path / PLAN):
         return Dataset.open(path)
-    plan = Plan.read(path / PLAN, load_config(config_path(path)))
+    plan = Plan.read(path / PLAN, read_config(path))
     rows = sorted(_list_rows(path, plan), key=lambda row: int(row["trial"]))
+    on = find_way_on(path)
     warnings.warn(
-        f"{path} is not finished: it has {len(rows)} of {format_count(len(plan.trials), 'trial')} so far; "
-        f"`{command('resume', path)}` goes on with it",
+        f"{path} {on.state}: it has {len(rows)} of {format_count(len(plan.trials), 'trial')} so far; "
+        f"`{on.command}` {on.purpose}",
         UnfinishedDatasetWarning,
         stacklevel=2,
     )

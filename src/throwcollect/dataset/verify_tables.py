@@ -53,6 +53,8 @@ def check_tables(directory: Path) -> Tables:
             Finding(CONFIG, f"line {each.line}" if each.line else "", ": ".join(filter(None, [each.key, each.message])))
             for each in error.problems
         ]
+    except DatasetError as error:
+        tables.findings.append(Finding.of(CONFIG, error))
     if tables.config is not None:
         try:
             tables.plan = Plan.read(directory / PLAN, tables.config)

@@ -15,9 +15,10 @@ from pathlib import Path
 
 import pyarrow as pa
 
-from throwcollect.config.loader import dump_yaml, load
+from throwcollect.config.loader import dump_yaml
 from throwcollect.config.schema import Config
 from throwcollect.dataset.bag import FileSummary
+from throwcollect.dataset.configuration import read_config
 from throwcollect.dataset.creation import create
 from throwcollect.dataset.data_card import count_outcomes, data_card
 from throwcollect.dataset.description import write_description
@@ -28,7 +29,6 @@ from throwcollect.dataset.directory import (
     METADATA,
     PLAN,
     THROWS,
-    config_path,
     shard_name,
 )
 from throwcollect.dataset.journal import Event, Journal, was_open
@@ -126,7 +126,7 @@ class DatasetWriter:
             # Plan and configuration are read after this, when nobody else can change them any more.
             held.enter_context(hold_lock(directory, alone=False))
             journal = held.enter_context(closing(Journal(directory)))
-            plan = Plan.read(directory / PLAN, load(config_path(directory)))
+            plan = Plan.read(directory / PLAN, read_config(directory))
             plan.take_in_rounds(directory / PLAN)
             writer = cls(directory, plan, journal=journal, growing=plan.config.grows)
             writer._held = held.pop_all()

@@ -10,8 +10,9 @@ from datetime import datetime, timezone
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from throwcollect.config.loader import load, load_locating_errors
+from throwcollect.config.loader import load_locating_errors
 from throwcollect.config.schema import Config
+from throwcollect.dataset.configuration import read_config, refuse_damaged_config, refuse_lost_config
 from throwcollect.dataset.directory import CONFIG, PLAN, TRIALS, config_path
 from throwcollect.dataset.lock import hold_lock
 from throwcollect.errors import ConfigError, Problem
@@ -128,7 +129,7 @@ def resume(
     Raises:
         ConfigError: If there is no such dataset, or the configuration is another one.
         WorkerError: If the runtime that is asked for cannot be used.
-        DatasetError: If the dataset cannot be written.
+        DatasetError: If its configuration is lost or damaged, or it cannot be written.
     """
     from throwcollect.coordinator.resume import begun, finished
     from throwcollect.coordinator.resume import resume as resume_plan
@@ -136,6 +137,7 @@ def resume(
     started = datetime.now(timezone.utc)
     directory = Path(directory)
     if not begun(directory):
+        refuse_lost_config(directory)
         raise ConfigError(f"{directory}: holds no dataset", expected="a directory that throwcollect up has made")
     with ExitStack() as places:
         try:
@@ -146,6 +148,7 @@ def resume(
             # A problem without a place in a file is one of the overrides, which another file would not help.
             if config or all(problem.path is None for problem in error.problems):
                 raise
+            refuse_damaged_config(directory, error)
             hint = f"{command('up', 'CONFIG', '--resume', directory)}, if the dataset's own file is damaged"
             raise ConfigError(error.problems, hint=hint) from error
         records = Records()
@@ -176,7 +179,7 @@ def _take_over(
         return None
     from throwcollect.coordinator.prepare import make_self_contained
 
-    kept = load(config_path(left.place.directory))
+    kept = read_config(left.place.directory)
     # In a dataset, `sweep.file` names the copy of the list of trials that lies there.
     if kept.without_run() != make_self_contained(config).without_run():
         raise ConfigError(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from pathlib import Path
 
 from throwcollect.dataset.directory import config_path
@@ -23,8 +24,8 @@ def to_change(records: Records, named: str | None, *, command: str, died: bool =
 
     Args:
         records: All runs.
-        named: Id of the run, a unique beginning of its id, or directory of its dataset. None takes the only run that
-            lives and belongs to the current directory, because it was begun there or its dataset lies below.
+        named: Id of the run, the beginning of its id, or directory of its dataset (see `id_of`). None takes the only
+            run that lives and belongs to the current directory, because it was begun there or its dataset lies below.
         command: The command without its option ``--run``, for a hint.
         died: Whether None may also take a run whose launcher died.
 
@@ -46,7 +47,7 @@ def to_change(records: Records, named: str | None, *, command: str, died: bool =
 
 
 def find(named: str | os.PathLike[str]) -> Run:
-    """Find a run of this machine by its id, a unique beginning of its id, or the directory of its dataset.
+    """Find a run of this machine by its id, the beginning of its id, or the directory of its dataset; see `id_of`.
 
     Raises:
         ConfigError: If there is no such run, or more than one.
@@ -103,7 +104,10 @@ def _origin(run: Run) -> str:
 
 
 def id_of(records: Records, named: str) -> str:
-    """Find the id of the run that a user names by its id, a unique beginning of that, or the directory of the dataset.
+    """Find the id of the run that a user names by its id, the beginning of that, or the directory of the dataset.
+
+    Of several runs with the same beginning, the only one that lives is meant. Which one of several that live, or of
+    several that are over, would be a guess.
 
     Raises:
         ConfigError: If there is no such run, or more than one.
@@ -118,10 +122,30 @@ def id_of(records: Records, named: str) -> str:
     if len(matches) == 1:
         return matches[0]
     if matches:
-        raise ConfigError(f"{len(matches)} runs begin with {named!r}", expected=f"one of {_list(matches)}")
+        return _find_only_living(records, matches, named)
     known = _list(_latest_first(records.all()))
     hint = "throwcollect ps -a lists all" if known else None
     raise NotFoundError(f"no run {named!r}", expected=f"one of {known}" if known else None, hint=hint)
+
+
+def _find_only_living(records: Records, ids: Sequence[str], named: str) -> str:
+    """Find the only one of several runs that lives; all of their ids begin with `named`.
+
+    Raises:
+        ConfigError: If none lives, or more than one.
+    """
+    runs = []
+    for run in ids:
+        with suppress(ConfigError):
+            runs.append(records.get(run))
+    living = [run for run in runs if run.status == "running"]
+    if len(living) == 1:
+        return living[0].id
+    runs.sort(key=lambda run: (run.status == "running", run.record.started), reverse=True)
+    lines = [f"{run.id} ({run.status}): {run.place.dataset}" for run in runs[:_MOST_LISTED]]
+    if more := len(ids) - len(lines):
+        lines.append(f"{more} more, which throwcollect ps -a lists")
+    raise ConfigError(f"{len(ids)} runs begin with {named!r}", expected="\n".join(["one of", *lines]))
 
 
 def _latest_first(runs: Sequence[Run]) -> list[str]:

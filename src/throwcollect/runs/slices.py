@@ -8,9 +8,10 @@ from collections.abc import Callable, Sequence
 from datetime import datetime, timezone
 from pathlib import Path
 
-from throwcollect.config.loader import load, load_locating_errors
+from throwcollect.config.loader import load_locating_errors
 from throwcollect.config.schema import Config
 from throwcollect.coordinator.resume import refuse_changes
+from throwcollect.dataset.configuration import read_config
 from throwcollect.dataset.creation import create
 from throwcollect.dataset.directory import METADATA, PLAN, config_path
 from throwcollect.dataset.slice_directory import (
@@ -106,6 +107,7 @@ def read_frozen_config(directory: Path, overrides: Sequence[str] = ()) -> Config
 
     Raises:
         ConfigError: If there is no such dataset, its plan grows, or the overrides change what is collected.
+        DatasetError: If its configuration is lost or damaged.
     """
     read_changed_config(directory, overrides)
     with load_locating_errors(config_path(directory), overrides) as config:
@@ -119,13 +121,15 @@ def read_changed_config(directory: Path, overrides: Sequence[str] = ()) -> Confi
 
     Raises:
         ConfigError: If there is no such dataset, or the overrides change what is collected.
+        DatasetError: If its configuration is lost or damaged.
     """
     if not (directory / PLAN).is_file():
         raise ConfigError(
             f"{directory}: holds no plan", hint=command("plan", "CONFIG", "--output", directory) + " makes one"
         )
+    kept = read_config(directory)
     with load_locating_errors(config_path(directory), overrides) as config:
-        refuse_changes(directory, load(config_path(directory)), config)
+        refuse_changes(directory, kept, config)
         return config
 
 

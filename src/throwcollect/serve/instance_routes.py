@@ -38,7 +38,11 @@ class Wish(BaseModel):
     @classmethod
     def _is_text(cls, value: JsonValue) -> JsonValue:
         # JSON can escape half a character (a lone surrogate), which no file can hold.
-        json.dumps(value, ensure_ascii=False).encode()
+        try:
+            json.dumps(value, ensure_ascii=False).encode()
+        except UnicodeEncodeError as error:
+            half = error.object[error.start]
+            raise ValueError(f"should be text that UTF-8 can hold, got half a character ({half!a})") from error
         return value
 
     @property

@@ -15,7 +15,6 @@ from pydantic import JsonValue
 
 from throwcollect.config.containers import ContainerSpec
 from throwcollect.config.loader import load
-from throwcollect.coordinator.resume import is_complete
 from throwcollect.dataset.creation import refuse_taken
 from throwcollect.dataset.directory import config_path
 from throwcollect.errors import ConfigError, ConflictError, NotFoundError, Problem, WorkerError
@@ -29,9 +28,9 @@ from throwcollect.runs.selection import require_living
 from throwcollect.runs.state_directory import state_directory
 from throwcollect.serve.catalogue import NAME, Catalogue, Component
 from throwcollect.serve.live import name_node
+from throwcollect.serve.resumption import check_resumption
 from throwcollect.serve.robot_files import description_of
 from throwcollect.serve.state import simulations_of
-from throwcollect.wording import command
 
 _KEPT = ("run", "containers", "cluster", "sweep.file")
 """Keys of a configuration that only the operator sets, because they name files and resources of this machine."""
@@ -121,23 +120,16 @@ class Instances:
             ConflictError: If it lives, has no dataset to go on with or a complete one, or as many instances live as
                 may.
             ConfigError: If the configuration cannot be used.
+            DatasetError: If the configuration is no file.
             WorkerError: If it cannot be begun.
         """
         run = self.get(instance)
         origin = run.record.origin
-        config = config_path(run.place.directory)
         with _one_at_a_time():
-            if run.now().status == "running":
-                raise ConflictError(f"run {run.id} is still running")
-            if run.record.kind != "collection" or run.record.volume is not None or not config.is_file():
-                raise ConflictError(f"run {run.id} has no dataset in a directory to go on with")
-            if is_complete(run.place.directory):
-                raise ConflictError(
-                    f"the dataset of run {run.id} is complete",
-                    hint=f"{command('resume', run.place.directory, '--trials', 'K')} adds trials",
-                )
+            check_resumption(run.now())
             if origin is not None and origin.component in self.catalogue.components:
                 _check_room(self.catalogue.get(origin.component))
+            config = config_path(run.place.directory)
             return begin_run(config, overrides=(), output=run.place.directory, origin=origin, resumed=True)
 
     def stop(self, instance: str, *, force: bool = False) -> None:

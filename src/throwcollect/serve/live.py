@@ -16,7 +16,7 @@ from pathlib import Path
 from throwcollect.config.loader import load
 from throwcollect.config.schema import Config
 from throwcollect.dataset.directory import config_path
-from throwcollect.errors import ConfigError, NotFoundError, ThrowcollectError, WorkerError
+from throwcollect.errors import ConfigError, DatasetError, NotFoundError, ThrowcollectError, WorkerError
 from throwcollect.runs.control import set_parameter
 from throwcollect.runs.records import Records, Run
 from throwcollect.serve.state import simulations_of
@@ -54,8 +54,8 @@ class Hold:
                 run = self.run.now()
                 if _runs(run, self.simulation):
                     _set_speed(run, self.simulation, None)
-            except ConfigError:
-                # The run was forgotten, so nothing of it can be slow.
+            except (ConfigError, DatasetError):
+                # The run was forgotten, or its configuration is gone, so nothing of it can be slow.
                 pass
             except WorkerError:
                 # The simulation may be busy: the file stays, so that `let_go_of_left` tries again.

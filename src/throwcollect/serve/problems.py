@@ -8,13 +8,18 @@ from typing import Any
 from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse
+from fastapi.routing import APIRoute
+from pydantic import BaseModel, ValidationError
 from starlette.exceptions import HTTPException
 from starlette.routing import Match
 
+from throwcollect.config.problems import findings
+from throwcollect.config.shape import Shape
 from throwcollect.errors import (
     ConfigError,
     ConflictError,
     NotFoundError,
+    Problem,
     ThrowcollectError,
     WorkerError,
 )
@@ -106,9 +111,52 @@ def add_handlers(app: FastAPI) -> None:
         return problem(error.status_code, str(error.detail), headers=headers)
 
     @app.exception_handler(RequestValidationError)
-    async def invalid(_: Request, error: RequestValidationError) -> ProblemResponse:
+    async def invalid(request: Request, error: RequestValidationError) -> ProblemResponse:
+        if problems_of_body := _find_problems_of_body(request, error):
+            return answer(ConfigError(problems_of_body))
         problems = [{"key": ".".join(map(str, each["loc"])), "message": each["msg"]} for each in error.errors()]
         return problem(422, "the request is not as it should be", problems=problems)
+
+
+def _find_problems_of_body(request: Request, error: RequestValidationError) -> list[Problem]:
+    """Put into words what is wrong with the body of a request; nothing if it is not the body that is wrong."""
+    wrong = next((each for each in error.errors() if each["loc"][0] == "body"), None)
+    model = _find_model_of_body(request)
+    if wrong is None or model is None:
+        return []
+    if wrong["type"] == "json_invalid":
+        return [Problem(f"the body is not valid JSON: {wrong['ctx']['error']}")]
+    if isinstance(error.body, bytes):
+        return [Problem("the body should be JSON, and the header Content-Type should be application/json")]
+    try:
+        model.model_validate(error.body)
+    except ValidationError as found:
+        schema = model.model_json_schema()
+        shape = Shape(_resolve(schema, schema.get("$defs", {})))
+        return [
+            Problem(each.sentence if each.key else f"the body {each.sentence}", key=each.key)
+            for each in findings(found, error.body, shape=shape)
+        ]
+    return []
+
+
+def _resolve(node: Any, definitions: dict[str, Any]) -> Any:
+    """Put definitions in the place of references to them, as shapes know those of configurations alone."""
+    if isinstance(node, list):
+        return [_resolve(each, definitions) for each in node]
+    if not isinstance(node, dict):
+        return node
+    if "$ref" in node:
+        node = definitions[node["$ref"].rpartition("/")[2]]
+    return {key: _resolve(value, definitions) for key, value in node.items() if key != "$defs"}
+
+
+def _find_model_of_body(request: Request) -> type[BaseModel] | None:
+    """The model that the body of a request should fit; None if its route has none."""
+    route = request.scope.get("route")
+    field = route.body_field if isinstance(route, APIRoute) else None
+    model = None if field is None else field.field_info.annotation
+    return model if isinstance(model, type) and issubclass(model, BaseModel) else None
 
 
 def _methods_at(request: Request) -> set[str]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime
 from functools import lru_cache
 from pathlib import Path
@@ -20,6 +20,7 @@ from throwcollect.runs.record import Kind, Planning
 from throwcollect.runs.records import Records, Run
 from throwcollect.runtimes.runtime import NodeState
 from throwcollect.serve.catalogue import Catalogue, Component
+from throwcollect.serve.resumption import can_be_resumed
 
 _MOST_OVER = 100
 
@@ -72,6 +73,7 @@ class InstanceState:
         dataset: Where the dataset is, in words; None if it collects none.
         summary: What the dataset holds; None if it is not finished.
         robots: Names of its simulations that run, each of which is the namespace of its topics.
+        can_be_resumed: Whether it is over before its last trial, so that clients can go on with its dataset.
     """
 
     id: str
@@ -92,6 +94,7 @@ class InstanceState:
     dataset: str | None
     summary: Info | None
     robots: list[str]
+    can_be_resumed: bool
 
 
 @dataclass(frozen=True)
@@ -119,7 +122,7 @@ class Lookout:
 
     def __init__(self, catalogue: Catalogue) -> None:
         self._catalogue = catalogue
-        self._ended: dict[tuple[str, int | None], InstanceState] = {}
+        self._ended: dict[tuple[str, int | None], tuple[Run, InstanceState]] = {}
 
     def look(self) -> State:
         """Read the state: all runs that live, and the latest of those that are over."""
@@ -144,17 +147,22 @@ class Lookout:
         records = Records()
         known, ended = self._ended, {}
         instances = []
-        for run in records.ids():
-            written = run, records.read_change_ns(run)
-            if (instance := known.get(written)) is None:
+        for name in records.ids():
+            written = name, records.read_change_ns(name)
+            if written in known:
+                run, instance = known[written]
+                # A later run may have gone on with the dataset, which the record of this one does not tell.
+                instance = replace(instance, can_be_resumed=can_be_resumed(run))
+            else:
                 try:
-                    instance = describe(records.get(run))
+                    run = records.get(name)
                 except ConfigError:
                     # The record was removed just now, or is damaged; `throwcollect ps` tells of damaged ones.
                     continue
+                instance = describe(run)
             instances.append(instance)
             if instance.status == "ended":
-                ended[written] = instance
+                ended[written] = run, instance
         self._ended = ended
         return sorted(instances, key=lambda each: each.started, reverse=True)
 
@@ -203,6 +211,7 @@ def describe(run: Run) -> InstanceState:
         dataset=run.place.dataset if record.kind == "collection" else None,
         summary=record.summary,
         robots=simulations_of(run.nodes),
+        can_be_resumed=can_be_resumed(run),
     )
 
 

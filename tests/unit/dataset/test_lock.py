@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import fcntl
 import subprocess
 import sys
 from collections.abc import Callable
@@ -14,7 +16,7 @@ from tests.unit.dataset.mutations import SETTINGS
 
 from throwcollect.coordinator.resume import resume
 from throwcollect.dataset.creation import create
-from throwcollect.dataset.lock import hold_lock
+from throwcollect.dataset.lock import hold_lock, is_locked
 from throwcollect.dataset.rebuild import rebuild
 from throwcollect.dataset.writer import DatasetWriter
 from throwcollect.errors import DatasetError
@@ -105,3 +107,28 @@ def test_a_directory_that_is_not_there_cannot_be_locked(tmp_path: Path) -> None:
         hold_lock(tmp_path / "gone", alone=False),
     ):
         pass
+
+
+@pytest.mark.parametrize("alone", [True, False])
+def test_a_lock_is_seen_as_long_as_it_is_held(begun: Path, alone: bool) -> None:
+    assert not is_locked(begun)
+    with hold_lock(begun, alone=alone):
+        assert is_locked(begun)
+    assert not is_locked(begun)
+
+
+def test_where_there_are_no_locks_nothing_is_locked(begun: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*_: int) -> None:
+        raise OSError(errno.ENOLCK, "No locks available")
+
+    monkeypatch.setattr(fcntl, "flock", refuse)
+    assert not is_locked(begun)
+    assert not is_locked(begun / "gone")
+
+
+def test_a_run_begins_although_somebody_looks_whether_it_has(begun: Path) -> None:
+    code = "import fcntl, os, sys, time; fcntl.flock(os.open(sys.argv[1], 0), 2); print(flush=True); time.sleep(0.02)"
+    with subprocess.Popen([sys.executable, "-c", code, str(begun)], stdout=subprocess.PIPE) as other:
+        assert other.stdout is not None
+        other.stdout.readline()
+        DatasetWriter.open(begun).close()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +10,8 @@ import pytest
 
 import throwcollect
 from throwcollect.dataset.creation import create
+from throwcollect.dataset.inspect import info
+from throwcollect.dataset.verify import verify
 from throwcollect.dataset.writer import DatasetWriter
 from throwcollect.errors import DatasetError
 
@@ -42,6 +45,25 @@ def test_rows_are_the_trials_that_have_ended(collection: Any, collected: Path, t
     )
     with pytest.raises(DatasetError, match=r"throwcollect\.digest is missing"):
         _ = dataset.digest
+
+
+def test_what_is_being_collected_is_waited_for_and_not_resumed(collection: Any, tmp_path: Path) -> None:
+    directory = tmp_path / "dataset"
+    create(directory, collection.plan)
+    with pytest.raises(DatasetError, match=r"is not finished: it has no metadata\.yaml\n  try: throwcollect resume /"):
+        info(directory)
+    with closing(DatasetWriter.open(directory)) as writer:
+        collection.fill(writer, [0, 1])
+        with pytest.warns(
+            throwcollect.UnfinishedDatasetWarning,
+            match=r"is being collected: it has 2 of 7 trials so far; `throwcollect wait --run /.*/dataset` waits",
+        ):
+            throwcollect.load(directory)
+        for read in (info, verify):
+            with pytest.raises(
+                DatasetError, match=r"is being collected: .*\n  try: throwcollect wait --run /.*/dataset$"
+            ):
+                read(directory)
 
 
 def test_what_was_written_last_may_be_cut_off(collection: Any, tmp_path: Path) -> None:

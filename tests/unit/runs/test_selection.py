@@ -1,5 +1,6 @@
 import json
 import os
+import re
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from datetime import datetime, timedelta, timezone
@@ -32,6 +33,10 @@ Make = Callable[..., Record]
 
 def find(records: Records, named: str | None) -> Run:
     return to_change(records, named, command="stop")
+
+
+def find_to_watch(records: Records, named: str) -> Run:
+    return to_watch(records, named, say=print)
 
 
 def watched(records: Records) -> tuple[Record, list[str]]:
@@ -106,9 +111,10 @@ def test_an_exact_id_wins_over_longer_ones(records: Records, make: Make) -> None
 def test_a_name_of_several_or_of_none_is_refused_with_what_there_is(records: Records, make: Make) -> None:
     with pytest.raises(ConfigError, match="no run 'x'"):
         find(records, "x")
-    make("ab", "ended")
+    make("ab", "ended", age_h=1)
     make("ac", "ended")
-    with pytest.raises(ConfigError, match=r"2 runs begin with 'a'\n  expected: one of ab-0123, ac-0123"):
+    listed = r"ac-0123 \(ended\): /.*/ac\n    ab-0123 \(ended\): /.*/ab$"
+    with pytest.raises(ConfigError, match=rf"2 runs begin with 'a'\n  expected: one of\n    {listed}"):
         find(records, "a")
     with pytest.raises(ConfigError, match=r"no run 'x'\n  expected: one of ac-0123, ab-0123\n  try: .* ps -a"):
         find(records, "x")
@@ -118,9 +124,29 @@ def test_of_many_runs_the_latest_are_named(records: Records, make: Make) -> None
     for age_h in range(8):
         make(f"a{age_h}", "ended", age_h=age_h)
     latest = "a0-0123, a1-0123, a2-0123, a3-0123, a4-0123 and 3 more"
-    for named, said in (("x", f"one of {latest}\n"), ("a", f"one of {latest}$"), (None, f"there is {latest}\n")):
+    for named, said in (("x", f"one of {latest}\n"), (None, f"there is {latest}\n")):
         with pytest.raises(ConfigError, match=said):
             find(records, named)
+    with pytest.raises(ConfigError, match=r"8 runs begin with 'a'\n") as caught:
+        find(records, "a")
+    assert re.findall(r"a\d-0123", str(caught.value)) == [f"a{age_h}-0123" for age_h in range(5)]
+    assert str(caught.value).endswith("\n    3 more, which throwcollect ps -a lists")
+
+
+@pytest.mark.parametrize("look", [find, find_to_watch])
+def test_of_runs_that_begin_alike_the_only_one_that_lives_is_meant(
+    records: Records, make: Make, look: Callable[[Records, str], Run]
+) -> None:
+    make("ab", "ended")
+    make("ac", "died")
+    living = make("ad", "lives", age_h=3)
+    assert look(records, "a").record == living
+    make("ae", "lives", age_h=9)
+    with pytest.raises(
+        ConfigError, match=r"4 runs begin with 'a'\n  expected: one of\n    ad.*running.*\n    ae"
+    ) as told:
+        look(records, "a")
+    assert re.findall(r"\((\w+)\): /", str(told.value))[2:] in (["ended", "died"], ["died", "ended"])
 
 
 def test_without_a_name_it_is_the_only_one_that_lives(records: Records, make: Make) -> None:

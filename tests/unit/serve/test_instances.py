@@ -110,6 +110,36 @@ def test_a_complete_collection_is_not_resumed(
     assert client.post("/api/v1/collections/old/resume").status_code == 202
 
 
+def test_what_can_be_resumed_is_told(
+    client: TestClient, begun: list[dict[str, Any]], collected: Path, remember: Remember, tmp_path: Path
+) -> None:
+    def told() -> dict[str, bool]:
+        listed = {each["id"]: each["can_be_resumed"] for each in client.get("/api/v1/state").json()["instances"]}
+        assert {name: client.get(f"{URL}/{name}").json()["can_be_resumed"] for name in listed} == listed
+        return listed
+
+    directory, left = tmp_path / "datasets" / "whole", tmp_path / "datasets" / "left"
+    shutil.copytree(collected, directory)
+    shutil.copytree(collected, left)
+    (left / "metadata.yaml").unlink()
+    remember("died", lives=False, directory=str(directory))
+    remember("stopped", **ended(directory=str(directory), exit_code=130))
+    remember("left", **ended(directory=str(left), exit_code=130))
+    remember("finished", **ended(directory=str(directory)))
+    remember("unplanned", **ended(exit_code=2))
+    remember("session", **ended(kind="session", exit_code=130))
+    remember("alive")
+    resumable = told()
+    assert {name for name, can in resumable.items() if can} == {"left"}
+    # A later run finishes the one dataset; the other loses a file.
+    shutil.copy(collected / "metadata.yaml", left)
+    next(directory.glob("*.mcap")).unlink()
+    resumable = told()
+    assert {name for name, can in resumable.items() if can} == {"died", "stopped"}
+    for name in sorted(resumable.keys() - {"alive", "finished"}):
+        assert client.post(f"/api/v1/collections/{name}/resume").status_code == (202 if resumable[name] else 409), name
+
+
 def test_a_container_may_join_a_run(
     served: Served, remember: Remember, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
@@ -200,6 +230,61 @@ def test_a_request_of_another_form_is_refused(client: TestClient, begun: list[di
     assert answer.status_code == 422
     assert answer.json()["problems"]
     assert not begun
+
+
+@pytest.mark.parametrize(
+    ("wish", "key", "message"),
+    [
+        ({}, "component", "missing; should be text"),
+        ({"component": 7}, "component", "should be text, got 7"),
+        (
+            {"component": "throws", "simulations": 300},
+            "simulations",
+            "should be a whole number from 1 to 256 or null, got 300",
+        ),
+        (
+            {"component": "throws", "simulations": "many"},
+            "simulations",
+            "should be a whole number from 1 to 256 or null, got 'many'",
+        ),
+        ({"component": "throws", "simulation": 3}, "simulation", "unknown key; did you mean 'simulations'?"),
+        ({"component": "throws", "set": []}, "set", "should be keys, each with anything, got an empty list"),
+        (
+            {"component": "throws", "set": {"trials": "\ud800"}},
+            "set",
+            "should be text that UTF-8 can hold, got half a character ('\\ud800')",
+        ),
+        ([], "", "the body should be {component: …}, got an empty list"),
+    ],
+)
+def test_what_is_wrong_with_a_body_is_told_as_with_a_configuration(
+    client: TestClient, wish: Any, key: str, message: str
+) -> None:
+    answer = client.put(f"{URL}/a", content=json.dumps(wish).encode(), headers={"Content-Type": "application/json"})
+    assert answer.headers["content-type"] == "application/problem+json"
+    assert (answer.status_code, answer.json()) == (
+        422,
+        {
+            "title": f"{key}: {message}" if key else message,
+            "status": 422,
+            "problems": [{"message": message, "key": key, "line": None}],
+        },
+    )
+
+
+def test_each_key_of_a_body_is_told(client: TestClient) -> None:
+    answer = client.put(f"{URL}/a", json={"simulations": 0, "image": "ubuntu"})
+    assert [each["key"] for each in answer.json()["problems"]] == ["image", "component", "simulations"]
+    scaled = client.patch(f"{URL}/a", json={"simulations": "x"}).json()
+    assert scaled["title"] == "simulations: should be a whole number from 0 to 256, got 'x'"
+    assert client.post("/api/v1/exchange", json={"code": 3}).json()["title"] == "code: should be text, got 3"
+
+
+def test_a_body_that_is_no_json_is_told_in_one_sentence(client: TestClient) -> None:
+    torn = client.put(f"{URL}/a", content=b"{", headers={"Content-Type": "application/json"}).json()
+    assert torn["title"].startswith("the body is not valid JSON: ")
+    untold = client.put(f"{URL}/a", content=b"{}").json()
+    assert untold["title"] == "the body should be JSON, and the header Content-Type should be application/json"
 
 
 def test_what_is_no_json_is_refused(client: TestClient) -> None:

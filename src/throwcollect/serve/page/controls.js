@@ -187,7 +187,7 @@ class InstanceCard {
     this.scale.hidden = !isLiving || instance.kind === "container";
     this.watch.hidden = instance.kind === "container";
     const isOver = !isLiving && instance.kind === "collection";
-    this.resume.hidden = !isOver || instance.summary !== null;
+    this.resume.hidden = !instance.can_be_resumed;
     for (const element of [this.report, this.download]) element.hidden = !isOver || instance.summary === null;
     setText(this.force, isLiving ? "End now" : "Forget");
     if (before?.simulations !== instance.simulations) this.simulations.value = String(instance.simulations);

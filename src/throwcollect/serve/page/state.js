@@ -40,6 +40,7 @@
  * @property {string | null} dataset
  * @property {object | null} summary what its dataset holds; null if it is not finished
  * @property {string[]} robots names of its simulations that run
+ * @property {boolean} can_be_resumed whether it is over before its last trial
  */
 
 /** @typedef {{components: Component[], instances: Instance[], revision: number}} State */

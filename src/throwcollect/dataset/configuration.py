@@ -1,0 +1,64 @@
+"""Reads the configuration that lies in the directory of a dataset."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from throwcollect.config.loader import load
+from throwcollect.config.schema import Config
+from throwcollect.dataset.directory import CONFIG, PLAN, SOURCES, config_path, has_files
+from throwcollect.dataset.manifest import was_changed
+from throwcollect.errors import ConfigError, DatasetError
+from throwcollect.files import is_there
+from throwcollect.wording import command
+
+
+def read_config(directory: Path) -> Config:
+    """Read the configuration of a dataset.
+
+    Raises:
+        DatasetError: If its file is missing, cannot be read, or is wrong and not as it was written.
+        ConfigError: If a key is wrong here that was right where it was written, as when a package is not installed.
+    """
+    try:
+        return load(config_path(directory))
+    except ConfigError as error:
+        refuse_damaged_config(directory, error)
+        raise
+
+
+def refuse_damaged_config(directory: Path, error: ConfigError) -> None:
+    """Refuse a dataset whose configuration is damaged; the error of a sound one is that of whoever reads it.
+
+    Args:
+        directory: Directory of the dataset.
+        error: What reading its configuration has ended with.
+
+    Raises:
+        DatasetError: If the file is missing, cannot be read, or is not as it was written.
+    """
+    first = error.problems[0]
+    # Without a key, it is the file itself that is wrong.
+    if not first.key or was_changed(directory, CONFIG):
+        place = ": ".join(filter(None, [f"line {first.line}" if first.line else "", first.key]))
+        hint = _name_way_back(directory)
+        raise DatasetError(first.message, path=directory / CONFIG, place=place, hint=hint) from error
+
+
+def refuse_lost_config(directory: Path) -> None:
+    """Refuse a directory that holds files of a dataset, but no configuration.
+
+    Raises:
+        DatasetError: If it is one.
+    """
+    if has_files(directory) and not is_there(directory / CONFIG):
+        raise DatasetError("no such file", path=directory / CONFIG, hint=_name_way_back(directory))
+
+
+def _name_way_back(directory: Path) -> str:
+    """Name what brings the configuration of a dataset back; nothing else in the directory holds it."""
+    if (directory / SOURCES).exists():
+        return "derive the dataset again"
+    if (directory / PLAN).exists():
+        return f"{command('up', 'CONFIG', '--resume', directory)}, with the configuration that it was collected with"
+    return f"copy the configuration that it was collected with to {directory / CONFIG}"

@@ -1,0 +1,110 @@
+"""The configuration of a dataset is a file of it like any other: without it, the dataset is damaged."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from contextlib import closing
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import throwcollect
+from throwcollect.config.loader import load
+from throwcollect.coordinator.resume import resume
+from throwcollect.dataset.creation import create
+from throwcollect.dataset.inspect import info
+from throwcollect.dataset.rebuild import rebuild
+from throwcollect.dataset.verify import verify
+from throwcollect.dataset.writer import DatasetWriter
+from throwcollect.errors import ConfigError, DatasetError, Problem
+from throwcollect.runs.preparation import resume as prepare_to_resume
+
+
+def lose(path: Path) -> None:
+    path.unlink()
+
+
+def tear(path: Path) -> None:
+    path.write_bytes(path.read_bytes() + b"x")
+
+
+def put_a_link(path: Path) -> None:
+    os.rename(path, path.parent.parent / "elsewhere.yaml")
+    path.symlink_to(path.parent.parent / "elsewhere.yaml")
+
+
+def spoil(path: Path) -> None:
+    path.write_text(path.read_text().replace("trials: ", "trails: "))
+
+
+@pytest.mark.parametrize("look", [throwcollect.load, info, rebuild, prepare_to_resume])
+@pytest.mark.parametrize(
+    ("damage", "said"),
+    [
+        (lose, "no such file"),
+        (tear, "not valid YAML"),
+        (put_a_link, "a symbolic link"),
+        (spoil, "trails: unknown key"),
+    ],
+)
+def test_a_dataset_without_its_configuration_is_damaged(
+    dataset: Path, damage: Callable[[Path], None], said: str, look: Callable[[Path], object]
+) -> None:
+    damage(dataset / "config.yaml")
+    with pytest.raises(DatasetError, match=rf"config\.yaml: .*{said}"):
+        look(dataset)
+
+
+def test_the_configuration_comes_back_with_the_file_that_was_collected_with(dataset: Path, tmp_path: Path) -> None:
+    config = load(dataset / "config.yaml")
+    (dataset / "config.yaml").unlink()
+    with pytest.raises(DatasetError, match=r"\n  try: throwcollect up CONFIG --resume .*/dataset, with the conf"):
+        info(dataset)
+    resume(config, dataset, sweep_directory=tmp_path)
+    with closing(DatasetWriter.open(dataset)) as writer:
+        writer.recover()
+        writer.finish(wall_s=None)
+    assert verify(dataset) == []
+
+
+def test_an_unfinished_dataset_without_its_configuration_is_damaged(collection: Any, tmp_path: Path) -> None:
+    create(tmp_path / "dataset", collection.plan)
+    (tmp_path / "dataset" / "config.yaml").unlink()
+    for look in (throwcollect.load, prepare_to_resume):
+        with pytest.raises(DatasetError, match=r"config\.yaml: no such file\n  try: throwcollect up CONFIG --resume"):
+            look(tmp_path / "dataset")
+
+
+def test_recordings_alone_are_a_dataset_that_lost_its_configuration(dataset: Path, tmp_path: Path) -> None:
+    for name in ("config.yaml", "plan.parquet", "metadata.yaml"):
+        (dataset / name).unlink()
+    with pytest.raises(DatasetError, match=r"config\.yaml: no such file\n  try: copy the configuration .* to "):
+        prepare_to_resume(dataset)
+    (tmp_path / "other").mkdir()
+    (tmp_path / "other" / "notes.txt").touch()
+    with pytest.raises(ConfigError, match="holds no dataset"):
+        prepare_to_resume(tmp_path / "other")
+
+
+def test_a_configuration_as_it_was_written_is_not_damaged_where_it_cannot_be_used(
+    dataset: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Another package may have brought the robot or the task, and may not be installed here."""
+    from throwcollect.dataset import configuration
+
+    def refuse(_: Path) -> None:
+        path = dataset / "config.yaml"
+        raise ConfigError([Problem("no package brings it", key="task.name", path=path)])
+
+    monkeypatch.setattr(configuration, "load", refuse)
+    with pytest.raises(ConfigError, match="no package brings it"):
+        info(dataset)
+
+
+def test_a_derived_dataset_is_derived_again(dataset: Path) -> None:
+    (dataset / "config.yaml").unlink()
+    (dataset / "sources.parquet").touch()
+    with pytest.raises(DatasetError, match=r"no such file\n  try: derive the dataset again"):
+        info(dataset)
