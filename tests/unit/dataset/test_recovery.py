@@ -141,7 +141,7 @@ def test_a_collection_killed_at_any_instant_goes_on_to_the_same_files(
     trials: Trials, expected: dict[str, bytes], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # It is whole whenever a collection is killed, so it need not be read each time, which takes a third of all.
-    monkeypatch.setattr("throwcollect.dataset.writer.load", lambda _: trials.plan.config)
+    monkeypatch.setattr("throwcollect.dataset.writer.read_config", lambda _: trials.plan.config)
     call, died = 0, True
     while died:
         directory = tmp_path / str(call)
