@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 from throwcollect.coordinator.simulation_client import EPISODE_TOPIC
@@ -15,7 +14,9 @@ _GUARDED = {
     "parameter_events": "nobody may have this topic, as it tells the signed leases of trials",
 }
 """Last part of the name of each topic that clients may not have, and why."""
-_PARAMETER_SERVICES = ("get_parameters", "set_parameters", "set_parameters_atomically")
+_PARAMETER_SERVICES = tuple(
+    f"rcl_interfaces/srv/{name}" for name in ("GetParameters", "SetParameters", "SetParametersAtomically")
+)
 
 
 def is_guarded(topic: str) -> bool:
@@ -45,23 +46,17 @@ def refuse_leases(parameter: str) -> None:
         raise ConfigError(f"{LEASES}: nobody but the coordinator may have this parameter, as its leases are signed")
 
 
-def refuse_secrets(service: str, arguments: object) -> None:
-    """Refuse to call a service of a node that would read or set the parameter by which trials are leased.
+def refuse_secrets(type_name: str, request: Any) -> None:
+    """Refuse a request to a node that would read or set the parameter by which trials are leased.
 
     Args:
-        service: Absolute name of the service.
-        arguments: Arguments of the call.
+        type_name: Full name of the service's type.
+        request: The request, as it would be sent.
 
     Raises:
-        ConfigError: If the call would do so.
+        ConfigError: If it would do so.
     """
-    if service.rpartition("/")[2] not in _PARAMETER_SERVICES or not isinstance(arguments, Mapping):
+    if type_name not in _PARAMETER_SERVICES:
         return
-    for each in [*_as_list(arguments.get("names")), *_as_list(arguments.get("parameters"))]:
-        name = each.get("name") if isinstance(each, Mapping) else each
-        if isinstance(name, str):
-            refuse_leases(name)
-
-
-def _as_list(value: object) -> list[Any]:
-    return value if isinstance(value, list) else []
+    for name in [*getattr(request, "names", ()), *(each.name for each in getattr(request, "parameters", ()))]:
+        refuse_leases(name)

@@ -60,7 +60,6 @@ def call_node(client: Peer, questions: Questions, call: Call, request: Request) 
         ConfigError: If there is no such service, or it cannot be called like this.
     """
     service = absolute_name(call.given)
-    refuse_secrets(service, call.arguments)
     types = dict(client.session.node.get_service_names_and_types()).get(service, [])
     if not types:
         raise ConfigError(f"nobody offers a service {service}")
@@ -68,6 +67,7 @@ def call_node(client: Peer, questions: Questions, call: Call, request: Request) 
     type_name = named if named in types else types[0]
     message = find_interface("srv", ros.get_service, type_name).Request()
     _fill_arguments(message, call.arguments)
+    refuse_secrets(type_name, message)
 
     def reply(response: Any) -> None:
         call.reply(plain_values(response, call.form.compression))

@@ -59,11 +59,6 @@ def test_an_answer_comes_in_cbor_or_in_parts_if_that_is_wanted(party: Party, lam
         ({"service": "/lamp", "args": [True, True]}, "2 arguments are too many; expected: at most 1"),
         ({"service": "/lamp", "compression": "png"}, "call_service: no compression png"),
         ({"service": "/rosapi/nothing"}, "nobody offers a service /rosapi/nothing"),
-        ({"service": "/sim_0/get_parameters", "args": {"names": ["trial.leases"]}}, "nobody but the coordinator"),
-        (
-            {"service": "/sim_0/set_parameters", "args": {"parameters": [{"name": "trial.leases"}]}},
-            "trial.leases: nobody but the coordinator may have this parameter",
-        ),
     ],
 )
 def test_a_call_that_cannot_be_made_is_answered_with_a_sentence(party: Party, lamp: Any, asked: Any, said: str) -> None:
@@ -71,6 +66,25 @@ def test_a_call_that_cannot_be_made_is_answered_with_a_sentence(party: Party, la
     answer = party.next(op="service_response", id="c")
     assert answer["result"] is False
     assert said in answer["values"]
+
+
+@pytest.mark.parametrize(
+    ("service", "arguments"),
+    [
+        ("get_parameters", {"names": ["x", "trial.leases"]}),
+        ("get_parameters", [["trial.leases"]]),
+        ("set_parameters", {"parameters": [{"name": "trial.leases"}]}),
+        ("set_parameters", [[{"name": "x"}, {"name": "trial.leases"}]]),
+        ("set_parameters_atomically", [[{"name": "trial.leases"}]]),
+    ],
+)
+def test_leases_of_trials_can_be_neither_read_nor_set(party: Party, node: Node, service: str, arguments: Any) -> None:
+    name = f"{node.get_fully_qualified_name()}/{service}"
+    wait_for(lambda: name in party.call("rosapi/services")["services"])
+    party.ask(op="call_service", id="c", service=name, args=arguments)
+    answer = party.next(op="service_response", id="c")
+    assert answer["result"] is False
+    assert "trial.leases: nobody but the coordinator may have this parameter" in answer["values"]
 
 
 def test_a_call_is_given_up_in_time_or_when_its_service_has_gone(party: Party, node: Node) -> None:
