@@ -11,7 +11,7 @@ import signal
 import subprocess
 import time
 from collections.abc import Callable, Sequence
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass, replace
 from datetime import datetime, timezone
 from pathlib import Path
@@ -205,22 +205,27 @@ def carry_out(run: str, lock: int, order: bytes, *, onlooker: Onlooker, interrup
         launch_container(opened, CONTAINER_ORDERS.validate_json(order), onlooker=onlooker, interruptions=interruptions)
         return
     log = NodeLogs(Path(opened.record.logs)).path(LAUNCHER)
-    try:
-        prepare = _prepare_session if opened.record.kind == "session" else _prepare_collection
-        planner = _Planner(opened, onlooker, interruptions)
-        prepared = prepare(records, opened, _ORDERS.validate_json(order), planner)
-        if prepared is None:
-            opened.update(ended=datetime.now(timezone.utc), exit_code=0)
-            opened.close()
-            return
-        _move_log(log, NodeLogs(Path(prepared.record.logs)).path(LAUNCHER))
-        # The last steps of the preparation do not ask, and may have taken long.
-        planner.end_if_asked()
-    except ThrowcollectError as error:
-        end = datetime.now(timezone.utc)
-        opened.update(ended=end, exit_code=error.exit_code, failure=Failure.of(error), planning=None)
-        raise
-    with prepared:
+    # Whatever fails before the launch, what was made for it is removed, after the error is in the record.
+    with ExitStack() as made:
+        try:
+            prepare = _prepare_session if opened.record.kind == "session" else _prepare_collection
+            planner = _Planner(opened, onlooker, interruptions)
+            prepared = prepare(records, opened, _ORDERS.validate_json(order), planner)
+            if prepared is None:
+                opened.update(ended=datetime.now(timezone.utc), exit_code=0)
+                opened.close()
+                return
+            made.enter_context(prepared)
+            _move_log(log, NodeLogs(Path(prepared.record.logs)).path(LAUNCHER))
+            # The last steps of the preparation do not ask, and may have taken long.
+            planner.end_if_asked()
+        except ThrowcollectError as error:
+            end = datetime.now(timezone.utc)
+            opened.update(ended=end, exit_code=error.exit_code, failure=Failure.of(error), planning=None)
+            raise
+        if prepared.record.run != opened.run:
+            # `resume` has taken over a run whose containers outlived their launcher; that run keeps its own id.
+            opened.forget()
         prepared.launch(interruptions=interruptions)
 
 
@@ -295,11 +300,7 @@ def _move_log(before: Path, after: Path) -> None:
 def _prepare_collection(records: Records, run: OpenRun, order: Order, onlooker: Onlooker) -> PreparedRun | None:
     record = run.record
     if order.resumed:
-        prepared = resume(order.output, overrides=order.overrides, ahead=True, onlooker=onlooker, run=run)
-        if prepared is not None and prepared.record.run != run.run:
-            # `resume` has taken over a run whose containers outlived their launcher; that run keeps its own id.
-            run.forget()
-        return prepared
+        return resume(order.output, overrides=order.overrides, ahead=True, onlooker=onlooker, run=run)
     with load_locating_errors(order.config, order.overrides) as config:
         request = Request(
             config,

@@ -265,22 +265,25 @@ class Records:
         Raises:
             ConfigError: If the lock of the run cannot be opened.
         """
-        try:
-            # The file is made if need be, because `down` also takes runs of which only containers are known.
-            lock = os.open(self._runs / f"{run}.lock", os.O_RDWR | os.O_CREAT, 0o600)
-        except OSError as error:
-            raise unusable(self._runs / f"{run}.lock", error) from error
+        path = self._runs / f"{run}.lock"
         deadline = time.monotonic() + _LOCK_PATIENCE_S
         while True:
             try:
-                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except BlockingIOError:
-                if time.monotonic() > deadline:
-                    os.close(lock)
-                    return None
-                time.sleep(0.01)
-            else:
-                return OpenRun(self._runs, run, lock)
+                # The file is made if need be, because `down` also takes runs of which only containers are known.
+                lock = os.open(path, os.O_RDWR | os.O_CREAT, 0o600)
+            except OSError as error:
+                raise unusable(path, error) from error
+            with ExitStack() as given_up:
+                given_up.callback(os.close, lock)
+                with suppress(BlockingIOError, FileNotFoundError):
+                    fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                    # Whoever had the lock may have forgotten the run, and another process made the file anew.
+                    if os.path.samestat(os.fstat(lock), path.stat()):
+                        given_up.pop_all()
+                        return OpenRun(self._runs, run, lock)
+            if time.monotonic() > deadline:
+                return None
+            time.sleep(0.01)
 
     def ids(self) -> list[str]:
         """Sorted ids of all runs that have a record, even a damaged one."""

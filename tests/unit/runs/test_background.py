@@ -184,6 +184,25 @@ def test_who_stops_it_while_it_is_prepared_is_heeded(
     assert (record.origin, record.kind) == (ORIGIN, "collection")
 
 
+def test_what_was_made_for_a_run_is_removed_if_it_fails_between_preparation_and_launch(
+    config: Path, tmp_path: Path, processes: list[subprocess.Popen[bytes]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    order = take_over(config, tmp_path, processes)
+    run = Records().take("a")
+    assert run is not None
+
+    def fail(_before: Path, _after: Path) -> None:
+        assert (tmp_path / "data" / "plan.parquet").exists()
+        raise WorkerError("no space left")
+
+    monkeypatch.setattr(background, "_move_log", fail)
+    with pytest.raises(WorkerError):
+        carry_out("a", run.lock, order, onlooker=SILENT, interruptions=lambda: 0)
+    assert not (tmp_path / "data").exists()
+    assert str(Records().get("a").record.error) == "no space left"
+    assert Records().get("a").status == "ended"
+
+
 def test_while_a_large_plan_is_made_the_record_tells_how_far_it_is_and_who_stops_it_does_not_wait(
     config: Path, tmp_path: Path, processes: list[subprocess.Popen[bytes]], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -1,3 +1,4 @@
+import fcntl
 import json
 import os
 import stat
@@ -154,6 +155,27 @@ def test_a_dead_run_is_taken_by_one_and_refused_to_others(state: Path) -> None:
     taken.update(simulations=5)
     taken.close()
     assert records.get(name).record.simulations == 5
+
+
+def test_the_lock_of_a_run_that_was_just_forgotten_counts_for_nothing(
+    state: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    found = Records()
+    name = remember(found)
+    first = found.take(name)
+    assert first is not None
+    lock = fcntl.flock
+
+    def forget_before(descriptor: int, how: int) -> None:
+        if (state / "runs" / f"{name}.json").exists():
+            first.forget()
+        lock(descriptor, how)
+
+    monkeypatch.setattr(fcntl, "flock", forget_before)
+    second = found.take(name)
+    assert second is not None
+    assert os.path.samestat(os.fstat(second.lock), (state / "runs" / f"{name}.lock").stat())
+    second.close()
 
 
 def test_what_is_forgotten_leaves_no_file_but_datasets(state: Path, tmp_path: Path) -> None:
