@@ -223,8 +223,9 @@ def _make_scripts(config: Config, directory: Path) -> BatchScripts:
 
 def _check_size(tasks: int) -> None:
     largest = slurm.find_largest_array()
-    if largest is not None and tasks >= largest:
-        raise ConfigError(f"--tasks {tasks}: is more than Slurm takes here", expected=f"at most {largest - 1}")
+    # Indexes begin at 0, and the largest one is below this number.
+    if largest is not None and tasks > largest:
+        raise ConfigError(f"--tasks {tasks}: is more than Slurm takes here", expected=f"at most {largest}")
 
 
 def _freeze(config: Config, directory: Path, sweep_directory: Path, say: Say) -> None:

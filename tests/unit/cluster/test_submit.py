@@ -9,7 +9,7 @@ from tests.e2e.collection import CONFIG, FAST, write_config
 
 from throwcollect.cluster import slurm
 from throwcollect.cluster.submit import submit
-from throwcollect.errors import WorkerError
+from throwcollect.errors import ConfigError, WorkerError
 
 
 def test_an_array_whose_joining_job_is_refused_is_cancelled(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -30,3 +30,19 @@ def test_an_array_whose_joining_job_is_refused_is_cancelled(tmp_path: Path, monk
         submit(config, tmp_path / "data", 2, say=lambda _: None)
     assert cancelled == ["12"]
     assert not (tmp_path / "data").exists()
+
+
+@pytest.mark.parametrize(("tasks", "error", "said"), [(2, WorkerError, "submitted"), (3, ConfigError, "at most 2")])
+def test_an_array_may_be_as_large_as_slurm_says(
+    tasks: int, error: type[Exception], said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    config = write_config(tmp_path, trials=6, text=CONFIG + "record: {{trials_per_shard: 2}}\n", sim=FAST)
+
+    def refuse(*_: object) -> str:
+        raise WorkerError("submitted")
+
+    monkeypatch.setattr(slurm, "submit", refuse)
+    monkeypatch.setattr(slurm, "check", lambda _: None)
+    monkeypatch.setattr(slurm, "find_largest_array", lambda: 2)
+    with pytest.raises(error, match=said):
+        submit(config, tmp_path / "data", tasks, say=lambda _: None)
