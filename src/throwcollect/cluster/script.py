@@ -102,8 +102,8 @@ class BatchScripts:
             f"Collects a dataset of throwcollect in one run on {nodes} nodes.",
             directives,
             ("--no-kill", self._requeue_flag),
-            # By its number, each job has a port of its own, as several jobs may share a node. From 32768 on, Linux gives
-            # ports to connections that leave.
+            # By its number, each job has a port of its own, as several jobs may share a node. From 32768 on, ports are
+            # those that Linux gives to connections that leave.
             "export PORT=$((20000 + SLURM_JOB_ID % 12768))",
             # A token of an earlier start of this job would lead the other tasks to a router that is gone.
             f"rm -f {token}",

@@ -53,16 +53,18 @@ def send_goal(
             raise ConfigError(f"nobody offers {name} as {kind}", expected=", ".join(actions[name]))
         print(f"Sending goal:\n{_indent(message)}", flush=True)
         sent = client.send_goal_async(message, feedback_callback=_show_feedback if feedback else None)
-        handle = session.answer(sent, alive=client.server_is_ready, who=name)
-        if not handle.accepted:
-            echo = command("ros", "topic", "echo", "/rosout", *(("--run", run) if run is not None else ()))
-            raise ConfigError(f"{name}: the goal was rejected", hint=f"the log of the node says why: {echo}")
         try:
+            handle = session.answer(sent, alive=client.server_is_ready, who=name)
+            if not handle.accepted:
+                echo = command("ros", "topic", "echo", "/rosout", *(("--run", run) if run is not None else ()))
+                raise ConfigError(f"{name}: the goal was rejected", hint=f"the log of the node says why: {echo}")
             print(f"Goal accepted with ID: {bytes(bytearray(handle.goal_id.uuid)).hex()}\n", flush=True)
             response = session.answer(handle.get_result_async(), alive=client.server_is_ready, who=name)
         except KeyboardInterrupt:
-            # Otherwise `join_graph` would only leave the graph, and the goal would go on.
-            _cancel(session, client, handle, name)
+            # Otherwise `join_graph` would only leave the graph, and the goal would go on. It may not be accepted yet.
+            handle = session.answer(sent, alive=client.server_is_ready, who=name)
+            if handle.accepted:
+                _cancel(session, client, handle, name)
             raise Interrupted("") from None
         status = _STATUSES[response.status]
         print(f"Result:\n{_indent(response.result)}")

@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import threading
+import time
 from collections.abc import Callable, Iterator
 from datetime import datetime, timezone
 from pathlib import Path
@@ -62,7 +63,7 @@ class Robot(Node):
         self.declare_parameter("limit", 3, ParameterDescriptor(integer_range=[IntegerRange(from_value=0, to_value=9)]))
         self.declare_parameter("names", ["a", "b"])
         ActionServer(self, FJT, "follow", self.execute, goal_callback=self.consider, cancel_callback=self.cancel)
-        self.ends: Future = Future()
+        self.ends = Future()
 
     def switch(self, request: Any, response: Any) -> Any:
         response.success, response.message = request.data, "switched"
@@ -72,6 +73,9 @@ class Robot(Node):
         return await Future()
 
     def consider(self, goal: Any) -> GoalResponse:
+        self.ends = Future()
+        if "late" in goal.trajectory.joint_names:
+            time.sleep(0.5)
         return GoalResponse.ACCEPT if goal.trajectory.joint_names else GoalResponse.REJECT
 
     def cancel(self, _handle: Any) -> CancelResponse:
@@ -396,11 +400,14 @@ def test_the_rate_of_a_topic_is_told_every_second(endpoint: str) -> None:
     assert process.returncode == 130
 
 
-def test_ctrl_c_cancels_the_goal(endpoint: str) -> None:
-    process = start("action", "send", FOLLOW, FJT.TYPE, "{trajectory: {joint_names: [wait]}}")
+@pytest.mark.parametrize(("joints", "line"), [("wait", "Goal accepted"), ("wait, late", "Sending goal")])
+def test_ctrl_c_cancels_the_goal(endpoint: str, joints: str, line: str) -> None:
+    process = start("action", "send", FOLLOW, FJT.TYPE, f"{{trajectory: {{joint_names: [{joints}]}}}}")
     assert process.stdout is not None
-    while not process.stdout.readline().startswith("Goal accepted"):
+    while not process.stdout.readline().startswith(line):
         assert process.poll() is None
+    # Until the goal has left; it is accepted later.
+    time.sleep(0.2)
     process.send_signal(signal.SIGINT)
     out, err = process.communicate(timeout=10)
     assert (process.returncode, err) == (130, "")
