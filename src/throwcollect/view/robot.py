@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 import shutil
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -117,9 +116,11 @@ def read_drawn_robot(description: str, tool: str, share: Path) -> DrawnRobot:
                 link.remove(shape)
             if link.get("name") == tool:
                 for shape in link.findall("visual"):
+                    for material in shape.findall("material"):
+                        shape.remove(material)
                     shape.append(_material("spoon", _SPOON_RGBA))
         # A material may be defined in one place of a URDF, and only named in others.
-        colors = {name: rgba for material in robot.iter("material") for name, rgba in _color(material).items()}
+        colors = {name: rgba for each in robot.iter("material") for name, rgba in _color(each).items() if name}
         shapes = tuple(
             _shape(link.attrib["name"], visual, colors) for link in robot.iter("link") for visual in link.iter("visual")
         )
@@ -153,7 +154,7 @@ def _color(material: ElementTree.Element) -> dict[str, Rgba]:
     return {material.get("name", ""): (r, g, b, a)}
 
 
-def _shape(link: str, visual: ElementTree.Element, colors: Mapping[str, Rgba]) -> Shape:
+def _shape(link: str, visual: ElementTree.Element, colors: dict[str, Rgba]) -> Shape:
     origin, material = visual.find("origin"), visual.find("material")
     xyz, rpy = (_numbers("0 0 0" if origin is None else origin.get(key, "0 0 0")) for key in ("xyz", "rpy"))
     (geometry,) = visual.findall("geometry/*")
@@ -172,7 +173,9 @@ def _shape(link: str, visual: ElementTree.Element, colors: Mapping[str, Rgba]) -
         raise ValueError(f"link {link} has a {geometry.tag}")
     # URDF turns about fixed axes, for which SciPy has small letters.
     rotation = tuple(transform.Rotation.from_euler("xyz", rpy).as_quat().tolist())
-    rgba = _DEFAULT_RGBA if material is None else colors.get(material.get("name", ""), _DEFAULT_RGBA)
+    # Materials need no name, so the colour of the shape's own comes first.
+    found = {} if material is None else colors | _color(material)
+    rgba = _DEFAULT_RGBA if material is None else found.get(material.get("name", ""), _DEFAULT_RGBA)
     return Shape(link, xyz, rotation, size, geometry.tag, mesh, rgba)
 
 

@@ -36,3 +36,19 @@ def test_a_package_without_a_name_gets_that_of_its_directory(snowman: DrawnRobot
     snowman.copy_package(tmp_path / "view")
     assert (tmp_path / "view" / "snow" / "meshes" / "nose.stl").read_bytes() == b"solid nose"
     assert ElementTree.parse(tmp_path / "view" / "snow" / "package.xml").findtext("name") == "snow"  # noqa: S314
+
+
+def test_each_shape_has_its_own_colour(tmp_path: Path) -> None:
+    shape = '<visual><geometry><sphere radius="0.1"/></geometry>{}</visual>'
+    red, green, named = (
+        f'<material name=""><color rgba="{rgba}"/></material>' for rgba in ("1 0 0 1", "0 1 0 1", "0 0 1 1")
+    )
+    blue = named.replace('""', '"blue"')
+    parts = [red, green, blue, '<material name="blue"/>', "", red]
+    links = "".join(f'<link name="{number}">{shape.format(part)}</link>' for number, part in enumerate(parts))
+    drawn = read_drawn_robot(f'<robot name="r">{links}</robot>', "5", tmp_path)
+    colours = [part.rgba for part in drawn.shapes]
+    assert colours[:4] == [(1, 0, 0, 1), (0, 1, 0, 1), (0, 0, 1, 1), (0, 0, 1, 1)]
+    # A part without a colour is grey, and the tool has one of its own, whatever its description says.
+    assert len(set(colours)) == 5
+    assert drawn.urdf.count("<material") == 5
