@@ -22,7 +22,9 @@ CONFIG=$(basename "$config")
 RUN_USER=$(id -u):$(id -g)
 THROWCOLLECT_IMAGE=${THROWCOLLECT_IMAGE:-throwcollect:0.2.0}
 THROWCOLLECT_HOST=${THROWCOLLECT_HOST:-$(uname -n)}
-export CONFIGS CONFIG RUN_USER THROWCOLLECT_IMAGE THROWCOLLECT_HOST
+# The name in the volume, from where the dataset is taken below.
+DATASET=dataset
+export CONFIGS CONFIG RUN_USER THROWCOLLECT_IMAGE THROWCOLLECT_HOST DATASET
 
 project=throwcollect-$$
 file=$(dirname "$0")/compose.yaml
@@ -35,10 +37,13 @@ compose() {
 }
 # Whatever happens, nothing stays behind.
 trap 'compose down --volumes --timeout 5 >/dev/null 2>&1' EXIT
-trap 'exit 130' INT TERM
+# Compose is asked to stop as well, and ends the collection in order; what it has is taken out before anything is removed.
+stopped=
+trap 'stopped=130' INT TERM
 
 code=0
 compose up --scale sim="$simulations" --exit-code-from coordinator || code=$?
+code=${stopped:-$code}
 
 # Also of a collection that was broken off, if it ever began.
 mkdir -p "$output"

@@ -9,6 +9,7 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -21,9 +22,10 @@ from throwcollect.dataset.join import join
 from throwcollect.dataset.shard import OpenShard
 from throwcollect.dataset.slice_directory import SLICES, find_attempts, find_finished, make_attempt, publish
 from throwcollect.episode.message import Episode
-from throwcollect.errors import ConfigError, DatasetError, Interrupted
+from throwcollect.errors import ConfigError, DatasetError, Interrupted, LossError, ThrowcollectError
 from throwcollect.files import unwritable
 from throwcollect.runs.slices import collect_slice
+from throwcollect.sim.trial_runner import TrialRunner
 from throwcollect.sweep.slice import Slice
 
 INPROCESS = ["run.runtime=inprocess"]
@@ -276,6 +278,31 @@ def test_a_disk_that_is_full_costs_the_attempt_and_nothing_else(
     assert not find_finished(frozen)
     full = False
     collect(frozen, "0/2", "1/2")
+    join(frozen)
+    assert fingerprints(frozen) == fingerprints(whole)
+
+
+def test_of_a_slice_that_has_lost_a_trial_all_others_are_kept_also_from_a_disk_of_the_node(
+    frozen: Path, whole: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    begin, refused, begun = TrialRunner.begin, True, set[int]()
+
+    def begin_or_refuse(self: TrialRunner, trial: int, *values: Any, **token: str) -> None:
+        if trial == 1 and refused:
+            raise ThrowcollectError("no")
+        begun.add(trial)
+        begin(self, trial, *values, **token)
+
+    monkeypatch.setattr(TrialRunner, "begin", begin_or_refuse)
+    on_scratch = [*INPROCESS, f"cluster.scratch={tmp_path / 'scratch'}"]
+    with pytest.raises(LossError):
+        collect_slice(frozen, Slice(0, 2), overrides=on_scratch)
+    assert not list((tmp_path / "scratch").iterdir())
+    refused = False
+    begun.clear()
+    collect_slice(frozen, Slice(0, 2), overrides=on_scratch)
+    assert begun == {1}
+    collect(frozen, "1/2")
     join(frozen)
     assert fingerprints(frozen) == fingerprints(whole)
 

@@ -110,9 +110,10 @@ def submit(
             )
         if not live:
             _check_size(tasks)
-        made = not directory.exists()
-        undo.callback(_remove, directory, made=made, planned=not (directory / PLAN).exists())
+        made, planned = not directory.exists(), not (directory / PLAN).exists()
         _freeze(complete, directory, config.parent, say)
+        # Only from here on, because a directory that was refused holds the files of somebody else.
+        undo.callback(_remove, directory, made=made, planned=planned)
         if not live:
             Plan.read(directory / PLAN, read_frozen_config(directory), slice=Slice(0, tasks))
         image = str(scripts.image) if scripts.image else None

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import shutil
 from collections.abc import Callable, Sequence
+from contextlib import ExitStack
 from datetime import datetime, timezone
 from pathlib import Path
 
@@ -13,7 +14,7 @@ from throwcollect.config.schema import Config
 from throwcollect.coordinator.resume import refuse_changes
 from throwcollect.dataset.configuration import read_config
 from throwcollect.dataset.creation import create
-from throwcollect.dataset.directory import METADATA, PLAN, config_path
+from throwcollect.dataset.directory import PLAN, config_path
 from throwcollect.dataset.slice_directory import (
     find_attempts,
     find_finished,
@@ -81,25 +82,32 @@ def collect_slice(
         remove_stopped(earlier)
     onlooker.say(f"slice {slice}: trials {plan.trials.first} to {plan.trials.numbers[-1]}")
     request = Request(config, directory, attempt, started, plan, ahead=True)
-    with prepare_run(Records(), request, onlooker) as run:
-        try:
-            summary = run.collect(interruptions=interruptions)
-        except Interrupted as error:
-            mark_stopped(attempt)
-            raise Interrupted(f"slice {slice}: {error.message}", hint=f"{again} goes on with it") from error
-        finally:
-            # Only a finished dataset has this file; it is published from the scratch directory below.
-            if scratch is not None and not (attempt / METADATA).exists():
-                # The next attempt may run on another machine, which does not see the scratch directory of this one.
-                kept = make_attempt(directory, slice)
-                take_recordings([attempt], kept)
-                mark_stopped(kept)
-                remove_stopped(earlier)
-                shutil.rmtree(attempt, ignore_errors=True)
-    if (lost := explain_loss(summary.outcomes, hint=f"{again} runs them again")) is not None:
-        raise lost
-    publish(attempt, directory, slice)
+    with ExitStack() as unpublished:
+        if scratch is not None:
+            unpublished.callback(_keep_recordings, attempt, earlier, directory, slice)
+        with prepare_run(Records(), request, onlooker) as run:
+            try:
+                summary = run.collect(interruptions=interruptions)
+            except Interrupted as error:
+                mark_stopped(attempt)
+                raise Interrupted(f"slice {slice}: {error.message}", hint=f"{again} goes on with it") from error
+        if (lost := explain_loss(summary.outcomes, hint=f"{again} runs them again")) is not None:
+            raise lost
+        publish(attempt, directory, slice)
+        unpublished.pop_all()
     return True
+
+
+def _keep_recordings(attempt: Path, earlier: Sequence[Path], directory: Path, slice: Slice) -> None:
+    """Move the recordings of an attempt that is over from the scratch directory into that of the dataset.
+
+    The next attempt may run on another machine, which does not see the scratch directory of this one.
+    """
+    kept = make_attempt(directory, slice)
+    take_recordings([attempt], kept)
+    mark_stopped(kept)
+    remove_stopped(earlier)
+    shutil.rmtree(attempt, ignore_errors=True)
 
 
 def read_frozen_config(directory: Path, overrides: Sequence[str] = ()) -> Config:

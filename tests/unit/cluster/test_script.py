@@ -160,6 +160,20 @@ def test_in_one_run_the_first_task_begins_and_the_others_join(directory: Path, t
     assert not Path(token).exists()
 
 
+def test_where_the_run_ends_at_once_the_other_tasks_do_not_wait_for_it(directory: Path, tmp_path: Path) -> None:
+    (directory / "cluster").mkdir()
+    script = scripts(directory).live(2)
+    both = 'while [ "$1" != bash ]; do shift; done; (SLURM_PROCID=0; export SLURM_PROCID; "$@"); one=$?; exec "$@"'
+    (tmp_path / "bin").mkdir()
+    node = tmp_path / "bin" / "throwcollect"
+    # The shell above it is signalled as well, and outlives it.
+    node.write_text('#!/bin/bash\nkill -TERM $PPID; sleep 0.1; echo "$1"; exit 3\n')
+    node.chmod(0o755)
+    done = run(script, tmp_path, srun=both.replace("one=$?", "echo $?"), SLURM_PROCID="1")
+    assert done.stdout.splitlines() == ["up", "3"]
+    assert not list((directory / "cluster").iterdir())
+
+
 def test_the_joining_job_joins(directory: Path, tmp_path: Path) -> None:
     done = run(scripts(directory).join(), tmp_path, srun='printf "%s\\n" "$@"')
     assert done.stdout.splitlines()[2:] == ["throwcollect", "join", str(directory)]

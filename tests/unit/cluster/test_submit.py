@@ -46,3 +46,15 @@ def test_an_array_may_be_as_large_as_slurm_says(
     monkeypatch.setattr(slurm, "find_largest_array", lambda: 2)
     with pytest.raises(error, match=said):
         submit(config, tmp_path / "data", tasks, say=lambda _: None)
+
+
+def test_a_directory_that_is_refused_keeps_its_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    config = write_config(tmp_path, trials=4, text=CONFIG + "record: {{trials_per_shard: 2}}\n", sim=FAST)
+    for name in ("config.yaml", "trials.parquet", "cluster/mine.txt", "notes.txt"):
+        (tmp_path / "mine" / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / "mine" / name).write_text("mine")
+    monkeypatch.setattr(slurm, "find_largest_array", lambda: None)
+    before = sorted((tmp_path / "mine").rglob("*"))
+    with pytest.raises(ConfigError, match="a directory that is new or empty"):
+        submit(config, tmp_path / "mine", 2, say=lambda _: None)
+    assert sorted((tmp_path / "mine").rglob("*")) == before

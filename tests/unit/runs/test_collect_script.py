@@ -13,26 +13,34 @@ DOCKER = """\
 #!/bin/sh
 # Compose fails as it does when the coordinator does; the copy brings a file if there is one.
 case "$1 $*" in
-    "compose "*" up "*) echo "$THROWCOLLECT_HOST" >"$TOLD"; exit 4 ;;
-    "run "*) [ -z "$BEGUN" ] || touch "$OUTPUT/config.yaml" ;;
+    "compose "*" up "*) echo "$THROWCOLLECT_HOST $DATASET" >"$TOLD"; [ -z "$SIGNAL" ] || kill -s "$SIGNAL" $PPID; exit 4 ;;
+    "compose "*" down "*) touch "$TOLD.removed" ;;
+    "run "*) [ -z "$BEGUN" ] || [ -e "$TOLD.removed" ] || touch "$OUTPUT/config.yaml" ;;
 esac
 """
 
 
-@pytest.mark.parametrize("begun", ["", "yes"])
-def test_a_collection_that_never_began_leaves_no_directory(tmp_path: Path, begun: str) -> None:
+@pytest.mark.parametrize(
+    ("begun", "signal", "code"), [("", "", 4), ("yes", "", 4), ("yes", "INT", 130), ("yes", "TERM", 130)]
+)
+def test_what_was_collected_is_taken_out_and_what_never_began_leaves_no_directory(
+    tmp_path: Path, begun: str, signal: str, code: int
+) -> None:
     (tmp_path / "docker").write_text(DOCKER)
     (tmp_path / "docker").chmod(0o755)
     (tmp_path / "bad.yaml").write_text("nonsense: 1\n")
     output = tmp_path / "my data"
-    variables = {"OUTPUT": str(output), "TOLD": str(tmp_path / "told"), "BEGUN": begun}
+    variables = {"OUTPUT": str(output), "TOLD": str(tmp_path / "told"), "BEGUN": begun, "SIGNAL": signal}
+    # Of an .env file or a machine on which other datasets are made.
+    variables["DATASET"] = "mnist"
     environment = {**os.environ, **variables, "PATH": f"{tmp_path}:{os.environ['PATH']}"}
     done = subprocess.run(
         [SCRIPT, tmp_path / "bad.yaml", "2", output], env=environment, capture_output=True, text=True, check=False
     )
-    assert done.returncode == 4, done.stderr
+    assert done.returncode == code, done.stderr
     assert output.exists() == bool(begun)
-    assert (tmp_path / "told").read_text().strip() == os.uname().nodename
+    assert (tmp_path / "told").read_text().split() == [os.uname().nodename, "dataset"]
+    assert (tmp_path / "told.removed").exists()
 
 
 def test_a_file_that_is_not_there_is_named_before_anything_starts(tmp_path: Path) -> None:
