@@ -13,7 +13,10 @@ DOCKER = """\
 #!/bin/sh
 # Compose fails as it does when the coordinator does; the copy brings a file if there is one.
 case "$1 $*" in
-    "compose "*" up "*) echo "$THROWCOLLECT_HOST $DATASET" >"$TOLD"; [ -z "$SIGNAL" ] || kill -s "$SIGNAL" $PPID; exit 4 ;;
+    "compose "*" up "*)
+        echo "$THROWCOLLECT_HOST $DATASET" >"$TOLD"
+        [ -z "$SIGNAL" ] || kill -s "$SIGNAL" $PPID
+        exit 4 ;;
     "compose "*" down "*) touch "$TOLD.removed" ;;
     "run "*) [ -z "$BEGUN" ] || [ -e "$TOLD.removed" ] || touch "$OUTPUT/config.yaml" ;;
 esac
