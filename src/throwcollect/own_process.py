@@ -1,4 +1,4 @@
-"""Tells the process of a command of ours from that of another program that imports us.
+"""Tells the process of a command of ours from that of another program that imports us, and how to start one more.
 
 A command may be forked, because its threads, files and settings are known. Those of another program are not, and a fork
 of it would have them, too.
@@ -6,6 +6,7 @@ of it would have them, too.
 
 from __future__ import annotations
 
+import sys
 import threading
 
 _commands: list[bool] = []
@@ -19,3 +20,15 @@ def claim_process() -> None:
 def may_be_forked() -> bool:
     """Whether this process runs a command, and has no other thread whose locks a fork would copy."""
     return bool(_commands) and threading.active_count() == 1
+
+
+def make_command(module: str = "throwcollect") -> list[str]:
+    """Make the beginning of a command line that runs a module of ours by this Python.
+
+    With ``-m`` alone, Python would look for all modules in the working directory first, also for those of its own
+    library: a file of the user's, or one that comes with somebody's dataset, would be run in place of them.
+    """
+    if sys.version_info >= (3, 11):
+        return [sys.executable, "-P", "-m", module]
+    run = f"import runpy; runpy.run_module({module!r}, run_name='__main__', alter_sys=True)"
+    return [sys.executable, "-c", f"import sys; del sys.path[0]; {run}"]

@@ -279,6 +279,22 @@ def test_a_token_is_read_from_standard_input() -> None:
     assert "this is no token of a run" in done.stderr
 
 
+def test_waiting_for_a_token_can_be_interrupted() -> None:
+    with subprocess.Popen(
+        command("join-run", "-"), stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as waiting:
+        # It has loaded its libraries by then, and reads.
+        wchan = Path(f"/proc/{waiting.pid}/wchan")
+        deadline = time.monotonic() + 30
+        while "pipe" not in wchan.read_text() and time.monotonic() < deadline:
+            time.sleep(0.02)
+        waiting.send_signal(signal.SIGINT)
+        try:
+            assert waiting.wait(10) == 130
+        finally:
+            waiting.kill()
+
+
 def test_a_token_is_written_for_its_owner_alone(tmp_path: Path) -> None:
     path = tmp_path / "small.yaml"
     path.write_text(CONFIG.format(trials=1) + f"sim: {{{FAST}}}\n")

@@ -1,7 +1,14 @@
 """What tells a command of ours from somebody's program."""
 
+import re
 import subprocess
 import sys
+from pathlib import Path
+
+import pytest
+
+import throwcollect
+from throwcollect.own_process import make_command
 
 WHOSE = """
 import sys, threading
@@ -20,3 +27,23 @@ def test_only_a_command_without_further_threads_may_be_forked() -> None:
     with subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as asked:
         assert asked.stdout is not None
         assert [asked.stdout.readline().strip() for _ in range(3)] == ["False", "True", "False"]
+
+
+@pytest.mark.parametrize("version", [(3, 10), (3, 11)])
+def test_nothing_of_the_working_directory_is_run(
+    version: tuple[int, int], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("queue", "types", "runpy", "signal", "numpy", "throwcollect"):
+        (tmp_path / f"{name}.py").write_text("raise SystemExit('a file of the working directory was run')\n")
+    monkeypatch.setattr(sys, "version_info", version)
+    for words in (["--version"], ["simulate", "--help"]):
+        done = subprocess.run([*make_command(), *words], cwd=tmp_path, capture_output=True, text=True, check=False)
+        assert (done.returncode, done.stderr) == (0, "")
+        assert "throwcollect" in done.stdout
+
+
+def test_all_processes_of_ours_are_started_like_that() -> None:
+    sources = Path(throwcollect.__file__).parent.rglob("*.py")
+    asked = {path.name for path in sources if re.search(r'sys\.executable, "-[mc]"', path.read_text(encoding="utf-8"))}
+    # The other one only names processes for `ps`.
+    assert asked == {"own_process.py", "node_server.py"}

@@ -183,8 +183,9 @@ def join_run(
     """Add simulations of this machine to a run of another one, until it is over; Ctrl-C takes them away."""
     from throwcollect.runs.joining import join_run as join
 
+    # The counting begins afterwards, because what only counts does not end the wait for a line.
+    word = sys.stdin.readline() if token == "-" else token  # noqa: S105 - it is no password
     with display(quiet=False) as shown, count_interruptions() as interruptions:
-        word = sys.stdin.readline() if token == "-" else token  # noqa: S105 - it is no password
         join(word, simulations or count_cores(), onlooker=shown, interruptions=interruptions)
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import shutil
-import sys
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass, replace
@@ -31,6 +30,7 @@ from throwcollect.coordinator.resume import refuse_changes
 from throwcollect.dataset.directory import CONFIG, PLAN, TRIALS
 from throwcollect.errors import ConfigError, Problem
 from throwcollect.files import unwritable, write_file
+from throwcollect.own_process import make_command
 from throwcollect.runs.slices import check_closed, check_sliceable, read_changed_config, read_frozen_config
 from throwcollect.runtimes.apptainer.contents import check_sif
 from throwcollect.side_by_side import count_cores
@@ -219,7 +219,7 @@ def _make_scripts(config: Config, directory: Path) -> BatchScripts:
         # Many login nodes have no Apptainer, though the nodes of tasks have.
         if shutil.which("apptainer") is not None:
             check_sif(image)
-    return BatchScripts(config, directory, directory / CLUSTER / _LOGS, (sys.executable, "-m", "throwcollect"), image)
+    return BatchScripts(config, directory, directory / CLUSTER / _LOGS, tuple(make_command()), image)
 
 
 def _check_size(tasks: int) -> None:

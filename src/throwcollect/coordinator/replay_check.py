@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 import subprocess
-import sys
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
@@ -14,6 +13,7 @@ from typing import IO
 
 from throwcollect.errors import DatasetError, WorkerError
 from throwcollect.interruption import die_with_parent
+from throwcollect.own_process import make_command
 from throwcollect.trial.choice import choose_trials
 from throwcollect.wording import format_count
 
@@ -114,10 +114,12 @@ class _Process:
         # Files instead of pipes, because nobody reads while it works, and a full pipe would stop it.
         self._printed, self._said = TemporaryFile(), TemporaryFile()  # noqa: SIM115 - closed at its end
         self._process = subprocess.Popen(
-            [sys.executable, "-m", "throwcollect", "simulate", str(directory), *map(str, trials)],
+            [*make_command(), "simulate", str(directory), *map(str, trials)],
             stdin=subprocess.DEVNULL,
             stdout=self._printed,
             stderr=self._said,
+            # Ctrl-C is for this process alone, which ends that one.
+            start_new_session=True,
             preexec_fn=partial(die_with_parent, os.getpid()),  # noqa: PLW1509 - it calls nothing that takes a lock
         )
 

@@ -97,7 +97,7 @@ def begin_run(
     if kind == "session":
         _check_session(read)
     opened = Records().new(read.name, run=run)
-    directory = opened.directory / "data" if kind == "session" else output.absolute()
+    directory = opened.directory / "data" if kind == "session" else Path(os.path.realpath(output))
     record = replace(
         _make_record(opened, read.name, directory, kind, origin),
         domain_id=read.run.domain_id,

@@ -279,7 +279,7 @@ def _record(run: OpenRun, request: Request, choice: Choice, directory: Path, vol
         run=run.run,
         name=request.config.name,
         runtime=choice.name,
-        directory=str(directory.absolute()),
+        directory=os.path.realpath(directory),
         volume=volume,
         logs=str((run.directory if volume else directory).absolute() / "logs"),
         domain_id=request.config.run.domain_id,

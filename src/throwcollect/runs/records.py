@@ -18,7 +18,6 @@ import os
 import secrets
 import shutil
 import subprocess
-import sys
 import time
 from collections.abc import Iterable
 from contextlib import ExitStack, suppress
@@ -32,6 +31,7 @@ from pydantic_core import to_json
 
 from throwcollect.errors import ConfigError, ConflictError, NotFoundError
 from throwcollect.files import beside, open_log, write_all
+from throwcollect.own_process import make_command
 from throwcollect.ros.connection import Connection
 from throwcollect.run_key import RunKey
 from throwcollect.runs.record import VERSION, Record
@@ -186,7 +186,7 @@ class OpenRun:
         Raises:
             OSError: If the process cannot be started.
         """
-        words = [sys.executable, "-m", "throwcollect", command, self.run, "--lock", str(self.lock)]
+        words = [*make_command(), command, self.run, "--lock", str(self.lock)]
         with open(open_log(NodeLogs(logs).path(LAUNCHER)), "ab") as log:
             return subprocess.Popen(
                 words, stdin=stdin, stdout=log, stderr=subprocess.STDOUT, start_new_session=True, pass_fds=[self.lock]
@@ -306,11 +306,17 @@ class Records:
 
     def into(self, directory: Path) -> list[Run]:
         """Runs that collect, or have collected, into a directory and no volume; the latest last."""
-        name = str(directory.absolute())
+        # Records have the real path; those of earlier versions the path as it was given.
+        names = {os.path.realpath(directory), str(directory.absolute())}
         # There may be thousands of records, so only those are parsed that hold the directory's name.
-        written = to_json(name)
-        runs = self._read_all(run for run in self.ids() if written in _read_bytes(self._runs / f"{run}.json"))
-        return [run for run in runs if run.record.volume is None and run.record.directory == name]
+        written = [to_json(name) for name in names]
+
+        def names_it(run: str) -> bool:
+            text = _read_bytes(self._runs / f"{run}.json")
+            return any(name in text for name in written)
+
+        runs = self._read_all(filter(names_it, self.ids()))
+        return [run for run in runs if run.record.volume is None and run.record.directory in names]
 
     def _read_all(self, ids: Iterable[str]) -> list[Run]:
         """Those of the runs whose records can be read, the latest last."""

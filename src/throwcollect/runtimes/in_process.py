@@ -81,9 +81,17 @@ class InProcess:
             if not collection.complete:
                 message = f"interrupted; finished throws are in {directory}, the dataset is not complete"
                 raise Interrupted(message, hint=self._place.way_on)
+
+            def wait() -> None:
+                """Wait for the trials that are simulated again; who asks twice to stop does not wait."""
+                if session.interruptions() > 1:
+                    message = f"interrupted; the throws are in {directory}, the dataset is not finished"
+                    raise Interrupted(message, hint=self._place.way_on)
+                time.sleep(_IDLE_S)
+
             # The dataset is finished even if trials are lost; the launcher reports the loss from the summary.
             with suppress(LossError):
-                collection.finish(meanwhile=lambda: time.sleep(_IDLE_S), say=session.say)
+                collection.finish(meanwhile=wait, say=session.say)
         return info(directory)
 
     def _simulate(self, collection: TrialCollection, simulation: Replayer, session: Session) -> None:

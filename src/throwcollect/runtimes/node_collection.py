@@ -98,7 +98,7 @@ class NodeCollection:
         self._apart_since = math.inf
         self._started_again = False
         self._supervisor = Supervisor(host, host.config.run, roster(host, self._simulations))
-        self._listener = RunListener(self._report, name=LAUNCHER, on_connect=self._offer)
+        self._listener = RunListener(self._report, name=LAUNCHER, reports=host.place.collects, on_connect=self._offer)
 
     def run_to_the_end(self) -> Info | None:
         """See `runtime.Host.collect`."""

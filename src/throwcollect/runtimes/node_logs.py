@@ -32,6 +32,11 @@ class NodeLogs:
         """Leave what is in the files by now out of `tail` and `said_ready`: nodes of an earlier run printed it."""
         self._earlier_bytes = {name: path.stat().st_size for name, path in self.files().items() if path.is_file()}
 
+    def skip(self, name: str) -> None:
+        """Leave what a node has printed so far out as well: another one of the same name may come."""
+        if (path := self.path(name)).is_file():
+            self._earlier_bytes[name] = path.stat().st_size
+
     def path(self, name: str) -> Path:
         """Log file of a node."""
         return self._directory / f"{name}.log"

@@ -32,6 +32,7 @@ from throwcollect.config.schema import Config
 from throwcollect.errors import ThrowcollectError
 from throwcollect.interruption import die_with_parent, leave_when_stopped, stop_signals
 from throwcollect.members import load_member
+from throwcollect.own_process import make_command
 from throwcollect.ros.middleware import Middleware
 from throwcollect.runtimes.forked_process import ForkedProcess
 
@@ -187,7 +188,7 @@ class NodeServer:
 
     def _start_program(self, log: BinaryIO, connection: socket.socket) -> subprocess.Popen[bytes]:
         return subprocess.Popen(
-            [sys.executable, "-m", "throwcollect.runtimes.node_server", str(connection.fileno())],
+            [*make_command("throwcollect.runtimes.node_server"), str(connection.fileno())],
             stdin=subprocess.DEVNULL,
             stdout=log,
             stderr=subprocess.STDOUT,

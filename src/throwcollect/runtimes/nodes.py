@@ -167,6 +167,10 @@ class NodeHost(ABC):
         """Whether a simulation has ever been ready for trials."""
         return self.logs.said_ready(name)
 
+    def forget_readiness(self, name: str) -> None:
+        """Take note that a node is gone for good, so that another one of its name counts as not ready yet."""
+        self.logs.skip(name)
+
     def log_tail(self, name: str) -> str:
         """Last lines that a node printed."""
         return self.logs.tail(name)

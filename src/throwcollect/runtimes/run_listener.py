@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable
 from types import TracebackType
@@ -27,6 +28,7 @@ class RunListener:
     Args:
         on_progress: Is called with every report, within `spin`.
         name: Name of the node; by default a unique and hidden one.
+        reports: Whether the run has a coordinator, which reports.
         on_connect: Is called with the node whenever that is made anew.
     """
 
@@ -35,10 +37,12 @@ class RunListener:
         on_progress: Callable[[Progress], None],
         *,
         name: str | None = None,
+        reports: bool = True,
         on_connect: Callable[[ros.Node], None] = lambda _: None,
     ) -> None:
         self._on_progress = on_progress
         self._name = name or make_own_name()
+        self._silent_s = _SILENT_S if reports else math.inf
         self._on_connect = on_connect
         self._node: ros.Node | None = None
         self._connection: Connection | None = None
@@ -65,7 +69,7 @@ class RunListener:
         Raises:
             ConfigError: If the key of the run cannot be read.
         """
-        elsewhere = connection != self._connection or time.monotonic() > self._heard_at + _SILENT_S
+        elsewhere = connection != self._connection or time.monotonic() > self._heard_at + self._silent_s
         if connection is not None and elsewhere and answers(connection.endpoint):
             self.__exit__(None, None, None)
             self._connect(connection)

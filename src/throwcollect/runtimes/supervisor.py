@@ -77,6 +77,8 @@ class Supervisor:
                 memory.pop(name, None)
             self._ready.discard(name)
         self.host.stop(removed)
+        for name in removed:
+            self.host.forget_readiness(name)
         # Where no simulation that was ready is left, the deadline of an earlier start would be over at once.
         if not self._ready:
             self._start_deadline = time.monotonic() + self._run.start_timeout_s

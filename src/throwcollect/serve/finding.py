@@ -8,7 +8,6 @@ import json
 import os
 import ssl
 import subprocess
-import sys
 import threading
 import time
 from collections.abc import Iterator
@@ -22,6 +21,7 @@ from pydantic import TypeAdapter
 
 from throwcollect.errors import DatasetError, WorkerError
 from throwcollect.files import open_log, write_secret
+from throwcollect.own_process import make_command
 from throwcollect.runs.state_directory import is_locked, state_directory
 
 _FILE = "serve.json"
@@ -143,7 +143,7 @@ def ensure_server() -> Address:
     if (address := find_server()) is not None:
         return address
     log = log_path()
-    words = [sys.executable, "-m", "throwcollect", "serve", "--json"]
+    words = [*make_command(), "serve", "--json"]
     with open(open_log(log), "ab") as output:
         # Standard output has a one-time code, and the user may have allowed others to read the log.
         process = subprocess.Popen(

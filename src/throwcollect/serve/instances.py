@@ -6,6 +6,7 @@ import fcntl
 import json
 import os
 import re
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
@@ -36,6 +37,9 @@ _KEPT = ("run", "containers", "cluster", "sweep.file")
 """Keys of a configuration that only the operator sets, because they name files and resources of this machine."""
 _KEY = r"[A-Za-z0-9_-]+(\.[A-Za-z0-9_-]+)*"
 _LOCK = "instances.lock"
+_LOOK_S = 0.02
+_HEEDED_S = 2.0
+"""Longest wait until a launcher has written that it is stopping."""
 
 
 @dataclass(frozen=True)
@@ -127,6 +131,9 @@ class Instances:
         origin = run.record.origin
         with _one_at_a_time():
             check_resumption(run.now())
+            for other in Records().into(run.place.directory):
+                if other.status == "running":
+                    raise ConflictError(f"run {other.id} collects into the dataset of run {run.id}")
             if origin is not None and origin.component in self.catalogue.components:
                 _check_room(self.catalogue.get(origin.component))
             config = config_path(run.place.directory)
@@ -146,7 +153,8 @@ class Instances:
         if force:
             control.down(run)
         elif not (run.lives and run.record.stopping):
-            control.stop(run, keep_on=lambda: False)
+            with _one_at_a_time():
+                _stop_once(run)
 
     def stop_all(self) -> list[str]:
         """Ask all living runs that clients have begun to finish their running trials and end; returns their ids.
@@ -201,6 +209,24 @@ class Instances:
         for result in control.set_parameter(run, nodes, "robot_description", urdf or own):
             if not result.successful:
                 raise ConflictError(f"run {run.id}: {result.reason}")
+
+
+def _stop_once(run: Run) -> None:
+    """Ask a run to stop, unless somebody has just done so: a second signal would hurry it.
+
+    The launcher writes that it is stopping when its loop sees the signal, so this waits for that, for a while.
+
+    Raises:
+        ConflictError: If it has ended.
+        WorkerError: If its launcher died.
+    """
+    now = run.now()
+    if not (now.lives and now.record.stopping):
+        control.stop(now, keep_on=lambda: False)
+    deadline = time.monotonic() + _HEEDED_S
+    while now.lives and not now.record.stopping and time.monotonic() < deadline:
+        time.sleep(_LOOK_S)
+        now = run.now()
 
 
 def _refuse_taken(directory: Path) -> None:

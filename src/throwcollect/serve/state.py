@@ -147,6 +147,8 @@ class Lookout:
         records = Records()
         known, ended = self._ended, {}
         instances = []
+        collecting: set[str] = set()
+        resumable: dict[str, str] = {}
         for name in records.ids():
             written = name, records.read_change_ns(name)
             if written in known:
@@ -161,9 +163,18 @@ class Lookout:
                     continue
                 instance = describe(run)
             instances.append(instance)
+            if run.status == "running":
+                collecting.add(run.record.directory)
+            if instance.can_be_resumed:
+                resumable[instance.id] = run.record.directory
             if instance.status == "ended":
                 ended[written] = run, instance
         self._ended = ended
+        instances = [
+            # Another run may be going on with the dataset of one that is over.
+            replace(each, can_be_resumed=False) if resumable.get(each.id) in collecting else each
+            for each in instances
+        ]
         return sorted(instances, key=lambda each: each.started, reverse=True)
 
 

@@ -1,6 +1,7 @@
 """Trials that are simulated again in a fresh process, which may be begun before it is known which ones are compared."""
 
 import json
+import os
 import subprocess
 import time
 from collections.abc import Iterator
@@ -115,6 +116,20 @@ def test_nothing_is_left_of_a_check_that_is_given_up(check, monkeypatch) -> None
     check.begin(NUMBERS)
     check.close()
     assert begun[0].poll() is not None
+
+
+def test_ctrl_c_does_not_reach_the_process(check, digests, monkeypatch) -> None:
+    sessions: list[int] = []
+    popen = subprocess.Popen
+
+    def note(*arguments: object, **kwargs: object) -> object:
+        process = popen(*arguments, **kwargs)
+        sessions.append(os.getsid(process.pid))
+        return process
+
+    monkeypatch.setattr(replay_check.subprocess, "Popen", note)
+    assert compare(check, digests) is not None
+    assert sessions != [os.getsid(0)]
 
 
 def test_without_trials_there_is_nothing_to_do(tmp_path, started) -> None:

@@ -178,6 +178,22 @@ def test_the_lock_of_a_run_that_was_just_forgotten_counts_for_nothing(
     second.close()
 
 
+def test_runs_are_found_by_any_spelling_of_their_directory(
+    state: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "data").mkdir()
+    (tmp_path / "configs").mkdir()
+    (tmp_path / "link").symlink_to("data")
+    records = Records()
+    run = records.new("small")
+    run.write(record(run, directory=str(tmp_path / "data")))
+    run.close()
+    monkeypatch.chdir(tmp_path / "configs")
+    for spelling in (tmp_path / "data", Path("../data"), tmp_path / "link", Path("../configs/../link")):
+        assert [found.id for found in records.into(spelling)] == [run.run]
+    assert records.into(tmp_path / "configs") == []
+
+
 def test_what_is_forgotten_leaves_no_file_but_datasets(state: Path, tmp_path: Path) -> None:
     (tmp_path / "data").mkdir()
     records = Records()

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import json
 import os
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from throwcollect import load, runs
+from throwcollect.coordinator import replay_check
 from throwcollect.coordinator.progress import Progress
 from throwcollect.dataset.inspect import digest, info
 from throwcollect.errors import ConfigError, Interrupted, WorkerError
@@ -107,6 +109,20 @@ def test_what_is_interrupted_goes_on_later_to_the_same_dataset(yaml: Path) -> No
     (yaml.parent / "other" / "small.yaml").write_text(YAML)
     assert collect(yaml.parent / "other" / "small.yaml").digest == summary.digest
     assert runs.resume(yaml.parent / "data") is None
+
+
+def test_who_asks_twice_to_stop_does_not_wait_for_trials_that_are_simulated_again(
+    yaml: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked = [0]
+
+    class Ended(Onlooker):
+        def update(self, progress: Progress) -> None:
+            asked[0] = 2 * (progress.ended == progress.total)
+
+    monkeypatch.setattr(replay_check, "make_command", lambda: [sys.executable, "-c", "import time; time.sleep(60)"])
+    with pytest.raises(Interrupted, match=r"the throws are in .*, the dataset is not finished"):
+        collect(yaml, "run.replay=1", onlooker=Ended(), interruptions=lambda: asked[0])
 
 
 def test_a_plan_grows_with_what_came_of_it(yaml: Path) -> None:

@@ -18,7 +18,7 @@ def test_nodes_that_are_started_again_have_as_much_time_to_meet_as_before(monkey
     monkeypatch.setattr(node_collection, "Supervisor", Mock())
     monkeypatch.setattr(node_collection, "RunListener", Mock())
     monkeypatch.setattr(node_collection, "roster", Mock())
-    place = SimpleNamespace(simulations=1, middleware=SimpleNamespace(rmw="rmw_fastrtps_cpp"))
+    place = SimpleNamespace(simulations=1, collects=True, middleware=SimpleNamespace(rmw="rmw_fastrtps_cpp"))
     host = SimpleNamespace(place=place, config=SimpleNamespace(run=None), endpoint=None)
     session = Mock()
     collection = NodeCollection(host, session)

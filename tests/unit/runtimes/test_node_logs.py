@@ -30,6 +30,17 @@ def test_what_an_earlier_run_printed_is_left_out(tmp_path: Path) -> None:
     assert NodeLogs(tmp_path).tail("sim_0").splitlines()[1] == "größer"
 
 
+def test_what_a_node_printed_that_was_scaled_away_is_left_out(tmp_path: Path) -> None:
+    logs = NodeLogs(tmp_path)
+    for name in ("sim_0", "sim_1"):
+        append(logs.path(name), f"{ready_line(name)}\n".encode())
+    logs.skip("sim_1")
+    logs.skip("sim_2")
+    assert [logs.said_ready(name) for name in ("sim_0", "sim_1", "sim_2")] == [True, False, False]
+    append(logs.path("sim_1"), f"{ready_line('sim_1')}\n".encode())
+    assert logs.said_ready("sim_1")
+
+
 def test_a_node_without_a_log_has_said_nothing(tmp_path: Path) -> None:
     assert NodeLogs(tmp_path / "none").tail("sim_0") == ""
 

@@ -12,6 +12,7 @@ from throwcollect.ros.connection import Connection
 from throwcollect.ros.msg import String
 from throwcollect.ros.router import router
 from throwcollect.run_key import RunKey
+from throwcollect.runtimes import run_listener
 from throwcollect.runtimes.run_listener import RunListener
 
 PATIENCE_S = 20.0
@@ -56,3 +57,15 @@ def test_one_process_listens_to_two_runs_at_once(endpoints: list[str], key: RunK
                 listener.spin(Connection(endpoint, key), 0.05)
     assert [set(each) for each in heard] == [{1}, {2}]
     assert dict(os.environ) == before
+
+
+@pytest.mark.parametrize(("reports", "times"), [(False, 1), (True, 2)])
+def test_silence_is_no_reason_to_connect_anew_where_nobody_reports(
+    endpoints: list[str], key: RunKey, monkeypatch: pytest.MonkeyPatch, *, reports: bool, times: int
+) -> None:
+    monkeypatch.setattr(run_listener, "_SILENT_S", -1.0)
+    connected: list[Node] = []
+    with RunListener(lambda _: None, reports=reports, on_connect=connected.append) as listener:
+        for _ in range(2):
+            listener.spin(Connection(endpoints[0], key), 0.05)
+    assert len(connected) == times

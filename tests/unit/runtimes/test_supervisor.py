@@ -78,6 +78,9 @@ class FakeRuntime(NodeHost):
     def ready(self, name: str) -> bool:
         return name in self.ready_ones
 
+    def forget_readiness(self, name: str) -> None:
+        self.ready_ones.discard(name)
+
     def log_tail(self, name: str) -> str:
         return f"log of {name}"
 
@@ -352,7 +355,6 @@ def test_a_simulation_that_was_scaled_away_comes_back_with_a_clean_slate(runtime
     supervisor.poll()
     assert state(supervisor, "sim_1").status == "lost"
     supervisor.change(roster(runtime, 1))
-    runtime.ready_ones.discard("sim_1")
     supervisor.change(roster(runtime, 2))
     assert state(supervisor, "sim_1") == NodeState("sim_1", "starting", 0, "id of sim_1", None)
 
@@ -360,7 +362,6 @@ def test_a_simulation_that_was_scaled_away_comes_back_with_a_clean_slate(runtime
 def test_a_run_without_simulations_waits_for_some(runtime: FakeRuntime, clock: Clock) -> None:
     supervisor = supervise(runtime, start_timeout_s=7)
     supervisor.change(roster(runtime, 0))
-    runtime.ready_ones.clear()
     clock.now += 1000
     assert supervisor.poll() == (None, [])
     supervisor.change(roster(runtime, 1))

@@ -134,7 +134,7 @@ def test_what_keeps_a_server_from_starting_is_told(
     script = tmp_path / "python"
     script.write_text("#!/bin/sh\necho 'throwcollect: no such thing' >&2; exit 2\n")
     script.chmod(0o755)
-    monkeypatch.setattr(finding.sys, "executable", str(script))
+    monkeypatch.setattr(sys, "executable", str(script))
     with pytest.raises(WorkerError, match="no server starts") as error:
         ensure_server()
     assert error.value.evidence == "throwcollect: no such thing"

@@ -6,6 +6,7 @@ import hashlib
 import json
 import re
 import shutil
+import threading
 from pathlib import Path
 from typing import Any
 
@@ -93,6 +94,24 @@ def test_a_resumed_collection_counts(client: TestClient, remember: Remember, tmp
     assert [resume(name) for name in ("nobody", "none", "session", "resumed-1")] == [404, 409, 409, 409]
     assert put(client, "a").status_code == 202
     assert resume("old") == 409
+
+
+def test_a_dataset_that_another_run_goes_on_with_is_not_resumed(
+    client: TestClient, remember: Remember, tmp_path: Path
+) -> None:
+    def told() -> bool:
+        listed = client.get("/api/v1/state").json()["instances"]
+        return {each["id"]: each["can_be_resumed"] for each in listed}["old"]
+
+    directory = tmp_path / "datasets" / "old"
+    directory.mkdir(parents=True)
+    (directory / "config.yaml").write_text("name: small\n")
+    remember("old", **ended(origin=Origin("throws"), exit_code=130))
+    assert told()
+    remember("again", directory=str(directory))
+    assert not told()
+    said = client.post("/api/v1/collections/old/resume")
+    assert (said.status_code, said.json()["title"]) == (409, "run again collects into the dataset of run old")
 
 
 def test_a_complete_collection_is_not_resumed(
@@ -334,10 +353,15 @@ def test_a_run_that_is_stopping_is_not_told_again(
     client: TestClient, remember: Remember, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     told: list[str] = []
-    monkeypatch.setattr(instances_module.control, "stop", lambda run, **_: told.append(run.id))
-    remember("a")
-    remember("b", stopping=True)
-    assert [client.delete(f"{URL}/{name}").status_code for name in ("a", "b")] == [202, 202]
+    running = {"a": remember("a"), "b": remember("b", stopping=True)}
+
+    def stop(run: Run, **_: Any) -> None:
+        told.append(run.id)
+        # A launcher sees the signal a little later.
+        threading.Timer(0.1, lambda: running[run.id].update(stopping=True)).start()
+
+    monkeypatch.setattr(instances_module.control, "stop", stop)
+    assert [client.delete(f"{URL}/{name}").status_code for name in ("a", "a", "b")] == [202, 202, 202]
     assert told == ["a"]
     assert client.get(f"{URL}/b").json()["stopping"] is True
 
@@ -347,6 +371,7 @@ def test_all_that_clients_have_begun_are_stopped_and_nothing_else(
 ) -> None:
     told: list[str] = []
     monkeypatch.setattr(instances_module.control, "stop", lambda run, **_: told.append(run.id))
+    monkeypatch.setattr(instances_module, "_HEEDED_S", 0.0)
     remember("begun", origin=Origin("throws"))
     remember("over", origin=Origin("throws"), **ended())
     remember("of-a-command")
