@@ -83,7 +83,11 @@ class InProcess:
                 raise Interrupted(message, hint=self._place.way_on)
 
             def wait() -> None:
-                """Wait for the trials that are simulated again; who asks twice to stop does not wait."""
+                """Wait for the trials that are simulated again, for a moment.
+
+                Raises:
+                    Interrupted: If somebody has asked twice to stop.
+                """
                 if session.interruptions() > 1:
                     message = f"interrupted; the throws are in {directory}, the dataset is not finished"
                     raise Interrupted(message, hint=self._place.way_on)

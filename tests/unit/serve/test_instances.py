@@ -100,8 +100,7 @@ def test_a_dataset_that_another_run_goes_on_with_is_not_resumed(
     client: TestClient, remember: Remember, tmp_path: Path
 ) -> None:
     def told() -> bool:
-        listed = client.get("/api/v1/state").json()["instances"]
-        return {each["id"]: each["can_be_resumed"] for each in listed}["old"]
+        return {each["id"]: each for each in client.get("/api/v1/state").json()["instances"]}["old"]["can_be_resumed"]
 
     directory = tmp_path / "datasets" / "old"
     directory.mkdir(parents=True)
