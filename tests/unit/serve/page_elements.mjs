@@ -1,0 +1,126 @@
+// What the parts of the page that have elements do, without a browser. `node --test` runs it; the page's directory is in PAGE.
+
+import assert from "node:assert/strict";
+import { test } from "node:test";
+import { pathToFileURL } from "node:url";
+
+/** Something that keeps what is set; whatever else is asked of it does nothing. */
+const makeFake = (known) => new Proxy(known, { get: (own, name) => (name in own ? own[name] : () => {}) });
+
+/** @type {number[][]} x, y and radius of each arc that was drawn */
+const arcs = [];
+const pen = makeFake({ arc: (x, y, radius) => arcs.push([x, y, radius]), measureText: () => ({ width: 10 }) });
+
+class HTMLElement {}
+
+function makeElement() {
+  const acts = new Map();
+  return makeFake(Object.assign(new HTMLElement(), {
+    style: makeFake({}),
+    classList: { contains: () => false, add() {}, remove() {} },
+    clientWidth: 0,
+    clientHeight: 0,
+    textContent: "",
+    addEventListener: (name, act) => acts.set(name, act),
+    click: () => acts.get("click")(),
+    append(...parts) {
+      this.textContent += parts.map((part) => part?.textContent ?? part).join("");
+    },
+    replaceChildren(...parts) {
+      this.textContent = parts.map((part) => part.textContent).join(", ");
+    },
+    getContext: () => pen,
+    getBoundingClientRect: () => ({ left: 0, top: 0, width: 0, height: 0 }),
+  }));
+}
+
+const named = new Map();
+/** @type {any[]} all elements that were made, in their order */
+const made = [];
+const get = (id) => named.get(id) ?? named.set(id, makeElement()).get(id);
+const createElement = (tag) => Object.assign(made[made.push(makeElement()) - 1], { tag });
+const link = { nodeName: "link", children: [], getAttribute: () => "base" };
+const description = { nodeName: "robot", children: [link], getAttribute: () => "robot", querySelector: () => null };
+
+// Newer versions of node have their own, which cannot be set.
+globalThis.navigator ??= { language: "en" };
+Object.assign(globalThis, {
+  window: globalThis,
+  document: makeFake({ hidden: false, getElementById: get, createElement }),
+  addEventListener() {},
+  dispatchEvent() {},
+  CustomEvent: Event,
+  devicePixelRatio: 1,
+  matchMedia: () => makeElement(),
+  getComputedStyle: () => makeFake({ color: "black", getPropertyValue: () => "grey" }),
+  ResizeObserver: class {
+    observe() {}
+  },
+  Path2D: class {
+    constructor() {
+      return makeFake({});
+    }
+  },
+  Document: class {},
+  Element: class {},
+  HTMLElement,
+  DOMParser: class {
+    parseFromString() {
+      return { children: [description] };
+    }
+  },
+});
+
+const load = (name) => import(pathToFileURL(`${process.env.PAGE}/${name}`));
+const { Watching } = await load("watching.js");
+const { LandingMap } = await load("landing_map.js");
+const { PlotPanel } = await load("plot_panel.js");
+
+/** Let everything that waits for nothing but its turn have it. */
+const settle = () => new Promise((resolve) => setTimeout(resolve, 5));
+
+/** A view of one run, whose server lacks some answers. */
+function watch(lacks) {
+  const asked = [];
+  const connection = {
+    open: () => ({ close() {} }),
+    ask: async (_method, path) => {
+      const what = path.split("/").at(-1);
+      asked.push(what);
+      if (lacks.has(what)) throw new Error(`no ${what} for a moment`);
+      return { json: async () => ({ base_height_m: 1, target_distance_m: null }), text: async () => "<robot/>" };
+    },
+  };
+  const station = { robot: null, setRobot: (robot) => Object.assign(station, { robot }) };
+  const view = makeFake({ stations: new Map([["sim_0", station]]), shown: ["sim_0"] });
+  const note = { text: "" };
+  const tell = (text) => Object.assign(note, { text });
+  const watching = new Watching({ connection, view, playback: makeFake({}), map: makeFake({}), meshes: null, tell });
+  const instance = { id: "run", kind: "collection", status: "running", robots: ["sim_0"] };
+  const put = async () => {
+    watching.put(instance);
+    await settle();
+  };
+  return { watching, station, note, put, asked: () => asked.splice(0) };
+}
+
+test("a description that could not be had is asked for again with the next state", async () => {
+  for (const what of ["scene", "urdf"]) {
+    const lacks = new Set([what]);
+    const { watching, station, note, put, asked } = watch(lacks);
+    await put();
+    assert.equal(station.robot, null);
+    assert.equal(note.text, `no ${what} for a moment`);
+    assert.deepEqual(asked(), ["scene", "urdf"]);
+    lacks.clear();
+    await put();
+    assert.equal(station.robot?.urdf, "<robot/>", `without ${what} at first`);
+    assert.equal(note.text, "");
+    assert.deepEqual(asked(), ["scene", "urdf"]);
+    await put();
+    assert.deepEqual(asked(), []);
+    // What comes by rosbridge is drawn from now on.
+    watching.describe("sim_0", "<robot>other</robot>");
+    assert.equal(station.robot.urdf, "<robot>other</robot>");
+  }
+});
