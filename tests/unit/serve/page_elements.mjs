@@ -124,3 +124,42 @@ test("a description that could not be had is asked for again with the next state
     assert.equal(station.robot.urdf, "<robot>other</robot>");
   }
 });
+
+/** How many landings are drawn of each third of the ground before the robot, up to the farthest. */
+function countThirds(map, farthest) {
+  arcs.length = 0;
+  const { centre, scale } = map.paint(makeElement(), 300, 600, 1);
+  const dots = arcs.filter(([, , radius]) => radius === 2.5).map(([, y]) => centre[0] - (y - 300) / scale);
+  return [0, 1, 2].map((third) => dots.filter((x) => Math.min(2, Math.floor((x / farthest) * 3 + 1e-9)) === third).length);
+}
+
+test("of many landings of a collection that goes on, those that are drawn are evenly chosen", () => {
+  const map = new LandingMap(() => {});
+  // Every landing is a millimetre farther than the one before; every fourth ball is dropped.
+  const throws = Array.from({ length: 80_000 }, (_, i) => (i % 4 ? [i / 1000, 0, "landed", i] : [null, null, "dropped", i]));
+  for (let i = 0; i < throws.length; i += 7000) map.addAll(throws.slice(i, i + 7000));
+  const thirds = countThirds(map, 80);
+  assert.equal(thirds.reduce((sum, count) => sum + count), 15_000);
+  thirds.forEach((count) => assert.ok(Math.abs(count - 5000) < 5, `${thirds} are not even`));
+  assert.match(get("map-text").textContent, /^15000 of 60000 landings so far: 0\.00 to 80\.00 m before the robot, /);
+  assert.equal(get("legend").textContent, "landed 60000, dropped 20000");
+  map.add({ trial: 0, outcome: "dropped", landing: null });
+  assert.equal(get("legend").textContent, "landed 60000, dropped 20000");
+  map.clear();
+  assert.equal(get("legend").textContent, "");
+  map.addAll(throws.slice(0, 12));
+  assert.match(get("map-text").textContent, /^9 landings so far: /);
+  assert.equal(countThirds(map, 0.012).reduce((sum, count) => sum + count), 9);
+  map.put(throws.slice(1, 3), 4);
+  assert.match(get("map-text").textContent, /^2 of 4 landings of all throws: /);
+  assert.equal(get("legend").textContent, "landed 2");
+});
+
+test("a landing among very many throws that have none is drawn", () => {
+  const map = new LandingMap(() => {});
+  map.addAll(Array.from({ length: 30_000 }, (_, i) => [null, null, "dropped", i]));
+  assert.equal(get("map-text").textContent, "None of these throws has landed.");
+  map.addAll([[1, 0, "landed", 30_001]]);
+  assert.match(get("map-text").textContent, /^1 landings so far: 1\.00 to 1\.00 m/);
+  assert.equal(get("legend").textContent, "dropped 30000, landed 1");
+});
