@@ -163,3 +163,30 @@ test("a landing among very many throws that have none is drawn", () => {
   assert.match(get("map-text").textContent, /^1 landings so far: 1\.00 to 1\.00 m/);
   assert.equal(get("legend").textContent, "dropped 30000, landed 1");
 });
+
+test("a zoom of the last seconds ends with them, and one of replays stays from throw to throw", async () => {
+  const panel = new PlotPanel({ simulation: "sim_0", field: "ball", name: "z", link: "hand" }, false, () => {});
+  const zoomIn = made.find(({ textContent }) => textContent === "+");
+  const makeThrow = (trial) => ({
+    trial, simulation: "sim_0", joints: [], samples: 201, rate_hz: 100, duration: 2, positions: new Float32Array(), ball: new Float32Array(603),
+  });
+  /** Where the middle of a replay is in the plot, and how far it is from there to its end. */
+  const measure = async (shown) => {
+    const at = [];
+    for (const time of [1, 2]) {
+      panel.draw({ shown, time }, null);
+      await settle();
+      at.push(panel.picture.at);
+    }
+    return [at[0], at[1] - at[0]];
+  };
+  const [middle, half] = await measure(makeThrow(1));
+  assert.ok(half > 10);
+  panel.draw(undefined, [{ time: 1, ball: [0, 0, 1] }, { time: 2, ball: [0, 0, 2] }]);
+  await settle();
+  zoomIn.click();
+  assert.deepEqual(await measure(makeThrow(2)), [middle, half]);
+  zoomIn.click();
+  await settle();
+  assert.deepEqual(await measure(makeThrow(3)), [middle, 2 * half]);
+});
