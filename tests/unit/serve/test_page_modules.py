@@ -1,4 +1,4 @@
-"""What modules of the page compute: messages of the server, replays, meshes with fewer triangles."""
+"""What modules of the page compute and show: messages of the server, replays, coarse meshes, landings, plots."""
 
 from __future__ import annotations
 
@@ -26,7 +26,8 @@ def test_modules_can_be_parsed(path: Path) -> None:
     assert done.returncode == 0, done.stderr.decode()
 
 
-def test_modules_compute_what_they_should(tmp_path: Path) -> None:
+@pytest.mark.parametrize("script", ["page_modules.mjs", "page_elements.mjs"])
+def test_modules_do_what_they_should(tmp_path: Path, script: str) -> None:
     if (node := shutil.which("node")) is None:
         pytest.skip("needs node, which runs modules of the page without a browser")
     header = {"trial": 7, "outcome": "landed", "joints": ["elbow", "wrist"], "samples": 3, "rate_hz": 100.0}
@@ -43,8 +44,6 @@ def test_modules_compute_what_they_should(tmp_path: Path) -> None:
         "THROW": str(tmp_path / "throw"),
         "NODE_OPTIONS": "",
     }
-    script = Path(__file__).with_name("page_modules.mjs")
-    done = subprocess.run(
-        [node, "--test", script], env=environment, capture_output=True, text=True, timeout=60, check=False
-    )
+    command = [node, "--test", Path(__file__).with_name(script)]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=60, check=False)
     assert done.returncode == 0, done.stdout + done.stderr

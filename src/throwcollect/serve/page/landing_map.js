@@ -6,7 +6,7 @@ import { TARGET_COLOR, colorOf } from "./outcomes.js";
 
 const DOT_PX = 2.5;
 const MARGIN_PX = 26;
-/** Most landings that are kept; beyond that, every second one is dropped. */
+/** Most landings that are drawn; beyond that, every second one is dropped, and of those to come as many are left out. */
 const MOST = 20000;
 
 const SHOWN = "of throws that were shown";
@@ -17,9 +17,13 @@ const ALL = "of all throws";
 
 /** Draws landings into the canvas of the page. */
 export class LandingMap {
-  /** @type {Landing[]} */
+  /** @type {Landing[]} those that are drawn; each has a place */
   #landings = [];
   #trials = new Set();
+  /** @type {Map<string, number>} how many throws ended with each outcome, drawn or not; of a finished dataset, those that came */
+  #outcomes = new Map();
+  /** One of so many landings is drawn. */
+  #stride = 1;
   /** Which landings there are, in words. */
   #which = SHOWN;
   /** How many landings there are; those that are drawn are evenly chosen from them. */
@@ -58,8 +62,11 @@ export class LandingMap {
    */
   put(landings, total) {
     this.#total = total;
+    this.#stride = 1;
     this.#which = ALL;
-    this.#landings = landings;
+    this.#landings = landings.filter(isPlaced);
+    this.#outcomes.clear();
+    for (const [, , outcome] of landings) this.#count(outcome);
     this.#tell();
     this.#draw();
   }
@@ -101,12 +108,21 @@ export class LandingMap {
   }
 
   #push(landing) {
-    const [x, , , trial] = landing;
+    const [, , outcome, trial] = landing;
     if (this.#trials.has(trial)) return;
     this.#trials.add(trial);
+    this.#count(outcome);
+    if (!isPlaced(landing)) return;
+    this.#total += 1;
+    if ((this.#total - 1) % this.#stride) return;
     this.#landings.push(landing);
-    if (x !== null) this.#total += 1;
-    if (this.#landings.length > MOST) this.#landings = this.#landings.filter((_, i) => i % 2 === 0);
+    if (this.#landings.length <= MOST) return;
+    this.#landings = this.#landings.filter((_, i) => i % 2 === 0);
+    this.#stride *= 2;
+  }
+
+  #count(outcome) {
+    this.#outcomes.set(outcome, (this.#outcomes.get(outcome) ?? 0) + 1);
   }
 
   /** @param {import("./throws.js").Throw | null} shown the throw to mark */
@@ -116,13 +132,11 @@ export class LandingMap {
   }
 
   #tell() {
-    const counts = new Map();
-    for (const [, , outcome] of this.#landings) counts.set(outcome, (counts.get(outcome) ?? 0) + 1);
-    const items = [...counts].sort(([, a], [, b]) => b - a).map(([outcome, count]) => legendItem(outcome, count));
+    const items = [...this.#outcomes].sort(([, a], [, b]) => b - a).map(([outcome, count]) => legendItem(outcome, count));
     get("legend").replaceChildren(...items);
-    const placed = this.#placed();
+    const placed = this.#landings;
     if (!placed.length) {
-      setText(get("map-text"), this.#landings.length ? "None of these throws has landed." : "Nothing has landed yet.");
+      setText(get("map-text"), this.#outcomes.size ? "None of these throws has landed." : "Nothing has landed yet.");
       return;
     }
     const [x0, x1] = range(placed.map(([x]) => x));
@@ -131,10 +145,6 @@ export class LandingMap {
     const text = `${count} landings ${this.#which}: ${x0.toFixed(2)} to ${x1.toFixed(2)} m before the robot, `
       + `${y0.toFixed(2)} to ${y1.toFixed(2)} m to its left.${this.#target ? " Aimed at: between the arcs." : ""}`;
     setText(get("map-text"), text);
-  }
-
-  #placed() {
-    return this.#landings.filter(([x, y]) => Number.isFinite(x) && Number.isFinite(y));
   }
 
   #draw() {
@@ -146,10 +156,9 @@ export class LandingMap {
 
   /** Scale and conversions between places on the ground and in a picture, in which x points up and y to the left. */
   #frame(width, height) {
-    const placed = this.#placed();
     const [chosenX, chosenY] = this.#chosen ?? [0, 0];
     // The robot is always in the picture.
-    const places = [...placed, ...(this.#model?.reached ?? [])];
+    const places = [...this.#landings, ...(this.#model?.reached ?? [])];
     const [x0, x1] = range([...places.map(([x]) => x), -0.2, 1, this.#target?.[1] ?? 1, chosenX]);
     const [y0, y1] = range([...places.map(([, y]) => y), -0.5, 0.5, chosenY]);
     const scale = Math.min((width - 2 * MARGIN_PX) / (y1 - y0), (height - 2 * MARGIN_PX) / (x1 - x0));
@@ -176,7 +185,7 @@ export class LandingMap {
     const pen = canvas.getContext("2d");
     pen.scale(ratio, ratio);
     const style = getComputedStyle(this.canvas);
-    const placed = this.#placed();
+    const placed = this.#landings;
     const { at, scale, centre } = this.#frame(width, height);
     drawGrid(pen, style, at, scale, { width, height });
     drawRobot(pen, style, at, scale);
@@ -211,6 +220,10 @@ export function legendItem(outcome, count) {
   const dot = make("span", { className: "dot", "aria-hidden": "true" });
   dot.style.background = colorOf(outcome);
   return make("li", {}, dot, `${outcome} ${count}`);
+}
+
+function isPlaced([x, y]) {
+  return Number.isFinite(x) && Number.isFinite(y);
 }
 
 function range(values) {

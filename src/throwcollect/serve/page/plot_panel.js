@@ -118,6 +118,7 @@ export class PlotPanel {
   #drawThrow({ shown, time }) {
     if (this.#shown !== shown) {
       this.#shown = shown;
+      if (this.#live) this.#zoomed = null;
       this.#live = false;
       const series = seriesOf(shown, this.choice.field, this.choice.name);
       this.#x = Float64Array.from({ length: series ? shown.samples : 0 }, (_, i) => i / shown.rate_hz);

@@ -12,6 +12,8 @@ export class Watching {
   #socket = null;
   #urdf = null;
   #scene = null;
+  /** Whether the last request for the description failed, and the view says so. */
+  #isMissed = false;
   /** @type {(simulation: string, urdf: string) => void} called with each description that is drawn */
   described = () => {};
 
@@ -97,6 +99,7 @@ export class Watching {
     this.id = id;
     this.#urdf = null;
     this.#scene = null;
+    this.#isMissed = false;
     this.#socket?.close();
     this.#socket = null;
     this.view.clear();
@@ -132,9 +135,14 @@ export class Watching {
       this.#urdf = "";
       const scene = await this.#ask(`${run}/scene`, (response) => response.json());
       const urdf = await this.#ask(`${run}/urdf`, (response) => response.text());
-      if (this.id === id && scene !== null) {
+      if (this.id !== id) return;
+      const isWhole = scene !== null && urdf !== null;
+      // The next state asks again for what the server has not given.
+      this.#urdf = isWhole ? urdf : null;
+      if (isWhole && this.#isMissed) this.tell("");
+      this.#isMissed = !isWhole;
+      if (scene !== null) {
         this.#scene = scene;
-        this.#urdf = urdf;
         this.map.aim(scene.target_distance_m);
         this.show(this.view.shown);
       }

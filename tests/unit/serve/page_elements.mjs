@@ -1,0 +1,192 @@
+// What the parts of the page that have elements do, without a browser. `node --test` runs it; the page's directory is in PAGE.
+
+import assert from "node:assert/strict";
+import { test } from "node:test";
+import { pathToFileURL } from "node:url";
+
+/** Something that keeps what is set; whatever else is asked of it does nothing. */
+const makeFake = (known) => new Proxy(known, { get: (own, name) => (name in own ? own[name] : () => {}) });
+
+/** @type {number[][]} x, y and radius of each arc that was drawn */
+const arcs = [];
+const pen = makeFake({ arc: (x, y, radius) => arcs.push([x, y, radius]), measureText: () => ({ width: 10 }) });
+
+class HTMLElement {}
+
+function makeElement() {
+  const acts = new Map();
+  return makeFake(Object.assign(new HTMLElement(), {
+    style: makeFake({}),
+    classList: { contains: () => false, add() {}, remove() {} },
+    clientWidth: 0,
+    clientHeight: 0,
+    textContent: "",
+    addEventListener: (name, act) => acts.set(name, act),
+    click: () => acts.get("click")(),
+    append(...parts) {
+      this.textContent += parts.map((part) => part?.textContent ?? part).join("");
+    },
+    replaceChildren(...parts) {
+      this.textContent = parts.map((part) => part.textContent).join(", ");
+    },
+    getContext: () => pen,
+    getBoundingClientRect: () => ({ left: 0, top: 0, width: 0, height: 0 }),
+  }));
+}
+
+const named = new Map();
+/** @type {any[]} all elements that were made, in their order */
+const made = [];
+const get = (id) => named.get(id) ?? named.set(id, makeElement()).get(id);
+const createElement = (tag) => Object.assign(made[made.push(makeElement()) - 1], { tag });
+const link = { nodeName: "link", children: [], getAttribute: () => "base" };
+const description = { nodeName: "robot", children: [link], getAttribute: () => "robot", querySelector: () => null };
+
+// Newer versions of node have their own, which cannot be set.
+globalThis.navigator ??= { language: "en" };
+Object.assign(globalThis, {
+  window: globalThis,
+  document: makeFake({ hidden: false, getElementById: get, createElement }),
+  addEventListener() {},
+  dispatchEvent() {},
+  CustomEvent: Event,
+  devicePixelRatio: 1,
+  matchMedia: () => makeElement(),
+  getComputedStyle: () => makeFake({ color: "black", getPropertyValue: () => "grey" }),
+  ResizeObserver: class {
+    observe() {}
+  },
+  Path2D: class {
+    constructor() {
+      return makeFake({});
+    }
+  },
+  Document: class {},
+  Element: class {},
+  HTMLElement,
+  DOMParser: class {
+    parseFromString() {
+      return { children: [description] };
+    }
+  },
+});
+
+const load = (name) => import(pathToFileURL(`${process.env.PAGE}/${name}`));
+const { Watching } = await load("watching.js");
+const { LandingMap } = await load("landing_map.js");
+const { PlotPanel } = await load("plot_panel.js");
+
+/** Let everything that waits for nothing but its turn have it. */
+const settle = () => new Promise((resolve) => setTimeout(resolve, 5));
+
+/** A view of one run, whose server lacks some answers. */
+function watch(lacks) {
+  const asked = [];
+  const connection = {
+    open: () => ({ close() {} }),
+    ask: async (_method, path) => {
+      const what = path.split("/").at(-1);
+      asked.push(what);
+      if (lacks.has(what)) throw new Error(`no ${what} for a moment`);
+      return { json: async () => ({ base_height_m: 1, target_distance_m: null }), text: async () => "<robot/>" };
+    },
+  };
+  const station = { robot: null, setRobot: (robot) => Object.assign(station, { robot }) };
+  const view = makeFake({ stations: new Map([["sim_0", station]]), shown: ["sim_0"] });
+  const note = { text: "" };
+  const tell = (text) => Object.assign(note, { text });
+  const watching = new Watching({ connection, view, playback: makeFake({}), map: makeFake({}), meshes: null, tell });
+  const instance = { id: "run", kind: "collection", status: "running", robots: ["sim_0"] };
+  const put = async () => {
+    watching.put(instance);
+    await settle();
+  };
+  return { watching, station, note, put, asked: () => asked.splice(0) };
+}
+
+test("a description that could not be had is asked for again with the next state", async () => {
+  for (const what of ["scene", "urdf"]) {
+    const lacks = new Set([what]);
+    const { watching, station, note, put, asked } = watch(lacks);
+    await put();
+    assert.equal(station.robot, null);
+    assert.equal(note.text, `no ${what} for a moment`);
+    assert.deepEqual(asked(), ["scene", "urdf"]);
+    lacks.clear();
+    await put();
+    assert.equal(station.robot?.urdf, "<robot/>", `without ${what} at first`);
+    assert.equal(note.text, "");
+    assert.deepEqual(asked(), ["scene", "urdf"]);
+    await put();
+    assert.deepEqual(asked(), []);
+    // What comes by rosbridge is drawn from now on.
+    watching.describe("sim_0", "<robot>other</robot>");
+    assert.equal(station.robot.urdf, "<robot>other</robot>");
+  }
+});
+
+/** How many landings are drawn of each third of the ground before the robot, up to the farthest. */
+function countThirds(map, farthest) {
+  arcs.length = 0;
+  const { centre, scale } = map.paint(makeElement(), 300, 600, 1);
+  const dots = arcs.filter(([, , radius]) => radius === 2.5).map(([, y]) => centre[0] - (y - 300) / scale);
+  return [0, 1, 2].map((third) => dots.filter((x) => Math.min(2, Math.floor((x / farthest) * 3 + 1e-9)) === third).length);
+}
+
+test("of many landings of a collection that goes on, those that are drawn are evenly chosen", () => {
+  const map = new LandingMap(() => {});
+  // Every landing is a millimetre farther than the one before; every fourth ball is dropped.
+  const throws = Array.from({ length: 80_000 }, (_, i) => (i % 4 ? [i / 1000, 0, "landed", i] : [null, null, "dropped", i]));
+  for (let i = 0; i < throws.length; i += 7000) map.addAll(throws.slice(i, i + 7000));
+  const thirds = countThirds(map, 80);
+  assert.equal(thirds.reduce((sum, count) => sum + count), 15_000);
+  thirds.forEach((count) => assert.ok(Math.abs(count - 5000) < 5, `${thirds} are not even`));
+  assert.match(get("map-text").textContent, /^15000 of 60000 landings so far: 0\.00 to 80\.00 m before the robot, /);
+  assert.equal(get("legend").textContent, "landed 60000, dropped 20000");
+  map.add({ trial: 0, outcome: "dropped", landing: null });
+  assert.equal(get("legend").textContent, "landed 60000, dropped 20000");
+  map.clear();
+  assert.equal(get("legend").textContent, "");
+  map.addAll(throws.slice(0, 12));
+  assert.match(get("map-text").textContent, /^9 landings so far: /);
+  assert.equal(countThirds(map, 0.012).reduce((sum, count) => sum + count), 9);
+  map.put(throws.slice(1, 3), 4);
+  assert.match(get("map-text").textContent, /^2 of 4 landings of all throws: /);
+  assert.equal(get("legend").textContent, "landed 2");
+});
+
+test("a landing among very many throws that have none is drawn", () => {
+  const map = new LandingMap(() => {});
+  map.addAll(Array.from({ length: 30_000 }, (_, i) => [null, null, "dropped", i]));
+  assert.equal(get("map-text").textContent, "None of these throws has landed.");
+  map.addAll([[1, 0, "landed", 30_001]]);
+  assert.match(get("map-text").textContent, /^1 landings so far: 1\.00 to 1\.00 m/);
+  assert.equal(get("legend").textContent, "dropped 30000, landed 1");
+});
+
+test("a zoom of the last seconds ends with them, and one of replays stays from throw to throw", async () => {
+  const panel = new PlotPanel({ simulation: "sim_0", field: "ball", name: "z", link: "hand" }, false, () => {});
+  const zoomIn = made.find(({ textContent }) => textContent === "+");
+  const makeThrow = (trial) => ({
+    trial, simulation: "sim_0", joints: [], samples: 201, rate_hz: 100, duration: 2, positions: new Float32Array(), ball: new Float32Array(603),
+  });
+  /** Where the middle of a replay is in the plot, and how far it is from there to its end. */
+  const measure = async (shown) => {
+    const at = [];
+    for (const time of [1, 2]) {
+      panel.draw({ shown, time }, null);
+      await settle();
+      at.push(panel.picture.at);
+    }
+    return [at[0], at[1] - at[0]];
+  };
+  const [middle, half] = await measure(makeThrow(1));
+  assert.ok(half > 10);
+  panel.draw(undefined, [{ time: 1, ball: [0, 0, 1] }, { time: 2, ball: [0, 0, 2] }]);
+  await settle();
+  zoomIn.click();
+  assert.deepEqual(await measure(makeThrow(2)), [middle, half]);
+  zoomIn.click();
+  await settle();
+  assert.deepEqual(await measure(makeThrow(3)), [middle, 2 * half]);
+});
