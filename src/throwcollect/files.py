@@ -19,7 +19,6 @@ from pathlib import Path
 
 from throwcollect.errors import ConfigError, DatasetError
 
-_DIRECTORY_PERMISSIONS = 0o755
 StrPath = str | os.PathLike[str]
 """A path, as functions take it that other programs call."""
 
@@ -141,16 +140,27 @@ def beside(path: Path, *, mode: int = 0o666) -> Iterator[int]:
     new.unlink(missing_ok=True)
     # O_EXCL fails if somebody has put a file or a link there since the removal.
     descriptor = os.open(new, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW, mode)
+    own = os.fstat(descriptor)
+
+    def is_own() -> bool:
+        """Whether the file is that of this block, and not one of another process that has begun to write it as well."""
+        with suppress(OSError):
+            return os.path.samestat(own, new.lstat())
+        return False
+
     try:
         try:
             yield descriptor
         finally:
             os.close(descriptor)
+        if not is_own():
+            raise OSError(errno.EBUSY, "another process writes it, too", str(path))
         os.replace(new, path)
     # Also after Ctrl-C, which is no `Exception`, no half-written file shall stay.
     except BaseException:
-        with suppress(OSError):
-            new.unlink()
+        if is_own():
+            with suppress(OSError):
+                new.unlink()
         raise
 
 
@@ -190,6 +200,10 @@ def new_directory(path: Path) -> Iterator[Path]:
     try:
         if path.is_symlink() or (path.exists() and not (path.is_dir() and not any(path.iterdir()))):
             raise ConfigError(f"{path}: exists", expected="a directory that is new or empty")
+        taken = path.stat() if path.exists() else None
+        if taken is not None and (path.is_mount() or os.path.samestat(taken, os.stat("."))):
+            # Neither can be replaced, and that would only show when all is written.
+            raise ConfigError(f"{path}: is where something is mounted, or this command works", expected="another one")
         if not path.parent.exists():
             path.parent.mkdir(parents=True)
         # The directory beside is on the same file system, so one rename can give it its name.
@@ -198,14 +212,26 @@ def new_directory(path: Path) -> Iterator[Path]:
         raise unwritable(path, error) from error
     try:
         yield beside
-        # `mkdtemp` lets nobody but the owner in.
-        beside.chmod(_DIRECTORY_PERMISSIONS)
+        # `mkdtemp` lets nobody but the owner in. Whoever made the directory has decided who may.
+        if taken is not None:
+            with suppress(PermissionError):
+                os.chown(beside, -1, taken.st_gid)
+        beside.chmod(stat.S_IMODE(taken.st_mode) if taken is not None else 0o777 & ~_find_umask())
         os.rename(beside, path)
     except OSError as error:
         raise unwritable(path, error) from error
     finally:
         # After the rename, nothing has this name any more.
         shutil.rmtree(beside, ignore_errors=True)
+
+
+def _find_umask() -> int:
+    """Find the permissions that new files of this process lack."""
+    # `os.umask` sets another one meanwhile, with which another thread may make a file.
+    for line in Path("/proc/self/status").read_text(encoding="ascii", errors="replace").splitlines():
+        if line.startswith("Umask:"):
+            return int(line.split()[1], 8)
+    return 0o022
 
 
 def remove(path: Path) -> None:

@@ -91,6 +91,7 @@ def working_side_by_side(
     # With several threads, new interpreters are started: a fork could wait for ever for a lock of another thread.
     context = multiprocessing.get_context("fork" if fork and threading.active_count() == 1 else "spawn")
     pool = ProcessPoolExecutor(processes, context, _begin, (partial(begin, *arguments), os.getpid()))
+    started = set[Any]()
     try:
         # Only this process shall see Ctrl-C, and then end the others, so these start with the signal blocked.
         unblocked = signal.pthread_sigmask(signal.SIG_BLOCK, (signal.SIGINT,))
@@ -99,6 +100,8 @@ def working_side_by_side(
                 # From 3.12 on, Python warns of the threads of Arrow and BLAS, which forked processes do not use.
                 warnings.filterwarnings("ignore", "This process .* is multi-threaded", DeprecationWarning)
                 found = pool.map(_work, pieces)
+            # All have been started by now; later ones are somebody else's.
+            started = set(multiprocessing.active_children()) - others
         finally:
             signal.pthread_sigmask(signal.SIG_SETMASK, unblocked)
         yield found
@@ -108,7 +111,7 @@ def working_side_by_side(
         ) from error
     finally:
         # `shutdown` waits for pieces that are being worked on, so the processes are killed first.
-        for process in set(multiprocessing.active_children()) - others:
+        for process in started:
             process.kill()
         pool.shutdown(cancel_futures=True)
 

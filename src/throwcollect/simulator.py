@@ -58,9 +58,12 @@ class Simulator:
     """
 
     def __init__(self, config: StrPath, *, overrides: Sequence[str] = ()) -> None:
-        self._source = os.fspath(config)
-        self._overrides = tuple(overrides)
-        self.config: Config = load(Path(config), self._overrides)
+        self._begin(load(Path(config), tuple(overrides)), os.fspath(config))
+
+    def _begin(self, config: Config, source: str) -> None:
+        """Make the robot and the physics engine of a configuration; `source` is the file that it was read from."""
+        self._source = source
+        self.config: Config = config
         self._check = feasibility_check(self.config)
         self._replayer = Replayer(self.config)
         self._is_closed = False
@@ -98,8 +101,7 @@ class Simulator:
             ConflictError: If the simulator is closed.
             PlanError: If the plan of a collection would refuse it, for the reason that it would have.
         """
-        if self._is_closed:
-            raise ConflictError("this simulator is closed", hint="make another Simulator")
+        self._require_open()
         if trial < 0:
             raise ConfigError(f"trial {trial}: there is no such trial", expected="a number from 0")
         point = dict(values or {})
@@ -148,10 +150,12 @@ class Simulator:
         Raises:
             ConfigError: As `throw`, when it is the turn of that throw.
             PlanError: As `throw`, when it is the turn of that throw.
+            ConflictError: If the simulator is closed.
             WorkerError: If the physics engine of a process does not start, or a process is killed.
         """
         if processes < 1:
             raise ConfigError(f"processes: got {processes}", expected="1 or more")
+        self._require_open()
         if processes == 1:
             for trial, point in enumerate(points):
                 yield self.throw(point, trial=trial)
@@ -159,10 +163,19 @@ class Simulator:
         yield from work_side_by_side(
             tuple(enumerate(points)),
             _begin,
-            (self._source, self._overrides),
+            (self.config, self._source),
             processes=processes,
             doing="simulates",
         )
+
+    def _require_open(self) -> None:
+        """Refuse to simulate after the end.
+
+        Raises:
+            ConflictError: If the simulator is closed.
+        """
+        if self._is_closed:
+            raise ConflictError("this simulator is closed", hint="make another Simulator")
 
     def _throw(self, trial: Trial) -> Throw:
         episode = self._replayer.run(trial)
@@ -204,9 +217,10 @@ class _Simulated:
         return trajectory_rows(self.episode.state.contents, self.samples, self.joints)
 
 
-def _begin(config: str, overrides: tuple[str, ...]) -> Callable[[tuple[int, Point]], Throw]:
-    """Make the simulator of a process of `Simulator.throw_many`."""
-    simulator = Simulator(config, overrides=overrides)
+def _begin(config: Config, source: str) -> Callable[[tuple[int, Point]], Throw]:
+    """Make the simulator of a process of `Simulator.throw_many`; the file may have been changed meanwhile."""
+    simulator = Simulator.__new__(Simulator)
+    simulator._begin(config, source)
 
     def throw(numbered: tuple[int, Point]) -> Throw:
         trial, point = numbered

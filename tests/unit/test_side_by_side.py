@@ -83,6 +83,21 @@ def test_results_come_in_order_from_several_processes() -> None:
     assert multiprocessing.active_children() == []
 
 
+def test_processes_of_others_are_left_alone() -> None:
+    found = work_side_by_side(range(4), begin, (3,), processes=2, doing="counts", fork=True)
+    next(found)
+    mine = multiprocessing.get_context("fork").Process(target=time.sleep, args=[60])
+    mine.start()
+    try:
+        assert len(list(work_side_by_side(range(4), begin, (3,), processes=2, doing="counts", fork=True))) == 4
+        assert len(list(found)) == 3
+        mine.join(0.3)
+        assert mine.exitcode is None
+    finally:
+        mine.kill()
+        mine.join()
+
+
 def test_one_process_or_one_piece_needs_no_other() -> None:
     assert list(work_side_by_side([1, 2], begin, (1,), processes=1, doing="counts")) == [
         (1, os.getpid()),

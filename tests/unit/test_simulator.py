@@ -36,8 +36,9 @@ def test_a_simulator_that_is_closed_says_so_and_may_be_closed_again() -> None:
     with Simulator(ROOT / "configs" / "quickstart.yaml") as simulator:
         pass
     simulator.close()
-    with pytest.raises(ConflictError, match="this simulator is closed"):
-        simulator.throw(POINT)
+    for throw in (lambda: simulator.throw(POINT), lambda: next(simulator.throw_many([POINT] * 2, processes=2))):
+        with pytest.raises(ConflictError, match="this simulator is closed"):
+            throw()
 
 
 def test_the_number_of_the_trial_is_in_the_stamps_alone(simulator: Simulator) -> None:
@@ -81,13 +82,18 @@ def test_what_is_no_target_is_told(simulator: Simulator, target: dict[str, float
         simulator.throw(POINT, target=target)
 
 
-def test_several_processes_give_the_same_throws(simulator: Simulator) -> None:
+def test_several_processes_give_the_same_throws_whatever_becomes_of_the_file(tmp_path: Path) -> None:
+    path = tmp_path / "throws.yaml"
+    path.write_text((ROOT / "configs" / "quickstart.yaml").read_text() + "\nsim: {engine: ballistic}\n")
+    simulator = Simulator(path)
+    path.unlink()
     points = [POINT, {}, {"task.duration_s": 1.2}]
     alone = [throw.row for throw in simulator.throw_many(points)]
     assert [row["trial"] for row in alone] == [0, 1, 2]
     together = list(simulator.throw_many(points, processes=2))
     assert [throw.row for throw in together] == alone
     assert together[0].ball.position.shape == (alone[0]["samples"], 3)
+    simulator.close()
 
 
 @pytest.mark.parametrize("processes", [1, 2])

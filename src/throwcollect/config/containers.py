@@ -57,7 +57,7 @@ def _size(text: str) -> str:
 
 def _is_own_path(text: str) -> bool:
     """Whether a path in a container is in the directory of the dataset or the key, which belong to the runtime."""
-    path = PurePosixPath(text)
+    path = PurePosixPath(normal_path(text))
     return any(PurePosixPath(own) in (path, *path.parents) for own in _OWN_DIRECTORIES)
 
 
@@ -71,7 +71,7 @@ def _mount(text: str) -> str:
         raise ValueError(f"{source} is refused, as it is an engine's socket, and gives power over the host")
     if reason := refusal(source):
         raise ValueError(f"{source} {reason}")
-    if _is_own_path(target) or PurePosixPath(target) == PurePosixPath("/"):
+    if _is_own_path(target) or normal_path(target) == "/":
         raise ValueError(f"{target} is refused, as the dataset, the key or the image is there in the container")
     return text
 
@@ -104,7 +104,7 @@ def _label(text: str) -> str:
 
 
 def _tmpfs(text: str) -> str:
-    if not text.startswith("/") or _is_own_path(text):
+    if not text.startswith("/") or ".." in text.split("/") or normal_path(text) == "/" or _is_own_path(text):
         raise ValueError("should be an absolute path in the container, outside of /data and /key")
     return text
 

@@ -247,6 +247,10 @@ class Config(Section):
             update={"run": RunConfig(), "containers": ContainersConfig(), "cluster": ClusterConfig()}
         )
 
+    def run_as(self, other: Config) -> Config:
+        """This configuration, with all that does not change the dataset as another one has it."""
+        return self.model_copy(update={name: getattr(other, name) for name in ("run", "containers", "cluster")})
+
     def trial_start_ns(self, number: int) -> int:
         """Simulated time at which a trial starts [ns]; the slots of different trials never overlap.
 

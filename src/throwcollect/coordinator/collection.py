@@ -107,8 +107,12 @@ class TrialCollection:
             count += 1
             collection.recall(trial, result)
 
-        if collection.writer.recover(tell, processes=processes):
-            say(f"keeps {format_count(count, 'episode')} of an earlier collection")
+        try:
+            if collection.writer.recover(tell, processes=processes):
+                say(f"keeps {format_count(count, 'episode')} of an earlier collection")
+        except BaseException:
+            collection.writer.close()
+            raise
         return collection
 
     def __enter__(self) -> TrialCollection:

@@ -108,6 +108,8 @@ def _write(
         if (listed := read_listed_points(given, directory=sweep_directory)) is not None:
             write_file(directory / TRIALS, encode_points(listed))
     else:
+        # The digest of the plan also depends on the order of keys, which may have been changed in the file.
+        config = old.config.run_as(config)
         plan = replace(old, config=config)
     if damaged or (stored is not None and stored.without_run() != config.without_run()):
         # The dataset may be finished only by its earlier configuration, or by files that are gone.

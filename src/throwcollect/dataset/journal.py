@@ -17,7 +17,6 @@ from typing import Any, Literal, get_args
 
 from throwcollect.dataset.directory import JOURNAL
 from throwcollect.dataset.lock import lock
-from throwcollect.errors import DatasetError
 from throwcollect.files import open_log, unreadable, unwritable, write_all
 
 Event = Literal["opened", "exposed", "recovered", "planned", "lease", "commit", "fail", "lost", "shard", "finished"]
@@ -50,16 +49,17 @@ class Journal:
             raise unwritable(self._path, error) from error
         try:
             lock(self._descriptor, directory)
-        except DatasetError:
+            self._earlier_s = measure_collected_s(directory) or 0.0
+            self._opened = time.time()
+            size = os.fstat(self._descriptor).st_size
+            if size and os.pread(self._descriptor, 1, size - 1) != b"\n":
+                # The process that wrote last was killed while it wrote a line.
+                self._append(b"\n")
+            self.note("opened", pid=os.getpid())
+        except BaseException:
+            # The lock would last as long as this process otherwise.
             os.close(self._descriptor)
             raise
-        self._earlier_s = measure_collected_s(directory) or 0.0
-        self._opened = time.time()
-        size = os.fstat(self._descriptor).st_size
-        if size and os.pread(self._descriptor, 1, size - 1) != b"\n":
-            # The process that wrote last was killed while it wrote a line.
-            self._append(b"\n")
-        self.note("opened", pid=os.getpid())
 
     def measure_collected_s(self) -> float:
         """Real time for which this process and earlier ones have collected [s], to the millisecond."""

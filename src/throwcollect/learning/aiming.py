@@ -69,6 +69,9 @@ def aim(learned: LearnedMap, targets: Array, context: Array, choice: Choice = Ch
         context: Scaled, shape ``(n, n_context)``.
         choice: Which of several candidates is taken.
     """
+    if not len(targets):
+        places = np.empty_like(targets)
+        return Aims(np.empty((0, len(learned.axes_of(Role.PARAMETER)))), places, places, np.empty(0, np.bool_))
     rows = [_aim_at(learned, target, given, choice) for target, given in zip(targets, context, strict=True)]
     parameters, predicted, nearest = (np.array(column) for column in zip(*rows, strict=True))
     away, missed = (np.linalg.norm(places - targets, axis=1) for places in (nearest, predicted))

@@ -217,4 +217,7 @@ def _folds(outputs: Array) -> NDArray[np.int64]:
     """Number of the fold of each throw; throws that ended in one cell are in one fold."""
     # By a hash of the cell, so that a throw stays in its fold when the dataset grows.
     numbers = [hashlib.sha256(cell.tobytes()).digest()[0] % _FOLDS for cell in number_cells(outputs)]
+    if len(set(numbers)) < 2:
+        # All ended so close together that one fold would have all of them, and nothing would be left to learn from.
+        numbers = [number % _FOLDS for number in range(len(numbers))]
     return np.array(numbers, np.int64)

@@ -19,6 +19,7 @@ NETWORK = "is refused; a network of the engine is joined besides the run's own"
 PORT = "should be a port of the container from 1 to 65535, with /udp if it is not TCP"
 LABEL = "is refused, as labels that begin with throwcollect. are the launcher's"
 OUTSIDE = "should be an absolute path in the container, outside of /data and /key"
+INSIDE = "is refused, as the dataset, the key or the image is there in the container"
 VARIABLE = "should be the name of a variable: letters, digits and _"
 PATHS = "should be HOST:CONTAINER or HOST:CONTAINER:ro with absolute paths"
 
@@ -127,6 +128,11 @@ def test_a_single_core_needs_no_quotes(tmp_path: Path) -> None:
             f"sim.options.labels.throwcollect.run: {LABEL}",
         ),
         ("sim: {options: {tmpfs: {/data/x: size=1m}}}", f"sim.options.tmpfs./data/x: {OUTSIDE}"),
+        ("sim: {options: {tmpfs: {//data: size=1m}}}", f"sim.options.tmpfs.//data: {OUTSIDE}"),
+        ("sim: {options: {tmpfs: {/x/../key: size=1m}}}", f"sim.options.tmpfs./x/../key: {OUTSIDE}"),
+        ("sim: {options: {tmpfs: {/: size=1m}}}", f"sim.options.tmpfs./: {OUTSIDE}"),
+        ("sim: {mounts: [/a://data]}", f"sim.mounts.0: //data {INSIDE}"),
+        ("sim: {mounts: [/a://]}", f"sim.mounts.0: // {INSIDE}"),
         (
             "sim: {options: {device_requests: [{cuont: 1}]}}",
             "sim.options.device_requests.0.cuont: unknown key; did you mean 'count'?",

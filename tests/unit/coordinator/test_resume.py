@@ -55,6 +55,16 @@ def test_how_it_is_run_may_change(directory: Path, prepared: dict[str, bytes]) -
     assert contents(directory)["plan.parquet"] == prepared["plan.parquet"]
 
 
+def test_keys_may_stand_in_another_order(directory: Path, prepared: dict[str, bytes]) -> None:
+    parameters = dict(reversed(SETTINGS["sweep"]["parameters"].items()))
+    other = config_with(run={"simulations": 7}, sweep={"parameters": parameters})
+    for _ in range(2):
+        plan = resume(other, directory, sweep_directory=directory)
+        assert list(plan.config.sweep.parameters) == list(SETTINGS["sweep"]["parameters"])
+    assert contents(directory)["plan.parquet"] == prepared["plan.parquet"]
+    assert load(directory / "config.yaml").run.simulations == 7
+
+
 def test_anything_else_may_not_and_all_differences_are_told(directory: Path, prepared: dict[str, bytes]) -> None:
     other = config_with(ball={"radius_m": 0.03}, seed=5)
     with pytest.raises(ConfigError, match="the same configuration") as raised:

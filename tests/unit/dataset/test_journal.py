@@ -1,12 +1,15 @@
 from __future__ import annotations
 
+import errno
 import json
 from contextlib import closing
 from pathlib import Path
 
 import pytest
 
+from throwcollect.dataset import journal as journal_module
 from throwcollect.dataset.journal import Journal, measure_collected_s, read_journal
+from throwcollect.errors import DatasetError
 
 
 def journal_of(directory: Path, *lines: str) -> None:
@@ -31,6 +34,18 @@ def test_events_are_read_back_in_order_with_their_times(tmp_path: Path) -> None:
     assert events[0].time_s <= events[1].time_s <= events[2].time_s
     lease = json.loads((tmp_path / "logs" / "journal.jsonl").read_text().splitlines()[1])
     assert (lease["trial"], lease["simulation"]) == (3, "sim_0")
+
+
+def test_a_journal_that_cannot_be_written_is_not_held(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(*_: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    with monkeypatch.context() as full:
+        full.setattr(journal_module, "write_all", fail)
+        with pytest.raises(DatasetError, match="No space left"):
+            Journal(tmp_path)
+    with closing(Journal(tmp_path)):
+        pass
 
 
 def test_a_line_that_was_cut_off_does_not_spoil_the_next(tmp_path: Path) -> None:

@@ -44,6 +44,17 @@ def test_keys_have_the_role_that_they_play(model: Model) -> None:
     assert model.file.trained_on.throws == COUNT
 
 
+def test_throws_that_all_end_close_together_are_learned_from(dataset: Dataset) -> None:
+    near = dataset
+    for number, column in enumerate(TARGETS):
+        near = change(near, column, [1.0 + 1e-5 * ((7 * k + number) % COUNT) for k in range(COUNT)])
+    assert fit(near).targets == TARGETS
+
+
+def test_for_no_targets_there_are_no_aims(model: Model) -> None:
+    assert model.aim([]) == []
+
+
 def test_roles_can_be_chosen(dataset: Dataset) -> None:
     model = fit(dataset, parameters=KEYS[:2], given=KEYS[2:])
     assert (sorted(model.parameters), model.given, model.latents) == (sorted(KEYS[:2]), KEYS[2:], (DRAG.key,))

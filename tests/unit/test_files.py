@@ -1,0 +1,55 @@
+"""Files and directories that appear whole or not at all."""
+
+from __future__ import annotations
+
+import os
+import stat
+from pathlib import Path
+
+import pytest
+
+from throwcollect.errors import ConfigError
+from throwcollect.files import beside, new_directory, write_all
+
+
+def write_twice(path: Path) -> None:
+    with beside(path) as first:
+        write_all(first, b"first")
+        with beside(path) as second:
+            write_all(second, b"the second one")
+
+
+def test_of_two_who_write_one_file_at_once_the_last_one_succeeds_and_the_other_is_told(tmp_path: Path) -> None:
+    path = tmp_path / "file"
+    with pytest.raises(OSError, match="another process writes it, too"):
+        write_twice(path)
+    assert list(tmp_path.iterdir()) == [path]
+    assert path.read_bytes() == b"the second one"
+
+
+@pytest.mark.parametrize(("umask", "mode"), [(0o022, 0o755), (0o077, 0o700), (0o002, 0o775)])
+def test_a_new_directory_has_the_permissions_that_the_user_gives_to_others(
+    umask: int, mode: int, tmp_path: Path
+) -> None:
+    before = os.umask(umask)
+    try:
+        with new_directory(tmp_path / "new") as place:
+            (place / "file").touch()
+    finally:
+        os.umask(before)
+    assert stat.S_IMODE((tmp_path / "new").stat().st_mode) == mode
+
+
+def test_a_directory_that_was_made_keeps_its_permissions(tmp_path: Path) -> None:
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine").chmod(0o2750)
+    with new_directory(tmp_path / "mine"):
+        pass
+    assert stat.S_IMODE((tmp_path / "mine").stat().st_mode) == 0o2750
+
+
+def test_what_cannot_be_replaced_is_refused_before_the_work(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    for spelling in (Path(), tmp_path):
+        with pytest.raises(ConfigError, match="this command works"), new_directory(spelling):
+            pytest.fail("it began")
