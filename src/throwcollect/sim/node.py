@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Mapping
 from typing import Any
 
 from throwcollect.config.key import Effect
-from throwcollect.config.schema import Config
+from throwcollect.config.schema import FASTEST, SLOWEST, Config
 from throwcollect.config.values import leaves, sweepable_keys, with_values
 from throwcollect.episode.channels import Channels
 from throwcollect.episode.chunk import encode_message
@@ -65,6 +64,7 @@ DESCRIPTION = "robot_description"
 _OF_ONLOOKERS = (_FACTOR, DESCRIPTION)
 """Parameters that change nothing that is recorded, so anybody may set them even in the middle of a trial."""
 _NO_LIMIT = 0.0
+_FACTORS = f"a number from {SLOWEST} to {FASTEST}, or 0 for no limit"
 _HIDDEN = (Effect.PLAN, Effect.RUN)
 """Effects of keys that the node does not show as parameters, because they do not concern a simulation."""
 
@@ -253,7 +253,8 @@ class SimulationNode(Node):
         self.declare_parameter(LEASES, "", ParameterDescriptor(description=about_leases))
         factor = config.sim.real_time_factor or _NO_LIMIT
         about_factor = descriptors.of_key(_FACTOR, factor)
-        about_factor.additional_constraints = "a number; 0 stands for none"
+        about_factor.additional_constraints = _FACTORS
+        about_factor.floating_point_range = [descriptors.floating_range(_NO_LIMIT, FASTEST)]
         self.declare_parameter(_FACTOR, factor, about_factor)
         for key, value in self._physics.items():
             self.declare_parameter(key, value, descriptors.of_key(key, value))
@@ -339,8 +340,8 @@ class SimulationNode(Node):
 
     @staticmethod
     def _check_factor(factor: float) -> None:
-        if not 0 <= factor < math.inf:
-            raise ConfigError(f"{_FACTOR}: should be a finite number, 0 for no limit, got {factor}")
+        if factor != _NO_LIMIT and not SLOWEST <= factor <= FASTEST:
+            raise ConfigError(f"{_FACTOR}: should be {_FACTORS}, got {factor}")
 
     def _restore_physics(self) -> None:
         """Show the physics of the configuration in the parameters again, in case a client has set another one."""
