@@ -31,6 +31,8 @@ NOT_IN_PATHS = ";?"
 """Characters that a path to a key must not have: Zenoh puts paths into endpoints, in which they have a meaning."""
 
 _TLS = "transport/link/tls"
+_DEFAULT_MODE = "peer"
+"""Mode of the sessions whose configuration names none."""
 _SETTINGS = {
     "scouting/multicast/enabled": False,
     # Advanced subscribers, which all those of rmw_zenoh_cpp are, order samples by the time stamps of the session.
@@ -179,8 +181,11 @@ def _check_key(config: zenoh.Config) -> None:
 
 
 def _endpoints(config: zenoh.Config) -> list[str]:
-    endpoints: list[str] = json.loads(config.get_json("connect/endpoints"))
-    return endpoints
+    """Endpoints that a session of this configuration connects to: Zenoh takes one list, or one for each mode."""
+    endpoints: list[str] | dict[str, list[str]] = json.loads(config.get_json("connect/endpoints"))
+    if isinstance(endpoints, list):
+        return endpoints
+    return endpoints.get(json.loads(config.get_json("mode")) or _DEFAULT_MODE, [])
 
 
 def _apply(config: zenoh.Config, settings: Mapping[str, object], where: str) -> None:

@@ -42,6 +42,22 @@ def test_the_router_is_the_one_that_the_environment_names(monkeypatch, key, tmp_
     assert connect_endpoint() == "tcp/192.0.2.7:1"
 
 
+@pytest.mark.parametrize(
+    ("mode", "endpoint"), [('"client"', "tcp/192.0.2.7:1"), ('"peer"', "tcp/192.0.2.7:2"), ('"router"', None)]
+)
+def test_the_router_is_the_one_of_the_mode_that_the_environment_names(mode, endpoint, monkeypatch):
+    endpoints = '{client: ["tcp/192.0.2.7:1"], peer: ["tcp/192.0.2.7:2"]}'
+    monkeypatch.setenv(OVERRIDE_VARIABLE, f"mode={mode};connect/endpoints={endpoints}")
+    assert connect_endpoint() == endpoint
+
+
+def test_the_router_of_an_environment_that_names_no_mode_is_that_of_a_peer(monkeypatch, tmp_path):
+    endpoints = '{client: ["tcp/192.0.2.7:1"], peer: ["tcp/192.0.2.7:2"]}'
+    (tmp_path / "session.json5").write_text(f"{{connect: {{endpoints: {endpoints}}}}}")
+    monkeypatch.setenv(CONFIG_FILE_VARIABLE, str(tmp_path / "session.json5"))
+    assert connect_endpoint() == "tcp/192.0.2.7:2"
+
+
 def test_an_environment_with_no_router_at_all_leads_to_none(monkeypatch):
     monkeypatch.setenv(OVERRIDE_VARIABLE, "connect/endpoints=[]")
     assert connect_endpoint() is None
