@@ -152,6 +152,11 @@ class SimConfig(Section):
     max_trial_s: Annotated[float, Field(gt=0, le=60)] = 6.0
     """Simulated time after which a trial is ended as `timeout`."""
 
+    @property
+    def slowest_factor(self) -> float:
+        """The slowest real-time factor of leased trials: real time, which onlookers may ask for, or as configured."""
+        return min(self.real_time_factor or 1.0, 1.0)
+
 
 class RecordConfig(Section):
     """What is recorded, and how it is cut into files."""

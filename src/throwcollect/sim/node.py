@@ -62,7 +62,9 @@ _FACTOR = "sim.real_time_factor"
 DESCRIPTION = "robot_description"
 """Named as the parameter of ROS' robot_state_publisher."""
 _OF_ONLOOKERS = (_FACTOR, DESCRIPTION)
-"""Parameters that change nothing that is recorded, so anybody may set them even in the middle of a trial."""
+"""Parameters that change nothing that is recorded, so anybody may set them even in the middle of a trial.
+
+Slow motion alone waits for its end, because the coordinator would take the simulation for one that hangs."""
 _NO_LIMIT = 0.0
 _FACTORS = f"a number from {SLOWEST} to {FASTEST}, or 0 for no limit"
 _HIDDEN = (Effect.PLAN, Effect.RUN)
@@ -303,7 +305,7 @@ class SimulationNode(Node):
         if not any(parameter.name == LEASES and parameter.value for parameter in parameters):
             return
         self._leases.replace(self._asked)
-        self._restore_physics()
+        self._restore_parameters()
         self._begin_next()
 
     def _begin_next(self) -> None:
@@ -338,19 +340,29 @@ class SimulationNode(Node):
             raise ConfigError(f"no controller {unknown[0]!r}")
         return number, controllers
 
-    @staticmethod
-    def _check_factor(factor: float) -> None:
+    def _check_factor(self, factor: float) -> None:
         if factor != _NO_LIMIT and not SLOWEST <= factor <= FASTEST:
             raise ConfigError(f"{_FACTOR}: should be {_FACTORS}, got {factor}")
+        trial = self._simulation.trial
+        if trial.leased and self._hangs(factor):
+            slowest = self._simulation.config.sim.slowest_factor
+            expected = f"{slowest:g} or more, or 0 for no limit, as {trial.lease_in_words}"
+            raise ConfigError(f"{_FACTOR}: should be {expected}, got {factor:g}")
 
-    def _restore_physics(self) -> None:
-        """Show the physics of the configuration in the parameters again, in case a client has set another one."""
-        stray = [key for key, value in self._physics.items() if self._get_value(key) != value]
+    def _hangs(self, factor: float) -> bool:
+        """Whether a coordinator would take a simulation with this factor for one that hangs."""
+        return _NO_LIMIT < factor < self._simulation.config.sim.slowest_factor
+
+    def _restore_parameters(self) -> None:
+        """Go back to the configuration's physics, and from slow motion, in case a client has set something else."""
+        stray = {key: value for key, value in self._physics.items() if self._get_value(key) != value}
+        if self._hangs(self._get_value(_FACTOR)):
+            stray[_FACTOR] = self._simulation.config.sim.real_time_factor or _NO_LIMIT
         if stray:
             # Setting parameters calls `_set_up` again, which must not prepare a trial by hand from these.
             self._restoring = True
             try:
-                self.set_parameters([Parameter(key, value=self._physics[key]) for key in stray])
+                self.set_parameters([Parameter(key, value=value) for key, value in stray.items()])
             finally:
                 self._restoring = False
 
