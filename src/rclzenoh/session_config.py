@@ -31,6 +31,8 @@ NOT_IN_PATHS = ";?"
 """Characters that a path to a key must not have: Zenoh puts paths into endpoints, in which they have a meaning."""
 
 _TLS = "transport/link/tls"
+_DEFAULT_MODE = "peer"
+"""Mode of the sessions whose configuration names none."""
 _SETTINGS = {
     "scouting/multicast/enabled": False,
     # Advanced subscribers, which all those of rmw_zenoh_cpp are, order samples by the time stamps of the session.
@@ -104,17 +106,20 @@ def connect_endpoint() -> str | None:
     """
     if not (os.environ.get(OVERRIDE_VARIABLE) or os.environ.get(CONFIG_FILE_VARIABLE)):
         return None
-    endpoints = _endpoints(environment_config())
+    endpoints = _endpoints(environment_config(), "connect")
     return endpoints[0] if endpoints else None
 
 
 def is_protected() -> bool:
-    """Whether the environment leads to a router that lets nobody in without a key.
+    """Whether the environment leads to a router that lets nobody in without a key, and opens no other way in.
 
     Raises:
         ConfigurationError: As `environment_config`.
     """
-    return all(endpoint.startswith(PROTECTED) for endpoint in _endpoints(environment_config()))
+    config = environment_config()
+    routers = _endpoints(config, "connect")
+    # A session that names no router may be reached by, and find, anybody.
+    return bool(routers) and all(each.startswith(PROTECTED) for each in (*routers, *_endpoints(config, "listen")))
 
 
 def client_override(endpoint: str, key: Key | None = None) -> str:
@@ -178,9 +183,15 @@ def _check_key(config: zenoh.Config) -> None:
                 raise UnreadableKeyError(Path(path), error.strerror or str(error)) from error
 
 
-def _endpoints(config: zenoh.Config) -> list[str]:
-    endpoints: list[str] = json.loads(config.get_json("connect/endpoints"))
-    return endpoints
+def _endpoints(config: zenoh.Config, side: Literal["connect", "listen"]) -> list[str]:
+    """Endpoints that a session of this configuration connects to or listens on.
+
+    Zenoh takes one list, or one for each mode. By default clients listen nowhere, and others where anybody gets in.
+    """
+    endpoints: list[str] | dict[str, list[str]] = json.loads(config.get_json(f"{side}/endpoints"))
+    if isinstance(endpoints, list):
+        return endpoints
+    return endpoints.get(json.loads(config.get_json("mode")) or _DEFAULT_MODE, [])
 
 
 def _apply(config: zenoh.Config, settings: Mapping[str, object], where: str) -> None:

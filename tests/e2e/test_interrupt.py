@@ -42,7 +42,7 @@ def config(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return write_config(
         tmp_path_factory.mktemp("config"),
         trials=TRIALS,
-        sim=f"{FAST}, real_time_factor: 10, max_trial_s: 3",
+        sim=f"{FAST}, real_time_factor: 10, max_trial_s: 2",
     )
 
 
@@ -262,12 +262,12 @@ def test_a_killed_router_costs_nothing(config: Path, reference: Path, tmp_path: 
 def test_the_trial_of_a_hanging_simulation_goes_to_another(
     config: Path, reference: Path, tmp_path: Path, started: list[Running]
 ) -> None:
-    running, nodes = begin(started, config, tmp_path / "data", "--set", "run.trial_timeout_s=2")
+    running, nodes = begin(started, config, tmp_path / "data", "--set", "run.trial_timeout_s=0.5")
     in_the_middle(running, whole=reference)
     running.node("--name", "sim_0").suspend()
     code, _, err = running.finish()
     assert code == 0, err
-    assert "no episode within 2.3 s" in (tmp_path / "data" / "logs" / "coordinator.log").read_text()
+    assert "no episode within 2.5 s" in (tmp_path / "data" / "logs" / "coordinator.log").read_text()
     assert fingerprints(tmp_path / "data") == fingerprints(reference)
     assert_gone(nodes)
 

@@ -36,3 +36,11 @@ def test_a_robot_of_another_mass_is_refused(robot: Robot) -> None:
     assert not result.successful
     assert "should differ in what is seen alone" in result.reason
     assert "should be a URDF" in robot.set({"robot_description": "<robot"}).reason
+
+
+def test_a_description_that_is_nested_too_deeply_is_refused(robot: Robot) -> None:
+    deep = "<robot><link>" + 20000 * "<a>" + 20000 * "</a>" + "</link></robot>"
+    result = robot.set({"robot_description": deep})
+    assert not result.successful
+    assert result.reason == "robot_description: a link should not be nested so deeply"
+    assert robot.set({"robot_description": OWN}).successful

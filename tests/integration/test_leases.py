@@ -105,6 +105,24 @@ def test_what_a_lease_does_not_say_is_as_configured(robot: Robot) -> None:
     assert [value.double_value for value in values] == [CONFIG.ball.friction, CONFIG.scene.gravity_mps2]
 
 
+@pytest.mark.parametrize(("factor", "accepted"), [(0.0, True), (1.0, True), (5.0, True), (0.99, False), (0.001, False)])
+def test_a_leased_trial_is_slowed_down_to_real_time_and_no_further(
+    factor: float, accepted: bool, leased: Robot
+) -> None:
+    result = leased.set({"sim.real_time_factor": factor})
+    assert result.successful == accepted
+    if not accepted:
+        expected = f"should be 1 or more, or 0 for no limit, as {LEASED}, got {factor:g}"
+        assert result.reason == f"sim.real_time_factor: {expected}"
+
+
+def test_slow_motion_ends_when_a_trial_is_leased(robot: Robot) -> None:
+    assert robot.set({"sim.real_time_factor": 0.01}).successful
+    handed_over(robot, lease(robot, {}))
+    (value,) = robot.parameters("get_parameters", names=["sim.real_time_factor"]).values
+    assert value.double_value == 0.0
+
+
 @pytest.mark.parametrize(
     "values", [{"ball.friction": 0.1}, {"trial.number": 5}, {"trial.number": -1, "ball.friction": 0.1}]
 )

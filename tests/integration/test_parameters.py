@@ -50,13 +50,15 @@ def test_parameters_are_described_by_what_the_configuration_says_of_them(robot: 
     assert [name for name, each in mine.items() if not each.description] == []
     mass = described["ball.mass_kg"]
     assert (mass.description, mass.additional_constraints) == ("Mass.", "a number above 0 and up to 2 kg")
+    factor = described["sim.real_time_factor"]
+    assert factor.additional_constraints == "a number from 0.001 to 1000, or 0 for no limit"
     angle = described["task.start.arm_right_4_joint"]
     assert angle.description.startswith("Joint angles at the start of each trial")
     spans = {
         "ball.mass_kg": (0.0, 2.0),
         "task.start.arm_right_4_joint": (-6.3, 6.3),
         "trial.number": (-1, 9_999_999),
-        "sim.real_time_factor": (0.0, sys.float_info.max),
+        "sim.real_time_factor": (0.0, 1000.0),
         "sim.physics_hz": (100, 10000),
         "record.trials_per_shard": (1, 2**63 - 1),
         "robot.name": None,
@@ -88,6 +90,12 @@ def test_parameters_of_controllers_are_described(robot: Robot) -> None:
         ({"trial.controllers": [ARM, "arm_controller"]}, "no controller 'arm_controller'"),
         ({"sim.real_time_factor": -1.0}, "sim.real_time_factor"),
         ({"sim.real_time_factor": float("nan")}, "sim.real_time_factor"),
+        (
+            {"sim.real_time_factor": 1e-20},
+            "sim.real_time_factor: should be a number from 0.001 to 1000, or 0 for no limit",
+        ),
+        ({"sim.real_time_factor": 0.0009}, "sim.real_time_factor"),
+        ({"sim.real_time_factor": 1e308}, "sim.real_time_factor"),
         ({"trial.number": 10**15}, "trial.number"),
     ],
 )

@@ -10,6 +10,7 @@ from rclzenoh.session_config import (
     client_config,
     client_override,
     connect_endpoint,
+    is_protected,
 )
 
 ENDPOINT = "tls/127.0.0.1:7447"
@@ -42,6 +43,22 @@ def test_the_router_is_the_one_that_the_environment_names(monkeypatch, key, tmp_
     assert connect_endpoint() == "tcp/192.0.2.7:1"
 
 
+@pytest.mark.parametrize(
+    ("mode", "endpoint"), [('"client"', "tcp/192.0.2.7:1"), ('"peer"', "tcp/192.0.2.7:2"), ('"router"', None)]
+)
+def test_the_router_is_the_one_of_the_mode_that_the_environment_names(mode, endpoint, monkeypatch):
+    endpoints = '{client: ["tcp/192.0.2.7:1"], peer: ["tcp/192.0.2.7:2"]}'
+    monkeypatch.setenv(OVERRIDE_VARIABLE, f"mode={mode};connect/endpoints={endpoints}")
+    assert connect_endpoint() == endpoint
+
+
+def test_the_router_of_an_environment_that_names_no_mode_is_that_of_a_peer(monkeypatch, tmp_path):
+    endpoints = '{client: ["tcp/192.0.2.7:1"], peer: ["tcp/192.0.2.7:2"]}'
+    (tmp_path / "session.json5").write_text(f"{{connect: {{endpoints: {endpoints}}}}}")
+    monkeypatch.setenv(CONFIG_FILE_VARIABLE, str(tmp_path / "session.json5"))
+    assert connect_endpoint() == "tcp/192.0.2.7:2"
+
+
 def test_an_environment_with_no_router_at_all_leads_to_none(monkeypatch):
     monkeypatch.setenv(OVERRIDE_VARIABLE, "connect/endpoints=[]")
     assert connect_endpoint() is None
@@ -64,3 +81,34 @@ def test_a_key_that_cannot_be_read_is_named(key):
 def test_an_endpoint_that_is_none_is_refused():
     with pytest.raises(ConfigurationError, match="endpoint: connect/endpoints cannot be"):
         client_config("nowhere")
+
+
+def test_a_client_of_a_router_with_a_key_is_protected(monkeypatch, key):
+    monkeypatch.setenv(OVERRIDE_VARIABLE, client_override(ENDPOINT, key))
+    assert is_protected()
+
+
+@pytest.mark.parametrize(
+    ("override", "protected"),
+    [
+        ("connect/endpoints=[]", False),
+        ('mode="peer";connect/endpoints=[]', False),
+        ('connect/endpoints=["tls/192.0.2.7:1", "tcp/192.0.2.7:1"]', False),
+        # Peers listen by default.
+        ('mode="peer";connect/endpoints=["tls/192.0.2.7:1"]', False),
+        ('connect/endpoints=["tls/192.0.2.7:1"];listen/endpoints=["tcp/127.0.0.1:0"]', False),
+        ('connect/endpoints={client: ["tls/192.0.2.7:1"]}', True),
+        ('mode="peer";connect/endpoints={client: ["tls/192.0.2.7:1"]}', False),
+        ('mode="peer";connect/endpoints=["tls/192.0.2.7:1"];listen/endpoints=["tls/127.0.0.1:0"]', True),
+    ],
+)
+def test_a_session_is_protected_if_every_way_in_is(override, protected, monkeypatch):
+    monkeypatch.setenv(OVERRIDE_VARIABLE, override)
+    assert is_protected() == protected
+
+
+def test_an_environment_that_says_nothing_is_not_protected(monkeypatch, tmp_path):
+    assert not is_protected()
+    (tmp_path / "session.json5").write_text("{}")
+    monkeypatch.setenv(CONFIG_FILE_VARIABLE, str(tmp_path / "session.json5"))
+    assert not is_protected()

@@ -55,7 +55,8 @@ class RunConfig(Section):
     domain_id: Annotated[int, Field(ge=0, le=232)] = 0
     """ROS domain."""
     trial_timeout_s: PositiveFloat = 60.0
-    """Real time that a simulation may take for one trial before it counts as lost, besides what slow motion takes."""
+    """Real time that a simulation may take for one trial before it counts as lost, besides what `sim.max_trial_s` takes
+    in real time, or in slow motion (`sim.real_time_factor`)."""
     start_timeout_s: PositiveFloat = 60.0
     """Real time within which the first simulation must be ready once it runs."""
     grace_s: Annotated[float, Field(ge=0, le=3600)] = 8.0

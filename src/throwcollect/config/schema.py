@@ -26,7 +26,17 @@ from throwcollect.config.tool import ToolConfig
 from throwcollect.config.until import UntilConfig
 from throwcollect.members import load_member, names_of
 
-__all__ = ["Config", "DynamicMovementPrimitive", "MinimumJerk", "Parameter", "Range", "SweepConfig", "Values"]
+__all__ = [
+    "FASTEST",
+    "SLOWEST",
+    "Config",
+    "DynamicMovementPrimitive",
+    "MinimumJerk",
+    "Parameter",
+    "Range",
+    "SweepConfig",
+    "Values",
+]
 
 
 def _sections_of(family: str) -> Any:
@@ -60,6 +70,8 @@ else:
     AnyTask = _sections_of("tasks")
     AnyUntil = _untils()
 
+SLOWEST, FASTEST = 0.001, 1000
+"""Bounds of real-time factors: with slower ones, one step of the physics sleeps for minutes or overflows the clock."""
 _BETWEEN_TRIALS_S = 10
 """Simulated time between the slots of two trials: results of a trial's goals expire before the next one."""
 
@@ -135,10 +147,15 @@ class SimConfig(Section):
     """Simulated time for which the ball settles in the spoon before a trial."""
     command_delay_s: Annotated[float, Field(ge=0, le=0.2), Key(swept=True)] = 0.0
     """Time between a controller's command and the motor acting on it."""
-    real_time_factor: Annotated[Annotated[float, Field(gt=0)] | None, Key(Effect.APPEARANCE)] = None
+    real_time_factor: Annotated[Annotated[float, Field(ge=SLOWEST, le=FASTEST)] | None, Key(Effect.APPEARANCE)] = None
     """Upper bound of simulated over real time, for onlookers; none: as fast as it can."""
     max_trial_s: Annotated[float, Field(gt=0, le=60)] = 6.0
     """Simulated time after which a trial is ended as `timeout`."""
+
+    @property
+    def slowest_factor(self) -> float:
+        """The slowest real-time factor of leased trials: real time, which onlookers may ask for, or as configured."""
+        return min(self.real_time_factor or 1.0, 1.0)
 
 
 class RecordConfig(Section):

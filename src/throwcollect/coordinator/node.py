@@ -50,9 +50,9 @@ class Coordinator(Node):
         self._visible: set[str] = set()
         self._unreached: dict[str, float] = {}
         self._signer = Signer.of_environment()
-        # A real-time factor slows trials down on purpose; add that time before a simulation counts as lost.
-        slowed_s = config.sim.max_trial_s / (config.sim.real_time_factor or math.inf)
-        self._patience_s = config.run.trial_timeout_s + slowed_s
+        # A real-time factor slows trials down on purpose, also one that onlookers set, of which nobody hears here; add
+        # that time before a simulation counts as lost.
+        self._patience_s = config.run.trial_timeout_s + config.sim.max_trial_s / config.sim.slowest_factor
         self._showing = Showing(self)
         self._progress = self.create_publisher(String, PROGRESS_TOPIC, PROGRESS_QOS)
         self.create_timer(_DISCOVERY_PERIOD_S, self._discover)

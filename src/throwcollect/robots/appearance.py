@@ -58,6 +58,9 @@ def _physics_of(description: str) -> frozenset[str]:
     """Links and joints without their appearance, each in the canonical form of XML.
 
     Only these are compared: tooltips of links, to which viewers bind plots, are no part of the physics either.
+
+    Raises:
+        ConfigError: If it is no URDF, or its elements are nested too deeply to be compared.
     """
     texts = []
     for element in _parse(description, "robot_description"):
@@ -65,5 +68,8 @@ def _physics_of(description: str) -> frozenset[str]:
             continue
         for visible in [child for child in element if child.tag in _SEEN]:
             element.remove(visible)
-        texts.append(ElementTree.canonicalize(ElementTree.tostring(element, encoding="unicode"), strip_text=True))
+        try:
+            texts.append(ElementTree.canonicalize(ElementTree.tostring(element, encoding="unicode"), strip_text=True))
+        except RecursionError as error:
+            raise ConfigError(f"robot_description: a {element.tag} should not be nested so deeply") from error
     return frozenset(texts)

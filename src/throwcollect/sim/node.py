@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Mapping
 from typing import Any
 
 from throwcollect.config.key import Effect
-from throwcollect.config.schema import Config
+from throwcollect.config.schema import FASTEST, SLOWEST, Config
 from throwcollect.config.values import leaves, sweepable_keys, with_values
 from throwcollect.episode.channels import Channels
 from throwcollect.episode.chunk import encode_message
@@ -63,8 +62,11 @@ _FACTOR = "sim.real_time_factor"
 DESCRIPTION = "robot_description"
 """Named as the parameter of ROS' robot_state_publisher."""
 _OF_ONLOOKERS = (_FACTOR, DESCRIPTION)
-"""Parameters that change nothing that is recorded, so anybody may set them even in the middle of a trial."""
+"""Parameters that change nothing that is recorded, so anybody may set them even in the middle of a trial.
+
+Slow motion alone waits for its end, because the coordinator would take the simulation for one that hangs."""
 _NO_LIMIT = 0.0
+_FACTORS = f"a number from {SLOWEST} to {FASTEST}, or 0 for no limit"
 _HIDDEN = (Effect.PLAN, Effect.RUN)
 """Effects of keys that the node does not show as parameters, because they do not concern a simulation."""
 
@@ -253,7 +255,8 @@ class SimulationNode(Node):
         self.declare_parameter(LEASES, "", ParameterDescriptor(description=about_leases))
         factor = config.sim.real_time_factor or _NO_LIMIT
         about_factor = descriptors.of_key(_FACTOR, factor)
-        about_factor.additional_constraints = "a number; 0 stands for none"
+        about_factor.additional_constraints = _FACTORS
+        about_factor.floating_point_range = [descriptors.floating_range(_NO_LIMIT, FASTEST)]
         self.declare_parameter(_FACTOR, factor, about_factor)
         for key, value in self._physics.items():
             self.declare_parameter(key, value, descriptors.of_key(key, value))
@@ -302,7 +305,7 @@ class SimulationNode(Node):
         if not any(parameter.name == LEASES and parameter.value for parameter in parameters):
             return
         self._leases.replace(self._asked)
-        self._restore_physics()
+        self._restore_parameters()
         self._begin_next()
 
     def _begin_next(self) -> None:
@@ -337,19 +340,29 @@ class SimulationNode(Node):
             raise ConfigError(f"no controller {unknown[0]!r}")
         return number, controllers
 
-    @staticmethod
-    def _check_factor(factor: float) -> None:
-        if not 0 <= factor < math.inf:
-            raise ConfigError(f"{_FACTOR}: should be a finite number, 0 for no limit, got {factor}")
+    def _check_factor(self, factor: float) -> None:
+        if factor != _NO_LIMIT and not SLOWEST <= factor <= FASTEST:
+            raise ConfigError(f"{_FACTOR}: should be {_FACTORS}, got {factor}")
+        trial = self._simulation.trial
+        if trial.leased and self._hangs(factor):
+            slowest = self._simulation.config.sim.slowest_factor
+            expected = f"{slowest:g} or more, or 0 for no limit, as {trial.lease_in_words}"
+            raise ConfigError(f"{_FACTOR}: should be {expected}, got {factor:g}")
 
-    def _restore_physics(self) -> None:
-        """Show the physics of the configuration in the parameters again, in case a client has set another one."""
-        stray = [key for key, value in self._physics.items() if self._get_value(key) != value]
+    def _hangs(self, factor: float) -> bool:
+        """Whether a coordinator would take a simulation with this factor for one that hangs."""
+        return _NO_LIMIT < factor < self._simulation.config.sim.slowest_factor
+
+    def _restore_parameters(self) -> None:
+        """Go back to the configuration's physics, and from slow motion, in case a client has set something else."""
+        stray = {key: value for key, value in self._physics.items() if self._get_value(key) != value}
+        if self._hangs(self._get_value(_FACTOR)):
+            stray[_FACTOR] = self._simulation.config.sim.real_time_factor or _NO_LIMIT
         if stray:
             # Setting parameters calls `_set_up` again, which must not prepare a trial by hand from these.
             self._restoring = True
             try:
-                self.set_parameters([Parameter(key, value=self._physics[key]) for key in stray])
+                self.set_parameters([Parameter(key, value=value) for key, value in stray.items()])
             finally:
                 self._restoring = False
 

@@ -51,6 +51,13 @@ JOINT_LIST = "joint names, each with a number from -6.3 to 6.3 rad"
             ["run.yaml:1: sim.physics_hz: should be a whole number from 100 to 10000 Hz, got 240.0"],
         ),
         ("seed: -1", ["run.yaml:1: seed: should be a whole number from 0 to 4294967295, got -1"]),
+        *(
+            (
+                f"sim: {{real_time_factor: {factor}}}",
+                [f"run.yaml:1: sim.real_time_factor: should be a number from 0.001 to 1000 or null, got {factor}"],
+            )
+            for factor in ("1e-20", "0.0009", "1e+308")
+        ),
         ("run: {trial_timeout_s: 0}", ["run.yaml:1: run.trial_timeout_s: should be a number above 0 s, got 0"]),
         (
             "name: Über",

@@ -29,8 +29,8 @@ sweep: {sampler: uniform, parameters: {task.duration_s: {min: 1.0, max: 1.2}}}
 class Bench:
     """A coordinator, and nodes that look like simulations."""
 
-    def __init__(self, directory: Path) -> None:
-        (directory / "reach.yaml").write_text(YAML)
+    def __init__(self, directory: Path, more: str = "") -> None:
+        (directory / "reach.yaml").write_text(YAML + more)
         plan = make_plan(load(directory / "reach.yaml"))
         create(directory / "data", plan)
         self.writer = DatasetWriter.open(directory / "data")
@@ -56,12 +56,12 @@ class Bench:
 
 
 @pytest.fixture
-def bench(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[Bench]:
+def bench(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, request: pytest.FixtureRequest) -> Iterator[Bench]:
     monkeypatch.setattr(coordinator_node, "_REACH_S", 0.5)
     with router("tcp/127.0.0.1:0") as endpoint:
         monkeypatch.setenv("ZENOH_CONFIG_OVERRIDE", f'mode="client";connect/endpoints=["{endpoint}"]')
         ros.init()
-        bench = Bench(tmp_path)
+        bench = Bench(tmp_path, getattr(request, "param", ""))
         try:
             yield bench
         finally:
@@ -94,3 +94,15 @@ def test_a_simulation_that_was_started_again_is_another_one(bench: Bench) -> Non
     assert bench.until(lambda: list(bench.coordinator._simulations.values()) != [before])
     first.destroy_node()
     second.destroy_node()
+
+
+SLOWED = "run: {{trial_timeout_s: 1.5}}\nsim: {{max_trial_s: 8, real_time_factor: {factor}}}\n"
+
+
+@pytest.mark.parametrize(
+    ("bench", "patience_s"),
+    [(SLOWED.format(factor=factor), patience_s) for factor, patience_s in (("null", 9.5), (20, 9.5), (0.5, 17.5))],
+    indirect=["bench"],
+)
+def test_a_trial_has_the_time_that_it_takes_when_it_is_watched(bench: Bench, patience_s: float) -> None:
+    assert bench.coordinator._patience_s == patience_s
