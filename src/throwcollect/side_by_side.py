@@ -18,6 +18,7 @@ from throwcollect.interruption import die_with_parent
 THROWS_A_START = 20
 """A process takes about as long to begin as to simulate so many throws."""
 
+_SAFE_PATH = "PYTHONSAFEPATH"
 _Piece = TypeVar("_Piece")
 _Found = TypeVar("_Found")
 
@@ -90,13 +91,15 @@ def working_side_by_side(
     others = set(multiprocessing.active_children())
     # With several threads, new interpreters are started: a fork could wait for ever for a lock of another thread.
     context = multiprocessing.get_context("fork" if fork and threading.active_count() == 1 else "spawn")
-    pool = ProcessPoolExecutor(processes, context, _begin, (partial(begin, *arguments), os.getpid()))
+    with _hiding_working_directory():
+        # A process begins with it that looks after what several processes share.
+        pool = ProcessPoolExecutor(processes, context, _begin, (partial(begin, *arguments), os.getpid()))
     started = set[Any]()
     try:
         # Only this process shall see Ctrl-C, and then end the others, so these start with the signal blocked.
         unblocked = signal.pthread_sigmask(signal.SIG_BLOCK, (signal.SIGINT,))
         try:
-            with warnings.catch_warnings():
+            with _hiding_working_directory(), warnings.catch_warnings():
                 # From 3.12 on, Python warns of the threads of Arrow and BLAS, which forked processes do not use.
                 warnings.filterwarnings("ignore", "This process .* is multi-threaded", DeprecationWarning)
                 found = pool.map(_work, pieces)
@@ -114,6 +117,24 @@ def working_side_by_side(
         for process in started:
             process.kill()
         pool.shutdown(cancel_futures=True)
+
+
+@contextmanager
+def _hiding_working_directory() -> Iterator[None]:
+    """Have Python processes that are started in the block look for no module in the working directory.
+
+    They would run what lies there in place of modules of Python's own library, also in a dataset of somebody else's.
+    Python before 3.11 knows no way to prevent that.
+    """
+    before = os.environ.get(_SAFE_PATH)
+    os.environ[_SAFE_PATH] = "1"
+    try:
+        yield
+    finally:
+        if before is None:
+            del os.environ[_SAFE_PATH]
+        else:
+            os.environ[_SAFE_PATH] = before
 
 
 def _do_here(

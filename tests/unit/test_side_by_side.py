@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
+from pathlib import Path
 
 import pytest
 
@@ -138,6 +139,22 @@ def test_processes_are_forked_off_one_without_other_threads_of_python() -> None:
     )
     have, have_not = [["read before"]] * 4, [[]] * 4
     assert (done.stdout, done.stderr) == (f"{have} False\n{have_not} False\n", "")
+
+
+@pytest.mark.skipif(sys.version_info < (3, 11), reason="Python knows no way")
+def test_nothing_of_the_working_directory_is_run(tmp_path: Path) -> None:
+    for name in ("multiprocessing", "runpy", "types", "queue"):
+        (tmp_path / f"{name}.py").write_text("raise SystemExit('a file of the working directory was run')\n")
+    program = (
+        "import operator\n"
+        "from throwcollect.side_by_side import work_side_by_side\n"
+        "print(*work_side_by_side(range(4), operator.methodcaller, ('bit_length',), processes=2, doing='counts'))\n"
+    )
+    words = [sys.executable, "-P", "-c", program]
+    # Python hands this switch on to processes of its own, but a command of ours is started without it.
+    for switch in (words, [sys.executable, "-c", f"import sys; del sys.path[0]\n{program}"]):
+        done = subprocess.run(switch, cwd=tmp_path, capture_output=True, text=True, timeout=60, check=False)
+        assert (done.stdout, done.stderr) == ("0 1 2 2\n", "")
 
 
 def test_a_process_that_was_forked_off_and_is_killed_is_named() -> None:
