@@ -92,7 +92,6 @@ def working_side_by_side(
     # With several threads, new interpreters are started: a fork could wait for ever for a lock of another thread.
     context = multiprocessing.get_context("fork" if fork and threading.active_count() == 1 else "spawn")
     with _hiding_working_directory():
-        # A process begins with it that looks after what several processes share.
         pool = ProcessPoolExecutor(processes, context, _begin, (partial(begin, *arguments), os.getpid()))
     started = set[Any]()
     try:
@@ -124,6 +123,7 @@ def _hiding_working_directory() -> Iterator[None]:
     """Have Python processes that are started in the block look for no module in the working directory.
 
     They would run what lies there in place of modules of Python's own library, also in a dataset of somebody else's.
+    A pool starts a process, which looks after what the others share, as soon as it is made.
     Python before 3.11 knows no way to prevent that.
     """
     before = os.environ.get(_SAFE_PATH)
