@@ -134,7 +134,7 @@ def beside(path: Path, *, mode: int = 0o666) -> Iterator[int]:
         File descriptor to write to.
 
     Raises:
-        OSError: If the file cannot be written.
+        OSError: If the file cannot be written, or another process writes it at the same time.
     """
     new = path.with_name(f"{path.name}.new")
     new.unlink(missing_ok=True)
@@ -203,7 +203,10 @@ def new_directory(path: Path) -> Iterator[Path]:
         taken = path.stat() if path.exists() else None
         if taken is not None and (path.is_mount() or os.path.samestat(taken, os.stat("."))):
             # Neither can be replaced, and that would only show when all is written.
-            raise ConfigError(f"{path}: is where something is mounted, or this command works", expected="another one")
+            raise ConfigError(
+                f"{path}: cannot be replaced, as it is the working directory or a mount point",
+                expected="another directory",
+            )
         if not path.parent.exists():
             path.parent.mkdir(parents=True)
         # The directory beside is on the same file system, so one rename can give it its name.

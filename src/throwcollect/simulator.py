@@ -58,9 +58,9 @@ class Simulator:
     """
 
     def __init__(self, config: StrPath, *, overrides: Sequence[str] = ()) -> None:
-        self._begin(load(Path(config), tuple(overrides)), os.fspath(config))
+        self._start(load(Path(config), tuple(overrides)), os.fspath(config))
 
-    def _begin(self, config: Config, source: str) -> None:
+    def _start(self, config: Config, source: str) -> None:
         """Make the robot and the physics engine of a configuration; `source` is the file that it was read from."""
         self._source = source
         self.config: Config = config
@@ -218,9 +218,9 @@ class _Simulated:
 
 
 def _begin(config: Config, source: str) -> Callable[[tuple[int, Point]], Throw]:
-    """Make the simulator of a process of `Simulator.throw_many`; the file may have been changed meanwhile."""
+    """Make the simulator of a process of `Simulator.throw_many`, without the file, which may have changed by then."""
     simulator = Simulator.__new__(Simulator)
-    simulator._begin(config, source)
+    simulator._start(config, source)
 
     def throw(numbered: tuple[int, Point]) -> Throw:
         trial, point = numbered

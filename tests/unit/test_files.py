@@ -51,5 +51,5 @@ def test_a_directory_that_was_made_keeps_its_permissions(tmp_path: Path) -> None
 def test_what_cannot_be_replaced_is_refused_before_the_work(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     for spelling in (Path(), tmp_path):
-        with pytest.raises(ConfigError, match="this command works"), new_directory(spelling):
+        with pytest.raises(ConfigError, match="is the working directory"), new_directory(spelling):
             pytest.fail("it began")

@@ -1,4 +1,4 @@
-"""Says how it stands with a dataset that is not finished, and what gets further."""
+"""Describes the state of a dataset that is not finished, and the command that goes on with it."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from throwcollect.wording import command
 
 @dataclass(frozen=True)
 class WayOn:
-    """How it stands with an unfinished dataset.
+    """The state of an unfinished dataset, and the way to a finished one.
 
     Attributes:
-        state: What it is or is not, in words.
-        command: The command that gets further.
+        state: Predicate of a sentence about the dataset, such as ``is not finished``.
+        command: The command that leads to a finished dataset.
         purpose: What that command does.
     """
 
@@ -25,7 +25,7 @@ class WayOn:
 
 
 def find_way_on(directory: Path) -> WayOn:
-    """Find out how it stands with an unfinished dataset; where there are no locks, it counts as left by its run."""
+    """Find the state of an unfinished dataset; on a file system without locks, no run is known to work on it."""
     if is_locked(directory):
         return WayOn("is being collected", command("wait", "--run", directory), "waits for its end")
     return WayOn("is not finished", command("resume", directory), "goes on with it")
