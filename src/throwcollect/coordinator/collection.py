@@ -18,6 +18,7 @@ from throwcollect.coordinator.acceptance import Acceptance
 from throwcollect.coordinator.growth import Growth
 from throwcollect.coordinator.leases import Leases
 from throwcollect.coordinator.lookahead import Lookahead
+from throwcollect.coordinator.pace import Pace
 from throwcollect.coordinator.progress import Progress
 from throwcollect.coordinator.replay_check import ReplayCheck
 from throwcollect.dataset.directory import find_known_directory
@@ -29,8 +30,6 @@ from throwcollect.tasks.result import Result
 from throwcollect.tasks.task import task_of
 from throwcollect.wording import command, format_count
 
-_RATE_WINDOW_S = 10.0
-"""Throws per second are averaged over this time."""
 _SYNC_EVERY_S = 1.0
 """Real time of collecting that a power cut may cost."""
 _TELL_EVERY_S = 2.0
@@ -60,8 +59,9 @@ class TrialCollection:
         self.warn: Callable[[str], object] = lambda _: None
         self.on_change: Callable[[], None] = lambda: None
         self._config = writer.plan.config
-        self._leases = Leases(writer.plan.trials.numbers_to_run, retries=self._config.run.retries)
         self._growth = Growth(writer.plan) if self._config.grows else None
+        sure = writer.plan.trials[: self._growth.planned if self._growth else None]
+        self._leases = Leases(sure.numbers_to_run, retries=self._config.run.retries)
         self._names: dict[str, str] = {}
         self._took_part: set[str] = set()
         self._acceptance = Acceptance(self._config)
@@ -71,9 +71,7 @@ class TrialCollection:
         self._backlog: deque[tuple[Episode, Result]] = deque()
         self._set_aside: dict[str, str] = {}
         self._outcomes: Counter[str] = Counter()
-        # Each time has the number of trials that had ended by then. One is there from the start, so that `_rate` has
-        # two ends.
-        self._ends: deque[tuple[float, int]] = deque([(time.monotonic(), 0)])
+        self._pace = Pace()
         self._draining = False
         self._drain_deadline = math.inf
         self._synced_at = time.monotonic()
@@ -110,6 +108,7 @@ class TrialCollection:
         try:
             if collection.writer.recover(tell, processes=processes):
                 say(f"keeps {format_count(count, 'episode')} of an earlier collection")
+            collection._cut_plan(say)
         except BaseException:
             collection.writer.close()
             raise
@@ -159,10 +158,10 @@ class TrialCollection:
 
     def recall(self, trial: int, result: Result) -> None:
         """Count a trial as ended whose episode is in the dataset already; only before anything is leased."""
-        self._leases.recall(trial)
-        self._note(trial, result)
-        # Trials of an earlier collection must not count as speed of this one.
-        self._ends = deque([(time.monotonic(), self._leases.ended)])
+        if self._growth is None or not self._growth.keep(trial, result):
+            self._recall(trial, result)
+        while self._confirm_round():
+            pass
 
     def join(self, simulation: str, name: str) -> None:
         """Note the address of a simulation that can be given trials, and the name of its node."""
@@ -256,11 +255,17 @@ class TrialCollection:
         """
         if self._growth is None:
             return False
+        if self._cut_plan(self.warn):
+            return True
         if self._growth.over:
             self._growth = None
             self.writer.close_plan()
             return True
-        trials = None if self._draining else self._growth.step()
+        if self._draining:
+            return False
+        if self._confirm_round():
+            return True
+        trials = self._growth.step()
         if trials:
             # The plan is on the disk before its trials are leased, so that no crash can leave an episode of a trial
             # that no plan has.
@@ -284,7 +289,7 @@ class TrialCollection:
         remaining = self._leases.total - self._leases.ended
         # The guess is made from all trials of the plan, so it is worth nothing while some may be added or left out.
         settled = self._growth is None and not self._draining
-        if settled and not self._replay.begun and remaining <= _REPLAY_AHEAD_S * self._rate:
+        if settled and not self._replay.begun and remaining <= _REPLAY_AHEAD_S * self._pace.rate:
             self._replay.begin(list(self.writer.plan.trials.numbers_to_run))
 
     def progress(self, hung: Iterable[str] = ()) -> Progress:
@@ -293,11 +298,8 @@ class TrialCollection:
         Args:
             hung: Names of the simulations that took too long for a trial.
         """
-        now = time.monotonic()
         ended = self._leases.ended
-        self._ends.append((now, ended))
-        while self._ends[0][0] < now - _RATE_WINDOW_S:
-            self._ends.popleft()
+        self._pace.note(ended)
         # The number of trials of a plan that ends when enough have succeeded is not known.
         expected = self._growth.most if self._growth is not None and self._config.until is None else 0
         return Progress(
@@ -305,7 +307,7 @@ class TrialCollection:
             ended=ended,
             outcomes=dict(self._outcomes),
             simulations=len(self._names),
-            throws_per_s=self._rate,
+            throws_per_s=self._pace.rate,
             hung=sorted(hung),
             wanted=self._config.until.wanted if self._config.until else None,
             success=self._config.task.success,
@@ -345,11 +347,35 @@ class TrialCollection:
         # Unless it was told otherwise, a simulation lives in a namespace that has the name of its node.
         return self._names.get(simulation, simulation.strip("/"))
 
-    @property
-    def _rate(self) -> float:
-        """Trials that ended per second of real time, as of the last call of `progress`."""
-        (since, before), (now, ended) = self._ends[0], self._ends[-1]
-        return (ended - before) / (now - since) if now > since else 0.0
+    def _recall(self, trial: int, result: Result) -> None:
+        self._leases.recall(trial)
+        self._note(trial, result)
+        self._pace.begin(self._leases.ended)
+
+    def _confirm_round(self) -> bool:
+        """Go on with the next round that an earlier collection has planned; False if results do not give it, or yet."""
+        earlier = self._growth.confirm() if self._growth is not None else None
+        if earlier is None:
+            return False
+        self._leases.add(earlier.trials.numbers_to_run)
+        for trial, result in earlier.results.items():
+            self._recall(trial, result)
+        self.on_change()
+        return True
+
+    def _cut_plan(self, say: Callable[[str], object]) -> bool:
+        """Remove what an earlier collection has planned otherwise than the results say; False if there is nothing.
+
+        Raises:
+            DatasetError: If the disk fails.
+        """
+        wrong = self._growth.take_wrong() if self._growth is not None else None
+        if wrong is None:
+            return False
+        count = format_count(wrong.episodes, "episode")
+        say(f"trial {wrong.first} and those behind were planned without results of lost ones: {count} removed")
+        self.writer.cut(wrong.first)
+        return True
 
     def _note(self, trial: int, result: Result) -> None:
         self._outcomes[result.outcome.value] += 1

@@ -2,16 +2,36 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 from throwcollect.config.values import with_values
 from throwcollect.coordinator.prepare import feasibility_check
-from throwcollect.sweep.plan import Check, Plan, make_trials, refusal
-from throwcollect.sweep.rounds import Rounds
+from throwcollect.sweep.plan import FIRST_TRIALS, Check, Plan, make_trials, refusal
+from throwcollect.sweep.rounds import Rounds, find_same
 from throwcollect.sweep.trials import Trials
 from throwcollect.tasks.result import Result
 
 
+class EarlierRound(NamedTuple):
+    """A round that an earlier collection has planned, and the results that it has left of it, by trial."""
+
+    trials: Trials
+    results: dict[int, Result]
+
+
+class WrongTrials(NamedTuple):
+    """Trials that an earlier collection has planned otherwise than the results say: the first, and how many ended."""
+
+    first: int
+    episodes: int
+
+
 class Growth:
     """The trials that a plan will still get.
+
+    Of a plan that an earlier collection has left, only the first two rounds are sure to be those of its configuration:
+    results of trials that were lost there, and are run again, may call for others behind. So all later rounds are drawn
+    again from the results, and stay if they are the same.
 
     Args:
         plan: The plan as it is by now.
@@ -22,25 +42,81 @@ class Growth:
 
     def __init__(self, plan: Plan) -> None:
         self._config = plan.config
+        self._earlier = plan.trials[:]
+        self._results: dict[int, Result] = {}
+        """Results of the earlier collection for trials that are not sure to belong to the plan."""
+        self._wrong: WrongTrials | None = None
         self._rounds = Rounds(plan.config)
-        self._rounds.add(plan.trials)
+        self._rounds.add(plan.trials[:FIRST_TRIALS])
         self._check: Check | None = None
         self._coming: Trials | None = None
         self._reasons: list[str | None] = []
 
     @property
+    def planned(self) -> int:
+        """Number of trials, from the first one on, that are sure to belong to the plan."""
+        return self._rounds.planned
+
+    @property
     def over(self) -> bool:
         """Whether no trial will follow."""
-        return self._coming is None and self._rounds.over
+        return not self._doubtful and self._coming is None and self._rounds.over
 
     @property
     def most(self) -> int:
         """Number of trials that may follow at most."""
         return 0 if self.over else self._rounds.limit - self._rounds.planned
 
+    @property
+    def _doubtful(self) -> bool:
+        """Whether the earlier collection has planned trials that are not drawn again yet."""
+        return self._rounds.planned < len(self._earlier)
+
     def tell(self, trial: int, result: Result) -> None:
-        """Take in the result of a trial."""
+        """Take in the result of a trial that is sure to belong to the plan."""
         self._rounds.tell(trial, result)
+
+    def keep(self, trial: int, result: Result) -> bool:
+        """Keep a result that the earlier collection has left, unless its trial is sure to belong to the plan.
+
+        Returns:
+            Whether it is kept; `confirm` returns it later.
+        """
+        if trial < self._rounds.planned:
+            return False
+        self._results[trial] = result
+        return True
+
+    def confirm(self) -> EarlierRound | None:
+        """Draw the next round of the earlier collection again.
+
+        Returns:
+            That round, whose trials are sure to belong to the plan from now on; None if there is none, if results are
+            missing on which it depends, or if they do not give it (see `take_wrong`).
+        """
+        if not self._doubtful or not self._rounds.due:
+            return None
+        first = self._rounds.planned
+        if self._rounds.over:
+            self._give_up(first)
+            return None
+        drawn = self._rounds.draw()
+        there = self._earlier[first : first + len(drawn.values)]
+        if not find_same(there.values, drawn.values[: len(there)]).all():
+            self._give_up(first)
+            self._coming = make_trials(self._config, drawn, first=first)
+            return None
+        self._rounds.add(there)
+        # The last round of a plan that had fewer `trials` is completed by the same draw.
+        if len(there) < len(drawn.values):
+            self._coming = make_trials(self._config, drawn[len(there) :], first=first + len(there))
+        known = [number for number in there.numbers if number in self._results]
+        return EarlierRound(there, {number: self._results.pop(number) for number in known})
+
+    def take_wrong(self) -> WrongTrials | None:
+        """The trials that were found not to belong to the plan, once; None if there are none."""
+        wrong, self._wrong = self._wrong, None
+        return wrong
 
     def step(self) -> Trials | tuple[()] | None:
         """Do the next piece of work, of some milliseconds: draw a round, or check one of its trials.
@@ -49,11 +125,9 @@ class Growth:
             The trials of a round when it is ready, none before that; None if there is nothing to do.
         """
         if self._coming is None:
-            if self._rounds.over or not self._rounds.due:
+            if self._doubtful or self._rounds.over or not self._rounds.due:
                 return None
-            points = self._rounds.draw()
-            if points is not None:
-                self._coming = make_trials(self._config, points, first=self._rounds.planned)
+            self._coming = make_trials(self._config, self._rounds.draw(), first=self._rounds.planned)
             return ()
         if len(self._reasons) < len(self._coming):
             self._check = self._check or feasibility_check(self._config)
@@ -64,3 +138,9 @@ class Growth:
         self._coming, self._reasons = None, []
         self._rounds.add(trials)
         return trials
+
+    def _give_up(self, first: int) -> None:
+        """Forget what the earlier collection has planned from a trial on."""
+        self._wrong = WrongTrials(first, len(self._results))
+        self._earlier = self._earlier[:first]
+        self._results.clear()

@@ -7,7 +7,7 @@ import tempfile
 from collections.abc import Iterable, Iterator, Mapping
 from functools import cached_property
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
 import numpy as np
 import pyarrow as pa
@@ -99,6 +99,12 @@ class RowStore:
             stream.write_table(rows)
         self._places[number] = self._by_shards.append([sink.getvalue()])
 
+    def take(self, number: int) -> list[dict[str, Any]]:
+        """Return the rows of a shard, and have them no longer."""
+        self._by_shards.map()
+        rows: list[dict[str, Any]] = self._read(self._places.pop(number)).to_pylist()
+        return rows
+
     @cached_property
     def table(self) -> pa.Table:
         """All rows in order of trials, each column in one piece; values come from the disk when they are looked at.
@@ -108,12 +114,15 @@ class RowStore:
         """
         self._by_shards.map()
         places = [place for _, place in sorted(self._places.items())]
-        rows = pa.concat_tables([pa.ipc.open_stream(self._by_shards.read(place)).read_all() for place in places])
+        rows = pa.concat_tables([self._read(place) for place in places])
         columns = [self._put_column(column.chunks) for column in rows.columns]
         self._by_columns.map()
         pairs = zip(self._schema.types, columns, strict=True)
         arrays = [self._read_column(kind, len(rows), places) for kind, places in pairs]
         return pa.Table.from_arrays(arrays, schema=self._schema)
+
+    def _read(self, place: _Place) -> pa.Table:
+        return pa.ipc.open_stream(self._by_shards.read(place)).read_all()
 
     def _put_column(self, chunks: list[pa.Array]) -> tuple[_Place | None, ...]:
         """Write a column in one piece; returns the places of the buffers of its array, in the order of Arrow."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Collection, Iterator, Mapping
 from pathlib import Path
 from typing import NamedTuple
@@ -18,15 +17,12 @@ from throwcollect.errors import ConfigError
 from throwcollect.extras import is_installed
 from throwcollect.sweep.plan import Check, Plan, make_trials, refusal
 from throwcollect.sweep.points import Points
-from throwcollect.sweep.rounds import Rounds
+from throwcollect.sweep.rounds import Rounds, find_same
 from throwcollect.sweep.samplers import draw_points
 from throwcollect.wording import blank_numbers, format_count
 
 CHECKED_AGAIN = 100
 """How many of the trials that the plan does not refuse are checked again as a sample; each takes 1 to 5 ms."""
-
-_RELATIVE_TOLERANCE = 1e-9
-"""Values that are drawn again on another machine may differ in their last bits."""
 
 CheckOf = Callable[[Config], Check]
 """Makes the check of the trials of a configuration."""
@@ -59,9 +55,12 @@ def find_drawing_problems(directory: Path, plan: Plan, rows: Mapping[int, Row] |
     if drawing.problem is not None:
         yield Finding(PLAN, "", drawing.problem)
     drawn = make_trials(plan.config, Points(plan.keys, drawing.values[: len(plan.trials)]))
-    for trial, again in zip(plan.trials, drawn, strict=False):
+    planned = plan.trials[: len(drawn)]
+    same = find_same(planned.values, drawn.values).all(axis=1) & (planned.seeds == drawn.seeds)
+    for index in np.flatnonzero(~same):
+        trial, again = planned[int(index)], drawn[int(index)]
         for key, value in again.values.items():
-            if not math.isclose(trial.values[key], value, rel_tol=_RELATIVE_TOLERANCE, abs_tol=_RELATIVE_TOLERANCE):
+            if not find_same(np.array(trial.values[key]), np.array(value)):
                 yield _of_trial(again.number, f"has {key} = {trial.values[key]!r}, the configuration draws {value!r}")
         if trial.seed != again.seed:
             yield _of_trial(again.number, f"has seed {trial.seed}, the configuration gives {again.seed}")
@@ -126,9 +125,6 @@ def _draw_rounds(plan: Plan, rows: Mapping[int, Row] | None) -> _Drawing:
     values: list[NDArray[np.float64]] = []
     while rounds.due and not rounds.over and rounds.planned < there:
         points = rounds.draw()
-        # The sampler has only learned from a round that is known already.
-        if points is None:
-            continue
         values.append(_of_keys(points, plan).values)
         added = plan.trials[rounds.planned : rounds.planned + len(points.values)]
         rounds.add(added)

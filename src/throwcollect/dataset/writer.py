@@ -8,7 +8,7 @@ stopped, the next writer takes in the files that it left (see `recovery`) and go
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from contextlib import ExitStack, closing
 from dataclasses import replace
 from pathlib import Path
@@ -22,33 +22,26 @@ from throwcollect.dataset.configuration import read_config
 from throwcollect.dataset.creation import create
 from throwcollect.dataset.data_card import count_outcomes, data_card
 from throwcollect.dataset.description import write_description
-from throwcollect.dataset.directory import (
-    CARD,
-    CONFIG,
-    MANIFEST,
-    METADATA,
-    PLAN,
-    THROWS,
-    shard_name,
-)
+from throwcollect.dataset.directory import CARD, CONFIG, MANIFEST, METADATA, PLAN, THROWS
 from throwcollect.dataset.journal import Event, Journal, was_open
 from throwcollect.dataset.lock import hold_lock
 from throwcollect.dataset.manifest import FileEntry
 from throwcollect.dataset.provenance import Provenance, write_provenance
-from throwcollect.dataset.recovery import Part, find_left, recover_shard, remove_unfinished
+from throwcollect.dataset.recovery import LeftOfShard, RecoveredEpisode, find_left, recover_shard, remove_unfinished
 from throwcollect.dataset.row_store import Digests, RowStore
-from throwcollect.dataset.shard import FinishedShard, OpenShard, path_of_part
+from throwcollect.dataset.shard import FinishedShard, OpenShard
+from throwcollect.dataset.shard_layout import ShardLayout
 from throwcollect.dataset.throws_table import Place, Row, ThrowsTable
 from throwcollect.episode.channels import Channels
 from throwcollect.episode.message import Episode
 from throwcollect.errors import DatasetError
-from throwcollect.files import is_there, remove, write_file
+from throwcollect.files import remove, write_file
 from throwcollect.robots.description import full_description
 from throwcollect.sweep.plan import Plan
 from throwcollect.sweep.points import Points
 from throwcollect.sweep.round_file import append_round
 from throwcollect.sweep.trials import Trials
-from throwcollect.tasks.result import Result
+from throwcollect.tasks.result import LOST, Result
 from throwcollect.tasks.task import task_of
 from throwcollect.wording import format_count
 
@@ -56,11 +49,12 @@ Tell = Callable[[int, Result], None]
 """Receives the number of a trial and its result."""
 
 
+def _tell_nobody(_trial: int, _result: Result) -> None:
+    """Take in the result of a trial where nobody wants to know."""
+
+
 class DatasetWriter:
     """Takes the episodes of a plan's trials, each once and in any order, and writes the dataset.
-
-    Attributes:
-        plan: The trials.
 
     Args:
         directory: A directory as `create` leaves it.
@@ -79,14 +73,12 @@ class DatasetWriter:
         growing: bool = False,
         channels: Channels | None = None,
     ) -> None:
-        self.plan = plan
         self._directory = directory
         self._config: Config = plan.config
         self._journal = journal
-        self._growing = growing
-        if growing:
-            # The caller's plan must not grow with this one.
-            self.plan = replace(plan, trials=plan.trials[:])
+        # The caller's plan must not grow with this one.
+        plan = replace(plan, trials=plan.trials[:]) if growing else plan
+        self._layout = ShardLayout(directory, plan, growing)
         self._channels = channels or Channels(self._config, full_description(self._config))
         self._table = ThrowsTable.of(plan)
         self._unfinished: set[int] = set()
@@ -98,7 +90,12 @@ class DatasetWriter:
         """What bag's metadata and manifest say of the file of each finished shard that has one."""
         self._finished_rows = RowStore(directory, self._table.schema)
         self._held = ExitStack()
-        self._expect(self.plan.trials)
+        self._expect(plan.trials)
+
+    @property
+    def plan(self) -> Plan:
+        """The trials."""
+        return self._layout.plan
 
     @classmethod
     def create(cls, directory: Path, plan: Plan, *, listed: Points | None = None) -> DatasetWriter:
@@ -132,7 +129,7 @@ class DatasetWriter:
             writer._held = held.pop_all()
         return writer
 
-    def recover(self, tell: Tell | None = None, *, processes: int = 1) -> int:
+    def recover(self, tell: Tell = _tell_nobody, *, processes: int = 1) -> int:
         """Take in what earlier writers have left: every episode that is whole stays, everything else is removed.
 
         A finished dataset is an unfinished one then, even if all its trials have ended; `finish` writes the same files.
@@ -154,20 +151,16 @@ class DatasetWriter:
             remove(self._directory / name)
         count = 0
         # Every process gets the trials of the shards that it looks through, and not a whole plan.
-        parts = {number: self._part(number) for number in sorted(self._unfinished) if self._has_file(number)}
+        parts = {each: self._layout.part(each) for each in sorted(self._unfinished) if self._layout.has_file(each)}
         all_left = find_left([*parts.values()], self._channels, processes=processes)
         for number, left in zip(parts, all_left, strict=True):
-            shard = self._shard(number)
-            episodes = recover_shard(shard, left)
+            episodes = self._take_left(number, left)
             for each in episodes:
-                place = replace(each.place, shard=shard.path.name)
-                self._rows[number][each.trial] = self._row(each.trial, each.result, place)
-                if tell is not None:
-                    tell(each.trial, each.result)
+                tell(each.trial, each.result)
             count += len(episodes)
             if left.finished is not None:
                 self._close_shard(number, left.finished)
-            elif episodes or not shard.missing:
+            elif episodes or not self._shard(number).missing:
                 self._finish_shard_if_complete(number)
             else:
                 del self._shards[number], self._rows[number]
@@ -186,13 +179,33 @@ class DatasetWriter:
         self.note("planned", trials=len(self.plan.trials))
         self._expect(trials)
 
+    def cut(self, first: int) -> None:
+        """Take the trials from a number on out of the plan again, with all that was written of them.
+
+        Whenever this is interrupted, the trials before are as they were, and `recover` removes what is left of the
+        others, or finds them in the plan.
+
+        Raises:
+            DatasetError: If the disk fails.
+        """
+        shard, within = divmod(first, self._layout.trials_per_shard)
+        last = self._layout.number_of(self.plan.trials.numbers.stop - 1)
+        rows = {number: self._let_go_of(number) for number in range(shard, last + 1)}
+        for number in range(shard + bool(within), last + 1):
+            self._layout.remove_files(number)
+        self._layout.plan = replace(self.plan, trials=self.plan.trials[:first])
+        self.plan.write(self._directory / PLAN)
+        self.note("planned", trials=first)
+        if within:
+            self._reopen(shard, rows[shard])
+
     def close_plan(self) -> None:
         """Declare that the plan has all its trials.
 
         Raises:
             DatasetError: If the plan, or a shard that is now complete, cannot be written.
         """
-        self._growing = False
+        self._layout.growing = False
         self.plan.take_in_rounds(self._directory / PLAN)
         # A copy, as shards that are finished leave the dictionary.
         for number in list(self._shards):
@@ -313,43 +326,50 @@ class DatasetWriter:
         self._journal = None
 
     def _expect(self, trials: Trials) -> None:
-        per_shard = self._config.record.trials_per_shard
-        for number in range(trials.first // per_shard, -(-trials.numbers.stop // per_shard)):
+        for number in range(self._layout.number_of(trials.first), self._layout.number_of(trials.numbers.stop - 1) + 1):
             self._unfinished.add(number)
             if number in self._shards:
-                self._shards[number].expect(each for each in self._to_run(number) if each in trials.numbers)
+                self._shards[number].expect(each for each in self._layout.to_run(number) if each in trials.numbers)
             # A shard of refused trials alone waits for no episode, and nothing would finish it later.
-            if number in self._shards or next(self._to_run(number), None) is None:
+            if number in self._shards or next(self._layout.to_run(number), None) is None:
                 self._finish_shard_if_complete(number)
 
-    def _members(self, number: int) -> range:
-        """Numbers of the trials of a shard."""
-        per_shard, numbers = self._config.record.trials_per_shard, self.plan.trials.numbers
-        return range(max(number * per_shard, numbers.start), min((number + 1) * per_shard, numbers.stop))
+    def _let_go_of(self, number: int) -> list[Row]:
+        """Forget a shard, but for its files; returns the rows of the trials that have ended."""
+        self._recordings.pop(number, None)
+        if number not in self._unfinished:
+            return self._finished_rows.take(number)
+        self._unfinished.discard(number)
+        if number not in self._shards:
+            return []
+        self._shards.pop(number).close()
+        return [*self._rows.pop(number).values()]
 
-    def _to_run(self, number: int) -> Iterator[int]:
-        """Numbers of the trials of a shard that are not refused."""
-        return (each for each in self._members(number) if each not in self.plan.trials.refused)
+    def _reopen(self, number: int, rows: list[Row]) -> None:
+        """Fill a shard further, of which trials were taken out of the plan; `rows` are those that it had."""
+        self._unfinished.add(number)
+        [left] = find_left([self._layout.part(number)], self._channels)
+        self._take_left(number, left)
+        # Trials that were lost before and are so again have no episode by which they would be found.
+        for row in rows:
+            if row["outcome"] == LOST and row["trial"] in self._layout.members(number):
+                self._rows[number][row["trial"]] = row
+                self._shards[number].missing.discard(row["trial"])
 
-    def _part(self, number: int) -> Part:
-        """Describe a shard for `find_left`, without a look into its files."""
-        members, first = self._members(number), self.plan.trials.first
-        trials = self.plan.trials[members.start - first : members.stop - first]
-        return Part(self._path(number), Plan(self._config, trials), self._settled(number))
-
-    def _has_file(self, number: int) -> bool:
-        """Whether an earlier writer has begun a shard."""
-        path = self._path(number)
-        return is_there(path) or is_there(path_of_part(path))
-
-    def _path(self, number: int) -> Path:
-        return self._directory / shard_name(self._config.name, number)
+    def _take_left(self, number: int, left: LeftOfShard) -> list[RecoveredEpisode]:
+        """Take in what is left of an unfinished shard; returns its episodes in order of trials."""
+        shard = self._shard(number)
+        episodes = recover_shard(shard, left)
+        for each in episodes:
+            place = replace(each.place, shard=shard.path.name)
+            self._rows[number][each.trial] = self._row(each.trial, each.result, place)
+        return episodes
 
     def _shard(self, number: int) -> OpenShard:
         """An unfinished shard, which takes memory only from when it is first asked for."""
         if number not in self._shards:
-            shard = OpenShard(self._path(number), self._channels)
-            shard.expect(self._to_run(number))
+            shard = OpenShard(self._layout.path(number), self._channels)
+            shard.expect(self._layout.to_run(number))
             self._shards[number], self._rows[number] = shard, {}
         return self._shards[number]
 
@@ -357,23 +377,19 @@ class DatasetWriter:
         return self._table.row(self.plan.trial(trial), result, place)
 
     def _waiting_shard(self, trial: int) -> int:
-        shard = trial // self._config.record.trials_per_shard
+        shard = self._layout.number_of(trial)
         if shard not in self._unfinished or trial not in self._shard(shard).missing:
             raise DatasetError(f"no episode of trial {trial} is waited for", path=self._directory)
         return shard
 
-    def _settled(self, number: int) -> bool:
-        """Whether no trial will be added to a shard any more."""
-        return not self._growing or len(self.plan.trials) >= (number + 1) * self._config.record.trials_per_shard
-
     def _finish_shard_if_complete(self, number: int) -> None:
         shard = self._shard(number)
-        if not shard.missing and self._settled(number):
+        if not shard.missing and self._layout.is_settled(number):
             self._close_shard(number, shard.finish())
 
     def _close_shard(self, number: int, finished: FinishedShard) -> None:
         ended, refused = self._rows.pop(number), self._table.make_refused_row
-        rows = [ended.get(trial) or refused(self.plan.trial(trial)) for trial in self._members(number)]
+        rows = [ended.get(trial) or refused(self.plan.trial(trial)) for trial in self._layout.members(number)]
         for row in rows:
             row["chunk_offset"] = finished.offsets.get(row["trial"])
         self.take_shard(number, finished.recording, self._table.table(rows))

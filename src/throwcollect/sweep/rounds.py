@@ -25,6 +25,13 @@ if TYPE_CHECKING:
     from throwcollect.sweep.target import TargetSampler
 
 _FIRST_ROUNDS = FIRST_TRIALS // ROUND_TRIALS
+_TOLERANCE = 1e-9
+"""Values that are drawn again on another machine may differ in their last bits; relative, absolute where near 0."""
+
+
+def find_same(planned: NDArray[np.float64], drawn: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Find the values of a plan that are drawn again the same; all three arrays have one shape."""
+    return np.isclose(planned, drawn, rtol=_TOLERANCE, atol=_TOLERANCE)
 
 
 class Rounds:
@@ -103,22 +110,18 @@ class Rounds:
             values = dict(zip(self._points.keys, self._values.all[number].tolist(), strict=True))
             self._places.all[number] = self._sampler.place(values, result)
 
-    def draw(self) -> Points | None:
-        """Draw one round, as `due` and not `over` allow.
+    def draw(self) -> Points:
+        """Draw the points of the next trials, to the end of their round, as `due` and not `over` allow.
 
-        The sampler of `sweep.target` learns from round to round, so after a resumption it first draws all rounds that
-        are in the plan already, one with each call.
-
-        Returns:
-            The points of the next trials, to the end of their round; None if this round is in the plan already.
+        The sampler of `sweep.target` learns from round to round, so each round from the third on has to be drawn once,
+        and in order.
         """
         number, present = divmod(self.planned, ROUND_TRIALS)
         if self._sampler is None or number < _FIRST_ROUNDS:
             return Points(self._points.keys, self._values_of(number)[present:])
-        drawn = self._sampler.next_round
-        known = (drawn - 1) * ROUND_TRIALS
-        values = self._sampler.draw(self._values_of(drawn), self._values.all[:known], self._places.all[:known])
-        return Points(self._points.keys, values[present:]) if drawn == number else None
+        known = (number - 1) * ROUND_TRIALS
+        values = self._sampler.draw(self._values_of(number), self._values.all[:known], self._places.all[:known])
+        return Points(self._points.keys, values)
 
     def _values_of(self, number: int) -> NDArray[np.float64]:
         return self._points.values[number * ROUND_TRIALS : (number + 1) * ROUND_TRIALS]

@@ -30,7 +30,7 @@ class TargetSampler:
     """
 
     def __init__(self, config: Config, target: TargetConfig, *, first: int) -> None:
-        self.next_round = first
+        self._next_round = first
         """Number of the round that `draw` draws next."""
         self._seed = config.seed
         self._parameters: Mapping[str, Parameter] = config.sweep.parameters
@@ -70,9 +70,9 @@ class TargetSampler:
         Returns:
             Values in the units of the parameters, shape ``(n_trials, n_parameters)``.
         """
-        key = (_RANDOMNESS, self.next_round)
+        key = (_RANDOMNESS, self._next_round)
         randomness = np.random.default_rng(np.random.SeedSequence(self._seed, spawn_key=key))
-        self.next_round += 1
+        self._next_round += 1
         self._learn(self._unit(tried[self._known :]), ended[self._known :])
         if not self._model.usable:
             self._aims = np.append(self._aims, np.full(ROUND_TRIALS, NOWHERE))

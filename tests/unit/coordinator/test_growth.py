@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import pytest
 from tests.unit.sweep.columns import in_columns
 from tests.unit.sweep.thrower import collected, configuration, throw
 
@@ -52,16 +53,80 @@ def test_trials_of_later_rounds_are_refused_as_those_of_a_plan_made_at_once() ->
     assert 0 < sum(trial.refused is not None for trial in later) < len(later)
 
 
-def test_a_plan_that_has_rounds_already_goes_on_where_it_was() -> None:
-    settings = configuration(trials=256)
-    growth = Growth(Plan(settings, in_columns(collected(settings, rounds=3))))
-    for trial in collected(settings, rounds=3):
+def resumed(settings: Config, trials: list[Trial]) -> Growth:
+    """The growth of a plan that an earlier collection has left with the results of all its trials."""
+    growth = Growth(Plan(settings, in_columns(trials)))
+    for trial in trials:
+        if not growth.keep(trial.number, throw(trial)):
+            growth.tell(trial.number, throw(trial))
+    return growth
+
+
+def go_on(growth: Growth) -> list[Trial]:
+    """Confirm the rounds of an earlier collection with its results, then add one more; returns the trials of that."""
+    while (earlier := growth.confirm()) is not None:
+        for number, result in earlier.results.items():
+            growth.tell(number, result)
+    while not (trials := growth.step()):
+        assert trials == ()
+    return list(trials)
+
+
+@pytest.mark.parametrize("rounds", [2, 3, 4, 6])
+def test_a_plan_that_has_rounds_already_goes_on_where_it_was(rounds: int) -> None:
+    settings = configuration(trials=500)
+    growth = resumed(settings, collected(settings, rounds=rounds))
+    following = [trial.values for trial in collected(settings)[64 * rounds : 64 * (rounds + 1)]]
+    assert [trial.values for trial in go_on(growth)] == following
+    assert growth.take_wrong() is None
+
+
+def test_a_last_round_that_was_cut_short_is_completed() -> None:
+    growth = resumed(configuration(trials=500), collected(configuration(trials=330)))
+    following = [trial.values for trial in collected(configuration(trials=500))[330:384]]
+    assert [trial.values for trial in go_on(growth)] == following
+    assert growth.take_wrong() is None
+
+
+def test_rounds_that_the_results_do_not_give_are_found_and_drawn_anew() -> None:
+    settings = configuration(trials=500)
+    lost = ThrowResult(ThrowOutcome.LOST)
+    planned = collected(settings, throw=lambda trial: lost if trial.number == 3 else throw(trial), rounds=6)
+    growth = resumed(settings, planned)
+    assert [trial.values for trial in go_on(growth)] == [trial.values for trial in collected(settings)[128:192]]
+    assert growth.take_wrong() == (128, 256)
+    assert growth.take_wrong() is None
+
+
+def test_rounds_behind_the_end_are_found() -> None:
+    settings = configuration(trials=None, target=None, landed=63)
+    lost, landed = ThrowResult(ThrowOutcome.LOST), throw(make_plan(settings).trials[0])
+    planned = collected(settings, throw=lambda trial: lost if trial.number in (3, 4) else landed)
+    assert len(planned) == 192
+    growth = Growth(Plan(settings, in_columns(planned)))
+    for number in range(64):
+        growth.tell(number, landed)
+    assert growth.keep(130, landed)
+    assert growth.confirm() is None
+    assert growth.take_wrong() == (128, 1)
+    assert growth.over
+
+
+def test_nothing_is_drawn_before_all_rounds_of_the_earlier_collection_are_confirmed() -> None:
+    settings = configuration(trials=500)
+    planned = collected(settings, rounds=4)
+    growth = Growth(Plan(settings, in_columns(planned)))
+    for trial in planned[1:64]:
         growth.tell(trial.number, throw(trial))
-    steps = []
-    while (trials := growth.step()) is not None:
-        steps.append(trials)
-    assert steps[0] == ()
-    assert [trial.values for trial in steps[-1]] == [trial.values for trial in collected(settings)[192:]]
+    assert growth.confirm() is None
+    assert growth.step() is None
+    assert not growth.over
+    growth.tell(0, throw(planned[0]))
+    assert growth.step() is None
+    earlier = growth.confirm()
+    assert earlier is not None
+    assert list(earlier.trials.numbers) == list(range(128, 192))
+    assert growth.confirm() is None
 
 
 def test_it_says_how_many_trials_may_follow() -> None:

@@ -70,19 +70,19 @@ def go_on(
         rounds: Rounds after which it is left.
     """
     grown = Rounds(config)
-    grown.add(in_columns(trials))
+    grown.add(in_columns(trials[:128]))
     ended = 0
     while True:
-        for trial in order(trials[ended:]):
+        for trial in order(trials[ended : grown.planned]):
             grown.tell(trial.number, throw(trial))
-        ended = len(trials)
+        ended = grown.planned
         if grown.over or (rounds is not None and ended >= 64 * rounds):
             return trials
-        points = grown.draw()
-        if points is not None:
-            added = make_trials(config, points, first=ended)
-            grown.add(added)
-            trials += added
+        added = make_trials(config, grown.draw(), first=ended)
+        there = trials[ended : ended + len(added)]
+        assert there == list(added)[: len(there)], "a round that the plan has already is drawn again the same"
+        trials += added[len(there) :]
+        grown.add(added)
 
 
 def collected(config: Config, **options: Any) -> list[Trial]:

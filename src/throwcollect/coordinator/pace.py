@@ -1,0 +1,35 @@
+"""How many trials end in a second."""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+
+_WINDOW_S = 10.0
+"""Trials per second are averaged over this time."""
+
+
+class Pace:
+    """Trials that ended per second of real time, over the last ten seconds."""
+
+    def __init__(self) -> None:
+        # Each time has the number of trials that had ended by then. One is there from the start, so that `rate` has two
+        # ends.
+        self._ends: deque[tuple[float, int]] = deque([(time.monotonic(), 0)])
+
+    @property
+    def rate(self) -> float:
+        """Trials that ended per second, as of the last call of `note`."""
+        (since, before), (now, ended) = self._ends[0], self._ends[-1]
+        return (ended - before) / (now - since) if now > since else 0.0
+
+    def note(self, ended: int) -> None:
+        """Note the number of trials that have ended by now."""
+        now = time.monotonic()
+        self._ends.append((now, ended))
+        while self._ends[0][0] < now - _WINDOW_S:
+            self._ends.popleft()
+
+    def begin(self, ended: int) -> None:
+        """Begin anew, so that trials of an earlier collection do not count as speed of this one."""
+        self._ends = deque([(time.monotonic(), ended)])

@@ -1,0 +1,75 @@
+"""Which trials of a plan each shard has, and where its files lie."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from throwcollect.dataset.directory import shard_name
+from throwcollect.dataset.recovery import Part
+from throwcollect.dataset.shard import path_of_part
+from throwcollect.files import is_there, remove
+from throwcollect.sweep.plan import Plan
+
+
+@dataclass
+class ShardLayout:
+    """The shards of a dataset by their numbers, before and after they are begun.
+
+    Attributes:
+        directory: Directory of the dataset.
+        plan: The trials, which may become more.
+        growing: Whether they may still become more.
+    """
+
+    directory: Path
+    plan: Plan
+    growing: bool
+
+    @property
+    def trials_per_shard(self) -> int:
+        """Number of trials in each shard but the last one."""
+        return self.plan.config.record.trials_per_shard
+
+    def number_of(self, trial: int) -> int:
+        """Number of the shard of a trial."""
+        return trial // self.trials_per_shard
+
+    def members(self, number: int) -> range:
+        """Numbers of the trials of a shard."""
+        size, numbers = self.trials_per_shard, self.plan.trials.numbers
+        return range(max(number * size, numbers.start), min((number + 1) * size, numbers.stop))
+
+    def to_run(self, number: int) -> Iterator[int]:
+        """Numbers of the trials of a shard that are not refused."""
+        return (each for each in self.members(number) if each not in self.plan.trials.refused)
+
+    def is_settled(self, number: int) -> bool:
+        """Whether no trial will be added to a shard any more."""
+        return not self.growing or len(self.plan.trials) >= (number + 1) * self.trials_per_shard
+
+    def path(self, number: int) -> Path:
+        """Path of a shard once it is finished."""
+        return self.directory / shard_name(self.plan.config.name, number)
+
+    def has_file(self, number: int) -> bool:
+        """Whether a shard was begun."""
+        path = self.path(number)
+        return is_there(path) or is_there(path_of_part(path))
+
+    def remove_files(self, number: int) -> None:
+        """Remove the files of a shard, finished or not.
+
+        Raises:
+            DatasetError: If they cannot be removed.
+        """
+        path = self.path(number)
+        remove(path)
+        remove(path_of_part(path))
+
+    def part(self, number: int) -> Part:
+        """Describe a shard for `find_left`, without a look into its files."""
+        members, first = self.members(number), self.plan.trials.first
+        trials = self.plan.trials[members.start - first : members.stop - first]
+        return Part(self.path(number), Plan(self.plan.config, trials), self.is_settled(number))

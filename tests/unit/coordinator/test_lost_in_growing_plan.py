@@ -1,0 +1,125 @@
+"""Trials of a plan that grows are lost and run again: the dataset becomes the one of an undisturbed collection."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Collection, Iterator
+from pathlib import Path
+
+import pytest
+
+from throwcollect.config.schema import Config
+from throwcollect.coordinator.collection import TrialCollection
+from throwcollect.coordinator.prepare import prepare
+from throwcollect.coordinator.resume import resume
+from throwcollect.dataset.verify import verify
+from throwcollect.dataset.writer import DatasetWriter
+from throwcollect.episode.message import Delivery
+from throwcollect.errors import LossError
+from throwcollect.replay.throw import Replayer
+from throwcollect.sweep.trials import Trial
+
+LANDED = 64
+"""All trials land, so the first round alone is enough unless one of it is lost."""
+PARAMETERS = {"task.duration_s": {"min": 1.0, "max": 1.6}, "task.trajectory.gamma": {"min": 1.0, "max": 1.4}}
+TARGET = {"distance_m": {"min": 0.5, "max": 2.0, "bins": 6}}
+
+
+def configuration(*, per_shard: int, target: bool) -> Config:
+    return Config.model_validate(
+        {
+            "name": "grown",
+            "trials": 192,
+            "until": None if target else {"landed": LANDED},
+            "sweep": {"parameters": PARAMETERS, "target": TARGET if target else None},
+            "sim": {"engine": "ballistic", "physics_hz": 125},
+            "record": {"rate_hz": 25, "trials_per_shard": per_shard},
+            "run": {"retries": 0, "replay": 0},
+        }
+    )
+
+
+@pytest.fixture(scope="module")
+def simulate() -> Iterator[Callable[[Trial], Delivery]]:
+    """Simulates a trial, each only once, as collections that differ in shards alone have the same ones."""
+    replayer = Replayer(configuration(per_shard=64, target=False))
+    deliveries: dict[tuple[int, str], Delivery] = {}
+
+    def simulate(trial: Trial) -> Delivery:
+        key = (trial.number, trial.digest)
+        if key not in deliveries:
+            deliveries[key] = replayer.delivery(trial)
+        return deliveries[key]
+
+    yield simulate
+    replayer.close()
+
+
+def collect(directory: Path, simulate: Callable[[Trial], Delivery], *, lose: Collection[int] = ()) -> str:
+    """Collect what is left of a dataset; trials to lose end the simulation that runs them. Returns what was said."""
+    said: list[str] = []
+    with TrialCollection.open(directory, say=said.append) as collection:
+        collection.warn = said.append
+        collection.join("/sim_0", "sim_0")
+        while not collection.finished:
+            if leased := collection.lease("/sim_0"):
+                if leased[0] in lose:
+                    collection.take_back("/sim_0", "died")
+                else:
+                    assert collection.take_in("/sim_0", simulate(collection.writer.plan.trial(leased[0])))
+            else:
+                collection.grow_plan()
+            if collection.backlog:
+                collection.write_one()
+        if lose:
+            with pytest.raises(LossError):
+                collection.finish(meanwhile=lambda: None, say=said.append)
+        else:
+            collection.finish(meanwhile=lambda: None, say=said.append)
+    return "\n".join(said)
+
+
+def go_on(config: Config, directory: Path, simulate: Callable[[Trial], Delivery], **options: Collection[int]) -> str:
+    resume(config, directory, sweep_directory=directory)
+    return collect(directory, simulate, **options)
+
+
+def fingerprints(directory: Path) -> dict[str, str]:
+    """SHA-256 of every file that must be the same for the same configuration."""
+    return {
+        path.name: hashlib.sha256(path.read_bytes()).hexdigest()
+        for path in sorted(directory.iterdir())
+        if path.is_file() and path.name not in ("README.md", "provenance.json")
+    }
+
+
+def die(*_: object) -> None:
+    raise KeyboardInterrupt
+
+
+@pytest.mark.parametrize(("per_shard", "target"), [(50, False), (300, True)])
+def test_lost_trials_that_are_run_again(
+    per_shard: int, target: bool, tmp_path: Path, simulate: Callable[[Trial], Delivery], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    config = configuration(per_shard=per_shard, target=target)
+    expected, directory = tmp_path / "expected", tmp_path / "data"
+    for each in (expected, directory):
+        prepare(config, each, sweep_directory=tmp_path)
+    collect(expected, simulate)
+    collect(directory, simulate, lose={1, 3, 120})
+    assert verify(directory) == []
+    lost = fingerprints(directory)
+    assert lost["plan.parquet"] != fingerprints(expected)["plan.parquet"]
+    # Where they are lost again, everything stays.
+    assert "removed" not in go_on(config, directory, simulate, lose={1, 3, 120})
+    assert fingerprints(directory) == lost
+    if target:
+        with monkeypatch.context() as patch:
+            patch.setattr(DatasetWriter, "_reopen", die)
+            with pytest.raises(KeyboardInterrupt):
+                go_on(config, directory, simulate, lose={120})
+    # A trial that is still lost, and ends in a shard of which others are removed, is known to be lost.
+    go_on(config, directory, simulate, lose={120})
+    assert verify(directory) == []
+    go_on(config, directory, simulate)
+    assert fingerprints(directory) == fingerprints(expected)
