@@ -15,10 +15,11 @@ from throwcollect.dataset.findings import Finding
 from throwcollect.dataset.throws_table import REFUSED, Row, ThrowsTable
 from throwcollect.errors import ConfigError
 from throwcollect.extras import is_installed
-from throwcollect.sweep.plan import Check, Plan, make_trials, refusal
+from throwcollect.sweep.plan import ROUND_TRIALS, Check, Plan, make_trials, refusal
 from throwcollect.sweep.points import Points
 from throwcollect.sweep.rounds import Rounds, find_same
 from throwcollect.sweep.samplers import draw_points
+from throwcollect.tasks.result import LOST
 from throwcollect.wording import blank_numbers, format_count
 
 CHECKED_AGAIN = 100
@@ -37,7 +38,8 @@ def find_drawing_problems(directory: Path, plan: Plan, rows: Mapping[int, Row] |
     """Find trials that are not those that the configuration draws.
 
     The rounds of a plan that grows are drawn from the results in the table of throws, which other checks compare with
-    the episodes. A plan that cannot be drawn here (see `can_draw`) is not compared.
+    the episodes. Those behind a lost trial are not compared if they are not those that follow from its loss, as they
+    may follow from the episode that it had. A plan that cannot be drawn here (see `can_draw`) is not compared.
 
     Args:
         directory: Directory of the dataset.
@@ -123,20 +125,30 @@ def _draw_rounds(plan: Plan, rows: Mapping[int, Row] | None) -> _Drawing:
     """
     rounds, table, there = Rounds(plan.config), ThrowsTable.of(plan), len(plan.trials)
     values: list[NDArray[np.float64]] = []
+    lost: int | None = None
+
+    def is_doubtful() -> bool:
+        """Whether the next round depends on a lost trial, which may have had an episode when the round was drawn."""
+        return lost is not None and rounds.planned >= (lost // ROUND_TRIALS + 2) * ROUND_TRIALS
+
     while rounds.due and not rounds.over and rounds.planned < there:
-        points = rounds.draw()
-        values.append(_of_keys(points, plan).values)
+        points = _of_keys(rounds.draw(), plan)
         added = plan.trials[rounds.planned : rounds.planned + len(points.values)]
+        if is_doubtful() and not find_same(added.values, points.values[: len(added)]).all():
+            break
+        values.append(points.values)
         rounds.add(added)
         for trial in added:
             row = None if rows is None else rows.get(trial.number)
             if row is not None and row["outcome"] != REFUSED:
                 rounds.tell(trial.number, table.result(row))
+                lost = trial.number if lost is None and row["outcome"] == LOST else lost
     problem, count = None, sum(map(len, values))
-    if count > there or (rounds.over and count < there):
-        problem = f"has {format_count(there, 'trial')}, the configuration draws {count}"
-    elif rounds.due and not rounds.over:
-        problem = f"ends with trial {there - 1}, and by the results more would follow"
+    if not is_doubtful():
+        if count > there or (rounds.over and count < there):
+            problem = f"has {format_count(there, 'trial')}, the configuration draws {count}"
+        elif rounds.due and not rounds.over:
+            problem = f"ends with trial {there - 1}, and by the results more would follow"
     return _Drawing(np.vstack(values), problem)
 
 
