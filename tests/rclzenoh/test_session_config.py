@@ -10,6 +10,7 @@ from rclzenoh.session_config import (
     client_config,
     client_override,
     connect_endpoint,
+    environment_config,
     is_protected,
 )
 
@@ -76,6 +77,16 @@ def test_a_key_that_cannot_be_read_is_named(key):
         client_config(ENDPOINT, key)
     assert caught.value.path == key.certificate
     client_config("tcp/127.0.0.1:7447", key)
+
+
+def test_a_client_listens_nowhere_whatever_the_configuration_file_says(monkeypatch, tmp_path):
+    file = tmp_path / "session.json5"
+    # These are defaults of rmw_zenoh_cpp.
+    file.write_text('{mode: "peer", listen: {endpoints: ["tcp/localhost:0"]}}')
+    monkeypatch.setenv(CONFIG_FILE_VARIABLE, str(file))
+    monkeypatch.setenv(OVERRIDE_VARIABLE, client_override("tcp/192.0.2.7:1"))
+    config = environment_config()
+    assert (config.get_json("mode"), config.get_json("listen/endpoints")) == ('"client"', "[]")
 
 
 def test_an_endpoint_that_is_none_is_refused():
