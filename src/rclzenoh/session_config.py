@@ -151,7 +151,7 @@ def in_words(error: zenoh.ZError) -> str:
 
 
 def _client_settings(endpoint: str, key: Key | None) -> Mapping[str, object]:
-    # A configuration file, as rmw_zenoh_cpp has one, may have nodes listen, and a client would do so without a key, too.
+    # A configuration file, as rmw_zenoh_cpp has one, may have nodes listen; clients would do so without a key, too.
     settings: dict[str, object] = {"mode": "client", "connect/endpoints": [endpoint], "listen/endpoints": []}
     if key is None or not endpoint.startswith(PROTECTED):
         return settings

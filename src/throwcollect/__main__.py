@@ -21,7 +21,7 @@ def main() -> None:
     try:
         run_command()
     finally:
-        # At its end, the interpreter would look for garbage among all objects of the libraries, for a tenth of a second.
+        # At its end, the interpreter would look for garbage among all objects of libraries, for a tenth of a second.
         gc.freeze()
 
 
