@@ -35,7 +35,10 @@ compose() {
         docker-compose -f "$file" -p "$project" "$@"
     fi
 }
-# Whatever happens, nothing stays behind.
+# Before hours of collecting, as the dataset has to come out there. It is removed again if nothing is to keep.
+mkdir -p "$output"
+output=$(cd "$output" && pwd)
+# Whatever happens, nothing stays behind but a dataset that cannot be taken out.
 trap 'compose down --volumes --timeout 5 >/dev/null 2>&1' EXIT
 # Compose is asked to stop as well, and ends the collection in order; what it has is taken out before anything is removed.
 stopped=
@@ -46,10 +49,15 @@ compose up --scale sim="$simulations" --exit-code-from coordinator || code=$?
 code=${stopped:-$code}
 
 # Also of a collection that was broken off, if it ever began.
-mkdir -p "$output"
-docker run --rm --network none --user "$RUN_USER" --entrypoint sh \
-    -v "${project}_data:/data:ro" -v "$(cd "$output" && pwd):/out" "$THROWCOLLECT_IMAGE" \
-    -c 'test ! -d /data/dataset || cp -r /data/dataset/. /out'
+if ! docker run --rm --network none --user "$RUN_USER" --entrypoint sh \
+    -v "${project}_data:/data:ro" -v "$output:/out" "$THROWCOLLECT_IMAGE" \
+    -c 'test ! -d /data/dataset || cp -r /data/dataset/. /out'; then
+    trap 'compose down --timeout 5 >/dev/null 2>&1' EXIT
+    echo "$0: what was collected cannot be copied to $output and stays in the volume ${project}_data; to take it out:" >&2
+    echo "  docker run --rm --user $RUN_USER --entrypoint cp -v ${project}_data:/data:ro -v /DIRECTORY:/out" \
+        "$THROWCOLLECT_IMAGE -r /data/dataset/. /out" >&2
+    [ "$code" != 0 ] || code=1
+fi
 # Where nothing was begun there is nothing to keep, and the next try wants a new directory.
 rmdir "$output" 2>/dev/null || true
 exit "$code"
