@@ -49,6 +49,7 @@ class Landings(BaseModel):
     Attributes:
         landings: x and y [m], outcome and trial; a trial that was collected again may be there twice.
         total: Number of landings that these were evenly chosen from.
+        outcomes: Of a finished dataset, how many trials with an episode ended with each outcome.
         following: What to ask for as `first` next, for landings that come later, if the dataset grows.
         is_finished: Whether the dataset is finished.
         has_more: Whether there are later ones by now.
@@ -56,6 +57,7 @@ class Landings(BaseModel):
 
     landings: list[tuple[float, float, str, int]]
     total: int
+    outcomes: dict[str, int]
     following: int
     is_finished: bool
     has_more: bool
@@ -170,19 +172,25 @@ def _list_names(directory: Path) -> list[str]:
 def _read_landings(directory: Path) -> Landings:
     """Read the landings of a finished dataset."""
     table = read_parquet(directory / THROWS)
+    recorded = table.filter(table["digest"].is_valid())
+    outcomes = {each["values"]: each["counts"] for each in recorded["outcome"].value_counts().to_pylist()}
     if not set(_LANDING) <= set(table.column_names):
-        return Landings(landings=[], total=0, following=0, is_finished=True, has_more=False)
+        return Landings(landings=[], total=0, outcomes=outcomes, following=0, is_finished=True, has_more=False)
     landed = table.select([*_LANDING]).drop_null()
     # The step is rounded up, so that there are never more landings than allowed.
     some = landed.take([*range(0, len(landed), max(1, -(-len(landed) // _MOST_LANDINGS)))])
     rows: Any = zip(*(column.to_pylist() for column in some.columns), strict=True)
-    return Landings(landings=list(rows), total=len(landed), following=0, is_finished=True, has_more=False)
+    return Landings(
+        landings=list(rows), total=len(landed), outcomes=outcomes, following=0, is_finished=True, has_more=False
+    )
 
 
 def _read_landings_so_far(directory: Path, first: int) -> Landings:
     """Read the landings of a dataset that grows, from a byte of its journal on."""
     rows, following, has_more = read_commits(directory / JOURNAL, _LANDING, first=first, most_bytes=_JOURNAL_BYTES)
-    return Landings(landings=rows, total=len(rows), following=following, is_finished=False, has_more=has_more)
+    return Landings(
+        landings=rows, total=len(rows), outcomes={}, following=following, is_finished=False, has_more=has_more
+    )
 
 
 def _archive(directory: Path, name: str) -> Iterator[bytes]:

@@ -150,9 +150,9 @@ test("of many landings of a collection that goes on, those that are drawn are ev
   map.addAll(throws.slice(0, 12));
   assert.match(get("map-text").textContent, /^9 landings so far: /);
   assert.equal(countThirds(map, 0.012).reduce((sum, count) => sum + count), 9);
-  map.put(throws.slice(1, 3), 4);
+  map.put(throws.slice(1, 3), 4, { landed: 4, dropped: 1 });
   assert.match(get("map-text").textContent, /^2 of 4 landings of all throws: /);
-  assert.equal(get("legend").textContent, "landed 2");
+  assert.equal(get("legend").textContent, "landed 4, dropped 1");
 });
 
 test("a landing among very many throws that have none is drawn", () => {

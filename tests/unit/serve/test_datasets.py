@@ -91,6 +91,7 @@ def test_of_many_landings_some_are_given(client: TestClient, directory: Path, mo
     monkeypatch.setattr(dataset_routes, "_MOST_LANDINGS", 2)
     found = client.get(f"{URL}/a/landings").json()
     assert (found["total"], [trial for *_, trial in found["landings"]]) == (3, [0, 2])
+    assert found["outcomes"] == {"landed": 3}
 
 
 def test_landings_are_given_while_they_come(client: TestClient, directory: Path, remember: Remember) -> None:

@@ -20,7 +20,7 @@ export class LandingMap {
   /** @type {Landing[]} those that are drawn; each has a place */
   #landings = [];
   #trials = new Set();
-  /** @type {Map<string, number>} how many throws ended with each outcome, drawn or not; of a finished dataset, those that came */
+  /** @type {Map<string, number>} how many throws ended with each outcome, drawn or not */
   #outcomes = new Map();
   /** One of so many landings is drawn. */
   #stride = 1;
@@ -52,21 +52,21 @@ export class LandingMap {
     this.#trials.clear();
     this.#newest = null;
     this.#target = null;
-    this.put([], 0);
+    this.put([], 0, {});
     this.#which = SHOWN;
   }
 
   /**
    * @param {Landing[]} landings of a finished dataset, evenly chosen
    * @param {number} total number of its landings
+   * @param {Record<string, number>} outcomes how many of its throws ended with each outcome
    */
-  put(landings, total) {
+  put(landings, total, outcomes) {
     this.#total = total;
     this.#stride = 1;
     this.#which = ALL;
     this.#landings = landings.filter(isPlaced);
-    this.#outcomes.clear();
-    for (const [, , outcome] of landings) this.#count(outcome);
+    this.#outcomes = new Map(Object.entries(outcomes));
     this.#tell();
     this.#draw();
   }
