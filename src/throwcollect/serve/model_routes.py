@@ -24,7 +24,7 @@ def make_model_routes(models: Models) -> APIRouter:
         return models.view(model)
 
     @router.get("/{model}/aim")
-    def aim(model: str, at: Annotated[list[float], Query(max_length=16)]) -> AimView:
+    def aim(model: str, at: Annotated[list[float], Query()]) -> AimView:
         """The parameters of a throw at a target: values of the model's targets, then of what is given with them."""
         return models.aim(model, at)
 

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from http import HTTPStatus
-from typing import Any
+from typing import Any, get_origin
 
 from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse
 from fastapi.routing import APIRoute
-from pydantic import BaseModel, ValidationError
+from pydantic import BaseModel, ValidationError, create_model
 from starlette.exceptions import HTTPException
 from starlette.routing import Match
 
@@ -112,10 +112,7 @@ def add_handlers(app: FastAPI) -> None:
 
     @app.exception_handler(RequestValidationError)
     async def invalid(request: Request, error: RequestValidationError) -> ProblemResponse:
-        if problems_of_body := _find_problems_of_body(request, error):
-            return answer(ConfigError(problems_of_body))
-        problems = [{"key": ".".join(map(str, each["loc"])), "message": each["msg"]} for each in error.errors()]
-        return problem(422, "the request is not as it should be", problems=problems)
+        return answer(ConfigError(_find_problems_of_body(request, error) or _find_problems_of_query(request)))
 
 
 def _find_problems_of_body(request: Request, error: RequestValidationError) -> list[Problem]:
@@ -128,14 +125,33 @@ def _find_problems_of_body(request: Request, error: RequestValidationError) -> l
         return [Problem(f"the body is not valid JSON: {wrong['ctx']['error']}")]
     if isinstance(error.body, bytes):
         return [Problem("the body should be JSON, and the header Content-Type should be application/json")]
+    return _find_problems(model, error.body, "the body ")
+
+
+def _find_problems_of_query(request: Request) -> list[Problem]:
+    """Put into words what is wrong with the parameters of a request."""
+    parameters = request.scope["route"].dependant.query_params
+    fields: dict[str, Any] = {each.name: (each.field_info.annotation, each.field_info) for each in parameters}
+    model = create_model("Query", **fields)
+    given = request.query_params
+    values = {
+        each.name: given.getlist(each.name) if get_origin(each.field_info.annotation) is list else given[each.name]
+        for each in parameters
+        if each.name in given
+    }
+    return _find_problems(model, values, "the query ")
+
+
+def _find_problems(model: type[BaseModel], values: object, what: str) -> list[Problem]:
+    """Find what does not fit a model; `what` begins the sentence on something that is wrong as a whole."""
     try:
-        model.model_validate(error.body)
+        model.model_validate(values)
     except ValidationError as found:
         schema = model.model_json_schema()
         shape = Shape(_resolve(schema, schema.get("$defs", {})))
         return [
-            Problem(each.sentence if each.key else f"the body {each.sentence}", key=each.key)
-            for each in findings(found, error.body, shape=shape)
+            Problem(each.sentence if each.key else f"{what}{each.sentence}", key=each.key)
+            for each in findings(found, values, shape=shape)
         ]
     return []
 

@@ -132,7 +132,10 @@ def test_without_a_journal_nothing_has_landed(client: TestClient, directory: Pat
     remember("growing", directory=str(directory))
     (directory / "logs" / "journal.jsonl").unlink()
     assert client.get(f"{URL}/growing/landings").json()["landings"] == []
-    assert client.get(f"{URL}/growing/landings", params={"first": -1}).status_code == 422
+    refused = client.get(f"{URL}/growing/landings", params={"first": -1})
+    assert (refused.status_code, refused.json()["problems"][0]["key"]) == (422, "first")
+    assert refused.json()["title"].startswith("first: should be a whole number from 0 to ")
+    assert refused.json()["title"].endswith(", got '-1'")
 
 
 def test_what_is_not_finished_is_not_given(client: TestClient, directory: Path, remember: Remember) -> None:

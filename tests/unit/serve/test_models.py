@@ -83,6 +83,12 @@ def test_what_is_no_target_is_refused(client: TestClient, models: Path, at: list
     assert answer.status_code == 422, answer.text
 
 
+def test_the_number_that_is_none_is_named(client: TestClient, models: Path) -> None:
+    answer = client.get(f"{URL}/quick/aim", params={"at": ["0", "x"]}).json()
+    assert answer["title"] == "at.1: should be a number, got 'x'"
+    assert "expected" in client.get(f"{URL}/quick/aim", params={"at": [0] * 17}).json()
+
+
 @pytest.mark.parametrize("name", ["none", "..", "..%2fquick", "%00", ".hidden", "quick%2f", 300 * "a"])
 def test_nothing_else_is_read(client: TestClient, models: Path, name: str) -> None:
     make_model(models.parent / "models2")
