@@ -325,7 +325,7 @@ def test_a_run_is_joined_by_its_name_or_directory(
         begun_in=os.getcwd(),
     )
     run.write(record)
-    override = f'mode="client";connect/endpoints=["{endpoint}"]'
+    override = f'mode="client";connect/endpoints=["{endpoint}"];listen/endpoints=[]'
     line = (
         f"export THROWCOLLECT_ROS=embedded ZENOH_CONFIG_OVERRIDE='{override}' ROS_DOMAIN_ID=0 "
         f"THROWCOLLECT_KEY={run.key.directory} RMW_IMPLEMENTATION=rmw_zenoh_cpp\n"
