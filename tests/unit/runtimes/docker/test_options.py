@@ -80,7 +80,10 @@ def test_every_node_gets_the_key_as_files_that_it_can_only_read_and_the_paths_of
 
 def test_an_open_run_has_a_router_that_asks_for_no_key_and_nodes_that_have_one() -> None:
     environment = options("sim_0", run={"open": True})["environment"]
-    assert environment["ZENOH_CONFIG_OVERRIDE"] == 'mode="client";connect/endpoints=["tcp/router:7447"];listen/endpoints=[]'
+    assert (
+        environment["ZENOH_CONFIG_OVERRIDE"]
+        == 'mode="client";connect/endpoints=["tcp/router:7447"];listen/endpoints=[]'
+    )
     assert environment["THROWCOLLECT_KEY"] == "/key"
 
 
