@@ -151,7 +151,8 @@ def in_words(error: zenoh.ZError) -> str:
 
 
 def _client_settings(endpoint: str, key: Key | None) -> Mapping[str, object]:
-    settings: dict[str, object] = {"mode": "client", "connect/endpoints": [endpoint]}
+    # The session configuration of rmw_zenoh_cpp lets clients, too, listen on this host, where anybody gets in.
+    settings: dict[str, object] = {"mode": "client", "connect/endpoints": [endpoint], "listen/endpoints": []}
     if key is None or not endpoint.startswith(PROTECTED):
         return settings
     return {**settings, **_tls_settings(key, "connect")}
