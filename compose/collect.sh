@@ -16,6 +16,10 @@ if [ -e "$output" ]; then
     echo "$0: $output exists already" >&2
     exit 2
 fi
+# Before anything is collected that could not be put there.
+mkdir -p "$output" || exit 2
+# With it, cd might go elsewhere, and would print where.
+unset CDPATH
 
 CONFIGS=$(cd "$(dirname "$config")" && pwd)
 CONFIG=$(basename "$config")
@@ -35,8 +39,8 @@ compose() {
         docker-compose -f "$file" -p "$project" "$@"
     fi
 }
-# Whatever happens, nothing stays behind.
-trap 'compose down --volumes --timeout 5 >/dev/null 2>&1' EXIT
+# Whatever happens, nothing stays behind but a dataset that could not be taken out.
+trap 'compose down --volumes --timeout 5 >/dev/null 2>&1; rmdir "$output" 2>/dev/null || true' EXIT
 # Compose is asked to stop as well, and ends the collection in order; what it has is taken out before anything is removed.
 stopped=
 trap 'stopped=130' INT TERM
@@ -45,11 +49,15 @@ code=0
 compose up --scale sim="$simulations" --exit-code-from coordinator || code=$?
 code=${stopped:-$code}
 
-# Also of a collection that was broken off, if it ever began.
-mkdir -p "$output"
-docker run --rm --network none --user "$RUN_USER" --entrypoint sh \
+# Also of a collection that was broken off, if it ever began. Where nothing was begun there is nothing to keep, and the next
+# try wants a new directory.
+if ! docker run --rm --network none --user "$RUN_USER" --entrypoint sh \
     -v "${project}_data:/data:ro" -v "$(cd "$output" && pwd):/out" "$THROWCOLLECT_IMAGE" \
-    -c 'test ! -d /data/dataset || cp -r /data/dataset/. /out'
-# Where nothing was begun there is nothing to keep, and the next try wants a new directory.
-rmdir "$output" 2>/dev/null || true
+    -c 'test ! -d /data/dataset || cp -r /data/dataset/. /out'; then
+    trap - EXIT
+    compose down --timeout 5 >/dev/null 2>&1 || true
+    docker volume rm "${project}_key" >/dev/null 2>&1 || true
+    echo "$0: $output: what was collected could not be copied there; it stays in the volume ${project}_data, in dataset/" >&2
+    [ "$code" != 0 ] || code=1
+fi
 exit "$code"
