@@ -9,7 +9,15 @@ const makeFake = (known) => new Proxy(known, { get: (own, name) => (name in own 
 
 /** @type {number[][]} x, y and radius of each arc that was drawn */
 const arcs = [];
-const pen = makeFake({ arc: (x, y, radius) => arcs.push([x, y, radius]), measureText: () => ({ width: 10 }) });
+/** How many lines have been drawn. */
+let lines = 0;
+const pen = makeFake({
+  arc: (x, y, radius) => arcs.push([x, y, radius]),
+  measureText: () => ({ width: 10 }),
+  lineTo: () => {
+    lines += 1;
+  },
+});
 
 class HTMLElement {}
 
@@ -153,6 +161,16 @@ test("of many landings of a collection that goes on, those that are drawn are ev
   map.put(throws.slice(1, 3), 4);
   assert.match(get("map-text").textContent, /^2 of 4 landings of all throws: /);
   assert.equal(get("legend").textContent, "landed 2");
+});
+
+test("the grid of the map has some lines, however far away a target is", () => {
+  const map = new LandingMap(() => {});
+  for (const away of [0, 3, 30, 300, 1e6, 1e12]) {
+    map.choose([away, 0, 0]);
+    lines = 0;
+    map.paint(makeElement(), 300, 300, 1);
+    assert.ok(lines > 4 && lines < 40, `${lines} lines at ${away} m`);
+  }
 });
 
 test("a landing among very many throws that have none is drawn", () => {
