@@ -82,6 +82,7 @@ Object.assign(globalThis, {
 const load = (name) => import(pathToFileURL(`${process.env.PAGE}/${name}`));
 const { Watching } = await load("watching.js");
 const { LandingMap } = await load("landing_map.js");
+const { Landings } = await load("landings.js");
 const { PlotPanel } = await load("plot_panel.js");
 
 /** Let everything that waits for nothing but its turn have it. */
@@ -161,6 +162,38 @@ test("of many landings of a collection that goes on, those that are drawn are ev
   map.put(throws.slice(1, 3), 4);
   assert.match(get("map-text").textContent, /^2 of 4 landings of all throws: /);
   assert.equal(get("legend").textContent, "landed 2");
+});
+
+/** Landings of a run, as the server gives them; what it answers can be changed. */
+function follow() {
+  const map = new LandingMap(() => {});
+  const server = { answer: async () => null };
+  const asked = [];
+  const ask = async (_method, path) => {
+    asked.push(path);
+    return { json: server.answer };
+  };
+  const landings = new Landings({ ask }, map);
+  landings.begin("run");
+  const put = async (facts) => {
+    landings.follow({ id: "run", kind: "collection", status: "ended", progress: { ended: 3 }, summary: null, ...facts });
+    await settle();
+  };
+  return { landings, server, put, asked };
+}
+
+test("the legend of a finished dataset counts all of its throws, on the map or not", async () => {
+  const { landings, server, put } = follow();
+  const found = { landings: [[1, 0, "landed", 0], [2, 0, "landed", 2]], total: 4, following: 0, is_finished: true, has_more: false };
+  server.answer = async () => found;
+  await put({ summary: { outcomes: { landed: 4, dropped: 7 } } });
+  assert.equal(get("legend").textContent, "dropped 7, landed 4");
+  landings.begin("run");
+  server.answer = async () => ({ ...found, landings: [], total: 0 });
+  await put({ summary: { outcomes: { dropped: 7 } } });
+  assert.equal(get("legend").textContent, "dropped 7");
+  assert.equal(get("map-text").textContent, "None of these throws has landed.");
+  landings.begin(null);
 });
 
 test("the grid of the map has some lines, however far away a target is", () => {

@@ -22,7 +22,7 @@ export class LandingMap {
   /** @type {Landing[]} those that are drawn; each has a place */
   #landings = [];
   #trials = new Set();
-  /** @type {Map<string, number>} how many throws ended with each outcome, drawn or not; of a finished dataset, those that came */
+  /** @type {Map<string, number>} how many throws ended with each outcome, drawn or not */
   #outcomes = new Map();
   /** One of so many landings is drawn. */
   #stride = 1;
@@ -61,14 +61,15 @@ export class LandingMap {
   /**
    * @param {Landing[]} landings of a finished dataset, evenly chosen
    * @param {number} total number of its landings
+   * @param {Record<string, number> | null} outcomes how many throws of it ended with each; null if only landings are known
    */
-  put(landings, total) {
+  put(landings, total, outcomes = null) {
     this.#total = total;
     this.#stride = 1;
     this.#which = ALL;
     this.#landings = landings.filter(isPlaced);
-    this.#outcomes.clear();
-    for (const [, , outcome] of landings) this.#count(outcome);
+    this.#outcomes = new Map(Object.entries(outcomes ?? {}));
+    if (outcomes === null) for (const [, , outcome] of landings) this.#count(outcome);
     this.#tell();
     this.#draw();
   }

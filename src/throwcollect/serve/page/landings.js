@@ -54,7 +54,7 @@ export class Landings {
         this.#hasAll = found.is_finished;
         this.#following = found.following;
         hasMore = found.has_more;
-        if (found.is_finished) this.map.put(found.landings, found.total);
+        if (found.is_finished) this.map.put(found.landings, found.total, this.instance.summary?.outcomes);
         else this.map.addAll(found.landings);
       }
     } catch {
