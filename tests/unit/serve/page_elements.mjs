@@ -81,6 +81,7 @@ Object.assign(globalThis, {
 
 const load = (name) => import(pathToFileURL(`${process.env.PAGE}/${name}`));
 const { Watching } = await load("watching.js");
+const { Problem } = await load("connection.js");
 const { LandingMap } = await load("landing_map.js");
 const { Landings } = await load("landings.js");
 const { PlotPanel } = await load("plot_panel.js");
@@ -213,6 +214,25 @@ test("a landing among very many throws that have none is drawn", () => {
   map.addAll([[1, 0, "landed", 30_001]]);
   assert.match(get("map-text").textContent, /^1 landings so far: 1\.00 to 1\.00 m/);
   assert.equal(get("legend").textContent, "dropped 30000, landed 1");
+});
+
+test("landings that could not be had without a connection are asked for again", async () => {
+  const { landings, server, put, asked } = follow();
+  const summary = { outcomes: { landed: 1 } };
+  for (const facts of [{ summary }, { summary: null }]) {
+    asked.splice(0);
+    landings.begin("run");
+    server.answer = async () => {
+      throw new Problem(0, {});
+    };
+    await put(facts);
+    server.answer = async () => ({ landings: [[1, 0, "landed", 0]], total: 1, following: 9, is_finished: true, has_more: false });
+    // It asks by itself, after two seconds.
+    await new Promise((resolve) => setTimeout(resolve, 2100));
+    assert.equal(asked.length, 2);
+    assert.match(get("map-text").textContent, /^1 landings of all throws/);
+  }
+  landings.begin(null);
 });
 
 test("a zoom of the last seconds ends with them, and one of replays stays from throw to throw", async () => {
