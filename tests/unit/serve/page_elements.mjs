@@ -82,6 +82,7 @@ Object.assign(globalThis, {
 const load = (name) => import(pathToFileURL(`${process.env.PAGE}/${name}`));
 const { Watching } = await load("watching.js");
 const { Problem } = await load("connection.js");
+const { showProblem } = await load("dom.js");
 const { LandingMap } = await load("landing_map.js");
 const { Landings } = await load("landings.js");
 const { PlotPanel } = await load("plot_panel.js");
@@ -233,6 +234,20 @@ test("landings that could not be had without a connection are asked for again", 
     assert.match(get("map-text").textContent, /^1 landings of all throws/);
   }
   landings.begin(null);
+});
+
+test("a problem is told once, and several all of them", () => {
+  const place = makeElement();
+  const one = { key: "trials", message: "should be above 0" };
+  showProblem(place, new Problem(422, { title: "trials: should be above 0", problems: [one] }));
+  assert.equal(place.textContent, "trials: should be above 0");
+  place.textContent = "";
+  const other = { key: null, message: "no such file" };
+  showProblem(place, new Problem(422, { title: "a.yaml:2: trials: should be above 0\nno such file", problems: [one, other] }));
+  assert.equal(place.textContent, "a.yaml:2: trials: should be above 0no such file");
+  place.textContent = "";
+  showProblem(place, new Problem(422, { title: "the request is wrong", problems: [one, other], hint: "ask" }));
+  assert.equal(place.textContent, "the request is wrongtrials: should be above 0no such filetry: ask");
 });
 
 test("a zoom of the last seconds ends with them, and one of replays stays from throw to throw", async () => {
