@@ -15,6 +15,9 @@ READY_ROS := $(ROS_VENV)/.ready
 # starts twice as fast when its libraries are compiled once.
 export PYTHONDONTWRITEBYTECODE :=
 
+# An environment that could not be finished has a Python, and would be taken for one that is ready.
+.DELETE_ON_ERROR:
+
 .PHONY: up ros dist test test-fast \
     test-units test-ros test-ros-client test-containers test-processes test-cluster \
     check check-format check-types check-imports check-house docs bench bench-full clean
@@ -27,7 +30,7 @@ up: $(READY)
 	echo "and $(PYTHON) is no Python from 3.10 to 3.14: make up takes the one that is there")" >&2; exit 1; }
 	$(BIN)/throwcollect up -n 2 configs/quickstart.yaml \
 	    $$($(BIN)/python -c 'import sys; print("--set sim.engine=mujoco" * (sys.version_info >= (3, 12)))')
-	@command -v throwcollect > /dev/null || echo 'so that the shell finds throwcollect: export PATH="$(CURDIR)/$(BIN):$$PATH"'
+	@command -v throwcollect > /dev/null || echo "so that the shell finds throwcollect: export PATH=\"$$PWD/$(BIN):\$$PATH\""
 
 $(VENV)/bin/python:
 	@packaging/environment.sh $(VENV) "$(PYTHON)"
@@ -66,8 +69,8 @@ $(READY_ROS): $(ROS_WHEELS)/made-from.sha256 | $(READY_DEV)
 	rm -rf $(ROS_VENV)
 	packaging/environment.sh $(ROS_VENV) $(BIN)/python
 	packaging/install.sh $(ROS_VENV)/bin/python --quiet --no-deps $$(ls $(ROS_WHEELS)/*.whl | grep -v /numpy-)
-	$(ROS_VENV)/bin/python -c "import sysconfig; print('import site; site.addsitedir(\'' \
-	    + sysconfig.get_path('purelib', vars={'base': '$(CURDIR)/$(VENV)'}) + '\')')" > $@.pth
+	$(ROS_VENV)/bin/python -c "import os, sysconfig; print('import site; site.addsitedir(' \
+	    + repr(sysconfig.get_path('purelib', vars={'base': os.path.abspath('$(VENV)')})) + ')')" > $@.pth
 	mv $@.pth "$$($(ROS_VENV)/bin/python -c "import sysconfig; print(sysconfig.get_path('purelib'))")/development.pth"
 	@# Without rclpy, tests would be skipped and nobody would notice.
 	$(ROS_VENV)/bin/python -c "import rclpy, control_msgs, simulation_interfaces"

@@ -16,6 +16,10 @@ if [ -e "$output" ]; then
     echo "$0: $output exists already" >&2
     exit 2
 fi
+# Before anything is collected that could not be put there.
+mkdir -p "$output" || exit 2
+# With it, cd might go elsewhere, and would print where.
+unset CDPATH
 
 CONFIGS=$(cd "$(dirname "$config")" && pwd)
 CONFIG=$(basename "$config")
@@ -35,11 +39,8 @@ compose() {
         docker-compose -f "$file" -p "$project" "$@"
     fi
 }
-# Before hours of collecting, as the dataset has to come out there. It is removed again if nothing is to keep.
-mkdir -p "$output"
-output=$(cd "$output" && pwd)
-# Whatever happens, nothing stays behind but a dataset that cannot be taken out.
-trap 'compose down --volumes --timeout 5 >/dev/null 2>&1' EXIT
+# Whatever happens, nothing stays behind but a dataset that could not be taken out.
+trap 'compose down --volumes --timeout 5 >/dev/null 2>&1; rmdir "$output" 2>/dev/null || true' EXIT
 # Compose is asked to stop as well, and ends the collection in order; what it has is taken out before anything is removed.
 stopped=
 trap 'stopped=130' INT TERM
@@ -48,16 +49,18 @@ code=0
 compose up --scale sim="$simulations" --exit-code-from coordinator || code=$?
 code=${stopped:-$code}
 
-# Also of a collection that was broken off, if it ever began.
+# Also of a collection that was broken off, if it ever began. Where nothing was begun there is nothing to keep, and the next
+# try wants a new directory.
 if ! docker run --rm --network none --user "$RUN_USER" --entrypoint sh \
-    -v "${project}_data:/data:ro" -v "$output:/out" "$THROWCOLLECT_IMAGE" \
+    -v "${project}_data:/data:ro" -v "$(cd "$output" && pwd):/out" "$THROWCOLLECT_IMAGE" \
     -c 'test ! -d /data/dataset || cp -r /data/dataset/. /out'; then
-    trap 'compose down --timeout 5 >/dev/null 2>&1' EXIT
+    trap - EXIT
+    compose down --timeout 5 >/dev/null 2>&1 || true
+    docker volume rm "${project}_key" >/dev/null 2>&1 || true
+    rmdir "$output" 2>/dev/null || true
     echo "$0: what was collected cannot be copied to $output and stays in the volume ${project}_data; to take it out:" >&2
     echo "  docker run --rm --user $RUN_USER --entrypoint cp -v ${project}_data:/data:ro -v /DIRECTORY:/out" \
         "$THROWCOLLECT_IMAGE -r /data/dataset/. /out" >&2
     [ "$code" != 0 ] || code=1
 fi
-# Where nothing was begun there is nothing to keep, and the next try wants a new directory.
-rmdir "$output" 2>/dev/null || true
 exit "$code"

@@ -94,7 +94,11 @@ def test_an_endpoint_that_is_none_is_refused():
         client_config("nowhere")
 
 
-def test_a_client_of_a_router_with_a_key_is_protected(monkeypatch, key):
+@pytest.mark.parametrize("defaults", ["{}", '{mode: "peer", listen: {endpoints: ["tcp/localhost:0"]}}'])
+def test_a_client_of_a_router_with_a_key_is_protected(monkeypatch, key, tmp_path, defaults):
+    """Also where the override is applied to a configuration like the one that rmw_zenoh_cpp has by default."""
+    (tmp_path / "session.json5").write_text(defaults)
+    monkeypatch.setenv(CONFIG_FILE_VARIABLE, str(tmp_path / "session.json5"))
     monkeypatch.setenv(OVERRIDE_VARIABLE, client_override(ENDPOINT, key))
     assert is_protected()
 

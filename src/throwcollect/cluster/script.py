@@ -21,7 +21,7 @@ from throwcollect.errors import Interrupted
 _ENDING_S = 30
 """Time that a task needs besides `run.grace_s` to end in order: to end nodes and close files."""
 _JOIN_MEMORY = "4G"
-_EXPANDED = re.compile(r"\$SLURM_|cluster\.scratch=|--bind=\$|tcp/0\.0\.0\.0:\$PORT$")
+_EXPANDED = re.compile(r"\$SLURM_|cluster\.scratch=|tcp/0\.0\.0\.0:\$PORT$")
 """Words in which the shell of the task replaces variables; all other words are quoted."""
 
 
@@ -193,12 +193,14 @@ class BatchScripts:
 
     def _words(self, words: Sequence[str]) -> str:
         """Write a command of throwcollect for the shell, in the image if there is one."""
-        program = list(self.program)
-        if self.image is not None:
-            bound = [str(self.directory), *self.config.cluster.binds, *filter(None, [self.config.cluster.scratch])]
-            binds = [f"--bind={bind}" for bind in bound]
-            program = ["apptainer", "--quiet", "exec", "--cleanenv", *binds, str(self.image), "throwcollect"]
-        return " ".join(_in_shell(word) for word in (*program, *words))
+        if self.image is None:
+            return " ".join(map(_in_shell, (*self.program, *words)))
+        binds = [shlex.quote(f"--bind={bind}") for bind in (self.directory, *self.config.cluster.binds)]
+        if self.config.cluster.scratch:
+            # It may have variables anywhere.
+            binds.append(f'"--bind={self.config.cluster.scratch}"')
+        image = shlex.quote(str(self.image))
+        return " ".join(["apptainer --quiet exec --cleanenv", *binds, image, "throwcollect", *map(_in_shell, words)])
 
 
 def _requeue(times: int, job: str) -> Iterator[str]:

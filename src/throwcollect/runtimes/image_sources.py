@@ -107,6 +107,8 @@ def write_context(archive: IO[bytes], root: Path, wheelhouse: Path | None) -> No
     def entry(info: tarfile.TarInfo) -> tarfile.TarInfo | None:
         info.uid = info.gid = 0
         info.uname = info.gname = ""
+        # Whoever runs the image reads them, whatever the umask was when the clone was made.
+        info.mode = 0o755 if info.mode & 0o100 else 0o644
         return None if _LEFT_OUT.fullmatch(Path(info.name).name) else info
 
     with tarfile.open(fileobj=archive, mode="w") as context:

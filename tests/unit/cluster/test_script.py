@@ -92,15 +92,16 @@ def test_a_task_collects_its_slice(directory: Path, tmp_path: Path) -> None:
     assert words[words.index("-n") + 1] == "4"
 
 
-def test_in_an_image_it_sees_its_directories_and_no_variables_of_the_host(tmp_path: Path) -> None:
+@pytest.mark.parametrize("scratch", ["$SCRATCH/mine", "/local/$NAME"])
+def test_in_an_image_it_sees_its_directories_and_no_variables_of_the_host(tmp_path: Path, scratch: str) -> None:
     (tmp_path / "plan.parquet").touch()
-    made = scripts(tmp_path, image=Path("/images/t.sif"), binds=["/data:/inside:ro"], scratch="$SCRATCH/mine")
-    done = run(made.collect(8, "0-7"), tmp_path, srun='printf "%s\\n" "$@"', SCRATCH="/local")
+    made = scripts(tmp_path, image=Path("/images/t.sif"), binds=["/data:/inside:ro", "/$NAME"], scratch=scratch)
+    done = run(made.collect(8, "0-7"), tmp_path, srun='printf "%s\\n" "$@"', SCRATCH="/local", NAME="mine")
     words = done.stdout.splitlines()
     assert words[2:5] == ["apptainer", "--quiet", "exec"]
     assert "--cleanenv" in words
     binds = [word.removeprefix("--bind=") for word in words if word.startswith("--bind=")]
-    assert binds == [str(tmp_path), "/data:/inside:ro", "/local/mine"]
+    assert binds == [str(tmp_path), "/data:/inside:ro", "/$NAME", "/local/mine"]
     assert words[words.index("/images/t.sif") + 1] == "throwcollect"
     assert words[-2:] == ["--set", "cluster.scratch=/local/mine"]
 

@@ -9,7 +9,15 @@ const makeFake = (known) => new Proxy(known, { get: (own, name) => (name in own 
 
 /** @type {number[][]} x, y and radius of each arc that was drawn */
 const arcs = [];
-const pen = makeFake({ arc: (x, y, radius) => arcs.push([x, y, radius]), measureText: () => ({ width: 10 }) });
+/** How many lines have been drawn. */
+let lines = 0;
+const pen = makeFake({
+  arc: (x, y, radius) => arcs.push([x, y, radius]),
+  measureText: () => ({ width: 10 }),
+  lineTo: () => {
+    lines += 1;
+  },
+});
 
 class HTMLElement {}
 
@@ -73,7 +81,10 @@ Object.assign(globalThis, {
 
 const load = (name) => import(pathToFileURL(`${process.env.PAGE}/${name}`));
 const { Watching } = await load("watching.js");
+const { Problem } = await load("connection.js");
+const { showProblem } = await load("dom.js");
 const { LandingMap } = await load("landing_map.js");
+const { Landings } = await load("landings.js");
 const { PlotPanel } = await load("plot_panel.js");
 
 /** Let everything that waits for nothing but its turn have it. */
@@ -155,6 +166,48 @@ test("of many landings of a collection that goes on, those that are drawn are ev
   assert.equal(get("legend").textContent, "landed 4, dropped 1");
 });
 
+/** Landings of a run, as the server gives them; what it answers can be changed. */
+function follow() {
+  const map = new LandingMap(() => {});
+  const server = { answer: async () => null };
+  const asked = [];
+  const ask = async (_method, path) => {
+    asked.push(path);
+    return { json: server.answer };
+  };
+  const landings = new Landings({ ask }, map);
+  landings.begin("run");
+  const put = async (facts) => {
+    landings.follow({ id: "run", kind: "collection", status: "ended", progress: { ended: 3 }, summary: null, ...facts });
+    await settle();
+  };
+  return { landings, server, put, asked };
+}
+
+test("the legend of a finished dataset counts all of its throws, on the map or not", async () => {
+  const { landings, server, put } = follow();
+  const found = { landings: [[1, 0, "landed", 0], [2, 0, "landed", 2]], total: 4, outcomes: { landed: 4, dropped: 7 }, following: 0, is_finished: true, has_more: false };
+  server.answer = async () => found;
+  await put({ summary: {} });
+  assert.equal(get("legend").textContent, "dropped 7, landed 4");
+  landings.begin("run");
+  server.answer = async () => ({ ...found, landings: [], total: 0, outcomes: { dropped: 7 } });
+  await put({ summary: {} });
+  assert.equal(get("legend").textContent, "dropped 7");
+  assert.equal(get("map-text").textContent, "None of these throws has landed.");
+  landings.begin(null);
+});
+
+test("the grid of the map has some lines, however far away a target is", () => {
+  const map = new LandingMap(() => {});
+  for (const away of [0, 3, 30, 300, 1e6, 1e12]) {
+    map.choose([away, 0, 0]);
+    lines = 0;
+    map.paint(makeElement(), 300, 300, 1);
+    assert.ok(lines > 4 && lines < 40, `${lines} lines at ${away} m`);
+  }
+});
+
 test("a landing among very many throws that have none is drawn", () => {
   const map = new LandingMap(() => {});
   map.addAll(Array.from({ length: 30_000 }, (_, i) => [null, null, "dropped", i]));
@@ -162,6 +215,39 @@ test("a landing among very many throws that have none is drawn", () => {
   map.addAll([[1, 0, "landed", 30_001]]);
   assert.match(get("map-text").textContent, /^1 landings so far: 1\.00 to 1\.00 m/);
   assert.equal(get("legend").textContent, "dropped 30000, landed 1");
+});
+
+test("landings that could not be had without a connection are asked for again", async () => {
+  const { landings, server, put, asked } = follow();
+  const summary = {};
+  for (const facts of [{ summary }, { summary: null }]) {
+    asked.splice(0);
+    landings.begin("run");
+    server.answer = async () => {
+      throw new Problem(0, {});
+    };
+    await put(facts);
+    server.answer = async () => ({ landings: [[1, 0, "landed", 0]], total: 1, outcomes: { landed: 1 }, following: 9, is_finished: true, has_more: false });
+    // It asks by itself, after two seconds.
+    await new Promise((resolve) => setTimeout(resolve, 2100));
+    assert.equal(asked.length, 2);
+    assert.match(get("map-text").textContent, /^1 landings of all throws/);
+  }
+  landings.begin(null);
+});
+
+test("a problem is told once, and several all of them", () => {
+  const place = makeElement();
+  const one = { key: "trials", message: "should be above 0" };
+  showProblem(place, new Problem(422, { title: "trials: should be above 0", problems: [one] }));
+  assert.equal(place.textContent, "trials: should be above 0");
+  place.textContent = "";
+  const other = { key: null, message: "no such file" };
+  showProblem(place, new Problem(422, { title: "a.yaml:2: trials: should be above 0\nno such file", problems: [one, other] }));
+  assert.equal(place.textContent, "a.yaml:2: trials: should be above 0no such file");
+  place.textContent = "";
+  showProblem(place, new Problem(422, { title: "the request is wrong", problems: [one, other], hint: "ask" }));
+  assert.equal(place.textContent, "the request is wrongtrials: should be above 0no such filetry: ask");
 });
 
 test("a zoom of the last seconds ends with them, and one of replays stays from throw to throw", async () => {

@@ -60,11 +60,12 @@ export function showProblem(place, error) {
   place.replaceChildren();
   if (error === null || error === undefined) return;
   const { message, facts = {} } = /** @type {any} */ (error);
-  place.append(make("p", {}, message));
-  const problems = (facts.problems ?? []).filter((each) => each.message && each.message !== message);
-  if (problems.length) {
-    place.append(make("ul", {}, ...problems.map(({ key, message: text }) => make("li", {}, key ? `${key}: ${text}` : text))));
-  }
+  const lines = message.split("\n");
+  place.append(...lines.map((line) => make("p", {}, line)));
+  const problems = (facts.problems ?? []).filter((each) => each.message).map(({ key, message: text }) => (key ? `${key}: ${text}` : text));
+  // The message of a wrong configuration has a line for each, which may begin with its file.
+  const others = problems.filter((each) => !lines.some((line) => line.endsWith(each)));
+  if (others.length) place.append(make("ul", {}, ...others.map((each) => make("li", {}, each))));
   if (facts.expected) place.append(make("p", {}, `expected: ${facts.expected}`));
   if (facts.hint) place.append(make("p", {}, `try: ${facts.hint}`));
 }

@@ -6,6 +6,8 @@ import { TARGET_COLOR, colorOf } from "./outcomes.js";
 
 const DOT_PX = 2.5;
 const MARGIN_PX = 26;
+/** Two lines of the grid are no closer than this. */
+const CLOSEST_PX = 25;
 /** Most landings that are drawn; beyond that, every second one is dropped, and of those to come as many are left out. */
 const MOST = 20000;
 
@@ -230,8 +232,14 @@ function range(values) {
   return values.reduce(([low, high], value) => [Math.min(low, value), Math.max(high, value)], [Infinity, -Infinity]);
 }
 
+/** Distance of lines that are not too close to each other [m]. */
+function chooseStep(scale) {
+  if (scale > 5) return scale > 200 ? 0.2 : scale > 70 ? 0.5 : scale > 25 ? 1 : 5;
+  return 10 ** Math.ceil(Math.log10(CLOSEST_PX / scale));
+}
+
 function drawGrid(pen, style, at, scale, { width, height }) {
-  const step = scale > 200 ? 0.2 : scale > 70 ? 0.5 : scale > 25 ? 1 : 5;
+  const step = chooseStep(scale);
   const [left, bottom] = at(0, 0);
   pen.font = "11px system-ui, sans-serif";
   pen.fillStyle = style.getPropertyValue("--muted");

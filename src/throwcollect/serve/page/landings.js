@@ -57,9 +57,12 @@ export class Landings {
         if (found.is_finished) this.map.put(found.landings, found.total, found.outcomes);
         else this.map.addAll(found.landings);
       }
-    } catch {
+    } catch (error) {
+      if (id !== this.#id) return;
+      // Without a connection, there may be more to be had later.
+      if (error.status === 0) this.#ended = -1;
       // The server cannot read a dataset in a volume of a container engine; the map keeps the throws that were shown.
-      this.#hasAll = id === this.#id && Boolean(this.instance.summary);
+      else this.#hasAll = Boolean(this.instance.summary);
     }
   }
 }

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import io
 import re
+import shutil
 import subprocess
 import tarfile
+import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 from types import SimpleNamespace
@@ -26,6 +28,7 @@ from throwcollect.runtimes.image_sources import (
     find_address,
     find_revision,
     source_root,
+    write_context,
 )
 
 ROOT = Path(__file__).parents[4]
@@ -111,6 +114,22 @@ def test_the_context_is_what_the_dockerfile_copies_and_nothing_else(said: list[s
     assert {name.partition("/")[0] for name in files} == above
     assert not [name for name in files if "__pycache__" in name or ".egg-info" in name]
     assert {member.uid for member in engine.context.values()} == {0}
+
+
+def test_whoever_runs_the_image_can_read_it_also_from_a_clone_that_others_cannot_read(tmp_path: Path) -> None:
+    for name in ("src", "configs", "packaging", "docker"):
+        shutil.copytree(ROOT / name, tmp_path / name, ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copy(ROOT / "pyproject.toml", tmp_path)
+    for path in tmp_path.rglob("*"):
+        path.chmod(path.stat().st_mode & 0o700)
+    with tempfile.TemporaryFile() as archive:
+        write_context(archive, tmp_path, None)
+        archive.seek(0)
+        with tarfile.open(fileobj=archive) as context:
+            modes = {member.name: member.mode for member in context}
+    assert modes["docker/apptainer.sh"] == modes["src/throwcollect/version.py"] == 0o644
+    assert modes["docker/base.sh"] == modes["src"] == 0o755
+    assert set(modes.values()) == {0o644, 0o755}
 
 
 def test_a_build_by_docker_alone_finds_what_the_dockerfile_copies() -> None:

@@ -6,6 +6,7 @@ from typing import Any
 import pytest
 
 import throwcollect
+from rclzenoh.session_config import client_override
 from throwcollect.config.schema import Config
 from throwcollect.ros.middleware import Middleware
 from throwcollect.runtimes.docker.image import default_tag
@@ -80,10 +81,7 @@ def test_every_node_gets_the_key_as_files_that_it_can_only_read_and_the_paths_of
 
 def test_an_open_run_has_a_router_that_asks_for_no_key_and_nodes_that_have_one() -> None:
     environment = options("sim_0", run={"open": True})["environment"]
-    assert (
-        environment["ZENOH_CONFIG_OVERRIDE"]
-        == 'mode="client";connect/endpoints=["tcp/router:7447"];listen/endpoints=[]'
-    )
+    assert environment["ZENOH_CONFIG_OVERRIDE"] == client_override("tcp/router:7447")
     assert environment["THROWCOLLECT_KEY"] == "/key"
 
 

@@ -1,0 +1,56 @@
+"""What `make` does on machines that are not as ours are; what it installs and calls is replaced."""
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+pytestmark = pytest.mark.skipif(shutil.which("make") is None, reason="needs make")
+
+
+@pytest.fixture(params=["clone", "it's a $clone"])
+def clone(tmp_path: Path, request: pytest.FixtureRequest) -> Path:
+    """A directory with the Makefile, and an environment in which everything is installed."""
+    path = tmp_path / str(request.param)
+    (path / ".venv" / "bin").mkdir(parents=True)
+    for name in ("Makefile", "pyproject.toml"):
+        shutil.copy(ROOT / name, path)
+    (path / ".venv" / "bin" / "python").symlink_to(sys.executable)
+    put(path / ".venv" / "bin" / "throwcollect", 'echo "throwcollect $*"')
+    (path / ".venv" / ".ready").touch()
+    return path
+
+
+def put(path: Path, lines: str) -> None:
+    path.parent.mkdir(exist_ok=True)
+    path.write_text(f"#!/bin/sh\n{lines}\n")
+    path.chmod(0o755)
+
+
+def make(directory: Path, target: str) -> subprocess.CompletedProcess[str]:
+    # Another make may run the tests.
+    variables = {name: value for name, value in os.environ.items() if not name.startswith(("MAKE", "MFLAGS"))}
+    variables["PATH"] = "/usr/bin:/bin"
+    return subprocess.run(
+        ["make", "-s", target], cwd=directory, env=variables, capture_output=True, text=True, timeout=60, check=False
+    )
+
+
+def test_a_clone_may_lie_anywhere(clone: Path) -> None:
+    done = make(clone, "up")
+    assert done.returncode == 0, done.stderr
+    collected, hint = done.stdout.splitlines()
+    assert collected.startswith("throwcollect up -n 2 configs/quickstart.yaml")
+    assert hint == f'so that the shell finds throwcollect: export PATH="{clone}/.venv/bin:$PATH"'
+
+
+def test_an_environment_that_could_not_be_finished_is_not_taken_for_one(clone: Path) -> None:
+    shutil.rmtree(clone / ".venv")
+    unfinished = f'mkdir -p "$1/bin"; ln -s "{sys.executable}" "$1/bin/python"; exit 1'
+    put(clone / "packaging" / "environment.sh", unfinished)
+    assert make(clone, ".venv/bin/python").returncode != 0
+    assert not (clone / ".venv" / "bin" / "python").is_symlink()
