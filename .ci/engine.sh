@@ -26,19 +26,24 @@ unavailable() {
 
 answers() { docker version --format '{{.Server.Version}}' > /dev/null 2>&1; }
 
-# Installs what is missing of the commands of a package.
-need() {
+# Installs a package unless all of its commands are there, or says why it cannot.
+install_missing() {
     local package=$1 command
     shift
     for command; do
-        command -v "$command" > /dev/null || {
-            [ "$(id -u)" = 0 ] || unavailable "$command is not installed, and only root can install $package"
-            command -v apt-get > /dev/null || unavailable "$command is not installed, and there is no apt-get"
-            apt-get update -qq && apt-get install -qq -y --no-install-recommends "$package" > build/apt.log 2>&1 \
-                || unavailable "$package cannot be installed: $(tail -n 1 build/apt.log 2> /dev/null)"
+        if ! command -v "$command" > /dev/null; then
+            [ "$(id -u)" = 0 ] || { echo "$command is not installed, and only root can install $package"; return 1; }
+            command -v apt-get > /dev/null || { echo "$command is not installed, and there is no apt-get"; return 1; }
+            { apt-get update -qq && apt-get install -qq -y --no-install-recommends "$package"; } > build/apt.log 2>&1 \
+                || { echo "$package cannot be installed: $(tail -n 1 build/apt.log)"; return 1; }
             return
-        }
+        fi
     done
+}
+
+need() {
+    local why
+    why=$(install_missing "$@") || unavailable "$why"
 }
 
 start_engine() {
@@ -76,7 +81,8 @@ if ! docker image inspect "$base" > /dev/null 2>&1; then
     docker/base.sh "$base" > build/base.log 2>&1 || { tail -n 5 build/base.log; unavailable "no base image could be made"; }
     echo "base image: $base"
 fi
-need docker-compose docker-compose
+# Without one of the two, its own tests alone are skipped.
+why=$(install_missing docker-compose docker-compose) || echo "no Compose 1.29 for the tests: $why"
 .ci/compose.sh || echo "no Compose v2 for the tests"
 [ -z "${AFTER:-}" ] || tail --pid="$AFTER" -f /dev/null
 "$python" docker/wheelhouse.py --ros "$wheelhouse"

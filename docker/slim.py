@@ -181,9 +181,5 @@ def slim(directory: Path) -> None:
             path.rmdir()
 
 
-def _is_plain(path: Path) -> bool:
-    return path.is_file() and not path.is_symlink()
-
-
 if __name__ == "__main__":
     slim(Path(sys.argv[1]))

@@ -11,6 +11,9 @@ set -eu
 directory=$1
 named=${2:-}
 
+# What is left of one that was not finished: uv makes none where one is.
+if [ -e "$directory/pyvenv.cfg" ] && ! [ -e "$directory/bin/python" ]; then rm -rf "$directory"; fi
+
 # Whether a Python has a version in a range, and the modules that are named.
 suits() {
     "$1" -c "import sys${4:-}; sys.exit(not ($2 <= sys.version_info < $3))" 2> /dev/null

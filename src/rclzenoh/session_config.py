@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import os
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -27,6 +27,8 @@ OPEN = "tcp/"
 """Beginning of the endpoints whose router lets anybody in."""
 PROTECTED = "tls/"
 """Beginning of the endpoints whose router lets nobody in without a key."""
+LISTENS_OF_RMW = ("tcp/localhost:0",)
+"""Where a session of rmw_zenoh_cpp listens, client or not, unless its environment says something else."""
 NOT_IN_PATHS = ";?"
 """Characters that a path to a key must not have: Zenoh puts paths into endpoints, in which they have a meaning."""
 
@@ -110,8 +112,11 @@ def connect_endpoint() -> str | None:
     return endpoints[0] if endpoints else None
 
 
-def is_protected() -> bool:
+def is_protected(listens: Sequence[str] = ()) -> bool:
     """Whether the environment leads to a router that lets nobody in without a key, and opens no other way in.
+
+    Args:
+        listens: Where a client listens of which the environment does not say it; ours do nowhere.
 
     Raises:
         ConfigurationError: As `environment_config`.
@@ -119,7 +124,9 @@ def is_protected() -> bool:
     config = environment_config()
     routers = _endpoints(config, "connect")
     # A session that names no router may be reached by, and find, anybody.
-    return bool(routers) and all(each.startswith(PROTECTED) for each in (*routers, *_endpoints(config, "listen")))
+    # A file takes the place of all that sessions have by default.
+    listening = _endpoints(config, "listen", () if os.environ.get(CONFIG_FILE_VARIABLE) else listens)
+    return bool(routers) and all(each.startswith(PROTECTED) for each in (*routers, *listening))
 
 
 def client_override(endpoint: str, key: Key | None = None) -> str:
@@ -184,15 +191,23 @@ def _check_key(config: zenoh.Config) -> None:
                 raise UnreadableKeyError(Path(path), error.strerror or str(error)) from error
 
 
-def _endpoints(config: zenoh.Config, side: Literal["connect", "listen"]) -> list[str]:
+def _endpoints(
+    config: zenoh.Config, side: Literal["connect", "listen"], of_clients: Sequence[str] = ()
+) -> Sequence[str]:
     """Endpoints that a session of this configuration connects to or listens on.
 
     Zenoh takes one list, or one for each mode. By default clients listen nowhere, and others where anybody gets in.
+
+    Args:
+        config: The configuration.
+        side: Which of the two.
+        of_clients: Those of a client, if the configuration says nothing of clients.
     """
     endpoints: list[str] | dict[str, list[str]] = json.loads(config.get_json(f"{side}/endpoints"))
     if isinstance(endpoints, list):
         return endpoints
-    return endpoints.get(json.loads(config.get_json("mode")) or _DEFAULT_MODE, [])
+    mode = json.loads(config.get_json("mode")) or _DEFAULT_MODE
+    return endpoints.get(mode, of_clients if mode == "client" else ())
 
 
 def _apply(config: zenoh.Config, settings: Mapping[str, object], where: str) -> None:

@@ -89,6 +89,21 @@ def test_where_no_python_suits_uv_fetches_one(commands: Path) -> None:
     )
 
 
+@pytest.mark.parametrize("finished", [True, False])
+def test_what_is_left_of_an_unfinished_environment_keeps_uv_from_nothing(
+    commands: Path, tmp_path: Path, finished: bool
+) -> None:
+    (commands / "rm").symlink_to(shutil.which("rm") or "/bin/rm")
+    put(commands, "uv")
+    (tmp_path / "there" / "bin").mkdir(parents=True)
+    (tmp_path / "there" / "pyvenv.cfg").touch()
+    if finished:
+        (tmp_path / "there" / "bin" / "python").touch()
+    code, out, _ = made(cwd=tmp_path)
+    assert (code, out.splitlines()[0]) == (0, "uv venv --quiet --seed --python 3.11 there")
+    assert (tmp_path / "there").exists() == finished
+
+
 @pytest.mark.parametrize("by", ["pip", "fetch"])
 def test_where_uv_is_missing_pip_fetches_it_or_a_script_without_pip(commands: Path, tmp_path: Path, by: str) -> None:
     for name in ("mkdir", "chmod", "cat"):

@@ -5,6 +5,7 @@ import pytest
 from rclzenoh.exceptions import ConfigurationError, UnreadableKeyError
 from rclzenoh.session_config import (
     CONFIG_FILE_VARIABLE,
+    LISTENS_OF_RMW,
     OVERRIDE_VARIABLE,
     Key,
     client_config,
@@ -120,6 +121,19 @@ def test_a_client_of_a_router_with_a_key_is_protected(monkeypatch, key, tmp_path
 def test_a_session_is_protected_if_every_way_in_is(override, protected, monkeypatch):
     monkeypatch.setenv(OVERRIDE_VARIABLE, override)
     assert is_protected() == protected
+
+
+@pytest.mark.parametrize(
+    ("listen", "protected"), [("", False), (";listen/endpoints=[]", True), (";listen/endpoints={client: []}", True)]
+)
+def test_a_session_that_listens_by_default_is_protected_only_if_it_is_told_not_to(
+    listen, protected, monkeypatch, tmp_path
+):
+    monkeypatch.setenv(OVERRIDE_VARIABLE, f'mode="client";connect/endpoints=["tls/192.0.2.7:1"]{listen}')
+    assert is_protected(LISTENS_OF_RMW) == protected
+    (tmp_path / "session.json5").write_text("{}")
+    monkeypatch.setenv(CONFIG_FILE_VARIABLE, str(tmp_path / "session.json5"))
+    assert is_protected(LISTENS_OF_RMW)
 
 
 def test_an_environment_that_says_nothing_is_not_protected(monkeypatch, tmp_path):

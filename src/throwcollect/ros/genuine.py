@@ -41,7 +41,14 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 from rclpy.time import Time
 
-from rclzenoh.session_config import OPEN, OVERRIDE_VARIABLE, client_override, connect_endpoint, is_protected
+from rclzenoh.session_config import (
+    LISTENS_OF_RMW,
+    OPEN,
+    OVERRIDE_VARIABLE,
+    client_override,
+    connect_endpoint,
+    is_protected,
+)
 from throwcollect.errors import ThrowcollectError, WorkerError
 from throwcollect.ros.connection import Connection, session_key
 from throwcollect.ros.fast_dds import PLAIN_DISCOVERY, PROFILE_VARIABLE, client_profile, write_temporarily
@@ -189,7 +196,7 @@ def joins_protected() -> bool:
     if not Middleware("rclpy", rclpy.get_rmw_implementation_identifier()).keeps_others_out:
         return False
     with zenoh_errors():
-        return is_protected()
+        return is_protected(LISTENS_OF_RMW)
 
 
 def spin_some(executor: Executor, timeout_sec: float) -> None:

@@ -160,16 +160,25 @@ test("a model is told in sentences, before and after it was adapted", () => {
   };
   assert.match(describe(model), /1021 throws of quick: task.duration_s to landing_x_m, landing_y_m\. .* 0\.21 cm \(median\)\. Nobody/);
   assert.match(describe({ ...model, targets: [...model.targets, "hit_angle_rad"] }), /predicted to 0\.0021 \(over targets of several units\) \(median\)/);
+  assert.match(describe({ ...model, targets: ["hit_angle_rad"] }), /predicted to 0\.12° \(median\)/);
   const adaptation = { method: "bias", throws: 3, before: [0.1, 0.2, 0.3], after: [0.01, 0.03, 0.02], found: [{ name: "task.duration_s", value: 0.01234, deviation: 0.001 }] };
   assert.match(describe({ ...model, adaptation }), /by 3 throws \(bias\): .* 20\.00 cm .* before, and 2\.00 cm after.* task\.duration_s 0\.0123 ± 0\.001\./);
   assert.match(describe({ ...model, adaptation: { ...adaptation, throws: 1, before: [0.1], after: [] } }), /by 1 throw \(bias\): .* 10\.00 cm from their prediction before \(median\)/);
 });
 
 test("errors are rows, those in another world behind those in the own one", () => {
-  const errors = { median: 0.01, share90: 0.02, largest: null };
+  const errors = { unit: "m", median: 0.01, share90: 0.02, largest: null, others: [] };
   const rows = tabulate({ trained: [{ trained_on: 30, errors }], adapted: [{ real_throws: 0, method: "none", errors }, { real_throws: 1, method: "offset", errors }] });
   assert.deepEqual(rows.map(([text]) => text), ["learned from 30 throws", "other world, not adapted", "other world, 1 throw there (offset)"]);
-  assert.deepEqual(rows[0].slice(1), [0.01, 0.02, null]);
+  assert.deepEqual(rows[0].slice(1), ["1.00\u00a0cm", "2.00\u00a0cm", "–"]);
+});
+
+test("misses are told in the unit of their targets", () => {
+  const angle = { unit: "rad", median: Math.PI / 180, share90: Math.PI / 90, largest: null, others: [] };
+  const several = { unit: "m", median: 0.01, share90: 0.02, largest: null, others: [angle, { unit: "s", median: 0.5, share90: 1, largest: null }] };
+  const rows = tabulate({ trained: [{ trained_on: 30, errors: angle }, { trained_on: 60, errors: several }], adapted: [] });
+  assert.deepEqual(rows[0].slice(1), ["1.00°", "2.00°", "–"]);
+  assert.deepEqual(rows[1].slice(1), ["1.00\u00a0cm, 1.00°, 0.5\u00a0s", "2.00\u00a0cm, 2.00°, 1\u00a0s", "–"]);
 });
 
 test("what is drawn of a model is told as well", () => {

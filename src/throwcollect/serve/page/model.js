@@ -2,7 +2,7 @@
 
 import { get, make, setChoices, setText } from "./dom.js";
 import { drawErrors } from "./model_chart.js";
-import { CENTIMETRES, describe, median, tabulate } from "./model_words.js";
+import { describe, median, tabulate } from "./model_words.js";
 
 const HEIGHT = "scene.landing_height_m";
 /** Targets that lie on the landing map. */
@@ -103,8 +103,7 @@ export class Models {
     get("model-throws-box").hidden = score === null || !this.isOnMap;
     setChoices(get("model-throws"), [["throws", "in its own world"], ...(several ? [["adapted_throws", "in the other one, adapted"]] : []), ["none", "none"]]);
     if (score === null) return;
-    const cell = (length) => make("td", {}, length === null ? "–" : (length * CENTIMETRES).toFixed(2));
-    const rows = tabulate(score).map(([text, ...lengths]) => make("tr", {}, make("th", { scope: "row" }, text), ...lengths.map(cell)));
+    const rows = tabulate(score).map(([text, ...cells]) => make("tr", {}, make("th", { scope: "row" }, text), ...cells.map((cell) => make("td", {}, cell))));
     get("model-rows").replaceChildren(...rows);
     const place = get("model-charts");
     drawErrors(place, "throws learned from", score.trained.map(({ trained_on: count, errors }) => [count, errors]), { isLogarithmic: true });

@@ -2,19 +2,25 @@
 
 import uPlot from "./vendor/uplot/dist/uPlot.esm.js";
 import { make } from "./dom.js";
-import { CENTIMETRES } from "./model_words.js";
+import { byUnit, readAs } from "./model_words.js";
 
 const HEIGHT_PX = 130;
 
 /**
- * Draw median and what nine of ten throws stay below, both in centimetres.
+ * Draw median and what nine of ten throws stay below, in a chart for each unit of the targets.
  * @param {Element} place that it is put into
  * @param {string} title of the numbers of throws
- * @param {[number, {median: number | null, share90: number | null}][]} errors by number of throws
+ * @param {[number, import("./model_words.js").Misses & {others: import("./model_words.js").Misses[]}][]} errors by number of throws
  * @param {{isLogarithmic: boolean}} options whether both axes are
  */
-export function drawErrors(place, title, errors, { isLogarithmic }) {
-  const box = make("figure", { className: "model-chart" }, make("figcaption", {}, `Distance from the target [cm] over ${title}`));
+export function drawErrors(place, title, errors, options) {
+  if (!errors.length) return;
+  byUnit(errors[0][1]).forEach(({ unit }, i) => drawMisses(place, title, unit, errors.map(([count, each]) => [count, byUnit(each)[i]]), options));
+}
+
+function drawMisses(place, title, unit, errors, { isLogarithmic }) {
+  const [factor, shown, noun] = readAs(unit);
+  const box = make("figure", { className: "model-chart" }, make("figcaption", {}, `${noun} from the target [${shown}] over ${title}`));
   box.setAttribute("aria-hidden", "true");
   place.append(box);
   const style = getComputedStyle(place);
@@ -23,8 +29,8 @@ export function drawErrors(place, title, errors, { isLogarithmic }) {
   const line = { stroke: style.getPropertyValue("--accent"), width: 2, points: { show: true, size: 5 } };
   const data = [
     errors.map(([count]) => count),
-    errors.map(([, { median }]) => scale(median)),
-    errors.map(([, { share90 }]) => scale(share90)),
+    errors.map(([, { median }]) => scale(median, factor)),
+    errors.map(([, { share90 }]) => scale(share90, factor)),
   ];
   new uPlot({
     width: place.clientWidth,
@@ -37,6 +43,6 @@ export function drawErrors(place, title, errors, { isLogarithmic }) {
   }, data, box);
 }
 
-function scale(length) {
-  return length === null ? null : length * CENTIMETRES;
+function scale(length, factor) {
+  return length === null ? null : length * factor;
 }

@@ -1,14 +1,36 @@
 /** What is known of a model, in words. */
 
-/** Lengths are told in them. */
-export const CENTIMETRES = 100;
+/** By unit of targets: the factor and the unit by which people read their misses, and what these are. */
+const SHOWN_AS = { m: [100, "cm", "Distance"], rad: [180 / Math.PI, "°", "Angle"] };
+
+/** @typedef {{unit: string, median: number | null, share90: number | null, largest: number | null}} Misses */
 
 /**
- * @param {number | null} length [m]
+ * @param {string} unit of targets
+ * @returns {[number, string, string]} the factor and the unit by which people read their misses, and what these are
+ */
+export function readAs(unit) {
+  return SHOWN_AS[unit] ?? [1, unit, "Difference"];
+}
+
+/**
+ * @param {Misses & {others: Misses[]}} errors
+ * @returns {Misses[]} misses over the targets of each unit
+ */
+export function byUnit(errors) {
+  return [errors, ...errors.others];
+}
+
+/**
+ * @param {number | null} miss
+ * @param {string} unit
  * @returns {string}
  */
-function inCentimetres(length) {
-  return length === null ? "–" : `${(length * CENTIMETRES).toFixed(2)} cm`;
+function tellMiss(miss, unit) {
+  if (miss === null) return "–";
+  const [factor, shown] = readAs(unit);
+  const number = unit in SHOWN_AS ? (miss * factor).toFixed(2) : short(miss);
+  return shown === "°" ? number + shown : `${number} ${shown}`.trim();
 }
 
 /**
@@ -17,7 +39,9 @@ function inCentimetres(length) {
  * @returns {string} one of several units has no name
  */
 function tellLength(length, targets) {
-  return length === null || targets.every((each) => each.endsWith("_m")) ? inCentimetres(length) : `${short(length)} (over targets of several units)`;
+  const units = [...new Set(targets.map((each) => each.slice(each.lastIndexOf("_") + 1)))];
+  if (length === null || (units.length === 1 && units[0] in SHOWN_AS)) return tellMiss(length, units[0]);
+  return units.length === 1 ? short(length) : `${short(length)} (over targets of several units)`;
 }
 
 /**
@@ -34,13 +58,15 @@ export function describe({ learned_from: name, throws, error, parameters, target
       + `${after.length ? `, and ${tellLength(median(after), targets)} after, each predicted by the others` : ""} (median).`);
     if (found.length) texts.push(`Found: ${found.map(({ name: key, value, deviation }) => `${key} ${short(value)} ± ${short(deviation)}`).join(", ")}.`);
   }
-  texts.push(score ? `All distances below are those of throws in simulation, at ${score.targets} targets${score.seeds > 1 ? ` of each of ${score.seeds} seeds` : ""}.` : "Nobody has thrown with it yet; throwcollect score does, in simulation.");
+  texts.push(score ? `All misses below are those of throws in simulation, at ${score.targets} targets${score.seeds > 1 ? ` of each of ${score.seeds} seeds` : ""}.` : "Nobody has thrown with it yet; throwcollect score does, in simulation.");
   return texts.join(" ");
 }
 
-/** Rows of the table of errors: what was thrown with, median, what nine of ten stay below, largest [m]. */
+/** Rows of the table of errors: what was thrown with, median, what nine of ten stay below, largest. */
 export function tabulate({ trained, adapted }) {
-  const row = (text, { median: middle, share90, largest }) => [text, middle, share90, largest];
+  // A line may be broken between two units alone.
+  const tell = (errors, name) => [...new Set(byUnit(errors).map((each) => tellMiss(each[name], each.unit).replaceAll(" ", "\u00a0")))].join(", ");
+  const row = (text, errors) => [text, ...["median", "share90", "largest"].map((name) => tell(errors, name))];
   return [
     ...trained.map(({ trained_on: count, errors }) => row(`learned from ${count} throws`, errors)),
     ...adapted.map(({ real_throws: count, method, errors }) => row(`other world, ${count ? `${count} ${count === 1 ? "throw" : "throws"} there (${method})` : "not adapted"}`, errors)),
