@@ -8,6 +8,18 @@ from pathlib import Path
 import pytest
 
 SCRIPT = Path(__file__).parents[2] / "compose" / "collect.sh"
+DOCKER = """\
+#!/bin/sh
+# Compose fails as it does when the coordinator does; the copy brings a file if there is one.
+case "$1 $*" in
+    "compose "*" up "*)
+        echo "$THROWCOLLECT_HOST $DATASET" >"$TOLD"
+        [ -z "$SIGNAL" ] || kill -s "$SIGNAL" $PPID
+        exit 4 ;;
+    "compose "*" down "*) touch "$TOLD.removed" ;;
+    "run "*) [ -z "$BEGUN" ] || [ -e "$TOLD.removed" ] || touch "$OUTPUT/config.yaml" ;;
+esac
+"""
 
 
 @pytest.fixture
@@ -48,7 +60,7 @@ def test_nothing_is_collected_that_could_not_be_put_anywhere(tmp_path: Path, cal
 def test_a_dataset_that_cannot_be_copied_stays_in_its_volume(tmp_path: Path, calls: Path) -> None:
     done = collect(tmp_path, "data", RUN="1")
     assert done.returncode == 1
-    assert "it stays in the volume throwcollect-" in done.stderr
+    assert "stays in the volume throwcollect-" in done.stderr
     (down,) = [line for line in calls.read_text().splitlines() if " down " in line]
     assert "--volumes" not in down
     assert collect(tmp_path, "other", RUN="1", UP="5").returncode == 5
@@ -65,3 +77,39 @@ def test_directories_are_found_whatever_the_shell_of_the_user_searches(tmp_path:
     up, run, _ = calls.read_text().splitlines()
     assert up == f"up {tmp_path}/configs throws.yaml"
     assert f" -v {tmp_path}/data:/out " in run
+
+
+@pytest.mark.parametrize(
+    ("begun", "signal", "code"), [("", "", 4), ("yes", "", 4), ("yes", "INT", 130), ("yes", "TERM", 130)]
+)
+def test_what_was_collected_is_taken_out_and_what_never_began_leaves_no_directory(
+    tmp_path: Path, begun: str, signal: str, code: int
+) -> None:
+    (tmp_path / "docker").write_text(DOCKER)
+    (tmp_path / "docker").chmod(0o755)
+    (tmp_path / "bad.yaml").write_text("nonsense: 1\n")
+    output = tmp_path / "my data"
+    variables = {"OUTPUT": str(output), "TOLD": str(tmp_path / "told"), "BEGUN": begun, "SIGNAL": signal}
+    # Of an .env file or a machine on which other datasets are made.
+    variables["DATASET"] = "mnist"
+    environment = {**os.environ, **variables, "PATH": f"{tmp_path}:{os.environ['PATH']}"}
+    done = subprocess.run(
+        [SCRIPT, tmp_path / "bad.yaml", "2", output], env=environment, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == code, done.stderr
+    assert output.exists() == bool(begun)
+    assert (tmp_path / "told").read_text().split() == [os.uname().nodename, "dataset"]
+    assert (tmp_path / "told.removed").exists()
+
+
+def test_a_file_that_is_not_there_is_named_before_anything_starts(tmp_path: Path) -> None:
+    (tmp_path / "docker").write_text('#!/bin/sh\necho "$@" >>"$TOLD"\n')
+    (tmp_path / "docker").chmod(0o755)
+    told = tmp_path / "told"
+    environment = {**os.environ, "TOLD": str(told), "PATH": f"{tmp_path}:{os.environ['PATH']}"}
+    missing = tmp_path / "missing.yaml"
+    done = subprocess.run(
+        [SCRIPT, missing, "2", tmp_path / "data"], env=environment, capture_output=True, text=True, check=False
+    )
+    assert (done.returncode, done.stderr) == (2, f"{SCRIPT}: {missing}: no such file\n")
+    assert not told.exists()
