@@ -115,8 +115,7 @@ class World(Observer):
             start_ns: Simulated time of the start state [ns].
 
         Raises:
-            ConfigError: If the posture or the choice of locked joints is wrong, the ball falls through the tool, or
-                the robot's files cannot be read.
+            ConfigError: If the ball falls through the tool, or the robot's files cannot be read.
         """
         # Only the names count of `task.end`, because they say which joints are locked.
         key = (trial.robot, trial.tool, trial.ball, trial.scene, trial.sim, trial.task.start, tuple(trial.task.end))
