@@ -76,12 +76,7 @@ _MOST_TRIALS = 10_000_000
 
 
 class SimulationNode(Node):
-    """Serves one simulation.
-
-    Args:
-        name: Name of the node.
-        simulation: The simulation that it serves.
-        namespace: Namespace of the node and of all names; None for ``/<name>``.
+    """Serves one simulation, with all names in one namespace: ``/<name>`` unless another one is given.
 
     Raises:
         ConfigError: If the namespace is that of another simulation.

@@ -72,9 +72,6 @@ class StepRequest:
 class Simulation:
     """Steps one world as fast as it can while a run goes on.
 
-    Args:
-        config: Configuration of the collection.
-
     Raises:
         ConfigError: If it does not describe a world.
         WorkerError: If the physics engine does not start.
@@ -114,10 +111,7 @@ class Simulation:
     def lease(self, number: int, config: Config, goals: Mapping[str, TrajectoryGoal]) -> None:
         """Begin a trial for a coordinator, with controllers as they are configured, which no other client may touch.
 
-        Args:
-            number: Number of the trial.
-            config: Configuration with the trial's values.
-            goals: Goal of each controller that moves.
+        The configuration has the trial's values; each controller that moves has a goal.
 
         Raises:
             ConfigError: If there is no such start state.
