@@ -222,8 +222,7 @@ class Simulation:
     def advance(self, *, watched: bool) -> None:
         """Run for a slice of time, or until the run ends; it ends on time where a real-time factor asks for it.
 
-        Args:
-            watched: Whether a client listens, so that slices have to be short.
+        The slice has to be short if a client listens (`watched`).
         """
         began_s, since_ns, factor = time.monotonic(), self.now_ns, self.real_time_factor
         # A long slice costs the least. A short one lets messages be sent in between, which only watching clients need.

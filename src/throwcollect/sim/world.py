@@ -131,11 +131,7 @@ class World(Observer):
         self._begin(start_ns, self._settled.sample)
 
     def restart_clock(self, start_ns: int) -> None:
-        """Count time, steps, samples and contacts anew from the present state, which stays as it is.
-
-        Args:
-            start_ns: Simulated time of the present state [ns].
-        """
+        """Count steps, samples and contacts anew, and time from `start_ns` [ns]; the present state stays as it is."""
         now = self.engine.state
         # A body that was removed since the last step does not press on the ball any more.
         self._touching = now.touching
