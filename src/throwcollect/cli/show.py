@@ -24,11 +24,10 @@ def init(
     ] = "sobol",
 ) -> None:
     """Write a commented throwcollect.yaml, for `throwcollect up`."""
-    from throwcollect.config.starter import make_starter
     from throwcollect.files import write_file
-    from throwcollect.tasks.first_motion import find_first_motion
+    from throwcollect.tasks.starter import make_starter
 
-    texts = make_starter(robot, task, sampler, find_motion=find_first_motion)
+    texts = make_starter(robot, task, sampler)
     if existing := [name for name in texts if Path(name).exists()]:
         raise ConfigError(f"{existing[0]}: is there already", hint="move it away, or go to another directory")
     for name, text in texts.items():

@@ -31,9 +31,6 @@ _SWEPT_FIELDS = ("min", "max", "scale", "count", "values")
 class Document:
     """Values of a configuration file and of overrides, with the line of each.
 
-    Args:
-        path: The file.
-
     Raises:
         ConfigError: If the file cannot be read or is not YAML.
 

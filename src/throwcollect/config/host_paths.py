@@ -35,11 +35,8 @@ def normal_path(text: str) -> str:
 def refusal(path: str, *, more: Iterable[str] = ()) -> str | None:
     """Say why a directory or file of the host must not be mounted; None if it may be.
 
-    Mounts are for data. What belongs to the system is refused even for reading, because it may hold secrets.
-
-    Args:
-        path: An absolute path.
-        more: Further directories of the system, such as those of the engine.
+    Mounts are for data. What belongs to the system is refused even for reading, because it may hold secrets. The
+    path is absolute; `more` are further directories of the system, such as those of the engine.
     """
     plain = normal_path(path)
     if plain in _SHARED:

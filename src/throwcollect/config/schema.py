@@ -271,8 +271,7 @@ class Config(Section):
     def trial_start_ns(self, number: int) -> int:
         """Simulated time at which a trial starts [ns]; the slots of different trials never overlap.
 
-        Args:
-            number: Number of the trial, from 0; time 0 itself is left out, as it means "unset" in ROS.
+        Time 0 itself is left out, as it means "unset" in ROS.
         """
         slot_s = math.ceil(self.sim.max_trial_s) + _BETWEEN_TRIALS_S
         return (number + 1) * slot_s * 10**9

@@ -73,10 +73,7 @@ class TaskConfig(Section):
         return "throws of a ball" if self.throws else f"trials of the task {self.name}"
 
     def find_wrong_targets(self, columns: Collection[str]) -> dict[str, str]:
-        """Say what is wrong with the columns of targets of a list of its trials, or those that one trial has.
-
-        Args:
-            columns: Their names.
+        """Say what is wrong with the names of the columns of targets of a list of its trials, or of one trial.
 
         Returns:
             Sentence that says what is wrong, by column; empty if they are targets of this task, or none at all.

@@ -121,12 +121,7 @@ class JointTrajectoryController:
             self._motion.scale(factor)
 
     def reset(self, time_ns: int, measured: JointState) -> None:
-        """Begin, or begin anew after a reset of the simulation: abort the goal, and hold the measured positions.
-
-        Args:
-            time_ns: Time now [ns].
-            measured: State now.
-        """
+        """Begin now [ns], or anew after a reset of the simulation: abort the goal, and hold the measured positions."""
         self._finish(Decision.invalid("simulation was reset"))
         self._time_ns, self._measured, self._scaling = time_ns, measured, 1.0
         self._begin(Waypoints.single(measured.positions), measured)
@@ -138,7 +133,7 @@ class JointTrajectoryController:
 
         Args:
             goal_id: Identity that its result will bear; not None.
-            goal: The goal.
+            goal: What is asked for.
             now_ns: Current time [ns].
 
         Returns:
@@ -153,15 +148,7 @@ class JointTrajectoryController:
         return None
 
     def replace(self, trajectory: Trajectory, now_ns: int) -> Refusal | None:
-        """Follow a trajectory from the topic instead of the present one, or refuse it.
-
-        Args:
-            trajectory: The trajectory.
-            now_ns: Current time [ns].
-
-        Returns:
-            None if the trajectory is accepted; otherwise the reason of the refusal, which the log has too.
-        """
+        """Follow a trajectory from the topic instead of the present one, or refuse it as `submit` refuses a goal."""
         if reason := self._refusal(trajectory, now_ns):
             return reason
         if self._topic_aborts_goal:

@@ -51,10 +51,7 @@ class Judge:
     def decide(self, motion: Motion, measured: JointState, *, first: bool) -> Decision | None:
         """Judge one update; None while the trajectory goes on, or its end waits for the joints.
 
-        Args:
-            motion: The motion along the trajectory.
-            measured: Measured state.
-            first: Whether it is the motion's first update, in which the path is checked even if the end has come.
+        In the `first` update of a motion, the path is checked even if the end has come.
         """
         past_end = motion.past_end
         if self.tolerances.path.any() and (first or not past_end):
@@ -82,9 +79,7 @@ class Judge:
     def updates_to_skip(self, motion: Motion, *, goal: bool) -> int | None:
         """Number of updates that can pass without anything to decide; None if there will never be anything.
 
-        Args:
-            motion: The motion along the trajectory.
-            goal: Whether a goal waits for the end of it.
+        `goal` tells whether a goal waits for the end of the motion.
         """
         tolerances = self.tolerances
         if tolerances.path.any() and not motion.past_end:

@@ -99,7 +99,7 @@ def read_list(directory: Path, plan: Plan) -> Points:
         points = read_points(path, plan.config)
     except ConfigError as error:
         raise DatasetError(error.problems[0].message, path=path) from error
-    if points.first(len(plan.trials)) != plan.trials.points:
+    if points[: len(plan.trials)] != plan.trials.points:
         raise DatasetError(f"begins with other points than those of {PLAN}", path=path)
     return points
 

@@ -32,7 +32,7 @@ BALL_NUMBERS = 13
 GROUND = "ground"
 """Name of the ground in contacts of the ball."""
 
-_STL = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+STL = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 """A triangle in a binary STL file, which has a title of 80 bytes and the number of triangles before them."""
 
 
@@ -195,7 +195,7 @@ class BodyModel:
         """Encode the meshes as binary STL, by the names that the description has for them."""
         files = {}
         for number, triangles in enumerate(self.meshes):
-            records = np.zeros(len(triangles), _STL)
+            records = np.zeros(len(triangles), STL)
             records["corners"] = triangles
             files[f"{number}.stl"] = bytes(80) + len(triangles).to_bytes(4, "little") + records.tobytes()
         return files

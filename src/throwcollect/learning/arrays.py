@@ -1,4 +1,4 @@
-"""Arrays of numbers, which stand as nested lists in the JSON files of models."""
+"""Parts of the JSON files of models: objects that never change, and arrays of numbers, which are nested lists there."""
 
 from __future__ import annotations
 
@@ -6,10 +6,16 @@ from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, FiniteFloat, GetPydanticSchema
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, GetPydanticSchema
 from pydantic_core import core_schema
 
 Array = NDArray[np.float64]
+
+
+class Entry(BaseModel):
+    """Base of all objects in these files: unknown keys are errors."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
 
 
 def _read_lists(lists: Any, dtype: type[np.generic]) -> GetPydanticSchema:

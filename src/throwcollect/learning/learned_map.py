@@ -150,9 +150,7 @@ class LearnedMap:
     def predict(self, parameters: Array, context: Array) -> Array:
         """Where trials end in the corrected world, in the units of the targets, shape ``(n, n_targets)``.
 
-        Args:
-            parameters: Scaled, shape ``(n, n_parameters)``.
-            context: Scaled, shape ``(n, n_context)``.
+        Parameters and context are those of `in_world`.
         """
         inputs = self.in_world(parameters, context)
         return self.forward.predict(inputs) + self.predict_residuals(inputs) + self.correction.offset
@@ -160,8 +158,7 @@ class LearnedMap:
     def carry_over(self, context: Array) -> Array:
         """Where the throws of the dataset would have ended in the corrected world, shape ``(n, n_targets)``.
 
-        Args:
-            context: Scaled, the same for all throws, shape ``(n_context,)``.
+        The context is scaled and the same for all throws, shape ``(n_context,)``.
         """
         parameters = self.inputs[:, self.columns_of(Role.PARAMETER)]
         moved = self.in_world(parameters, np.tile(context, (len(parameters), 1)))
@@ -176,10 +173,9 @@ class LearnedMap:
         return other
 
     def predict_residuals(self, inputs: Array) -> Array:
-        """Means of the residuals of the nearest throws, weighted by closeness, shape ``(n, n_targets)``.
+        """Means of the residuals of the throws nearest to scaled inputs, ``(n, n_axes)``, weighted by closeness.
 
-        Args:
-            inputs: All inputs, scaled, shape ``(n, n_axes)``.
+        Shape ``(n, n_targets)``.
         """
         if self.kind is Kind.POLYNOMIAL:
             return np.zeros((len(inputs), len(self.targets)))

@@ -10,6 +10,7 @@ from pathlib import Path
 from throwcollect.config.task import TaskConfig
 from throwcollect.errors import ConfigError
 from throwcollect.learning.model import Aim
+from throwcollect.sweep.point_file import read_number
 from throwcollect.wording import join_names
 
 
@@ -38,7 +39,7 @@ def read_table(path: Path, names: Sequence[str], *, aliases: dict[str, str] | No
                 )
             rows = []
             for row in reader:
-                numbers = {name: _to_number(row[column]) for name, column in columns.items()}
+                numbers = {name: read_number(row[column]) for name, column in columns.items()}
                 if wrong := [column for name, column in columns.items() if not math.isfinite(numbers[name])]:
                     raise ConfigError(
                         f"{path}:{reader.line_num}: {wrong[0]}: {row[wrong[0]] or ''!r}", expected="a finite number"
@@ -49,14 +50,6 @@ def read_table(path: Path, names: Sequence[str], *, aliases: dict[str, str] | No
     if not rows:
         raise ConfigError(f"{path}: has no rows", expected=f"columns {', '.join(names)}")
     return rows
-
-
-def _to_number(text: str | None) -> float:
-    """Read the number in a cell; NaN if the cell holds none."""
-    try:
-        return float(text or "")
-    except ValueError:
-        return math.nan
 
 
 def read_targets(path: Path, names: Sequence[str], task: TaskConfig) -> list[list[float]]:

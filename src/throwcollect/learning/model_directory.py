@@ -29,14 +29,7 @@ _MOST_BYTES = 10_000_000
 
 
 def write_model(directory: Path, file: ModelFile, learned: LearnedMap, trials: NDArray[np.int64], config: str) -> None:
-    """Write a model into a directory that is new or empty.
-
-    Args:
-        directory: The directory.
-        file: All of the model but its throws.
-        learned: The map, with its throws.
-        trials: Numbers of their trials, shape ``(n,)``.
-        config: YAML of the dataset's configuration.
+    """Write a model, in the parts in which `read_model` gives it, into a directory that is new or empty.
 
     Raises:
         ConfigError: If there is something already.
@@ -60,7 +53,8 @@ def read_model(directory: Path) -> tuple[ModelFile, LearnedMap, NDArray[np.int64
     """Read a model.
 
     Returns:
-        All of it but its throws; the map; numbers of the trials; YAML of the dataset's configuration.
+        All of it but its throws; the map with its throws; numbers of their trials, shape ``(n,)``; YAML of the
+        dataset's configuration.
 
     Raises:
         DatasetError: If there is none, or it is damaged.

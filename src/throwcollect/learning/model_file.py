@@ -5,12 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Literal
 
-from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError, model_validator
+from pydantic import Field, FiniteFloat, ValidationError, model_validator
 
 from throwcollect.errors import DatasetError
 from throwcollect.files import read_text
 from throwcollect.learning.adapting import ROLES, Method
-from throwcollect.learning.arrays import Array
+from throwcollect.learning.arrays import Array, Entry
 from throwcollect.learning.distilling import DistilledMap
 from throwcollect.learning.learned_map import Axis, Correction, Kind, LearnedMap, Role
 from throwcollect.learning.polynomial import Polynomial
@@ -19,11 +19,7 @@ MODEL = "model.json"
 _MOST_BYTES = 100_000_000
 
 
-class _Entry(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class Found(_Entry):
+class Found(Entry):
     """A number that adaptation found.
 
     Attributes:
@@ -37,7 +33,7 @@ class Found(_Entry):
     deviation: FiniteFloat
 
 
-class AdaptationEntry(_Entry):
+class AdaptationEntry(Entry):
     """How the model was adapted.
 
     Attributes:
@@ -58,7 +54,7 @@ class AdaptationEntry(_Entry):
     found: list[Found]
 
 
-class TrainedOn(_Entry):
+class TrainedOn(Entry):
     """The dataset and the throws that the model was learned from.
 
     Attributes:
@@ -93,7 +89,7 @@ class TrainedOn(_Entry):
         return min(self.folds_error.values())
 
 
-class ModelFile(_Entry):
+class ModelFile(Entry):
     """The whole file: a pure function of the dataset and of the arguments of `fit`, `adapt` and `distil`."""
 
     format: Literal["1"] = "1"

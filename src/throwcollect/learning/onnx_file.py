@@ -17,15 +17,11 @@ helper, numpy_helper = lazily("onnx.helper"), lazily("onnx.numpy_helper")
 
 
 def encode_onnx(learned: LearnedMap, distilled: DistilledMap) -> bytes:
-    """Encode a distilled map as a graph of 32-bit floats.
+    """Encode a distilled map as a graph of 32-bit floats; the map that it was distilled from has the ranges.
 
     Its input ``target`` has the shape ``(n, n_targets + n_context)``, its output ``parameters``
     ``(n, n_parameters)``, both in the order and the units that ``model.json`` has.
     Parameters stay inside of their ranges.
-
-    Args:
-        learned: The map that was distilled; its axes have the ranges of parameters and context.
-        distilled: The polynomial.
 
     Raises:
         MissingExtraError: If the package ``onnx`` is not installed.

@@ -6,21 +6,17 @@ from collections.abc import Sequence
 from typing import Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, FiniteFloat
+from pydantic import Field, FiniteFloat
 
 from throwcollect.learning.adapting import Method
-from throwcollect.learning.arrays import Array
+from throwcollect.learning.arrays import Array, Entry
 from throwcollect.units import unit_of_name
 
 SHOWN_AS = {"m": (100.0, " cm"), "rad": (180.0 / np.pi, "°")}
 """By unit of targets: the factor and the unit by which people read their misses."""
 
 
-class _Entry(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class Misses(_Entry):
+class Misses(Entry):
     """How far throws ended from their targets, over the targets of one unit: a distance [m], an angle [rad].
 
     Attributes:
@@ -47,7 +43,7 @@ class Errors(Misses):
 
     throws: int
     missed: int
-    others: list[Misses] = []
+    others: list[Misses] = Field(default=[])
 
     @property
     def by_unit(self) -> tuple[Misses, ...]:
@@ -132,7 +128,7 @@ def _find_median(values: Sequence[float | None]) -> float | None:
     return median if np.isfinite(median) else None
 
 
-class Trained(_Entry):
+class Trained(Entry):
     """How a model of some throws of the dataset hits.
 
     Attributes:
@@ -144,7 +140,7 @@ class Trained(_Entry):
     errors: Errors
 
 
-class Adapted(_Entry):
+class Adapted(Entry):
     """How a model hits in another world after some throws there.
 
     Attributes:
@@ -158,7 +154,7 @@ class Adapted(_Entry):
     errors: Errors
 
 
-class ThrowAtTarget(_Entry):
+class ThrowAtTarget(Entry):
     """A throw at a target.
 
     Attributes:
@@ -170,7 +166,7 @@ class ThrowAtTarget(_Entry):
     place: list[FiniteFloat] | None
 
 
-class Score(_Entry):
+class Score(Entry):
     """All results of a model; every number is one "in simulation".
 
     Attributes:

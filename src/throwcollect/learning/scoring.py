@@ -191,12 +191,9 @@ def draw_targets(landings: Array, count: int, seed: int) -> Array:
 
 
 def spread_first(targets: Array) -> Array:
-    """Order targets so that the first few of them are spread, as a few throws there tell most of a world.
+    """Order targets, ``(n, n_targets)``, so that the first few are spread, as a few throws there tell most of a world.
 
     The target nearest to the middle comes first, as it stands for all; then always the one farthest from all before.
-
-    Args:
-        targets: Shape ``(n, n_targets)``.
     """
     squares = ((targets[:, np.newaxis] - targets) ** 2).sum(axis=2)
     order = [int(((targets - targets.mean(axis=0)) ** 2).sum(axis=1).argmin())]

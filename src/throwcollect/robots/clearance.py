@@ -111,8 +111,7 @@ class Clearance:
     def find_lowest(self, configuration: NDArray[np.float64]) -> tuple[str, float]:
         """Find the lowest link of a posture by boxes around its shapes: its name, and its height above the base [m].
 
-        Args:
-            configuration: In the order of the model [rad], shape ``(n_joints,)``.
+        The posture is in the order of the model [rad], shape ``(n_joints,)``.
         """
         pinocchio.updateGeometryPlacements(self._model, self._data, self.geometry, self._distances, configuration)
         heights = []

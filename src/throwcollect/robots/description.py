@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from throwcollect.config.schema import Config
-from throwcollect.errors import ConfigError, Problem
+from throwcollect.errors import ConfigError
 from throwcollect.extras import MissingExtraError, is_installed
 from throwcollect.members import load_member
 from throwcollect.pinocchio_library import pinocchio
@@ -76,29 +76,13 @@ def find_locked_joints(config: Config) -> Mapping[str, float]:
     For ``robot.locked: auto``, these are all joints that the task does not move.
 
     Raises:
-        ConfigError: If a joint that is to be locked is unknown or moved by the task, or the robot's files
-            cannot be read.
+        ConfigError: If the robot's files cannot be read.
     """
-    robot = robot_of(config)
-    posture = start_posture(config)
-    moved = config.task.end
     choice = config.robot.locked
-    if choice == "none":
-        names: set[str] = set()
-    elif choice == "auto":
-        names = set(robot.joints) - set(moved)
-    else:
-        names = set(choice)
-    problems = [
-        Problem(f"{robot.title} has no joint {joint}", "robot.locked") for joint in sorted(names - set(robot.joints))
-    ]
-    problems += [
-        Problem(f"{joint} cannot be locked, as task.end moves it", "robot.locked")
-        for joint in sorted(names & set(moved))
-    ]
-    if problems:
-        raise ConfigError(problems)
-    return MappingProxyType({joint: posture[joint] for joint in robot.joints if joint in names})
+    posture = start_posture(config)
+    if choice == "auto":
+        return MappingProxyType({joint: angle for joint, angle in posture.items() if joint not in config.task.end})
+    return MappingProxyType({joint: angle for joint, angle in posture.items() if choice != "none" and joint in choice})
 
 
 def full_description(config: Config) -> str:
@@ -146,7 +130,7 @@ def physics_description(config: Config) -> Description:
     bytes.
 
     Raises:
-        ConfigError: If the choice of locked joints is wrong, or the robot's files cannot be read.
+        ConfigError: If the robot's files cannot be read.
     """
     robot, tool = robot_of(config), tool_of(config.tool)
     locked = find_locked_joints(config)

@@ -36,12 +36,9 @@ class Dynamics:
         self._damping = joint_limits(robot).damping[self._columns]
 
     def efforts(self, config: Config, tool: Tool, motion: Motion) -> NDArray[np.float64]:
-        """Compute the torques that a motion needs, with tool and ball in the hand.
+        """Compute the torques that a motion of all joints needs, with tool and ball of a trial in the hand.
 
-        Args:
-            config: Configuration of the trial.
-            tool: Its tool.
-            motion: Of all joints; the locked ones rest where they are locked.
+        In the motion, locked joints rest where they are locked.
 
         Returns:
             [Nm], shape ``(n, n_joints)``, in the order of `Robot.joints`; 0 for locked joints.

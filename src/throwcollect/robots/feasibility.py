@@ -73,7 +73,7 @@ class Feasibility:
             not. Of limits, it tells the worst violation; of collisions, the first.
 
         Raises:
-            ConfigError: If the posture or the choice of locked joints is wrong, or the ball does not fit the tool.
+            ConfigError: If the ball does not fit the tool.
         """
         posture = np.array(list(start_posture(config).values())) + joint_offsets(config)
         joints, tool = self._robot.joints, self._tool_of(config)

@@ -27,11 +27,7 @@ class ContactLog:
             self._open[body] = step
 
     def intervals(self, stamp_ns: Callable[[int], int]) -> tuple[Contact, ...]:
-        """All intervals so far, by start time, then by name.
-
-        Args:
-            stamp_ns: Simulated time [ns] at the end of a step.
-        """
+        """All intervals so far, by start time, then by name; `stamp_ns` gives the time [ns] at the end of a step."""
         ended = [(start, body, stamp_ns(end)) for start, body, end in self._closed]
         lasting = [(start, body, None) for body, start in self._open.items()]
         return tuple(

@@ -27,14 +27,10 @@ class _Goal:
 
 
 class ControllerAction:
-    """Takes goals for a controller, and sends feedback and results.
+    """Takes goals for a controller, by its name in the simulation, and sends feedback and results.
 
-    Args:
-        node: Node of the controller.
-        simulation: The simulation.
-        controller: The controller, by its name in the simulation.
-        aborts_refused: Whether goals that cannot be executed are accepted and then aborted with the reason, instead of
-            being rejected.
+    With `aborts_refused`, goals that cannot be executed are accepted and then aborted with the reason, instead of being
+    rejected.
     """
 
     def __init__(self, node: Node, simulation: Simulation, controller: str, *, aborts_refused: bool) -> None:

@@ -6,8 +6,8 @@ import logging
 import math
 import time
 
-from throwcollect.control import REPEATED, ControllerState, GoalResult
-from throwcollect.ros import DurabilityPolicy, Node, QoSProfile, Time, pass_on_log, provide_time
+from throwcollect.control import REPEATED, ControllerState
+from throwcollect.ros import DurabilityPolicy, Node, QoSProfile, pass_on_log, provide_time
 from throwcollect.ros.msg import JointTrajectory, JointTrajectoryControllerState, SpeedScalingFactor
 from throwcollect.ros.srv import QueryTrajectoryState
 from throwcollect.sim.controller_action import ControllerAction
@@ -22,12 +22,11 @@ _REPEATED_S = 1.0
 
 
 class ControllerNode(Node):
-    """Offers one controller in the namespace of its simulation.
+    """Offers one controller, by its name in the simulation, in the namespace of the simulation's node.
 
-    Args:
-        parent: The simulation's node.
-        simulation: The simulation.
-        controller: The controller, by its name in the simulation.
+    Attributes:
+        controller: That name.
+        action: The action by which it is given goals.
     """
 
     def __init__(self, parent: Node, simulation: Simulation, controller: str) -> None:
@@ -40,7 +39,7 @@ class ControllerNode(Node):
         self._log = _LogHandler(self)
         limb.controller.logger.addHandler(self._log)
         ParameterFace(self, limb, simulation.trial)
-        self._action = ControllerAction(
+        self.action = ControllerAction(
             self, simulation, controller, aborts_refused=simulation.config.controllers.refused_goals == "abort"
         )
         self.create_subscription(JointTrajectory, "~/joint_trajectory", self._follow, 10)
@@ -48,19 +47,15 @@ class ControllerNode(Node):
         self.create_service(QueryTrajectoryState, "~/query_state", self._query)
         self._states = self.create_publisher(JointTrajectoryControllerState, "~/controller_state", _STATES)
 
-    def finish(self, result: GoalResult) -> None:
-        """Send the result of a goal to the client that waits for it."""
-        self._action.finish(result)
-
     @property
     def heard(self) -> bool:
         """Whether the controller's state or its feedback has subscribers."""
-        return self.wants_states or self._action.heard
+        return self.wants_states or self.action.heard
 
     @property
     def watched(self) -> bool:
         """Whether the controller's state, or the feedback of a goal that was taken, has subscribers."""
-        return self.wants_states or self._action.watched
+        return self.wants_states or self.action.watched
 
     @property
     def wants_states(self) -> bool:
@@ -77,12 +72,8 @@ class ControllerNode(Node):
             states = [self._present_state()]
         for state in states:
             self._states.publish(state_message(state))
-        if self._action.owes_feedback:
-            self._action.publish_feedback(self._present_state())
-
-    def set_time(self, time: Time) -> None:
-        """Set the node's clock."""
-        self.get_clock().set_ros_time_override(time)
+        if self.action.owes_feedback:
+            self.action.publish_feedback(self._present_state())
 
     def destroy_node(self) -> None:
         """Withdraw the node."""

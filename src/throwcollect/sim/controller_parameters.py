@@ -30,12 +30,7 @@ class ParameterFace:
     """Declares the parameters of a limb's controller on its node, and hands changes on.
 
     Changes hold for the next goal. The gains of ros2_controllers are left out, as controllers that command
-    positions have none.
-
-    Args:
-        node: Node of the controller.
-        limb: The limb.
-        trial: The simulation's trial; while it is leased, nothing is changed.
+    positions have none. While the simulation's trial is leased, nothing is changed.
     """
 
     def __init__(self, node: Node, limb: LimbController, trial: PresentTrial) -> None:

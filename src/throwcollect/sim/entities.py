@@ -44,12 +44,7 @@ class EntityInfo:
 
 
 class Entities:
-    """The entities of one world.
-
-    Args:
-        world: The world.
-        robot: Name of the robot.
-    """
+    """The entities of one world; that of the robot has the robot's name."""
 
     def __init__(self, world: World, robot: str) -> None:
         self._world = world
@@ -110,13 +105,9 @@ class Entities:
         return self._world.spawned.engine_bodies(name).state(name)
 
     def place(self, name: str, state: BodyState, *, frame: str, accelerates: bool) -> None:
-        """Put an entity somewhere.
+        """Put an entity into a state that is given in some frame, as `in_world` takes it.
 
-        Args:
-            name: The entity.
-            state: Its state in the frame.
-            frame: The world, or an entity; empty for the world.
-            accelerates: Whether an acceleration was asked for as well.
+        `accelerates` tells whether an acceleration was asked for as well.
 
         Raises:
             RequestError: ``RESULT_NOT_FOUND`` if there is none of that name, ``INVALID_POSE`` if the pose makes no
@@ -138,11 +129,9 @@ class Entities:
         self._world.spawned.engine_bodies(name).place(name, state)
 
     def in_world(self, state: BodyState, frame: str) -> BodyState:
-        """A state that is given in some frame.
+        """A state that is given in some frame: the world, or an entity; empty for the world.
 
-        Args:
-            state: The state; velocities are along the axes of the frame, as seen from the world.
-            frame: The world, or an entity; empty for the world.
+        Velocities are along the axes of the frame, as seen from the world.
 
         Raises:
             RequestError: ``INVALID_POSE`` if the frame is not known or the pose makes no sense.

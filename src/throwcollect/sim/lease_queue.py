@@ -15,11 +15,7 @@ _REMEMBERED = 1000
 
 
 class LeaseQueue:
-    """Holds the leases of a simulation and begins them one after the other.
-
-    Args:
-        runner: Runs their trials.
-    """
+    """Holds the leases of a simulation and begins them one after the other."""
 
     def __init__(self, runner: TrialRunner) -> None:
         self._runner = runner

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from throwcollect.engines.engine import STL
 from throwcollect.errors import RequestError
 
 Triangles = NDArray[np.float32]
@@ -17,7 +18,6 @@ Triangles = NDArray[np.float32]
 _LARGEST_FILE = 32 * 2**20
 _LARGEST_COORDINATE = 1e6
 _HEADER, _RECORD = 84, 50
-_STL = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 _VERTEX = re.compile(rb"\bvertex\s+(\S+)\s+(\S+)\s+(\S+)")
 
 
@@ -68,7 +68,7 @@ def _read_stl(content: bytes) -> Triangles:
     count = int.from_bytes(content[_HEADER - 4 : _HEADER], "little")
     # The length decides, because titles of some binary files begin with `solid`, as all files in text do.
     if len(content) >= _HEADER and len(content) == _HEADER + count * _RECORD:
-        corners: Triangles = np.frombuffer(content, _STL, count, _HEADER)["corners"]
+        corners: Triangles = np.frombuffer(content, STL, count, _HEADER)["corners"]
         return corners
     if not content.lstrip().startswith(b"solid"):
         raise ValueError(f"{len(content)} bytes are no STL of {count} triangles")

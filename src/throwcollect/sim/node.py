@@ -38,6 +38,7 @@ from throwcollect.sim.lease_queue import LeaseQueue
 from throwcollect.sim.present_trial import TrialSetup
 from throwcollect.sim.simulation import Simulation, State
 from throwcollect.sim.simulation_control import SimulationControl
+from throwcollect.sim.stepping import Stepping
 from throwcollect.sim.trial_runner import TrialRunner
 from throwcollect.trial.lease import LEASES, Lease, leases_from_json
 
@@ -75,12 +76,7 @@ _MOST_TRIALS = 10_000_000
 
 
 class SimulationNode(Node):
-    """Serves one simulation.
-
-    Args:
-        name: Name of the node.
-        simulation: The simulation that it serves.
-        namespace: Namespace of the node and of all names; None for ``/<name>``.
+    """Serves one simulation, with all names in one namespace: ``/<name>`` unless another one is given.
 
     Raises:
         ConfigError: If the namespace is that of another simulation.
@@ -113,7 +109,8 @@ class SimulationNode(Node):
         self._signer = Signer.of_environment()
         self._restoring = False
         self._asked: tuple[Lease, ...] = ()
-        self._control = SimulationControl(self, simulation)
+        SimulationControl(self, simulation)
+        self._stepping = Stepping(self, simulation)
         # Episodes come last: a coordinator that sees their publisher takes the whole simulation for ready.
         self._episodes = self.create_publisher(UInt8MultiArray, _EPISODE, _WHOLE)
 
@@ -142,11 +139,10 @@ class SimulationNode(Node):
         """Publish what has happened since the last call: time, samples, feedback, results, the episode."""
         simulation = self._simulation
         now = Time(nanoseconds=simulation.now_ns)
-        self.get_clock().set_ros_time_override(now)
-        for controller in self._controllers.values():
-            controller.set_time(now)
+        for node in (self, *self._controllers.values()):
+            node.get_clock().set_ros_time_override(now)
         for name, result in simulation.pop_results():
-            self._controllers[name].finish(result)
+            self._controllers[name].action.finish(result)
         self._notice_listeners()
         self._publish_samples()
         for controller in self._heard:
@@ -155,7 +151,7 @@ class SimulationNode(Node):
             # The next trial begins before the last one leaves, so that no client can reach a controller in between.
             self._begin_next()
             self._episodes.publish(pack(handed, self._signer))
-        self._control.follow_up()
+        self._stepping.follow_up()
 
     def _require_own_namespace(self) -> None:
         """Refuse the namespace of another simulation, because clients could not tell the two apart.

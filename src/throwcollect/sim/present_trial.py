@@ -37,9 +37,6 @@ class PresentTrial:
         setup: The trial that the next reset prepares.
         leased: Whether the trial belongs to a coordinator, until its episode is handed over; meanwhile no other client
             may change anything.
-
-    Args:
-        config: Configuration of the collection.
     """
 
     def __init__(self, config: Config) -> None:

@@ -72,9 +72,6 @@ class StepRequest:
 class Simulation:
     """Steps one world as fast as it can while a run goes on.
 
-    Args:
-        config: Configuration of the collection.
-
     Raises:
         ConfigError: If it does not describe a world.
         WorkerError: If the physics engine does not start.
@@ -114,10 +111,7 @@ class Simulation:
     def lease(self, number: int, config: Config, goals: Mapping[str, TrajectoryGoal]) -> None:
         """Begin a trial for a coordinator, with controllers as they are configured, which no other client may touch.
 
-        Args:
-            number: Number of the trial.
-            config: Configuration with the trial's values.
-            goals: Goal of each controller that moves.
+        The configuration has the trial's values; each controller that moves has a goal.
 
         Raises:
             ConfigError: If there is no such start state.
@@ -228,8 +222,7 @@ class Simulation:
     def advance(self, *, watched: bool) -> None:
         """Run for a slice of time, or until the run ends; it ends on time where a real-time factor asks for it.
 
-        Args:
-            watched: Whether a client listens, so that slices have to be short.
+        The slice has to be short if a client listens (`watched`).
         """
         began_s, since_ns, factor = time.monotonic(), self.now_ns, self.real_time_factor
         # A long slice costs the least. A short one lets messages be sent in between, which only watching clients need.

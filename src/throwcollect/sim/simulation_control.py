@@ -1,4 +1,4 @@
-"""The standard interfaces of simulators, simulation_interfaces 1.5, on top of a `Simulation`."""
+"""The standard services of simulators, simulation_interfaces 1.5, on top of a `Simulation`."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ from throwcollect.sim.entity_services import EntityServices
 from throwcollect.sim.service_results import answering
 from throwcollect.sim.simulation import Scope, Simulation, State
 from throwcollect.sim.spawn_services import SpawnServices
-from throwcollect.sim.stepping import Stepping
 from throwcollect.version import __version__
 
 _FEATURES = (
@@ -46,7 +45,7 @@ _WHOLE_SCOPES = (ResetSimulation.Request.SCOPE_DEFAULT, ResetSimulation.Request.
 
 
 class SimulationControl:
-    """Offers all services, and the action, under relative names, so that they stand in the simulation's namespace."""
+    """Offers services under relative names, so that they stand in the simulation's namespace."""
 
     def __init__(self, node: Node, simulation: Simulation) -> None:
         self._simulation = simulation
@@ -60,11 +59,6 @@ class SimulationControl:
             node.create_service(service, name, answering(service, fill))
         EntityServices(node, simulation)
         SpawnServices(node, simulation)
-        self._stepping = Stepping(node, simulation)
-
-    def follow_up(self) -> None:
-        """Send feedback and results to clients that wait for steps; call it after each slice."""
-        self._stepping.follow_up()
 
     def _get_features(
         self, _request: GetSimulatorFeatures.Request, response: GetSimulatorFeatures.Response

@@ -7,11 +7,7 @@ from throwcollect.errors import RequestError
 
 
 class SpawnedBodies:
-    """The bodies, by name, in the order in which they were spawned.
-
-    Args:
-        engine: The engine that has the world.
-    """
+    """The bodies of an engine's world, by name, in the order in which they were spawned."""
 
     def __init__(self, engine: Engine) -> None:
         self._engine = engine

@@ -22,10 +22,6 @@ class Stepping:
 
     Steps are taken by the loop of the simulation's process, slice by slice, so that other requests are answered
     meanwhile.
-
-    Args:
-        node: The simulation's node.
-        simulation: The simulation that is stepped through.
     """
 
     def __init__(self, node: Node, simulation: Simulation) -> None:

@@ -38,9 +38,6 @@ class TrialRunner:
 
     Attributes:
         channels: The topics that are recorded of a trial.
-
-    Args:
-        simulation: The simulation that they run in.
     """
 
     def __init__(self, simulation: Simulation) -> None:
@@ -55,10 +52,7 @@ class TrialRunner:
     def begin(self, trial: int, values: Mapping[str, float], *, token: str = "") -> None:
         """Begin a trial; its controllers get the goals that its configuration makes.
 
-        Args:
-            trial: Number of the trial.
-            values: Values that replace those of the configuration, by dotted key.
-            token: Token of its lease; empty without a lease.
+        The values replace those of the configuration, by dotted key; the token is that of its lease, if it has one.
 
         Raises:
             ConfigError: If the values make no motion, or no start state.

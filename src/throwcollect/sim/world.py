@@ -51,6 +51,9 @@ class World(Observer):
     Attributes:
         engine: The physics engine.
         spawned: The bodies that clients have put into the world.
+        moving: Names of the joints that are simulated and commanded, in the order of `Robot.joints`.
+        steps: Number of physics steps taken in this trial.
+        end_reason: Why the trial ended: ``landed``, ``rest`` or ``timeout``; None while it goes on.
 
     Raises:
         ConfigError: If the configuration does not describe a world (see `reset`).
@@ -58,10 +61,11 @@ class World(Observer):
         WorkerError: If the physics engine does not start.
     """
 
+    moving: tuple[str, ...]
+    steps: int
+    end_reason: EndReason | None
     _tool: str
-    _steps: int
     _contacts: ContactLog
-    _end_reason: EndReason | None
     _start: Sequence[float]
     _offsets: NDArray[np.float64]
     _settled: State
@@ -85,19 +89,9 @@ class World(Observer):
         self.engine.close()
 
     @property
-    def moving(self) -> tuple[str, ...]:
-        """Names of the joints that are simulated and commanded, in the order of `Robot.joints`."""
-        return self._moving
-
-    @property
     def stamp_ns(self) -> int:
         """Simulated time now [ns]."""
-        return self._stamp_ns(self._steps)
-
-    @property
-    def steps(self) -> int:
-        """Number of physics steps taken in this trial."""
-        return self._steps
+        return self._stamp_ns(self.steps)
 
     @property
     def recorded(self) -> int:
@@ -115,8 +109,7 @@ class World(Observer):
             start_ns: Simulated time of the start state [ns].
 
         Raises:
-            ConfigError: If the posture or the choice of locked joints is wrong, the ball falls through the tool, or
-                the robot's files cannot be read.
+            ConfigError: If the ball falls through the tool, or the robot's files cannot be read.
         """
         # Only the names count of `task.end`, because they say which joints are locked.
         key = (trial.robot, trial.tool, trial.ball, trial.scene, trial.sim, trial.task.start, tuple(trial.task.end))
@@ -138,20 +131,11 @@ class World(Observer):
         self._begin(start_ns, self._settled.sample)
 
     def restart_clock(self, start_ns: int) -> None:
-        """Count time, steps, samples and contacts anew from the present state, which stays as it is.
-
-        Args:
-            start_ns: Simulated time of the present state [ns].
-        """
+        """Count steps, samples and contacts anew, and time from `start_ns` [ns]; the present state stays as it is."""
         now = self.engine.state
         # A body that was removed since the last step does not press on the ball any more.
         self._touching = now.touching
         self._begin(start_ns, now.sample)
-
-    @property
-    def end_reason(self) -> EndReason | None:
-        """Why the trial ended: ``landed``, ``rest`` or ``timeout``; None while it goes on."""
-        return self._end_reason
 
     def run(self, commands: NDArray[np.float64], *, stop_at_end: bool = True) -> int:
         """Take one physics step for each command, or fewer if the trial ends.
@@ -164,9 +148,9 @@ class World(Observer):
         Returns:
             Number of steps taken.
         """
-        if stop_at_end and self._end_reason is not None:
+        if stop_at_end and self.end_reason is not None:
             return 0
-        first, self._first_step = self._steps, self._steps
+        first, self._first_step = self.steps, self.steps
         self._stops_at_end = stop_at_end
         # Commands are what sensors should show, and motors go by true angles.
         self._targets, velocities = self._motors.plan(commands + self._offsets)
@@ -178,7 +162,7 @@ class World(Observer):
             drag_kgpm=self._drag,
         )
         taken = self.engine.run(steps, self)
-        self._steps = first + taken
+        self.steps = first + taken
         self._motors.advance(taken)
         return taken
 
@@ -189,25 +173,20 @@ class World(Observer):
 
     def on_sample(self, step: int, sample: Sample) -> bool:
         """Record a sample after a step of the present `run`, and tell whether the run is over."""
-        self._steps = self._first_step + step
+        self.steps = self._first_step + step
         self._rows.append(sample)
-        self._end_reason = self._end_reason or self._judge(self._targets[step].tolist())
-        return self._stops_at_end and self._end_reason is not None
+        self.end_reason = self.end_reason or self._judge(self._targets[step].tolist())
+        return self._stops_at_end and self.end_reason is not None
 
-    def samples(self, first: int = 0, last: int | None = None) -> Samples:
-        """Recorded samples as arrays.
-
-        Args:
-            first: Number of the first sample; those that are forgotten are left out.
-            last: Number after the last sample; None for all.
-        """
-        numbers = range(self.recorded)[max(first, self._forgotten) : last]
-        steps = np.arange(numbers.start, numbers.stop, dtype=np.int64) * self._stride
+    def samples(self, first: int = 0) -> Samples:
+        """Recorded samples as arrays, from number `first` on; those that are forgotten are left out."""
+        first = max(first, self._forgotten)
+        steps = np.arange(first, self.recorded, dtype=np.int64) * self._stride
         # Each stamp is divided once, because a period may be no whole number of nanoseconds, and sums of it would
         # drift.
         stamps = self._start_ns + steps * NS_PER_S // self._hz
-        rows = self._rows[numbers.start - self._forgotten : numbers.stop - self._forgotten]
-        return to_samples(rows, stamps, self._joints, self._moving, self._locked, self._offsets)
+        rows = self._rows[first - self._forgotten :]
+        return to_samples(rows, stamps, self._joints, self.moving, self._locked, self._offsets)
 
     def forget_samples(self) -> None:
         """Drop the recorded samples but the last two, so that a world can go on for ever; their numbers stay."""
@@ -221,13 +200,13 @@ class World(Observer):
 
     def joints(self) -> tuple[Sample, Sample]:
         """Position [rad] and velocity [rad/s] of each moving joint now, as its sensor shows them."""
-        count, sample = len(self._moving), self.engine.state.sample
+        count, sample = len(self.moving), self.engine.state.sample
         shown = tuple((np.array(sample[:count]) - self._offsets).tolist()) if self._offsets.any() else sample[:count]
         return shown, sample[count : 2 * count]
 
     def posture(self) -> Mapping[str, float]:
         """Position of each joint of the robot now [rad], as its sensor shows it."""
-        return {**self._locked, **dict(zip(self._moving, self.joints()[0], strict=True))}
+        return {**self._locked, **dict(zip(self.moving, self.joints()[0], strict=True))}
 
     @property
     def robot_base(self) -> BodyState:
@@ -242,13 +221,13 @@ class World(Observer):
     @ball.setter
     def ball(self, state: BodyState) -> None:
         self.engine.place_ball(state)
-        if self._steps == 0:
+        if self.steps == 0:
             self._record_start()
 
     def _begin(self, start_ns: int, present: Sample) -> None:
         """Begin to count from the present state."""
         self._start_ns = start_ns
-        self._steps = 0
+        self.steps = 0
         self._first_step = 0
         self._start_joints = present[:-BALL_NUMBERS]
         self._record_start()
@@ -257,22 +236,22 @@ class World(Observer):
         self._sampled_target = self._motors.target
         self._has_moved = False
         self._resting_since = 0
-        self._end_reason = None
+        self.end_reason = None
 
     def _settle(self, trial: Config) -> None:
         """Let the ball come to rest in the tool of the still robot, and keep that state."""
         description = self._description(trial)
         try:
             self.engine.load(scene_of(trial, description))
-            self._moving, self._locked = description.moving, description.locked
+            self.moving, self._locked = description.moving, description.locked
             posture = start_posture(trial)
             offsets = dict(zip(self._joints, joint_offsets(trial).tolist(), strict=True))
-            self._offsets = np.array([offsets[joint] for joint in self._moving])
-            self._start = [posture[joint] + offsets[joint] for joint in self._moving]
+            self._offsets = np.array([offsets[joint] for joint in self.moving])
+            self._start = [posture[joint] + offsets[joint] for joint in self.moving]
             tool = tool_of(trial.tool)
             self._tool = tool.name
             seat = tool.ball_seat(trial.ball.radius_m)
-            self.engine.configure(physics_of(trial, self._moving))
+            self.engine.configure(physics_of(trial, self.moving))
             self.engine.rest(self._start, seat)
             # One step is always taken, because contact forces and motor torques are those of the last step.
             steps = max(1, round(trial.sim.settle_s * trial.sim.physics_hz))
@@ -314,7 +293,7 @@ class World(Observer):
         self._has_moved |= not stands_still
         lies = stands_still and self._touching and self._has_moved
         if not (lies and math.hypot(*now[BALL_LINEAR_VELOCITY]) < _REST_SPEED):
-            self._resting_since = self._steps
-        elif self._steps - self._resting_since >= _REST_S * self._hz:
+            self._resting_since = self.steps
+        elif self.steps - self._resting_since >= _REST_S * self._hz:
             return "rest"
-        return "timeout" if self._steps >= self._last_step else None
+        return "timeout" if self.steps >= self._last_step else None

@@ -200,7 +200,7 @@ def draw_first_points(config: Config, *, directory: Path) -> Points:
         ConfigError: If the file of the sampler `list` cannot be used.
     """
     points = draw_points(config, directory=directory)
-    return points.first(FIRST_TRIALS) if config.grows else points
+    return points[:FIRST_TRIALS] if config.grows else points
 
 
 def make_trials(config: Config, points: Points, *, first: int = 0) -> Trials:

@@ -117,7 +117,7 @@ def _row(names: tuple[str, ...], cells: list[str], path: Path, line: int) -> tup
         return [], [Problem(f"should have {len(names)} values, got {len(cells)}", "", path, line)]
     row, problems = [], []
     for name, cell in zip(names, cells, strict=True):
-        number = _number(cell)
+        number = read_number(cell)
         row.append(number)
         if is_target(name) and not cell.strip():
             continue
@@ -127,9 +127,10 @@ def _row(names: tuple[str, ...], cells: list[str], path: Path, line: int) -> tup
     return row, problems
 
 
-def _number(cell: str) -> float:
+def read_number(cell: str | None) -> float:
+    """Read the number in a cell of a CSV file; NaN if the cell holds none."""
     try:
-        return float(cell)
+        return float(cell or "")
     except ValueError:
         return math.nan
 

@@ -60,7 +60,3 @@ class Points:
 
     def __getitem__(self, rows: slice) -> Points:
         return Points(self.keys, self.values[rows], self.targets and self.targets[rows])
-
-    def first(self, count: int) -> Points:
-        """Return the first `count` points."""
-        return self[:count]

@@ -38,7 +38,7 @@ def draw_points(config: Config, *, directory: Path) -> Points:
     sweep = config.sweep
     if sweep.file is not None:
         points = read_points(directory / sweep.file, config)
-        return points.first(_check_count(config.trials, len(points.values)))
+        return points[: _check_count(config.trials, len(points.values))]
     if not sweep.parameters:
         raise PlanError(
             [Problem("nothing is swept", key="sweep.parameters")],

@@ -9,13 +9,15 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from throwcollect.config.schema import Config
-from throwcollect.config.starter import Motion
 from throwcollect.config.task import TaskConfig
 from throwcollect.errors import ConfigError
 from throwcollect.members import load_member
 from throwcollect.robots.limits import joint_limits
 from throwcollect.robots.robot import Robot
 from throwcollect.tasks.task import trajectory_of
+
+Motion = tuple[Mapping[str, float], Mapping[str, float], float]
+"""Angles at the start and at the end, by joint [rad], and the time in between [s]."""
 
 _STROKE_RAD = 0.4
 """How far each joint moves, where its limits let it."""
@@ -33,11 +35,8 @@ _SPEED_SHARE = 0.95
 def find_first_motion(robot: str, task: str) -> Motion:
     """Find a motion: the default of the task or, if that is for another robot, a short one from the posture at rest.
 
-    The short one keeps the limits of positions and velocities; neither torques nor collisions are looked at.
-
-    Args:
-        robot: Name of the robot.
-        task: Name of the task.
+    The short one keeps the limits of positions and velocities, also where the joint that moves most goes half as far
+    again; neither torques nor collisions are looked at. Robot and task are given by their names.
 
     Raises:
         ConfigError: If the robot's files cannot be read, or none of its joints may move.

@@ -25,16 +25,12 @@ class Outcome(str, Enum):
 class Result:
     """Outcome and measures of a trial; a measure is None where there is nothing to measure.
 
-    Tasks derive their own results from it and declare the fields that they add with their columns, see `tasks.columns`.
+    Tasks derive their own results from it and declare the fields that they add with their columns, see `tasks.columns`;
+    the columns say what each measure is.
 
     Attributes:
         outcome: How the trial ended.
         reason: One sentence on why the trial did not simply succeed; None if it did.
-        position_peak: Of the moving joints: distance from the middle of the range over half the range.
-        velocity_peak: Of all joints: speed over its limit.
-        effort_peak: Of all joints: torque over its limit.
-        effort_saturated_share: Share of samples in which some joint's torque is at its limit [-].
-        tracking_error_rad: Of each moving joint: largest distance from the commanded trajectory [rad].
     """
 
     outcome: Outcome

@@ -84,9 +84,6 @@ class Settings:
 
     Attributes:
         digest: SHA-256, in hexadecimal.
-
-    Args:
-        config: Configuration of the collection.
     """
 
     def __init__(self, config: Config) -> None:

@@ -15,12 +15,8 @@ from throwcollect.robots.trajectory import JointTrajectory
 def trial_goals(robot: Robot, trajectory: JointTrajectory, posture: Mapping[str, float]) -> dict[str, TrajectoryGoal]:
     """Split a joint trajectory into one goal for each controller that moves, in the robot's order.
 
-    Controllers refuse partial goals by default, so joints of a moving limb that do not move are sent where they are.
-
-    Args:
-        robot: The robot.
-        trajectory: Trajectory of the moving joints.
-        posture: Angle of all joints at the start of the trial [rad].
+    Controllers refuse partial goals by default, so joints of a moving limb that do not move are sent where they are, in
+    the posture of all joints at the start of the trial [rad].
     """
     moved = {robot.controller_of(joint) for joint in trajectory.joints}
     return {name: _goal(trajectory, joints, posture) for name, joints in robot.controllers.items() if name in moved}

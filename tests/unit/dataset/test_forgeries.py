@@ -227,9 +227,9 @@ def test_refusals_that_are_invented_or_dropped_are_found(tmp_path: Path) -> None
 def test_what_depends_on_results_is_not_judged_without_them(tmp_path: Path) -> None:
     config = Config.model_validate({**SETTINGS, "trials": None, "until": {"landed": 60}})
     points = draw_points(config, directory=tmp_path)
-    plan = Plan(config, make_trials(config, points.first(192)))
+    plan = Plan(config, make_trials(config, points[:192]))
     assert list(find_drawing_problems(tmp_path, plan, None)) == []
-    plan = Plan(config, make_trials(config, Points(points.keys, points.values[::-1].copy()).first(192)))
+    plan = Plan(config, make_trials(config, Points(points.keys, points.values[::-1].copy())[:192]))
     found = list(find_drawing_problems(tmp_path, plan, None))
     assert len(found) == 128
 
@@ -247,7 +247,7 @@ def test_the_rounds_of_a_plan_that_grew_follow_from_the_results(
     tmp_path: Path, trials: int, landed: int, problem: str | None
 ) -> None:
     config = Config.model_validate({**SETTINGS, "trials": None, "until": {"landed": 60}})
-    plan = Plan(config, make_trials(config, draw_points(config, directory=tmp_path).first(trials)))
+    plan = Plan(config, make_trials(config, draw_points(config, directory=tmp_path)[:trials]))
     table = ThrowsTable.of(plan)
     outcomes = [ThrowOutcome.LANDED if number < landed else ThrowOutcome.TIMEOUT for number in range(trials)]
     made = [table.row(trial, ThrowResult(outcomes[trial.number]), None) for trial in plan.trials]

@@ -10,7 +10,6 @@ from throwcollect.config.schema import Config, RobotConfig
 from throwcollect.errors import ConfigError
 from throwcollect.robots import description
 from throwcollect.robots.description import (
-    find_locked_joints,
     full_description,
     joint_model,
     physics_description,
@@ -75,16 +74,6 @@ def test_a_list_locks_just_these():
     made = physics_description(with_robot(locked=["head_1_joint", "leg_left_4_joint"]))
     assert list(made.locked) == ["leg_left_4_joint", "head_1_joint"]
     assert len(made.moving) == 30
-
-
-def test_locking_a_joint_that_the_task_moves_is_refused():
-    with pytest.raises(ConfigError, match=r"arm_right_4_joint cannot be locked, as task\.end moves it"):
-        find_locked_joints(with_robot(locked=["head_1_joint", "arm_right_4_joint"]))
-
-
-def test_locking_a_joint_that_talos_lacks_is_refused():
-    with pytest.raises(ConfigError, match="Talos has no joint tail_joint"):
-        physics_description(with_robot(locked=["tail_joint"]))
 
 
 def test_the_task_decides_a_joints_start_before_the_posture_and_half_sitting():

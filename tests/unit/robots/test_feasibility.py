@@ -222,13 +222,6 @@ def test_links_that_are_held_into_each_other_are_refused(reason):
     )
 
 
-def test_unsettled_choice_of_joints_is_an_error(feasibility):
-    config = Config(robot={"locked": ["head_1_joint"]})
-    bad = config.model_copy(update={"robot": config.robot.model_copy(update={"locked": ["arm_right_4_joint"]})})
-    with pytest.raises(ConfigError, match="arm_right_4_joint"):
-        feasibility.check(bad, task_of(bad).trajectory())
-
-
 def test_broad_phase_finds_what_all_distances_find():
     """Every pair's distance, one by one, is the reference for the pruned check."""
     model = pinocchio.buildModelFromUrdf(str(TALOS.urdf_path))

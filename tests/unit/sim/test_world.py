@@ -69,7 +69,7 @@ def test_samples_are_evenly_spaced_in_simulated_time(world):
     assert world.stamp_ns == 1_200_000_000
     assert world.steps == 100
     assert world.recorded == 51
-    assert world.samples(3, 5).stamps_ns.tolist() == [1_012_000_000, 1_016_000_000]
+    assert world.samples(3).stamps_ns[:2].tolist() == [1_012_000_000, 1_016_000_000]
 
 
 def test_stamps_do_not_drift_when_the_period_is_no_whole_number_of_nanoseconds():

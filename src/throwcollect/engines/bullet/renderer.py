@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Mapping, Sequence
 from types import TracebackType
@@ -11,7 +10,7 @@ import numpy as np
 import pybullet
 from numpy.typing import NDArray
 
-from throwcollect.engines.bullet.scenery import BASE, connect, links
+from throwcollect.engines.bullet.scenery import BASE, connect, links, load_robot
 from throwcollect.engines.engine import Vector
 from throwcollect.errors import ConfigError
 
@@ -38,7 +37,11 @@ class Renderer:
     ) -> None:
         heavy = _with_masses(urdf)
         self._client = connect()
-        self._robot = self._load(heavy, base_height_m)
+        try:
+            self._robot = load_robot(self._client, heavy, base_height_m)
+        except ConfigError:
+            pybullet.disconnect(self._client)
+            raise
         self._joints = {
             pybullet.getJointInfo(self._robot, number, physicsClientId=self._client)[1].decode(): number
             for number in links(self._client, self._robot)
@@ -56,17 +59,6 @@ class Renderer:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         pybullet.disconnect(self._client)
-
-    def _load(self, urdf: str, base_height_m: float) -> int:
-        with tempfile.NamedTemporaryFile("w", prefix="throwcollect-", suffix=".urdf", encoding="utf-8") as file:
-            file.write(urdf)
-            file.flush()
-            try:
-                position = [0, 0, base_height_m]
-                return int(pybullet.loadURDF(file.name, position, useFixedBase=True, physicsClientId=self._client))
-            except pybullet.error as error:
-                pybullet.disconnect(self._client)
-                raise ConfigError(f"Bullet cannot load the robot's description: {error}") from error
 
     def place(self, joints: Mapping[str, float], ball: Vector) -> None:
         """Put joints at angles [rad], and the centre of the ball at a place in world [m]; other joints stay at 0."""

@@ -63,7 +63,8 @@ def load_scenery(client: int, scene: Scene) -> Scenery:
     pybullet.resetSimulation(physicsClientId=client)
     plane = pybullet.createCollisionShape(pybullet.GEOM_PLANE, planeNormal=[0, 0, 1], physicsClientId=client)
     ground = pybullet.createMultiBody(0, plane, physicsClientId=client)
-    robot = _load_robot(client, scene)
+    # By default Bullet computes inertias from the collision shapes.
+    robot = load_robot(client, scene.urdf, scene.base_height_m, flags=pybullet.URDF_USE_INERTIA_FROM_FILE)
     root = pybullet.getBodyInfo(robot, physicsClientId=client)[0].decode()
     joints = {}
     names = {(ground, BASE): GROUND, (robot, BASE): root}
@@ -82,21 +83,18 @@ def load_scenery(client: int, scene: Scene) -> Scenery:
     return Scenery(robot=robot, joints=[joints[joint] for joint in scene.moving], tool=tool, names=names)
 
 
-def _load_robot(client: int, scene: Scene) -> int:
+def load_robot(client: int, urdf: str, base_height_m: float, *, flags: int = 0) -> int:
+    """Load a robot with its base fixed at a height [m], and return its body number.
+
+    Raises:
+        ConfigError: If Bullet cannot load the description.
+    """
     with tempfile.NamedTemporaryFile("w", prefix="throwcollect-", suffix=".urdf", encoding="utf-8") as file:
-        file.write(scene.urdf)
+        file.write(urdf)
         file.flush()
         try:
-            return int(
-                pybullet.loadURDF(
-                    file.name,
-                    basePosition=[0, 0, scene.base_height_m],
-                    useFixedBase=True,
-                    # By default Bullet computes inertias from the collision shapes.
-                    flags=pybullet.URDF_USE_INERTIA_FROM_FILE,
-                    physicsClientId=client,
-                )
-            )
+            place = [0, 0, base_height_m]
+            return int(pybullet.loadURDF(file.name, place, useFixedBase=True, flags=flags, physicsClientId=client))
         except pybullet.error as error:
             raise ConfigError(f"Bullet cannot load the robot's description: {error}") from error
 

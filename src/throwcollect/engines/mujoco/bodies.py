@@ -10,7 +10,7 @@ import mujoco
 
 from throwcollect.engines.engine import Bodies, BodyModel, BodyState, Box
 from throwcollect.engines.mujoco.frames import rotation, turn, turn_back
-from throwcollect.engines.mujoco.scenery import Surface, boxes, collide_with_everything, read_urdf, watch
+from throwcollect.engines.mujoco.scenery import Surface, boxes, collide_with_everything, read_urdf, rename_links, watch
 from throwcollect.errors import RequestError
 
 _FREE_JOINT = "free"
@@ -96,7 +96,7 @@ class MujocoBodies(Bodies):
             ValueError: If MuJoCo cannot read a description.
         """
         for name, body in self._bodies.items():
-            text, body.links = _rename_links(body.model.urdf)
+            text, body.links = _number_links(body.model.urdf)
             child = read_urdf(text, body.model.encode_meshes())
             for joint in child.joints:
                 # MuJoCo reads the effort of a URDF's limit as a range of motor torques. It brakes the joint once it is
@@ -165,15 +165,10 @@ class MujocoBodies(Bodies):
         return [model.body(f"{name}/{number}").id for number in range(len(self._bodies[name].links))]
 
 
-def _rename_links(urdf: str) -> tuple[str, list[str]]:
+def _number_links(urdf: str) -> tuple[str, list[str]]:
     """Name the links of a description by numbers, the root 0: MuJoCo gives names such as ``world`` a meaning."""
     robot = ElementTree.fromstring(urdf.encode())  # noqa: S314 - `BodyModel` has a checked and rewritten description
-    ends = [(joint.find("parent"), joint.find("child")) for joint in robot.findall("joint")]
-    children = {child.get("link") for _, child in ends if child is not None}
+    children = {child.get("link") for child in robot.findall("joint/child")}
     links = sorted((link.get("name", "") for link in robot.findall("link")), key=lambda name: name in children)
-    numbers = {name: str(number) for number, name in enumerate(links)}
-    for link in robot.findall("link"):
-        link.set("name", numbers[link.get("name", "")])
-    for end in (end for both in ends for end in both if end is not None):
-        end.set("link", numbers[end.get("link", "")])
+    rename_links(robot, {name: str(number) for number, name in enumerate(links)})
     return ElementTree.tostring(robot, encoding="unicode"), links

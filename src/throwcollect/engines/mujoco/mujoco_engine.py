@@ -250,10 +250,7 @@ class MujocoEngine(Engine):
     def _tell_touch(self, step: int, presses: bytes, observer: Observer) -> None:
         """Tell the observer which bodies press on the ball now, if others did before.
 
-        Args:
-            step: Number of the step.
-            presses: One byte for each surface, 1 if it presses.
-            observer: Whom to tell.
+        `presses` has one byte for each surface, 1 if it presses.
         """
         touching = frozenset(surface.name for surface in compress(self._surfaces, presses))
         if touching != self._touching:

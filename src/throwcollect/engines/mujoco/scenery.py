@@ -6,7 +6,7 @@ As in Bullet, nothing but the ball collides with other things as long as no body
 from __future__ import annotations
 
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import mujoco
@@ -113,15 +113,18 @@ def make_spec(scene: Scene) -> tuple[mujoco.MjSpec, list[Surface]]:
 def _rename_world(urdf: str) -> str:
     """Rename the link `_WORLD_LINK`; a description without one stays as it is."""
     robot = ElementTree.fromstring(urdf)  # noqa: S314 - a scene's files can be trusted
-    found = [link for link in robot.findall("link") if link.get("name") == _WORLD_LINK]
-    if not found:
+    if robot.find(f"link[@name='{_WORLD_LINK}']") is None:
         return urdf
-    for link in found:
-        link.set("name", _STAND_IN)
-    for end in (*robot.iter("parent"), *robot.iter("child")):
-        if end.get("link") == _WORLD_LINK:
-            end.set("link", _STAND_IN)
+    rename_links(robot, {_WORLD_LINK: _STAND_IN})
     return ElementTree.tostring(robot, encoding="unicode")
+
+
+def rename_links(robot: ElementTree.Element, names: Mapping[str, str]) -> None:
+    """Give links of a description new names, by the old ones; the others keep theirs."""
+    for key, elements in (("name", robot.findall("link")), ("link", robot.findall("joint/*[@link]"))):
+        for element in elements:
+            name = element.get(key, "")
+            element.set(key, names.get(name, name))
 
 
 def _add_ball(spec: mujoco.MjSpec, radius: float) -> None:

@@ -34,20 +34,10 @@ class ThrowOutcome(Outcome):
 
 @dataclass(frozen=True)
 class ThrowResult(Result):
-    """Outcome and measures of a throw; a measure is None where there is nothing to measure.
+    """Outcome and measures of a throw; the columns say what each measure is.
 
-    Attributes:
-        release: The ball when it left the tool.
-        apex: The ball at the highest point between release and landing (or the end of the record).
-        landing: The ball when its lowest point crossed the landing plane.
-        release_speed_mps: Speed at release [m/s].
-        release_elevation_rad: Direction of flight at release above the horizontal [rad].
-        flight_time_s: From release to landing [s].
-        hit_angle_rad: Direction of flight at landing below the horizontal [rad].
-        recontacts: Number of contacts with tool or robot between release and landing.
-        release_spin: Angular velocity of the ball in world when it left the tool [rad/s].
-        ballistic_residual_m: Largest distance of the recorded flight from one under gravity and drag alone [m]; see
-            `flight.flight_residual`.
+    The apex lies between release and landing, or the end of the record. The ball lands when its lowest point crosses
+    the landing plane. See `flight.flight_residual` for `ballistic_residual_m`.
     """
 
     release: BallState | None = measured(BallColumns("when it left the {tool}"))

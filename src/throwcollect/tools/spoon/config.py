@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Annotated, ClassVar, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from throwcollect.config.key import Key
-from throwcollect.config.kinds import ContradictionError
 from throwcollect.config.tool import ToolConfig
 
 
@@ -37,13 +37,7 @@ class SpoonConfig(ToolConfig):
     mass_kg: Annotated[float, Field(gt=0, le=2)] = 0.12
     """Mass of the whole spoon."""
 
-    @model_validator(mode="after")
-    def _cone_opens(self) -> SpoonConfig:
+    def _find_contradictions(self) -> Iterator[tuple[str, str]]:
         if self.cup_rim_radius_m <= self.cup_floor_radius_m:
-            raise ContradictionError(
-                {
-                    "cup_rim_radius_m": f"{self.cup_rim_radius_m} m should be above cup_floor_radius_m, "
-                    f"{self.cup_floor_radius_m} m, or the cup holds no ball"
-                }
-            )
-        return self
+            floor = f"cup_floor_radius_m, {self.cup_floor_radius_m} m"
+            yield "cup_rim_radius_m", f"{self.cup_rim_radius_m} m should be above {floor}, or the cup holds no ball"

@@ -12,10 +12,9 @@ import pytest
 from throwcollect.cli.show import init
 from throwcollect.config.default_path import DEFAULT_CONFIG
 from throwcollect.config.loader import load
-from throwcollect.config.starter import make_starter, samplers
 from throwcollect.errors import ConfigError
 from throwcollect.sweep.plan import make_plan
-from throwcollect.tasks.first_motion import find_first_motion
+from throwcollect.tasks.starter import make_starter, samplers
 
 PLUGINS = Path(__file__).parents[2] / "plugins"
 
@@ -33,9 +32,9 @@ def test_every_sampler_has_one_that_gives_a_plan(sampler: str, tmp_path: Path, m
 def test_where_bullet_has_no_wheel_mujoco_simulates(
     there: bool, engine: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("throwcollect.config.starter.has_wheel", lambda _package: there)
+    monkeypatch.setattr("throwcollect.tasks.starter.has_wheel", lambda _package: there)
     path = tmp_path / "throws.yaml"
-    path.write_text(make_starter("talos", "throw", "sobol", find_motion=find_first_motion)[str(DEFAULT_CONFIG)])
+    path.write_text(make_starter("talos", "throw", "sobol")[str(DEFAULT_CONFIG)])
     assert load(path).sim.engine == engine
 
 
@@ -79,5 +78,5 @@ def test_no_file_says_how_to_have_one(tmp_path: Path, monkeypatch: pytest.Monkey
 )
 def test_what_is_not_installed_is_told_with_what_is(names: tuple[str, str, str], said: str) -> None:
     with pytest.raises(ConfigError) as caught:
-        make_starter(*names, find_motion=find_first_motion)
+        make_starter(*names)
     assert str(caught.value).startswith(said)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 
 from throwcollect.config.default_path import DEFAULT_CONFIG
 from throwcollect.config.loader import value_as_yaml
@@ -10,6 +10,7 @@ from throwcollect.config.shape import root
 from throwcollect.errors import ConfigError
 from throwcollect.extras import has_wheel
 from throwcollect.members import names_of
+from throwcollect.tasks.first_motion import Motion, find_first_motion
 
 POINTS = "throws.csv"
 """The list of points that the sampler `list` reads, beside the configuration."""
@@ -17,24 +18,14 @@ POINTS = "throws.csv"
 _NARROW_RAD = 0.2
 """Range to either side in which the last angle of a joint is swept, and no more than half of its motion."""
 
-Motion = tuple[Mapping[str, float], Mapping[str, float], float]
-"""Angles at the start and at the end, by joint [rad], and the time in between [s]."""
-
 
 def samplers() -> list[str]:
     """Names of all samplers."""
     return root().child("sweep").child("sampler").choices
 
 
-def make_starter(robot: str, task: str, sampler: str, *, find_motion: Callable[[str, str], Motion]) -> dict[str, str]:
+def make_starter(robot: str, task: str, sampler: str) -> dict[str, str]:
     """Write a configuration to begin with, for the robot, the task and the sampler of these names.
-
-    Args:
-        robot: Name of the robot.
-        task: Name of the task.
-        sampler: Name of the sampler.
-        find_motion: Finds a motion for the robot and the task of these names; the end of the joint that moves most may
-            lie half as far again from its start.
 
     Returns:
         The text of the configuration as ``throwcollect.yaml``, and of `POINTS` if the sampler reads it.
@@ -49,7 +40,7 @@ def make_starter(robot: str, task: str, sampler: str, *, find_motion: Callable[[
     ):
         if name not in known:
             raise ConfigError(f"{option} {name}: no such {option[2:]} is installed", expected=" or ".join(known))
-    motion = find_motion(robot, task)
+    motion = find_first_motion(robot, task)
     start, end, duration_s = motion
     joint = max(end, key=lambda name: abs(end[name] - start[name]))
     half_rad = min(_NARROW_RAD, abs(end[joint] - start[joint]) / 2)
