@@ -46,7 +46,7 @@ time_s, ball_position_m = archive["time_s"][rows], archive["ball_position_m"][ro
 def write(source: Source, directory: Path) -> None:
     """Write a dataset as NumPy archives; see `Exporter.write`."""
     columns = {field.name: to_array(source.table[field.name]) for field in source.table.schema}
-    with _open_archive(directory / "throws.npz") as archive:
+    with zipfile.ZipFile(directory / "throws.npz", "w") as archive:
         for name, values in {**columns, "digest_of_dataset": np.array(source.dataset.digest)}.items():
             _add(archive, name, values)
     (directory / "trajectories").mkdir()
@@ -83,7 +83,7 @@ def _write_shard(source: Source, entries: tuple[Entry, ...], path: Path) -> None
         for throw in source.throws(entries):
             for name, file in files.items():
                 file.write(throw.signals[name].astype("<f8").tobytes())
-    with _open_archive(path) as archive:
+    with zipfile.ZipFile(path, "w") as archive:
         for name, values in names.items():
             _add(archive, name, values)
         for name, file_of_signal in unpacked.items():
@@ -91,10 +91,6 @@ def _write_shard(source: Source, entries: tuple[Entry, ...], path: Path) -> None
             with file_of_signal.open("rb") as array, archive.open(_make_member(name), "w", force_zip64=True) as packed:
                 shutil.copyfileobj(array, packed)
             file_of_signal.unlink()
-
-
-def _open_archive(path: Path) -> zipfile.ZipFile:
-    return zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED)
 
 
 def _add(archive: zipfile.ZipFile, name: str, values: NDArray[Any]) -> None:

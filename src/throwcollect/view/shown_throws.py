@@ -38,13 +38,12 @@ def choose_rows(dataset: Dataset, trials: Iterable[int] | None) -> list[Row]:
         ConfigError: If there is no such trial.
         DatasetError: If a trial has no episode, or none has one.
     """
-    rows = dataset.throws.to_pylist()
     if trials is None:
-        chosen = [row for row in rows if row["shard"] is not None]
+        chosen: list[Row] = dataset.recorded.throws.to_pylist()
         if not chosen:
             raise DatasetError("no trial has an episode: there is nothing to show", path=dataset.directory)
         return chosen
-    numbers = list(trials)
+    rows, numbers = dataset.throws.to_pylist(), list(trials)
     for number in numbers:
         if not 0 <= number < len(rows):
             raise ConfigError(f"{dataset.directory}: no trial {number}", expected=f"0 to {len(rows) - 1}")

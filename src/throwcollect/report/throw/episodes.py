@@ -98,7 +98,7 @@ def measure_residuals(dataset: Dataset) -> Residuals:
     Raises:
         DatasetError: If an episode is not where the table says, or is damaged.
     """
-    trials = _find_recorded(dataset)
+    trials = dataset.recorded.throws["trial"].to_numpy()
     # At random, as every n-th point of a Sobol sequence or a grid would lie on a lattice of its parameters.
     chosen = np.sort(np.random.default_rng(0).permutation(trials)[:MOST_RESIDUALS])
     distances = []
@@ -113,7 +113,7 @@ def measure_residuals(dataset: Dataset) -> Residuals:
 
 def choose_examples(dataset: Dataset, landed: Landings, outcomes: Outcomes) -> tuple[int, ...]:
     """Choose trials to look at: some that landed, from the nearest to the farthest, and one of some other outcomes."""
-    recorded = set(_find_recorded(dataset).tolist())
+    recorded = set(dataset.recorded.throws["trial"].to_pylist())
     by_distance = landed.trial[np.argsort(landed.distance_m, kind="stable")].tolist()
     usable = [trial for trial in by_distance if trial in recorded]
     picks = np.linspace(0, len(usable) - 1, min(len(usable), _MOST_LANDED)).round().astype(int)
@@ -166,7 +166,3 @@ def read_motion(dataset: Dataset, trial: int) -> JointMotion:
 def _find_release(header: EpisodeHeader, config: Config) -> int | None:
     gap_s = throw_section(config.task).recatch_gap_s
     return release_of(header.contacts, tool=config.tool.name, gap_s=gap_s)
-
-
-def _find_recorded(dataset: Dataset) -> NDArray[np.int64]:
-    return np.flatnonzero(dataset.throws["shard"].is_valid().to_numpy())
