@@ -350,7 +350,7 @@ class TrialCollection:
     def _recall(self, trial: int, result: Result) -> None:
         self._leases.recall(trial)
         self._note(trial, result)
-        self._pace.begin(self._leases.ended)
+        self._pace = Pace(self._leases.ended)
 
     def _confirm_round(self) -> bool:
         """Go on with the next round that an earlier collection has planned; False if results do not give it, or yet."""

@@ -10,12 +10,12 @@ _WINDOW_S = 10.0
 
 
 class Pace:
-    """Trials that ended per second of real time, over the last ten seconds."""
+    """Trials that ended per second of real time, over the last ten seconds; the first `ended` trials do not count."""
 
-    def __init__(self) -> None:
+    def __init__(self, ended: int = 0) -> None:
         # Each time has the number of trials that had ended by then. One is there from the start, so that `rate` has two
         # ends.
-        self._ends: deque[tuple[float, int]] = deque([(time.monotonic(), 0)])
+        self._ends = deque([(time.monotonic(), ended)])
 
     @property
     def rate(self) -> float:
@@ -29,7 +29,3 @@ class Pace:
         self._ends.append((now, ended))
         while self._ends[0][0] < now - _WINDOW_S:
             self._ends.popleft()
-
-    def begin(self, ended: int) -> None:
-        """Begin anew, so that trials of an earlier collection do not count as speed of this one."""
-        self._ends = deque([(time.monotonic(), ended)])
