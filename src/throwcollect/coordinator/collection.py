@@ -18,9 +18,9 @@ from throwcollect.coordinator.acceptance import Acceptance
 from throwcollect.coordinator.growth import Growth
 from throwcollect.coordinator.leases import Leases
 from throwcollect.coordinator.lookahead import Lookahead
-from throwcollect.coordinator.pace import Pace
 from throwcollect.coordinator.progress import Progress
 from throwcollect.coordinator.replay_check import ReplayCheck
+from throwcollect.coordinator.trial_rate import TrialRate
 from throwcollect.dataset.directory import find_known_directory
 from throwcollect.dataset.summary import explain_loss
 from throwcollect.dataset.writer import DatasetWriter
@@ -71,7 +71,7 @@ class TrialCollection:
         self._backlog: deque[tuple[Episode, Result]] = deque()
         self._set_aside: dict[str, str] = {}
         self._outcomes: Counter[str] = Counter()
-        self._pace = Pace()
+        self._rate = TrialRate()
         self._draining = False
         self._drain_deadline = math.inf
         self._synced_at = time.monotonic()
@@ -289,7 +289,7 @@ class TrialCollection:
         remaining = self._leases.total - self._leases.ended
         # The guess is made from all trials of the plan, so it is worth nothing while some may be added or left out.
         settled = self._growth is None and not self._draining
-        if settled and not self._replay.begun and remaining <= _REPLAY_AHEAD_S * self._pace.rate:
+        if settled and not self._replay.begun and remaining <= _REPLAY_AHEAD_S * self._rate.per_s:
             self._replay.begin(list(self.writer.plan.trials.numbers_to_run))
 
     def progress(self, hung: Iterable[str] = ()) -> Progress:
@@ -299,7 +299,7 @@ class TrialCollection:
             hung: Names of the simulations that took too long for a trial.
         """
         ended = self._leases.ended
-        self._pace.note(ended)
+        self._rate.note(ended)
         # The number of trials of a plan that ends when enough have succeeded is not known.
         expected = self._growth.most if self._growth is not None and self._config.until is None else 0
         return Progress(
@@ -307,7 +307,7 @@ class TrialCollection:
             ended=ended,
             outcomes=dict(self._outcomes),
             simulations=len(self._names),
-            throws_per_s=self._pace.rate,
+            throws_per_s=self._rate.per_s,
             hung=sorted(hung),
             wanted=self._config.until.wanted if self._config.until else None,
             success=self._config.task.success,
@@ -350,7 +350,7 @@ class TrialCollection:
     def _recall(self, trial: int, result: Result) -> None:
         self._leases.recall(trial)
         self._note(trial, result)
-        self._pace = Pace(self._leases.ended)
+        self._rate = TrialRate(self._leases.ended)
 
     def _confirm_round(self) -> bool:
         """Go on with the next round that an earlier collection has planned; False if results do not give it, or yet."""

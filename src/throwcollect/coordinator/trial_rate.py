@@ -9,16 +9,16 @@ _WINDOW_S = 10.0
 """Trials per second are averaged over this time."""
 
 
-class Pace:
+class TrialRate:
     """Trials that ended per second of real time, over the last ten seconds; the first `ended` trials do not count."""
 
     def __init__(self, ended: int = 0) -> None:
-        # Each time has the number of trials that had ended by then. One is there from the start, so that `rate` has two
-        # ends.
+        # Each time has the number of trials that had ended by then. One is there from the start, so that there are two
+        # ends to take a rate of.
         self._ends = deque([(time.monotonic(), ended)])
 
     @property
-    def rate(self) -> float:
+    def per_s(self) -> float:
         """Trials that ended per second, as of the last call of `note`."""
         (since, before), (now, ended) = self._ends[0], self._ends[-1]
         return (ended - before) / (now - since) if now > since else 0.0
