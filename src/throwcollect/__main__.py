@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import gc
-
 from throwcollect.interruption import leave_when_stopped
 
 
@@ -18,11 +16,7 @@ def main() -> None:
     open_streams()
     from throwcollect.cli.main import main as run_command
 
-    try:
-        run_command()
-    finally:
-        # At its end, the interpreter would look for garbage among all objects of libraries, for a tenth of a second.
-        gc.freeze()
+    run_command()
 
 
 if __name__ == "__main__":
