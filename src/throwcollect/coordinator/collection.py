@@ -22,6 +22,7 @@ from throwcollect.coordinator.progress import Progress
 from throwcollect.coordinator.replay_check import ReplayCheck
 from throwcollect.coordinator.trial_rate import TrialRate
 from throwcollect.dataset.directory import find_known_directory
+from throwcollect.dataset.journal import find_lost
 from throwcollect.dataset.summary import explain_loss
 from throwcollect.dataset.writer import DatasetWriter
 from throwcollect.episode.message import Delivery, Episode
@@ -59,7 +60,7 @@ class TrialCollection:
         self.warn: Callable[[str], object] = lambda _: None
         self.on_change: Callable[[], None] = lambda: None
         self._config = writer.plan.config
-        self._growth = Growth(writer.plan) if self._config.grows else None
+        self._growth = Growth(writer.plan, lost=find_lost(directory)) if self._config.grows else None
         sure = writer.plan.trials[: self._growth.planned if self._growth else None]
         self._leases = Leases(sure.numbers_to_run, retries=self._config.run.retries)
         self._names: dict[str, str] = {}
@@ -349,11 +350,13 @@ class TrialCollection:
 
     def _recall(self, trial: int, result: Result) -> None:
         self._leases.recall(trial)
-        self._note(trial, result)
+        self._outcomes[result.outcome.value] += 1
+        if self._growth is not None:
+            self._growth.recall(trial, result)
         self._rate = TrialRate(self._leases.ended)
 
     def _confirm_round(self) -> bool:
-        """Go on with the next round that an earlier collection has planned; False if results do not give it, or yet."""
+        """Count the next round that an earlier collection has planned as planned; False while that is not certain."""
         earlier = self._growth.confirm() if self._growth is not None else None
         if earlier is None:
             return False
@@ -364,7 +367,7 @@ class TrialCollection:
         return True
 
     def _cut_plan(self, say: Callable[[str], object]) -> bool:
-        """Remove what an earlier collection has planned otherwise than the results say; False if there is nothing.
+        """Remove the trials that an earlier collection has planned and results do not give; False if there are none.
 
         Raises:
             DatasetError: If the disk fails.

@@ -2,25 +2,27 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Collection
 from typing import NamedTuple
 
 from throwcollect.config.values import with_values
 from throwcollect.coordinator.prepare import feasibility_check
-from throwcollect.sweep.plan import FIRST_TRIALS, Check, Plan, make_trials, refusal
+from throwcollect.sweep.plan import FIRST_TRIALS, ROUND_TRIALS, Check, Plan, make_trials, refusal
 from throwcollect.sweep.rounds import Rounds, find_same
 from throwcollect.sweep.trials import Trials
 from throwcollect.tasks.result import Result
 
 
 class EarlierRound(NamedTuple):
-    """A round that an earlier collection has planned, and the results that it has left of it, by trial."""
+    """A round that an earlier collection has planned, and the results of its trials that are left, by number."""
 
     trials: Trials
     results: dict[int, Result]
 
 
 class WrongTrials(NamedTuple):
-    """Trials that an earlier collection has planned otherwise than the results say: the first, and how many ended."""
+    """Trials that an earlier collection has planned and the results do not give: the first, and how many had ended."""
 
     first: int
     episodes: int
@@ -31,21 +33,25 @@ class Growth:
 
     Of a plan that an earlier collection has left, only the first two rounds are sure to be those of its configuration:
     results of trials that were lost there, and are run again, may call for others behind. So all later rounds are drawn
-    again from the results, and stay if they are the same.
+    again from the results. One that comes out otherwise is given up if it was planned without a result that is known
+    now. If all results were known then, other versions of libraries draw otherwise, and it stays as it was planned.
 
     Args:
         plan: The plan as it is by now.
+        lost: Trials that were lost in an earlier collection.
 
     Raises:
         ConfigError: If the sweep cannot be drawn.
     """
 
-    def __init__(self, plan: Plan) -> None:
+    def __init__(self, plan: Plan, *, lost: Collection[int] = ()) -> None:
         self._config = plan.config
         self._earlier = plan.trials[:]
         self._results: dict[int, Result] = {}
         """Results of the earlier collection for trials that are not sure to belong to the plan."""
         self._wrong: WrongTrials | None = None
+        self._first_anew = min(lost, default=math.inf)
+        """The first trial whose result may not have been known when the earlier collection planned."""
         self._rounds = Rounds(plan.config)
         self._rounds.add(plan.trials[:FIRST_TRIALS])
         self._check: Check | None = None
@@ -72,8 +78,13 @@ class Growth:
         """Whether the earlier collection has planned trials that are not drawn again yet."""
         return self._rounds.planned < len(self._earlier)
 
+    def recall(self, trial: int, result: Result) -> None:
+        """Take in a result that an earlier collection has left of a trial that is sure to belong to the plan."""
+        self._rounds.tell(trial, result)
+
     def tell(self, trial: int, result: Result) -> None:
-        """Take in the result of a trial that is sure to belong to the plan."""
+        """Take in the result of a trial that has ended now."""
+        self._first_anew = min(self._first_anew, trial)
         self._rounds.tell(trial, result)
 
     def keep(self, trial: int, result: Result) -> bool:
@@ -97,18 +108,18 @@ class Growth:
         if not self._doubtful or not self._rounds.due:
             return None
         first = self._rounds.planned
-        if self._rounds.over:
+        there = self._earlier[first : first + ROUND_TRIALS]
+        drawn = None if self._rounds.over else self._rounds.draw()
+        is_same = drawn is not None and find_same(there.values, drawn.values[: len(there)]).all()
+        # The results of all rounds up to two before this one determine it.
+        if not is_same and self._first_anew < first - ROUND_TRIALS:
             self._give_up(first)
-            return None
-        drawn = self._rounds.draw()
-        there = self._earlier[first : first + len(drawn.values)]
-        if not find_same(there.values, drawn.values[: len(there)]).all():
-            self._give_up(first)
-            self._coming = make_trials(self._config, drawn, first=first)
+            if drawn is not None:
+                self._coming = make_trials(self._config, drawn, first=first)
             return None
         self._rounds.add(there)
         # The last round of a plan that had fewer `trials` is completed by the same draw.
-        if len(there) < len(drawn.values):
+        if drawn is not None and len(there) < len(drawn.values):
             self._coming = make_trials(self._config, drawn[len(there) :], first=first + len(there))
         known = [number for number in there.numbers if number in self._results]
         return EarlierRound(there, {number: self._results.pop(number) for number in known})

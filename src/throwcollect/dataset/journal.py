@@ -1,7 +1,8 @@
 """The journal of a dataset, ``logs/journal.jsonl``: what happened while it was collected, in that order.
 
 Each line is a JSON object with `event`, `time` (Unix [s]) and the facts of that event. Lines are only ever appended,
-also after an interruption. The dataset never depends on the journal, which is for people and for the data card.
+also after an interruption. The journal is for people and for the data card. A dataset depends on it in one case alone:
+rounds of a plan that results do not give are removed only if trials before them were lost (see `coordinator.growth`).
 """
 
 from __future__ import annotations
@@ -158,6 +159,19 @@ def _parse(line: bytes) -> dict[str, Any]:
         if isinstance(entry, dict):
             return entry
     return {}
+
+
+def find_lost(directory: Path) -> frozenset[int]:
+    """Find the trials that no simulation brought back in one of the collections into a dataset."""
+    try:
+        descriptor = open_log(directory / JOURNAL, os.O_RDONLY)
+    except OSError:
+        return frozenset()
+    with open(descriptor, "rb") as file:
+        # Lines of other events are not parsed, as there are several for each trial.
+        entries = [_parse(line) for line in file if b'"lost"' in line]
+    numbers = [entry.get("trial") for entry in entries if entry.get("event") == "lost"]
+    return frozenset(number for number in numbers if isinstance(number, int))
 
 
 def was_open(directory: Path) -> bool:

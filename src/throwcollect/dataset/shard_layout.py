@@ -27,18 +27,17 @@ class ShardLayout:
     plan: Plan
     growing: bool
 
-    @property
-    def trials_per_shard(self) -> int:
-        """Number of trials in each shard but the last one."""
-        return self.plan.config.record.trials_per_shard
-
     def number_of(self, trial: int) -> int:
         """Number of the shard of a trial."""
-        return trial // self.trials_per_shard
+        return trial // self._trials_per_shard
+
+    def numbers_of(self, trials: range) -> range:
+        """Numbers of the shards of consecutive trials."""
+        return range(self.number_of(trials.start), self.number_of(trials.stop - 1) + 1)
 
     def members(self, number: int) -> range:
         """Numbers of the trials of a shard."""
-        size, numbers = self.trials_per_shard, self.plan.trials.numbers
+        size, numbers = self._trials_per_shard, self.plan.trials.numbers
         return range(max(number * size, numbers.start), min((number + 1) * size, numbers.stop))
 
     def to_run(self, number: int) -> Iterator[int]:
@@ -47,7 +46,7 @@ class ShardLayout:
 
     def is_settled(self, number: int) -> bool:
         """Whether no trial will be added to a shard any more."""
-        return not self.growing or len(self.plan.trials) >= (number + 1) * self.trials_per_shard
+        return not self.growing or len(self.plan.trials) >= (number + 1) * self._trials_per_shard
 
     def path(self, number: int) -> Path:
         """Path of a shard once it is finished."""
@@ -73,3 +72,7 @@ class ShardLayout:
         members, first = self.members(number), self.plan.trials.first
         trials = self.plan.trials[members.start - first : members.stop - first]
         return Part(self.path(number), Plan(self.plan.config, trials), self.is_settled(number))
+
+    @property
+    def _trials_per_shard(self) -> int:
+        return self.plan.config.record.trials_per_shard

@@ -49,10 +49,6 @@ Tell = Callable[[int, Result], None]
 """Receives the number of a trial and its result."""
 
 
-def _tell_nobody(_trial: int, _result: Result) -> None:
-    """Take in the result of a trial where nobody wants to know."""
-
-
 class DatasetWriter:
     """Takes the episodes of a plan's trials, each once and in any order, and writes the dataset.
 
@@ -129,7 +125,7 @@ class DatasetWriter:
             writer._held = held.pop_all()
         return writer
 
-    def recover(self, tell: Tell = _tell_nobody, *, processes: int = 1) -> int:
+    def recover(self, tell: Tell = lambda *_: None, *, processes: int = 1) -> int:
         """Take in what earlier writers have left: every episode that is whole stays, everything else is removed.
 
         A finished dataset is an unfinished one then, even if all its trials have ended; `finish` writes the same files.
@@ -174,30 +170,34 @@ class DatasetWriter:
         Raises:
             DatasetError: If the plan cannot be written.
         """
+        # Where a plan that was lost is made again, files of its later shards are still there.
+        for number in self._layout.numbers_of(trials.numbers):
+            if number not in self._unfinished:
+                self._layout.remove_files(number)
         append_round(self._directory / PLAN, trials)
         self.plan.trials.extend(trials)
         self.note("planned", trials=len(self.plan.trials))
         self._expect(trials)
 
     def cut(self, first: int) -> None:
-        """Take the trials from a number on out of the plan again, with all that was written of them.
+        """Take the trials from a number on out of the plan, with their episodes, as if they had never been planned.
 
-        Whenever this is interrupted, the trials before are as they were, and `recover` removes what is left of the
-        others, or finds them in the plan.
+        If this is interrupted, the plan still has them, or `recover` leaves out what remains of them.
 
         Raises:
             DatasetError: If the disk fails.
         """
-        shard, within = divmod(first, self._layout.trials_per_shard)
-        last = self._layout.number_of(self.plan.trials.numbers.stop - 1)
-        rows = {number: self._let_go_of(number) for number in range(shard, last + 1)}
-        for number in range(shard + bool(within), last + 1):
+        shards = self._layout.numbers_of(range(first, self.plan.trials.numbers.stop))
+        rows = [self._let_go_of(number) for number in shards]
+        # The first of these shards has trials that stay, unless it begins with the first one that goes.
+        is_shared = self._layout.members(shards[0]).start < first
+        for number in shards[is_shared:]:
             self._layout.remove_files(number)
         self._layout.plan = replace(self.plan, trials=self.plan.trials[:first])
         self.plan.write(self._directory / PLAN)
         self.note("planned", trials=first)
-        if within:
-            self._reopen(shard, rows[shard])
+        if is_shared:
+            self._reopen(shards[0], rows[0])
 
     def close_plan(self) -> None:
         """Declare that the plan has all its trials.
@@ -326,7 +326,7 @@ class DatasetWriter:
         self._journal = None
 
     def _expect(self, trials: Trials) -> None:
-        for number in range(self._layout.number_of(trials.first), self._layout.number_of(trials.numbers.stop - 1) + 1):
+        for number in self._layout.numbers_of(trials.numbers):
             self._unfinished.add(number)
             if number in self._shards:
                 self._shards[number].expect(each for each in self._layout.to_run(number) if each in trials.numbers)
@@ -346,7 +346,7 @@ class DatasetWriter:
         return [*self._rows.pop(number).values()]
 
     def _reopen(self, number: int, rows: list[Row]) -> None:
-        """Fill a shard further, of which trials were taken out of the plan; `rows` are those that it had."""
+        """Fill a shard further of which trials have left the plan; `rows` are those that it had."""
         self._unfinished.add(number)
         [left] = find_left([self._layout.part(number)], self._channels)
         self._take_left(number, left)

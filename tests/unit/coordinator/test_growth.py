@@ -1,5 +1,6 @@
 """Rounds that are made a little at a time, while trials are run."""
 
+from collections.abc import Collection
 from pathlib import Path
 
 import pytest
@@ -53,12 +54,12 @@ def test_trials_of_later_rounds_are_refused_as_those_of_a_plan_made_at_once() ->
     assert 0 < sum(trial.refused is not None for trial in later) < len(later)
 
 
-def resumed(settings: Config, trials: list[Trial]) -> Growth:
+def resumed(settings: Config, trials: list[Trial], *, lost: Collection[int] = ()) -> Growth:
     """The growth of a plan that an earlier collection has left with the results of all its trials."""
-    growth = Growth(Plan(settings, in_columns(trials)))
+    growth = Growth(Plan(settings, in_columns(trials)), lost=lost)
     for trial in trials:
         if not growth.keep(trial.number, throw(trial)):
-            growth.tell(trial.number, throw(trial))
+            growth.recall(trial.number, throw(trial))
     return growth
 
 
@@ -66,7 +67,7 @@ def go_on(growth: Growth) -> list[Trial]:
     """Confirm the rounds of an earlier collection with its results, then add one more; returns the trials of that."""
     while (earlier := growth.confirm()) is not None:
         for number, result in earlier.results.items():
-            growth.tell(number, result)
+            growth.recall(number, result)
     while not (trials := growth.step()):
         assert trials == ()
     return list(trials)
@@ -92,7 +93,7 @@ def test_rounds_that_the_results_do_not_give_are_found_and_drawn_anew() -> None:
     settings = configuration(trials=500)
     lost = ThrowResult(ThrowOutcome.LOST)
     planned = collected(settings, throw=lambda trial: lost if trial.number == 3 else throw(trial), rounds=6)
-    growth = resumed(settings, planned)
+    growth = resumed(settings, planned, lost=[3])
     assert [trial.values for trial in go_on(growth)] == [trial.values for trial in collected(settings)[128:192]]
     assert growth.take_wrong() == (128, 256)
     assert growth.take_wrong() is None

@@ -18,6 +18,7 @@ from throwcollect.dataset.writer import DatasetWriter
 from throwcollect.episode.message import Delivery
 from throwcollect.errors import LossError
 from throwcollect.replay.throw import Replayer
+from throwcollect.sweep.target import TargetSampler
 from throwcollect.sweep.trials import Trial
 
 LANDED = 64
@@ -133,3 +134,41 @@ def test_lost_trials_that_are_run_again(
     assert verify(mended) == []
     assert "removed" not in go_on(config, mended, simulate)
     assert fingerprints(mended) == fingerprints(expected)
+
+
+def test_rounds_that_other_versions_of_libraries_have_drawn_stay(
+    tmp_path: Path, simulate: Callable[[Trial], Delivery], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    config = configuration(per_shard=50, target=True)
+    directory = tmp_path / "data"
+    prepare(config, directory, sweep_directory=tmp_path)
+    with monkeypatch.context() as patch:
+        patch.setattr(TargetSampler, "draw", lambda _self, otherwise, _tried, _ended: otherwise)
+        collect(directory, simulate)
+    before = fingerprints(directory)
+    (directory / "metadata.yaml").unlink()
+    assert "removed" not in go_on(config, directory, simulate)
+    assert fingerprints(directory) == before
+
+
+def test_a_plan_that_is_gone_is_made_again_over_files_that_its_later_shards_have_left(
+    tmp_path: Path, simulate: Callable[[Trial], Delivery]
+) -> None:
+    config = configuration(per_shard=50, target=True)
+    expected, directory = tmp_path / "expected", tmp_path / "data"
+    for each in (expected, directory):
+        prepare(config, each, sweep_directory=tmp_path)
+    collect(expected, simulate)
+
+    def die_in_the_last_shard(trial: Trial) -> Delivery:
+        if trial.number == 170:
+            raise KeyboardInterrupt
+        return simulate(trial)
+
+    with pytest.raises(KeyboardInterrupt):
+        collect(directory, die_in_the_last_shard)
+    assert list(directory.glob("*_00003.mcap.part"))
+    (directory / "plan.parquet").unlink()
+    (directory / "plan.rounds.part").unlink()
+    go_on(config, directory, simulate)
+    assert fingerprints(directory) == fingerprints(expected)

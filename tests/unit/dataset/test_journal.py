@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 
 from throwcollect.dataset import journal as journal_module
-from throwcollect.dataset.journal import Journal, measure_collected_s, read_journal
+from throwcollect.dataset.directory import JOURNAL
+from throwcollect.dataset.journal import Journal, find_lost, measure_collected_s, read_journal
 from throwcollect.errors import DatasetError
 
 
@@ -80,3 +81,14 @@ def test_the_time_that_the_data_card_has_is_the_one_that_is_told(tmp_path: Path)
         line("commit", 101.0),
     )
     assert measure_collected_s(tmp_path) == 5.5
+
+
+def test_trials_that_were_lost_once_are_found(tmp_path: Path) -> None:
+    assert find_lost(tmp_path) == frozenset()
+    with closing(Journal(tmp_path)) as journal:
+        journal.note("lost", trial=3, reason="died")
+        journal.note("commit", trial=3, outcome="lost")
+        journal.note("fail", trial=4, simulation="lost", reason="lost")
+    with (tmp_path / JOURNAL).open("a") as file:
+        file.write('{"event": "lost", "trial": "x"}\n{"event": "lost", "tri')
+    assert find_lost(tmp_path) == {3}
