@@ -376,7 +376,7 @@ class TrialCollection:
         if wrong is None:
             return False
         count = format_count(wrong.episodes, "episode")
-        say(f"trial {wrong.first} and those behind were planned without results of lost ones: {count} removed")
+        say(f"plans trials from {wrong.first} on anew, as lost ones have results now: {count} removed")
         self.writer.cut(wrong.first)
         return True
 

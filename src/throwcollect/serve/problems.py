@@ -112,7 +112,8 @@ def add_handlers(app: FastAPI) -> None:
 
     @app.exception_handler(RequestValidationError)
     async def invalid(request: Request, error: RequestValidationError) -> ProblemResponse:
-        return answer(ConfigError(_find_problems_of_body(request, error) or _find_problems_of_query(request)))
+        found = _find_problems_of_body(request, error) or _find_problems_of_query(request)
+        return answer(ConfigError(found or [Problem("the request is not as it should be")]))
 
 
 def _find_problems_of_body(request: Request, error: RequestValidationError) -> list[Problem]:
