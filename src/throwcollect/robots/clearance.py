@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +11,7 @@ from numpy.typing import NDArray
 from throwcollect.errors import ConfigError
 from throwcollect.pinocchio_library import pinocchio
 from throwcollect.robots.clear_postures import ClearPostures, find_reaches
+from throwcollect.robots.description import joint_model
 from throwcollect.robots.robot import Robot
 from throwcollect.tools.tool import Tool
 
@@ -49,20 +51,8 @@ class Clearance:
     def __init__(self, robot: Robot, model: pinocchio.Model, tool: Tool) -> None:
         self._robot, self._model = robot, model
         self._data = model.createData()
-        try:
-            geometry = pinocchio.buildGeomFromUrdf(
-                model, str(robot.urdf_path), pinocchio.GeometryType.COLLISION, package_dirs=[str(robot.share())]
-            )
-        except (ValueError, RuntimeError) as error:
-            raise ConfigError(f"{robot.urdf_path}: its meshes cannot be read: {error}") from error
-        for shape in geometry.geometryObjects:
-            if isinstance(shape.geometry, pinocchio.coal.BVHModelBase):
-                # Bullet collides the convex hulls of meshes, so those are what has to stay apart.
-                shape.geometry.buildConvexHull(True, "Qt")
-                shape.geometry = shape.geometry.convex
-        geometry.addAllCollisionPairs()
-        pinocchio.removeCollisionPairs(model, geometry, str(robot.srdf_path), False)
-        self.geometry = geometry
+        # Copies share the shapes and have pairs of their own.
+        geometry = self.geometry = pinocchio.GeometryModel(_read_shapes(robot))
         self._links = [model.frames[shape.parentFrame].name for shape in geometry.geometryObjects]
         for pair in list(geometry.collisionPairs):
             names = self._links[pair.first], self._links[pair.second]
@@ -145,3 +135,29 @@ class Clearance:
             self._links.append(tool.name)
             for other in others:
                 self.geometry.addCollisionPair(pinocchio.CollisionPair(other, added))
+
+
+@lru_cache(maxsize=4)
+def _read_shapes(robot: Robot) -> pinocchio.GeometryModel:
+    """Read the shapes of a robot's links, and the pairs of them that must stay apart; to be changed by nobody.
+
+    Reading meshes takes a third of a second, and programs that look at several datasets check each of them.
+
+    Raises:
+        ConfigError: If the robot's meshes cannot be read.
+    """
+    model = joint_model(robot)
+    try:
+        geometry = pinocchio.buildGeomFromUrdf(
+            model, str(robot.urdf_path), pinocchio.GeometryType.COLLISION, package_dirs=[str(robot.share())]
+        )
+    except (ValueError, RuntimeError) as error:
+        raise ConfigError(f"{robot.urdf_path}: its meshes cannot be read: {error}") from error
+    for shape in geometry.geometryObjects:
+        if isinstance(shape.geometry, pinocchio.coal.BVHModelBase):
+            # Bullet collides the convex hulls of meshes, so those are what has to stay apart.
+            shape.geometry.buildConvexHull(True, "Qt")
+            shape.geometry = shape.geometry.convex
+    geometry.addAllCollisionPairs()
+    pinocchio.removeCollisionPairs(model, geometry, str(robot.srdf_path), False)
+    return geometry

@@ -33,7 +33,7 @@ class Feasibility:
     """Checks joint trajectories against the limits of a robot.
 
     One object serves all trials of a collection: each check sets posture, masses, gravity and limits of its trial, and
-    only a trial with another tool costs the time to rebuild its shapes.
+    only a trial with another tool costs the time to rebuild its pairs.
 
     Raises:
         ConfigError: If the robot's files cannot be read, or lack something.

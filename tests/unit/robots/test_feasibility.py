@@ -276,6 +276,18 @@ def test_postures_near_clear_ones_are_clear():
     assert 0.3 < np.mean([approach is None for approach in approaches]) < 0.9
 
 
+def test_the_shapes_of_a_robot_are_read_once_and_have_no_tool(monkeypatch: pytest.MonkeyPatch) -> None:
+    model = joint_model(TALOS)
+    tools = tool_of(Config().tool), tool_of(Config(tool={"handle_length_m": 0.05}).tool)
+    before = Clearance(TALOS, model, tools[0])
+    monkeypatch.setattr(pinocchio, "buildGeomFromUrdf", lambda *_, **__: pytest.fail("the meshes are read again"))
+    other, again = Clearance(TALOS, model, tools[1]), Clearance(TALOS, model, tools[0])
+    assert before.geometry.ngeoms == other.geometry.ngeoms == again.geometry.ngeoms
+    boxes = [[*clearance.geometry.geometryObjects][-1].placement for clearance in (before, other, again)]
+    assert boxes[0] == boxes[2] != boxes[1]
+    assert [*before.geometry.collisionPairs] == [*again.geometry.collisionPairs]
+
+
 def test_torques_of_free_joints_are_those_of_the_whole_robot():
     feasibility, whole = Feasibility(Config()), Feasibility(Config())
     whole._dynamics_of_free_joints = lambda _: whole._dynamics
