@@ -48,7 +48,7 @@ def test_only_the_moves_of_the_state_machine_are_possible():
 
 def test_an_impossible_move_is_refused_in_words(table):
     goal = table[KEYS[3]]
-    with pytest.raises(RuntimeError, match="goal 0404.* is succeeded and cannot be aborted"):
+    with pytest.raises(RuntimeError, match=r"goal 0404.* is succeeded and cannot be aborted"):
         goal.advance(GoalEvent.ABORT, 0)
     table.expire(10**9)
     with pytest.raises(RuntimeError, match="is unknown and cannot be aborted"):
