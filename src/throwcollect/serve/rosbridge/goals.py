@@ -74,7 +74,7 @@ class Goals(Errands[Goal]):
         goal.form = request.form()
         on_feedback = goal.tell_feedback if request.flag("feedback") else None
         type_name = request.text("action_type")
-        action_type = find_interface("action", ros.get_action, type_name)
+        action_type = find_interface("action", type_name)
         if goal.name not in dict(ros.get_action_names_and_types(self._client.session.node)):
             raise ConfigError(f"nobody offers an action {goal.name}")
         message = action_type.Goal()

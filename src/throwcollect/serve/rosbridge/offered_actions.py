@@ -32,7 +32,7 @@ class OfferedAction:
         self._given = given
         self._type_name = type_name
         self._name = absolute_name(given)
-        self._type = find_interface("action", ros.get_action, type_name)
+        self._type = find_interface("action", type_name)
         self._goals: dict[str, tuple[Any, ros.Future]] = {}
         self._server: ros.ActionServer | None = None
 

@@ -69,7 +69,7 @@ class Session:
                 raise ConfigError(f"{topic} {what}", expected=f"one of {', '.join(types)}" if types else "a type")
             return types[0]
         name = full_name("msg", wanted)
-        find_interface("msg", ros.get_message, name)
+        find_interface("msg", name)
         if types and name not in types:
             raise ConfigError(f"{topic} is no {name}", expected=", ".join(types))
         return name
@@ -94,7 +94,7 @@ class Session:
         """
         key = service, type_name
         if key not in self._clients:
-            self._clients[key] = self.node.create_client(find_interface("srv", ros.get_service, type_name), service)
+            self._clients[key] = self.node.create_client(find_interface("srv", type_name), service)
         return self._clients[key]
 
     def is_offered_by_others(self, service: str) -> bool:
