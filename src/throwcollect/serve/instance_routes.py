@@ -18,6 +18,7 @@ from throwcollect.files import open_log
 from throwcollect.runs.events import EVENTS
 from throwcollect.runs.record import Origin
 from throwcollect.runtimes.node_logs import NodeLogs
+from throwcollect.serve.catalogue import LONGEST_NAME
 from throwcollect.serve.instances import Instances
 from throwcollect.serve.problems import describe_bytes, problem
 from throwcollect.serve.state import ComponentState, InstanceState, Lookout, describe
@@ -105,7 +106,8 @@ def make_instance_routes(instances: Instances, lookout: Lookout) -> APIRouter:
     @router.post("", status_code=202)
     def post(wish: Wish, response: Response) -> InstanceState:
         """Begin an instance of a component, with an id that is chosen here."""
-        made = f"{wish.component}-{time.time_ns() // 1_000_000:x}"
+        suffix = f"-{time.time_ns() // 1_000_000:x}"
+        made = wish.component[: LONGEST_NAME - len(suffix)] + suffix
         run, _ = instances.put(made, wish.origin)
         response.headers["Location"] = f"/api/v1/instances/{run.id}"
         return describe(run)
