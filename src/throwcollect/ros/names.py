@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import itertools
 import os
-import re
 from typing import Any
 
+from rclzenoh.exceptions import NameValidationException
+from rclzenoh.names import resolve
 from throwcollect.errors import ConfigError
 from throwcollect.ros.backend_names import Kind, find_class
 
 _numbers = itertools.count()
-_ABSOLUTE = re.compile(r"(/[A-Za-z_][A-Za-z0-9_]*)+")
 
 
 def absolute_name(name: str) -> str:
@@ -20,12 +20,11 @@ def absolute_name(name: str) -> str:
     Raises:
         ConfigError: If ROS does not allow such names.
     """
-    whole = name if name.startswith("/") else f"/{name}"
-    if not _ABSOLUTE.fullmatch(whole):
-        raise ConfigError(
-            f"{name!r} is no name in ROS", expected="letters, digits and underscores between single slashes"
-        )
-    return whole
+    try:
+        return resolve(name, "/", "")
+    except NameValidationException as error:
+        expected = "letters, digits and underscores between single slashes"
+        raise ConfigError(f"{name!r} is no name in ROS", expected=expected) from error
 
 
 def is_hidden(name: str) -> bool:

@@ -9,17 +9,14 @@ import threading
 import time
 from collections.abc import Callable
 from queue import Empty, SimpleQueue
-from typing import TYPE_CHECKING
 
 from throwcollect import ros
 from throwcollect.errors import ThrowcollectError
+from throwcollect.ros.connection import Connection
 from throwcollect.ros.endpoint import answers
 from throwcollect.serve.rosbridge.client import Client
 from throwcollect.serve.rosbridge.codec import Frame
 from throwcollect.serve.rosbridge.session import Session
-
-if TYPE_CHECKING:
-    from throwcollect.ros.connection import Connection
 
 _logger = logging.getLogger(__name__)
 

@@ -35,7 +35,7 @@ class Goal(Errand):
         self._client = client
         self.id: RequestId = request.id
         self._given = request.text("action")
-        super().__init__(absolute_name(self._given))
+        super().__init__(absolute_name(self._given), self._tell_failure)
         self.form = Form()
         self.handle: Any = None
         self.is_cancelled = False
@@ -49,8 +49,7 @@ class Goal(Errand):
         """Send the result to the client."""
         self._answer("action_result", plain_values(result, self.form.compression), status=status, result=True)
 
-    def fail(self, why: str) -> None:
-        """Tell the client why there is no result."""
+    def _tell_failure(self, why: str) -> None:
         self._answer("action_result", why, status=_UNKNOWN, result=False)
 
     def _answer(self, op: str, values: Any, **more: object) -> None:

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from throwcollect import ros
 from throwcollect.errors import ConfigError
+from throwcollect.ros.connection import Connection
 from throwcollect.ros.names import find_interface, full_name, make_own_name
 from throwcollect.serve.rosbridge.feed import Feed, Listener
-
-if TYPE_CHECKING:
-    from throwcollect.ros.connection import Connection
 
 
 class Session:
