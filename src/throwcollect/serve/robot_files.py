@@ -91,11 +91,7 @@ def _describe(path: Path, _changed_ns: int) -> str:
 
 
 def find_mesh(package: str, path: str) -> Path:
-    """Find the file of a mesh of one of the robots.
-
-    Args:
-        package: Name of the package in its URL.
-        path: Path within the package.
+    """Find the file of a mesh of one of the robots, whose URL is ``package://PACKAGE/PATH``.
 
     Raises:
         NotFoundError: If no robot's description names such a package, or it has no such file.

@@ -53,14 +53,9 @@ class Bridge:
         self._thread.start()
 
     def attach(self, send: Callable[[Frame], None], *, read_only: bool = False) -> Client:
-        """Add a client.
+        """Add a client, which the caller has to close.
 
-        Args:
-            send: Called with each frame for the client, in the bridge's thread; it may neither wait nor fail.
-            read_only: Whether the client may only look.
-
-        Returns:
-            The client, which the caller has to close.
+        Each frame for the client is given to ``send`` in the bridge's thread, so that may neither wait nor fail.
         """
         client = Client(self, send, read_only=read_only)
         self.submit(lambda: self._clients.append(client))

@@ -12,14 +12,7 @@ from throwcollect.serve.rosbridge.feed import Feed, Listener
 
 
 class Session:
-    """A context, a node in it, and its executor; all are used by one thread.
-
-    Args:
-        connection: The way into the graph.
-
-    Attributes:
-        node: The node, which is hidden.
-        executor: Its executor.
+    """A context, a hidden node in it, and the node's executor; all are used by one thread.
 
     Raises:
         ConfigError: If the connection cannot be used.
@@ -51,11 +44,7 @@ class Session:
             ros.shutdown(context=self._context)
 
     def type_of(self, topic: str, wanted: str) -> str:
-        """Full name of the type of a topic.
-
-        Args:
-            topic: Absolute name of the topic.
-            wanted: Type that a client names, in full or as ``pkg/Type``; empty if it names none.
+        """Full name of the type of a topic, which a client may name in full, as ``pkg/Type``, or not at all.
 
         Raises:
             ConfigError: If the topic has another type, or none is named and it has none or several.
