@@ -58,10 +58,9 @@ class Client(Receiver):
         return endpoint.node.context.graph.count(EntityKind.SERVICE, endpoint.name, endpoint.type) > 0
 
     def wait_for_service(self, timeout_sec: float | None = None) -> bool:
-        """Wait until somebody offers the service, and tell whether somebody does.
+        """Wait until somebody offers the service, for at most ``timeout_sec``, and tell whether somebody does.
 
-        Args:
-            timeout_sec: Longest time [s]; None or negative for no limit.
+        None or a negative time is no limit.
         """
         context = self._endpoint.node.context
         return context.graph.wait_for(self.service_is_ready, timeout_sec, context.ok)

@@ -113,9 +113,6 @@ class Task(Future):
     Args:
         work: The coroutine, or a function without arguments, which may return one.
         mailbox: Where the task waits until it is carried on.
-
-    Attributes:
-        mailbox: The same.
     """
 
     def __init__(self, work: Callable[[], Any] | Coroutine[Any, Any, Any], mailbox: Mailbox) -> None:

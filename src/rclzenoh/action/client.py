@@ -82,10 +82,9 @@ class ActionClient:
         )
 
     def wait_for_server(self, timeout_sec: float | None = None) -> bool:
-        """Wait until somebody offers the action, and tell whether somebody does.
+        """Wait until somebody offers the action, for at most ``timeout_sec``, and tell whether somebody does.
 
-        Args:
-            timeout_sec: Longest time [s]; None or negative for no limit.
+        None or a negative time is no limit.
         """
         context = self._node.context
         return context.graph.wait_for(self.server_is_ready, timeout_sec, context.ok)

@@ -102,7 +102,7 @@ class ActionServer:
     Args:
         node: Node that the server belongs to.
         action_type: Class of the action.
-        action_name: Name of the action.
+        action_name: Its absolute, relative or private name.
         execute_callback: Called with the goal handle, returns the result.
         goal_callback: Called with the goal, returns a `GoalResponse`; by default, every goal is accepted.
         handle_accepted_callback: Called with the goal handle of an accepted goal; by default, it executes at once.
