@@ -94,6 +94,18 @@ export class Connection {
   }
 
   /**
+   * Ask the server for an answer in JSON, as `ask` does.
+   * @param {string} method
+   * @param {string} path
+   * @param {unknown} [body]
+   * @returns {Promise<any>} what it says
+   * @throws {Problem}
+   */
+  async read(method, path, body) {
+    return (await this.ask(method, path, body)).json();
+  }
+
+  /**
    * Open a socket, and open it again whenever it is lost, after a wait that grows.
    * @param {string} path below the interface
    * @param {SocketEvents} events
