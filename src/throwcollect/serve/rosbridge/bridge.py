@@ -16,6 +16,7 @@ from throwcollect.ros.connection import Connection
 from throwcollect.ros.endpoint import answers
 from throwcollect.serve.rosbridge.client import Client
 from throwcollect.serve.rosbridge.codec import Frame
+from throwcollect.serve.rosbridge.offered_actions import FAREWELL_S
 from throwcollect.serve.rosbridge.session import Session
 
 _logger = logging.getLogger(__name__)
@@ -118,6 +119,11 @@ class Bridge:
             client.close()
         while not self._work.empty():
             self._do_next()
+        # Nodes that wait for results of clients' actions get them before the actions are withdrawn.
+        end = time.monotonic() + FAREWELL_S
+        while self._session is not None and self._timers and self._timers[0][0] <= end:
+            self._spin(self._session, max(self._timers[0][0] - time.monotonic(), 0.0))
+            self._call_timers()
         self._leave()
 
     def _spin(self, session: Session, seconds: float) -> None:
