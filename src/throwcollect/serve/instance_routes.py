@@ -106,9 +106,7 @@ def make_instance_routes(instances: Instances, lookout: Lookout) -> APIRouter:
     @router.post("", status_code=202)
     def post(wish: Wish, response: Response) -> InstanceState:
         """Begin an instance of a component, with an id that is chosen here."""
-        suffix = f"-{time.time_ns() // 1_000_000:x}"
-        made = wish.component[: LONGEST_NAME - len(suffix)] + suffix
-        run, _ = instances.put(made, wish.origin)
+        run, _ = instances.put(make_id(wish.component), wish.origin)
         response.headers["Location"] = f"/api/v1/instances/{run.id}"
         return describe(run)
 
@@ -128,6 +126,12 @@ def make_instance_routes(instances: Instances, lookout: Lookout) -> APIRouter:
         return describe(instances.scale(instance, scaling.simulations))
 
     return router
+
+
+def make_id(component: str) -> str:
+    """Make an id for an instance of a component, from its name, as far as that fits, and the present time."""
+    suffix = f"-{time.time_ns() // 1_000_000:x}"
+    return component[: LONGEST_NAME - len(suffix)] + suffix
 
 
 def make_log_routes(instances: Instances) -> APIRouter:

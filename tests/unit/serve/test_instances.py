@@ -44,16 +44,6 @@ def put(client: TestClient, name: str, **wish: Any) -> Any:
     return client.put(f"{URL}/{name}", json={"component": "throws", **wish})
 
 
-def test_an_id_that_is_chosen_here_fits_however_long_the_name_of_the_component_is(
-    served: Served, tmp_path: Path
-) -> None:
-    name = "c" * 63
-    (tmp_path / "long.yaml").write_text(f"components:\n  {name}: {{config: small.yaml, max_instances: 2}}\n")
-    object.__setattr__(served.instances, "catalogue", Catalogue.read(tmp_path / "long.yaml"))
-    answer = served.client().post(URL, json={"component": name})
-    assert (answer.status_code, answer.json()["component"], len(answer.json()["id"])) == (202, name, 63)
-
-
 def test_the_same_request_again_changes_nothing(
     client: TestClient, begun: list[dict[str, Any]], tmp_path: Path
 ) -> None:
