@@ -33,7 +33,7 @@ class Client(Receiver):
         super().__init__(node.mailbox, None)
         self.srv_type = srv_type
         self.qos_profile = qos_profile
-        self._pending: dict[int, tuple[Future, Callable[[Any], Any] | None]] = {}
+        self._pending: dict[int, tuple[Future, Callable[[Any], Any]]] = {}
         self._sequence = 0
         self._lock = threading.Lock()
         self._endpoint = Endpoint(node, EntityKind.CLIENT, srv_name, srv_type.TYPE, qos_profile)
@@ -58,26 +58,17 @@ class Client(Receiver):
         return endpoint.node.context.graph.count(EntityKind.SERVICE, endpoint.name, endpoint.type) > 0
 
     def wait_for_service(self, timeout_sec: float | None = None) -> bool:
-        """Wait until somebody offers the service, and tell whether somebody does.
+        """Wait until somebody offers the service, for at most ``timeout_sec``, and tell whether somebody does.
 
-        Args:
-            timeout_sec: Longest time [s]; None or negative for no limit.
+        None or a negative time is no limit.
         """
         context = self._endpoint.node.context
         return context.graph.wait_for(self.service_is_ready, timeout_sec, context.ok)
 
-    def call_async(self, request: Message) -> Future:
+    def call_async(self, request: Message, convert: Callable[[Any], Any] = lambda response: response) -> Future:
         """Send a request; the future of the response stays pending if nobody answers.
 
-        Raises:
-            TypeError: If the request is not of the service's type.
-            ValueError: If a field does not fit its type.
-            InvalidHandle: If the client was destroyed or the session closed.
-        """
-        return self.send(request, None)
-
-    def send(self, request: Message, convert: Callable[[Any], Any] | None) -> Future:
-        """Send a request like `call_async`; the future has what ``convert`` makes of the response.
+        It has what ``convert`` makes of the response, which is the response itself by default.
 
         Raises:
             TypeError: If the request is not of the service's type.
@@ -126,7 +117,7 @@ class Client(Receiver):
         future, convert = self._pending.pop(attachment.sequence)
         future.call_back_through(self.mailbox)
         if not future.cancelled():
-            future.set_result(convert(response) if convert else response)
+            future.set_result(convert(response))
 
     def destroy(self) -> None:
         """Withdraw the client; what is pending stays so. See `Node.destroy_client`."""

@@ -142,12 +142,7 @@ def get_default_context() -> Context:
 
 
 def init(*, context: Context | None = None, domain_id: int | None = None, config: zenoh.Config | None = None) -> None:
-    """Initialise a context; for the default one, a SIGTERM ends all spinning from now on.
-
-    Args:
-        context: The context; None for the default one.
-        domain_id: As in `Context.init`.
-        config: As in `Context.init`.
+    """Initialise a context as `Context.init` does; for the default one, a SIGTERM ends all spinning from now on.
 
     Raises:
         RuntimeError: If the context is in use already.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import dataclass
 
 S_TO_NS = 1_000_000_000
@@ -24,3 +25,8 @@ class Duration:
 
 Infinite = Duration(nanoseconds=2**63 - 1)
 """Longest duration; stands for no limit."""
+
+
+def deadline_after(timeout_s: float | None) -> float:
+    """Time of `time.monotonic` at which a wait ends [s]; never if the timeout is None or negative, as in rclpy."""
+    return float("inf") if timeout_s is None or timeout_s < 0 else time.monotonic() + timeout_s

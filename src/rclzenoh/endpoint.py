@@ -14,14 +14,7 @@ from rclzenoh.qos import QoSProfile, encode
 
 
 class Endpoint:
-    """Identity of one publisher, subscription, service or client.
-
-    Args:
-        node: The node that it belongs to.
-        kind: Kind of the endpoint.
-        name: Absolute, relative or private name of the topic or service.
-        type_name: ROS name of the message or service type.
-        qos: Quality of service.
+    """Identity of one publisher, subscription, service or client, made from names as a node has them.
 
     Attributes:
         name: Absolute name of the topic or service.
@@ -55,11 +48,7 @@ class Endpoint:
         self._has_complained = False
 
     def announce(self, declared: Any) -> None:
-        """Show the endpoint in the graph, now that it works.
-
-        Args:
-            declared: The Zenoh object behind it, which is undeclared after the token.
-        """
+        """Show the endpoint in the graph, now that the Zenoh object behind it works."""
         self._declared = [self.session.liveliness().declare_token(self.token.key()), declared]
 
     def close(self) -> None:

@@ -31,13 +31,7 @@ class UnreadableKeyError(ConfigurationError):
 
 
 class NoRouterError(RclzenohError):
-    """There is no router where a session looks for one.
-
-    Args:
-        endpoints: Where it looks, as JSON.
-        seconds: How long it has looked [s].
-        reason: What Zenoh says.
-    """
+    """There is no router at the endpoints, which are JSON; the reason is what Zenoh says."""
 
     def __init__(self, endpoints: str, seconds: float, reason: str) -> None:
         self.endpoints = endpoints

@@ -9,7 +9,7 @@ from queue import Empty
 from typing import Any
 
 from rclzenoh.context import Context, get_default_context
-from rclzenoh.duration import S_TO_NS
+from rclzenoh.duration import S_TO_NS, deadline_after
 from rclzenoh.exceptions import ExternalShutdownException
 from rclzenoh.mailbox import Mailbox
 from rclzenoh.node_base import NodeBase
@@ -22,11 +22,7 @@ _LONGEST_WAIT_S = 0.5
 
 
 class Executor:
-    """Calls the callbacks of its nodes in order of arrival; timers take turns with everything else.
-
-    Args:
-        context: Context of the nodes; None for the default one.
-    """
+    """Calls the callbacks of its nodes in order of arrival; timers take turns with everything else."""
 
     def __init__(self, *, context: Context | None = None) -> None:
         self.context = context or get_default_context()
@@ -82,37 +78,27 @@ class Executor:
             self.spin_once()
 
     def spin_until_future_complete(self, future: Future, timeout_sec: float | None = None) -> None:
-        """Call callbacks until a future is done or cancelled.
-
-        Args:
-            future: The future.
-            timeout_sec: Longest time [s]; None or negative for no limit.
+        """Call callbacks until a future is done or cancelled, ``timeout_sec`` at most; None or negative is no limit.
 
         Raises:
             ExternalShutdownException: If the context is shut down meanwhile.
         """
         future.add_done_callback(lambda _: self.wake())
-        limited = timeout_sec is not None and timeout_sec >= 0
-        deadline = time.monotonic() + (timeout_sec or 0.0)
+        deadline = deadline_after(timeout_sec)
         while self.context.ok() and not (future.done() or future.cancelled() or self._is_shutdown):
-            left = deadline - time.monotonic() if limited else None
-            self._spin_once(max(left, 0.0) if left is not None else None, future)
-            if limited and time.monotonic() >= deadline:
+            self._spin_once(deadline, future)
+            if time.monotonic() >= deadline:
                 return
 
     def spin_once(self, timeout_sec: float | None = None) -> None:
-        """Call one callback, waiting for it if need be.
-
-        Args:
-            timeout_sec: Longest time to wait [s]; None or negative for no limit.
+        """Call one callback, waiting for it if need be, ``timeout_sec`` at most; None or negative is no limit.
 
         Raises:
             ExternalShutdownException: If the context is not usable.
         """
-        self._spin_once(timeout_sec, None)
+        self._spin_once(deadline_after(timeout_sec), None)
 
-    def _spin_once(self, timeout_s: float | None, until: Future | None) -> None:
-        deadline: float | None = None
+    def _spin_once(self, deadline: float, until: Future | None) -> None:
         while True:
             if not self.context.ok():
                 raise ExternalShutdownException("the context was shut down")
@@ -126,14 +112,10 @@ class Executor:
                 return
             self._timer_was_last = False
             if not queued:
-                if timeout_s == 0 or self._is_shutdown or (until is not None and (until.done() or until.cancelled())):
+                left = deadline - time.monotonic()
+                if left <= 0 or self._is_shutdown or (until is not None and (until.done() or until.cancelled())):
                     return
-                if timeout_s is not None and timeout_s > 0:
-                    now = time.monotonic()
-                    deadline = now + timeout_s if deadline is None else deadline
-                    if now >= deadline:
-                        return
-                    wait = min(wait, deadline - now)
+                wait = min(wait, left)
             try:
                 work = self._queue.get(timeout=0 if queued else min(wait, _LONGEST_WAIT_S))
             except Empty:

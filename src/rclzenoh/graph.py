@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterable, Iterator
 
 import zenoh
 
+from rclzenoh.duration import deadline_after
 from rclzenoh.keys import PREFIX, EntityKind, Token, parse_token
 
 _MOST_UNREAD = 10_000
@@ -77,15 +78,7 @@ class Graph:
         return sum(token.name == name for token in self.tokens(kind))
 
     def names_and_types(self, *kinds: EntityKind, node: tuple[str, str] | None = None) -> list[tuple[str, list[str]]]:
-        """Names and ROS types of endpoints.
-
-        Args:
-            kinds: Which endpoints.
-            node: Namespace and name of the node they belong to; None for all.
-
-        Returns:
-            Names, sorted, each with its types, sorted.
-        """
+        """Names and ROS types of endpoints, sorted, of all nodes or of one, given by its namespace and name."""
         return group_types(
             (token.name, token.ros_type)
             for token in self.tokens(*kinds)
@@ -93,21 +86,17 @@ class Graph:
         )
 
     def wait_for(self, condition: Callable[[], bool], timeout_s: float | None, alive: Callable[[], bool]) -> bool:
-        """Wait until something is true of the graph.
+        """Wait until a condition is true of the graph, and tell whether it is.
 
         Args:
             condition: What to wait for.
             timeout_s: Longest time [s]; None or negative for no limit.
             alive: Whether waiting still makes sense.
-
-        Returns:
-            Whether the condition is true.
         """
-        limited = timeout_s is not None and timeout_s >= 0
-        deadline = time.monotonic() + (timeout_s or 0.0)
+        deadline = deadline_after(timeout_s)
         while not condition():
             # The wait is cut into slices, because nothing notifies this thread when the context is shut down.
-            left = deadline - time.monotonic() if limited else _POLL_S
+            left = deadline - time.monotonic()
             if left <= 0 or not alive():
                 return False
             with self._changed:

@@ -24,13 +24,9 @@ REQUEST = b"\0\1\0\0" + struct.pack("<I", 0)
 
 
 def node_answers(session: zenoh.Session, node: str, *, domain_id: int, timeout_s: float) -> bool:
-    """Ask a node for a sign of life.
+    """Ask a node for a sign of life, and wait ``timeout_s`` for it.
 
-    Args:
-        session: An open session.
-        node: Full name of the node without its first slash; ``**/`` in front of a name stands for any namespace.
-        domain_id: ROS domain.
-        timeout_s: Time for the answer [s].
+    The node is given by its full name without the first slash; ``**/`` in front of a name stands for any namespace.
     """
     replies = session.get(
         data_key(domain_id, f"{node}/get_parameters", "rcl_interfaces/srv/GetParameters", _ANY_HASH),

@@ -86,29 +86,40 @@ def parse_token(key: str) -> Token | None:
     Chunks that later versions of rmw_zenoh_cpp append are ignored.
     """
     chunks = key.split("/")
-    if len(chunks) < _NODE_CHUNKS or chunks[0] != PREFIX or not all(chunks):
+    if chunks[0] != PREFIX or not all(chunks):
         return None
-    domain, session, node_id, entity_id, kind, enclave, namespace, node = chunks[1:_NODE_CHUNKS]
-    if not all(number.isdecimal() and len(number) <= _MOST_DIGITS for number in (domain, node_id, entity_id)):
+    try:
+        domain, session, node_id, entity_id, kind, enclave, namespace, node = chunks[1:_NODE_CHUNKS]
+        is_node = EntityKind(kind) is EntityKind.NODE
+        name, dds, type_hash, qos = [""] * 4 if is_node else chunks[_NODE_CHUNKS:_ENDPOINT_CHUNKS]
+        return Token(
+            domain=read_natural(domain),
+            session=session,
+            node_id=read_natural(node_id),
+            entity_id=read_natural(entity_id),
+            kind=EntityKind(kind),
+            namespace=namespace.replace("%", "/"),
+            node=node,
+            name=name.replace("%", "/"),
+            type=dds,
+            type_hash=type_hash,
+            qos=qos,
+            enclave=enclave.replace("%", "/"),
+        )
+    except ValueError:
         return None
-    if kind not in EntityKind._value2member_map_ or (kind != "NN" and len(chunks) < _ENDPOINT_CHUNKS):
-        return None
-    endpoint = chunks[_NODE_CHUNKS:_ENDPOINT_CHUNKS] if kind != "NN" else [""] * 4
-    name, dds, type_hash, qos = endpoint
-    return Token(
-        domain=int(domain),
-        session=session,
-        node_id=int(node_id),
-        entity_id=int(entity_id),
-        kind=EntityKind(kind),
-        namespace=namespace.replace("%", "/"),
-        node=node,
-        name=name.replace("%", "/"),
-        type=dds,
-        type_hash=type_hash,
-        qos=qos,
-        enclave=enclave.replace("%", "/"),
-    )
+
+
+def read_natural(text: str) -> int:
+    """A number from 0 on, as tokens have them.
+
+    Raises:
+        ValueError: If it is none, or larger than 64 bits may be.
+    """
+    # `int` alone takes signs, blanks and underscores, too.
+    if not (text.isascii() and text.isdecimal() and len(text) <= _MOST_DIGITS):
+        raise ValueError(f"{text!r:.40} is no number")
+    return int(text)
 
 
 def dds_type(name: str) -> str:

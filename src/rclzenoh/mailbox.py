@@ -92,7 +92,7 @@ class Receiver(ABC):
             self._items.append(item)
         if surplus is not None:
             # The lock is free again here, because refusing sends an answer.
-            self.refuse(surplus)
+            self.refuse(surplus, f"more than {self._queue_length} requests are waiting")
 
     def run(self) -> bool:
         """Handle the oldest item; returns whether there was one."""
@@ -107,12 +107,12 @@ class Receiver(ABC):
     def handle(self, item: Any) -> None:
         """Handle one item, in the thread that spins."""
 
-    def refuse(self, item: Any) -> None:  # noqa: B027 - most have nobody to tell
-        """Turn away an item for which there is no room, in Zenoh's thread."""
+    def refuse(self, item: Any, reason: str) -> None:  # noqa: B027 - most have nobody to tell
+        """Turn away an item that will not be handled, in any thread."""
 
     def discard_all(self) -> None:
         """Turn away all items that wait."""
         with self.mailbox.lock:
             items, self._items = self._items, deque()
         for item in items:
-            self.refuse(item)
+            self.refuse(item, "the service is offered no longer")

@@ -42,12 +42,7 @@ def join(namespace: str, name: str) -> str:
 
 
 def resolve(name: str, namespace: str, node: str) -> str:
-    """Absolute name of a topic or service.
-
-    Args:
-        name: Absolute (``/x``), relative (``x``) or private (``~/x``) name.
-        namespace: Absolute namespace of the node.
-        node: Name of the node.
+    """Absolute name of a topic or service that a node in a namespace calls ``/x``, ``x`` or ``~/x``.
 
     Raises:
         NameValidationException: If the result is no valid name.

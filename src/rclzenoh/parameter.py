@@ -33,16 +33,10 @@ class ParameterKind(Enum):
         Raises:
             TypeError: If parameters cannot have such values.
         """
-        if value is None:
-            return cls.NOT_SET
-        for type_, python in _SCALARS.items():
-            if isinstance(value, python):
-                return cls(type_)
-        if isinstance(value, (list, tuple, array.array)):
-            # An empty list fits all kinds of elements. It is an array of bytes, as in rclpy, because these come first.
-            for type_, python in _ELEMENTS.items():
-                if all(isinstance(element, python) for element in value):
-                    return cls(type_)
+        # An empty list fits all kinds of elements. It is an array of bytes, as in rclpy, because these come first.
+        for kind in cls:
+            if kind.check(value):
+                return kind
         raise TypeError(f"{value!r:.80} is no value of a parameter")
 
     def check(self, value: object) -> bool:
@@ -50,28 +44,20 @@ class ParameterKind(Enum):
         if self is ParameterKind.NOT_SET:
             return value is None
         if self.value in _SCALARS:
-            return isinstance(value, _SCALARS[self.value]) and (
-                self is ParameterKind.BOOL or not isinstance(value, bool)
-            )
+            # True is an int, too.
+            return isinstance(value, _SCALARS[self.value]) and isinstance(value, bool) == (self is ParameterKind.BOOL)
         return isinstance(value, (list, tuple, array.array)) and all(
             isinstance(element, _ELEMENTS[self.value]) for element in value
         )
 
+    @property
+    def field(self) -> str:
+        """Field of rcl_interfaces/msg/ParameterValue that holds such values."""
+        return f"{self.name.lower()}_value"
 
-# In this order: True is an int, too.
+
 _SCALARS: dict[int, type] = {1: bool, 2: int, 3: float, 4: str}
 _ELEMENTS: dict[int, type] = {5: bytes, 6: bool, 7: int, 8: float, 9: str}
-_FIELDS = {
-    ParameterKind.BOOL: "bool_value",
-    ParameterKind.INTEGER: "integer_value",
-    ParameterKind.DOUBLE: "double_value",
-    ParameterKind.STRING: "string_value",
-    ParameterKind.BYTE_ARRAY: "byte_array_value",
-    ParameterKind.BOOL_ARRAY: "bool_array_value",
-    ParameterKind.INTEGER_ARRAY: "integer_array_value",
-    ParameterKind.DOUBLE_ARRAY: "double_array_value",
-    ParameterKind.STRING_ARRAY: "string_array_value",
-}
 
 
 class Parameter:
@@ -108,7 +94,7 @@ class Parameter:
         if self.type_ is ParameterKind.BYTE_ARRAY:
             message.byte_array_value = b"".join(self.value)
         elif self.type_ is not ParameterKind.NOT_SET:
-            setattr(message, _FIELDS[self.type_], list(self.value) if self.type_.value in _ELEMENTS else self.value)
+            setattr(message, self.type_.field, list(self.value) if self.type_.value in _ELEMENTS else self.value)
         return message
 
     def to_parameter_msg(self) -> ParameterMessage:
@@ -135,7 +121,7 @@ def parameter_value_to_python(message: ParameterValue) -> Any:
     type_ = ParameterKind(message.type)
     if type_ is ParameterKind.NOT_SET:
         return None
-    value = getattr(message, _FIELDS[type_])
+    value = getattr(message, type_.field)
     if type_ is ParameterKind.BYTE_ARRAY:
         return [bytes([octet]) for octet in value]
     return value.tolist() if isinstance(value, np.ndarray) else value

@@ -40,10 +40,7 @@ class Publisher:
         return self._endpoint.name
 
     def publish(self, msg: Message | bytes) -> None:
-        """Publish a message.
-
-        Args:
-            msg: The message, or its CDR bytes.
+        """Publish a message, or its CDR bytes.
 
         Raises:
             TypeError: If the message is not of the topic's type.

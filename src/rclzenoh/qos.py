@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from enum import IntEnum
 
 from rclzenoh.duration import S_TO_NS, Duration, Infinite
+from rclzenoh.keys import read_natural
 
 
 class HistoryPolicy(IntEnum):
@@ -123,13 +124,13 @@ def decode(text: str) -> QoSProfile | None:
     (reliability, *_), (durability, *_), (history, depth, *_), deadline, lifespan, (liveliness, *lease) = groups[:6]
     try:
         return QoSProfile(
-            depth=_natural(depth or str(_MIDDLEWARE_DEPTH)),
-            history=HistoryPolicy(_natural(history or "1")),
-            reliability=ReliabilityPolicy(_natural(reliability or "1")),
-            durability=DurabilityPolicy(_natural(durability or "2")),
+            depth=read_natural(depth or str(_MIDDLEWARE_DEPTH)),
+            history=HistoryPolicy(read_natural(history or "1")),
+            reliability=ReliabilityPolicy(read_natural(reliability or "1")),
+            durability=DurabilityPolicy(read_natural(durability or "2")),
             lifespan=_duration(lifespan),
             deadline=_duration(deadline),
-            liveliness=LivelinessPolicy(_natural(liveliness or "1")),
+            liveliness=LivelinessPolicy(read_natural(liveliness or "1")),
             liveliness_lease_duration=_duration(lease),
         )
     except ValueError:
@@ -140,22 +141,11 @@ _SIZES = (1, 1, 2, 2, 2, 3)
 """Least number of values in each group."""
 
 
-def _natural(text: str) -> int:
-    # `int` alone takes signs, blanks and underscores, too.
-    if not (text.isascii() and text.isdecimal() and len(text) <= _MOST_DIGITS):
-        raise ValueError(f"{text!r:.40} is no number")
-    return int(text)
-
-
-_MOST_DIGITS = 20
-"""Digits of the largest number of 64 bits."""
-
-
 def _duration(chunk: list[str]) -> Duration:
     seconds, nanoseconds = chunk[:2]
     if not seconds and not nanoseconds:
         return Infinite
-    total = _natural(seconds or "0") * S_TO_NS + _natural(nanoseconds or "0")
+    total = read_natural(seconds or "0") * S_TO_NS + read_natural(nanoseconds or "0")
     return Duration(nanoseconds=min(total, Infinite.nanoseconds))
 
 

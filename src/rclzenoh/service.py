@@ -5,7 +5,6 @@ from __future__ import annotations
 import inspect
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any
 
 import zenoh
@@ -36,7 +35,7 @@ class Service(Receiver):
         self.srv_type = srv_type
         self.qos_profile = qos_profile
         self.callback = callback
-        self._open: set[_OpenRequest] = set()
+        self._open: set[zenoh.Query] = set()
         self._is_destroyed = False
         self._endpoint = Endpoint(node, EntityKind.SERVICE, srv_name, srv_type.TYPE, qos_profile)
         handler = zenoh.handlers.Callback(self.deliver, indirect=False)
@@ -59,14 +58,13 @@ class Service(Receiver):
             self._endpoint.complain(error)
             _refuse(item, str(error))
             return
-        open_request = _OpenRequest(item, attachment)
-        self._open.add(open_request)
-        start(self.mailbox, self._serve(open_request, request))
+        self._open.add(item)
+        start(self.mailbox, self._serve(item, attachment, request))
 
-    def refuse(self, item: zenoh.Query) -> None:  # noqa: D102 - see `Receiver`
-        _refuse(item, f"{self.service_name}: more than {self.qos_profile.depth} requests are waiting")
+    def refuse(self, item: zenoh.Query, reason: str) -> None:  # noqa: D102 - see `Receiver`
+        _refuse(item, f"{self.service_name}: {reason}")
 
-    async def _serve(self, open_request: _OpenRequest, request: Message) -> None:
+    async def _serve(self, query: zenoh.Query, received: Attachment, request: Message) -> None:
         try:
             response = self.callback(request, self.srv_type.Response())
             if inspect.iscoroutine(response):
@@ -75,19 +73,18 @@ class Service(Receiver):
                 raise TypeError(
                     f"{self.service_name}: the callback must return {self.srv_type.TYPE}.Response, got {response!r:.80}"
                 )
-            self._reply(open_request, response)
+            self._reply(query, received, response)
         finally:
             # A query that is not dropped stays open at the client until its timeout.
-            self._open.discard(open_request)
-            open_request.query.drop()  # type: ignore[no-untyped-call]
+            self._open.discard(query)
+            query.drop()  # type: ignore[no-untyped-call]
 
-    def _reply(self, open_request: _OpenRequest, response: Message) -> None:
-        received = open_request.attachment
+    def _reply(self, query: zenoh.Query, received: Attachment, response: Message) -> None:
         attachment = Attachment(received.sequence, time.time_ns(), received.gid).pack()
         if self._is_destroyed:
             return
         try:
-            open_request.query.reply(self._endpoint.key, serialize(response), attachment=attachment)
+            query.reply(self._endpoint.key, serialize(response), attachment=attachment)
         except zenoh.ZError as error:
             self._endpoint.complain(f"a response could not be sent, the client may be gone: {error}")
 
@@ -97,17 +94,9 @@ class Service(Receiver):
         self._is_destroyed = True
         self._endpoint.close()
         self.discard_all()
-        for open_request in list(self._open):
-            open_request.query.drop()  # type: ignore[no-untyped-call]
+        for query in list(self._open):
+            query.drop()  # type: ignore[no-untyped-call]
         self._open.clear()
-
-
-@dataclass(frozen=True, eq=False)
-class _OpenRequest:
-    """A request that has no answer yet."""
-
-    query: zenoh.Query
-    attachment: Attachment
 
 
 def _refuse(query: zenoh.Query, reason: str) -> None:

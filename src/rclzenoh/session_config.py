@@ -57,11 +57,7 @@ class Key:
 
 
 def client_config(endpoint: str, key: Key | None = None) -> zenoh.Config:
-    """Configuration of a client of a router, whatever the environment says.
-
-    Args:
-        endpoint: Endpoint of the router, such as ``tcp/127.0.0.1:7447``.
-        key: Key that a router at ``tls/...`` lets nobody in without.
+    """Configuration of a client of a router, whatever the environment says; one at ``tls/...`` asks for the key.
 
     Raises:
         ConfigurationError: If the endpoint is malformed, or the key cannot be read.
@@ -135,11 +131,7 @@ def client_override(endpoint: str, key: Key | None = None) -> str:
 
 
 def router_config(endpoint: str, key: Key | None = None) -> zenoh.Config:
-    """Configuration of a router that listens on one endpoint.
-
-    Args:
-        endpoint: Such as ``tcp/127.0.0.1:7447``.
-        key: Key that nobody is let in without, if the endpoint is a protected one.
+    """Configuration of a router that listens on one endpoint; at ``tls/...`` it lets nobody in without the key.
 
     Raises:
         ConfigurationError: If the endpoint is malformed, or the key cannot be read.
@@ -198,10 +190,7 @@ def _endpoints(
 
     Zenoh takes one list, or one for each mode. By default clients listen nowhere, and others where anybody gets in.
 
-    Args:
-        config: The configuration.
-        side: Which of the two.
-        of_clients: Those of a client, if the configuration says nothing of clients.
+    Where the configuration says nothing of clients, they are ``of_clients``.
     """
     endpoints: list[str] | dict[str, list[str]] = json.loads(config.get_json(f"{side}/endpoints"))
     if isinstance(endpoints, list):

@@ -113,17 +113,13 @@ class Task(Future):
     Args:
         work: The coroutine, or a function without arguments, which may return one.
         mailbox: Where the task waits until it is carried on.
-
-    Attributes:
-        mailbox: The same.
     """
 
     def __init__(self, work: Callable[[], Any] | Coroutine[Any, Any, Any], mailbox: Mailbox) -> None:
         super().__init__()
         self.call_back_through(mailbox)
         self.mailbox = mailbox
-        self._function = None if isinstance(work, Coroutine) else work
-        self._coroutine = work if isinstance(work, Coroutine) else None
+        self._work = work
 
     def schedule(self) -> None:
         """Have the thread that spins carry on with this task."""
@@ -138,13 +134,13 @@ class Task(Future):
         if self.done() or self.cancelled():
             return False
         try:
-            if self._function is not None:
-                result, self._function = self._function(), None
+            if not isinstance(self._work, Coroutine):
+                result = self._work()
                 if not isinstance(result, Coroutine):
                     self.set_result(result)
                     return True
-                self._coroutine = result
-            awaited = self._coroutine.send(None) if self._coroutine is not None else None
+                self._work = result
+            awaited = self._work.send(None)
         except StopIteration as stop:
             self.set_result(stop.value)
         except BaseException as error:
@@ -159,8 +155,8 @@ class Task(Future):
 
     def cancel(self) -> None:
         """Give up the coroutine where it waits."""
-        if self._coroutine is not None and not self.done():
-            self._coroutine.close()
+        if isinstance(self._work, Coroutine) and not self.done():
+            self._work.close()
         super().cancel()
 
 

@@ -66,6 +66,7 @@ def test_chunks_that_later_versions_append_are_ignored():
         "@ros2_lv/0/1a/0/0/MP/%/%/n",
         "@ros2_lv/0/1a/0/0/NN//%/n",
         "other/0/1a/0/0/NN/%/%/n",
+        "@ros2_lv/0/1a/0/٠/NN/%/%/n",
         "@ros2_lv/0/1a/0/" + 5000 * "9" + "/NN/%/%/n",
     ],
 )

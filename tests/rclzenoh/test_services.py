@@ -1,6 +1,7 @@
 """Services and clients, through a real router."""
 
 import threading
+from queue import SimpleQueue
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ import zenoh
 from rclzenoh.attachment import Attachment, unpack
 from rclzenoh.interfaces import deserialize, get_service, serialize, type_hash
 from rclzenoh.keys import data_key
+from rclzenoh.qos import QoSProfile
 
 Trigger = get_service("std_srvs/srv/Trigger")
 SetBool = get_service("std_srvs/srv/SetBool")
@@ -123,3 +125,21 @@ def test_a_request_that_arrives_while_the_service_is_destroyed_gets_no_response(
     )
     assert rig.spin(lambda: replies)
     assert replies == [None]
+
+
+def test_a_request_that_is_not_handled_is_told_why(rig, pair):
+    server, node, client = pair
+    service = server.create_service(SetBool, "~/set", answer, qos_profile=QoSProfile(depth=1))
+    assert client.wait_for_service(5)
+    reasons = SimpleQueue()
+    for number in range(2):
+        node.context.session.get(
+            data_key(node.context.get_domain_id(), "/server/set", SetBool.TYPE, type_hash(SetBool.TYPE)),
+            zenoh.handlers.Callback(lambda reply: reasons.put(reply.err.payload.to_string()), indirect=False),
+            payload=serialize(SetBool.Request()),
+            attachment=Attachment(number, 0, bytes(16)).pack(),
+        )
+    # Nobody spins, so the second request takes the place of the first.
+    assert reasons.get(timeout=30) == "/server/set: more than 1 requests are waiting"
+    server.destroy_service(service)
+    assert reasons.get(timeout=30) == "/server/set: the service is offered no longer"

@@ -82,10 +82,9 @@ class ActionClient:
         )
 
     def wait_for_server(self, timeout_sec: float | None = None) -> bool:
-        """Wait until somebody offers the action, and tell whether somebody does.
+        """Wait until somebody offers the action, for at most ``timeout_sec``, and tell whether somebody does.
 
-        Args:
-            timeout_sec: Longest time [s]; None or negative for no limit.
+        None or a negative time is no limit.
         """
         context = self._node.context
         return context.graph.wait_for(self.server_is_ready, timeout_sec, context.ok)
@@ -121,7 +120,7 @@ class ActionClient:
             return goal_handle
 
         request = self._action_type.Impl.SendGoalService.Request(goal_id=goal_id, goal=goal)
-        return self._goal_client.send(request, handle)
+        return self._goal_client.call_async(request, handle)
 
     def request_result(self, goal_handle: ClientGoalHandle) -> Future:
         """Ask for a goal's result; see `ClientGoalHandle.get_result_async`."""
@@ -131,7 +130,7 @@ class ActionClient:
             return response
 
         request = self._action_type.Impl.GetResultService.Request(goal_id=goal_handle.goal_id)
-        return self._result_client.send(request, take)
+        return self._result_client.call_async(request, take)
 
     def request_cancel(self, goal_handle: ClientGoalHandle) -> Future:
         """Ask for a goal to be cancelled; see `ClientGoalHandle.cancel_goal_async`."""

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from enum import Enum
+from typing import TypeVar
 
-from rclzenoh.duration import S_TO_NS
-from rclzenoh.interfaces.msg import GoalInfo, GoalStatus
+from rclzenoh.interfaces.msg import UUID, GoalInfo, GoalStatus
 from rclzenoh.interfaces.srv import CancelGoal
+from rclzenoh.time import Time
 
 _ACCEPTED, _EXECUTING = GoalStatus.STATUS_ACCEPTED, GoalStatus.STATUS_EXECUTING
 _CANCELING, _SUCCEEDED = GoalStatus.STATUS_CANCELING, GoalStatus.STATUS_SUCCEEDED
@@ -39,9 +39,8 @@ _MOVES = {
 _NAMES = ("unknown", "accepted", "executing", "canceling", "succeeded", "canceled", "aborted")
 
 
-@dataclass
 class TrackedGoal:
-    """A goal that was accepted.
+    """A goal that was accepted, and its state.
 
     Attributes:
         info: Identifier and time of acceptance.
@@ -49,17 +48,38 @@ class TrackedGoal:
         ended_ns: Time at which it ended [ns]; None before.
     """
 
-    info: GoalInfo
-    status: int = _ACCEPTED
-    ended_ns: int | None = None
+    def __init__(self, info: GoalInfo) -> None:
+        self.info = info
+        self.status: int = _ACCEPTED
+        self.ended_ns: int | None = None
 
     @property
     def is_active(self) -> bool:
         """Whether the goal has not ended."""
         return self.status in (_ACCEPTED, _EXECUTING, _CANCELING)
 
+    def can(self, event: GoalEvent) -> bool:
+        """Whether an event is possible in the present state."""
+        return (self.status, event) in _MOVES
 
-class GoalTable(dict[bytes, TrackedGoal]):
+    def advance(self, event: GoalEvent, now_ns: int) -> None:
+        """Change the state.
+
+        Raises:
+            RuntimeError: If the event is not possible in the present state.
+        """
+        if not self.can(event):
+            key = key_of(self.info.goal_id).hex()
+            raise RuntimeError(f"goal {key} is {_NAMES[self.status]} and cannot be {event.value}")
+        self.status = _MOVES[self.status, event]
+        if not self.is_active:
+            self.ended_ns = now_ns
+
+
+AGoal = TypeVar("AGoal", bound=TrackedGoal)
+
+
+class GoalTable(dict[bytes, AGoal]):
     """Goals by identifier, in order of acceptance.
 
     Args:
@@ -70,71 +90,38 @@ class GoalTable(dict[bytes, TrackedGoal]):
         super().__init__()
         self._result_timeout_ns = result_timeout_ns
 
-    def add(self, key: bytes, info: GoalInfo) -> TrackedGoal:
-        """Accept a goal."""
-        self[key] = TrackedGoal(info)
-        return self[key]
-
-    def can(self, key: bytes, event: GoalEvent) -> bool:
-        """Whether an event is possible in the present state of a goal."""
-        return key in self and (self[key].status, event) in _MOVES
-
-    def change(self, key: bytes, event: GoalEvent, now_ns: int) -> None:
-        """Change a goal's state.
-
-        Raises:
-            RuntimeError: If the event is not possible in its present state.
-        """
-        if not self.can(key, event):
-            status = self[key].status if key in self else GoalStatus.STATUS_UNKNOWN
-            raise RuntimeError(f"goal {key.hex()} is {_NAMES[status]} and cannot be {event.value}")
-        goal = self[key]
-        goal.status = _MOVES[goal.status, event]
-        if not goal.is_active:
-            goal.ended_ns = now_ns
-
-    def select(self, key: bytes, stamp_ns: int) -> tuple[int, list[bytes]]:
-        """Goals that a request to cancel is about.
-
-        Args:
-            key: Identifier in the request; all zeros for none.
-            stamp_ns: Stamp in the request [ns]; 0 for none.
-
-        Returns:
-            Return code of action_msgs/srv/CancelGoal, and the identifiers of the goals.
-        """
+    def select(self, asked: GoalInfo) -> tuple[int, list[AGoal]]:
+        """Goals that a request to cancel is about, behind the return code of action_msgs/srv/CancelGoal."""
         # action_msgs/srv/CancelGoal has four cases: one goal, all goals, all up to a time, and these together with one
         # goal.
+        key, stamp_ns = key_of(asked.goal_id), Time.from_msg(asked.stamp).nanoseconds
         has_key = any(key)
         if has_key and not stamp_ns:
             if key not in self:
                 return CancelGoal.Response.ERROR_UNKNOWN_GOAL_ID, []
-            if not self.can(key, GoalEvent.CANCEL):
+            if not self[key].can(GoalEvent.CANCEL):
                 return CancelGoal.Response.ERROR_GOAL_TERMINATED, []
-            return CancelGoal.Response.ERROR_NONE, [key]
+            return CancelGoal.Response.ERROR_NONE, [self[key]]
         everything = not has_key and not stamp_ns
         selected = [
-            other
+            goal
             for other, goal in self.items()
-            if self.can(other, GoalEvent.CANCEL) and (everything or other == key or _stamp_ns(goal) <= stamp_ns)
+            if goal.can(GoalEvent.CANCEL)
+            and (everything or other == key or Time.from_msg(goal.info.stamp).nanoseconds <= stamp_ns)
         ]
         return CancelGoal.Response.ERROR_NONE, selected
 
-    def expire(self, now_ns: int) -> list[bytes]:
-        """Forget the goals that ended long enough ago, and return their identifiers."""
-        old = []
-        for key, goal in self.items():
+    def expire(self, now_ns: int) -> None:
+        """Forget the goals that ended long enough ago."""
+        for key, goal in list(self.items()):
             if goal.ended_ns is None:
                 continue
             # After a reset of the simulation the clock is behind the time of the end, so the wait begins anew.
             goal.ended_ns = min(goal.ended_ns, now_ns)
             if now_ns - goal.ended_ns > self._result_timeout_ns:
-                old.append(key)
-        for key in old:
-            self.pop(key).status = GoalStatus.STATUS_UNKNOWN
-        return old
+                self.pop(key).status = GoalStatus.STATUS_UNKNOWN
 
 
-def _stamp_ns(goal: TrackedGoal) -> int:
-    stamp = goal.info.stamp
-    return int(stamp.sec * S_TO_NS + stamp.nanosec)
+def key_of(goal_id: UUID) -> bytes:
+    """The 16 octets of an identifier."""
+    return bytes(goal_id.uuid)

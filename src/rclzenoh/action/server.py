@@ -7,7 +7,7 @@ from enum import Enum
 from functools import partial
 from typing import Any
 
-from rclzenoh.action.goals import GoalEvent, GoalTable, TrackedGoal
+from rclzenoh.action.goals import GoalEvent, GoalTable, TrackedGoal, key_of
 from rclzenoh.duration import S_TO_NS
 from rclzenoh.interfaces import Action, AnyMessage, Message
 from rclzenoh.interfaces.msg import UUID, GoalInfo, GoalStatus, GoalStatusArray
@@ -33,34 +33,24 @@ class CancelResponse(Enum):
     ACCEPT = 2
 
 
-class ServerGoalHandle:
+class ServerGoalHandle(TrackedGoal):
     """An accepted goal, as its server sees it."""
 
-    def __init__(self, server: ActionServer, goal: TrackedGoal, request: Message) -> None:
+    def __init__(self, server: ActionServer, info: GoalInfo, request: Message) -> None:
+        super().__init__(info)
         self._server = server
-        self._goal = goal
         self.request = request
         self.result_future = Future()
 
     @property
     def goal_id(self) -> UUID:
         """Identifier of the goal."""
-        return self._goal.info.goal_id
-
-    @property
-    def status(self) -> int:
-        """Status, of action_msgs/msg/GoalStatus; unknown once the goal is forgotten."""
-        return self._goal.status
-
-    @property
-    def is_active(self) -> bool:
-        """Whether the goal has not ended."""
-        return self._goal.is_active
+        return self.info.goal_id
 
     @property
     def is_cancel_requested(self) -> bool:
         """Whether the goal is to be cancelled."""
-        return bool(self._goal.status == GoalStatus.STATUS_CANCELING)
+        return self.status == GoalStatus.STATUS_CANCELING
 
     def execute(self, execute_callback: Callable[[ServerGoalHandle], Any] | None = None) -> None:
         """Begin to carry the goal out.
@@ -104,23 +94,6 @@ class ServerGoalHandle:
             self._server.set_result(self, response)
 
 
-def default_goal_callback(goal_request: Message) -> GoalResponse:
-    """Accept every goal."""
-    del goal_request
-    return GoalResponse.ACCEPT
-
-
-def default_handle_accepted_callback(goal_handle: ServerGoalHandle) -> None:
-    """Execute at once."""
-    goal_handle.execute()
-
-
-def default_cancel_callback(goal_handle: ServerGoalHandle) -> CancelResponse:
-    """Cancel no goal."""
-    del goal_handle
-    return CancelResponse.REJECT
-
-
 class ActionServer:
     """Carries out goals.
 
@@ -129,11 +102,11 @@ class ActionServer:
     Args:
         node: Node that the server belongs to.
         action_type: Class of the action.
-        action_name: Name of the action.
+        action_name: Its absolute, relative or private name.
         execute_callback: Called with the goal handle, returns the result.
-        goal_callback: Called with the goal, returns a `GoalResponse`.
-        handle_accepted_callback: Called with the goal handle of an accepted goal.
-        cancel_callback: Called with the goal handle, returns a `CancelResponse`.
+        goal_callback: Called with the goal, returns a `GoalResponse`; by default, every goal is accepted.
+        handle_accepted_callback: Called with the goal handle of an accepted goal; by default, it executes at once.
+        cancel_callback: Called with the goal handle, returns a `CancelResponse`; by default, no goal is cancelled.
         result_timeout: Time for which a result is kept [s], on the node's clock.
     """
 
@@ -144,9 +117,9 @@ class ActionServer:
         action_name: str,
         execute_callback: Callable[[ServerGoalHandle], Any] | None = None,
         *,
-        goal_callback: Callable[[Any], Any] = default_goal_callback,
-        handle_accepted_callback: Callable[[ServerGoalHandle], Any] = default_handle_accepted_callback,
-        cancel_callback: Callable[[ServerGoalHandle], Any] = default_cancel_callback,
+        goal_callback: Callable[[Any], Any] = lambda _: GoalResponse.ACCEPT,
+        handle_accepted_callback: Callable[[ServerGoalHandle], Any] = ServerGoalHandle.execute,
+        cancel_callback: Callable[[ServerGoalHandle], Any] = lambda _: CancelResponse.REJECT,
         result_timeout: float = _RESULT_TIMEOUT_S,
     ) -> None:
         self._node = node
@@ -156,8 +129,7 @@ class ActionServer:
         self._handle_accepted_callback = handle_accepted_callback
         self._cancel_callback = cancel_callback
         self._logger = node.get_logger()
-        self._goals = GoalTable(int(result_timeout * S_TO_NS))
-        self._handles: dict[bytes, ServerGoalHandle] = {}
+        self._goals: GoalTable[ServerGoalHandle] = GoalTable(int(result_timeout * S_TO_NS))
         protocol, prefix = action_type.Impl, f"{action_name}/_action"
         self._services = [
             node.create_service(protocol.SendGoalService, f"{prefix}/send_goal", self._on_goal),
@@ -173,7 +145,7 @@ class ActionServer:
             self._node.destroy_service(service)
         self._node.destroy_publisher(self._feedback)
         self._node.destroy_publisher(self._status)
-        self._handles.clear()
+        self._goals.clear()
 
     def change(self, handle: ServerGoalHandle, event: GoalEvent) -> None:
         """Change a goal's state, and publish it.
@@ -181,7 +153,7 @@ class ActionServer:
         Raises:
             RuntimeError: If the event is not possible in its present state.
         """
-        self._goals.change(_key(handle.goal_id), event, self._now_ns())
+        handle.advance(event, self._now_ns())
         self._publish_status()
 
     def publish_feedback(self, handle: ServerGoalHandle, feedback: Message) -> None:
@@ -228,7 +200,7 @@ class ActionServer:
     def _abort_if_active(self, handle: ServerGoalHandle, how: str) -> None:
         if handle.is_active:
             self._logger.warning(
-                f"the execute callback {how} without ending goal {_key(handle.goal_id).hex()}: aborted"
+                f"the execute callback {how} without ending goal {key_of(handle.goal_id).hex()}: aborted"
             )
             # The state machine has no way from accepted to aborted.
             if handle.status == GoalStatus.STATUS_ACCEPTED:
@@ -237,8 +209,8 @@ class ActionServer:
 
     async def _on_goal(self, request: AnyMessage, response: AnyMessage) -> Message:
         now = self._node.get_clock().now()
-        self._forget_old()
-        key = _key(request.goal_id)
+        self._goals.expire(now.nanoseconds)
+        key = key_of(request.goal_id)
         answer = None
         if key not in self._goals:
             answer = await _outcome(self._goal_callback(request.goal))
@@ -248,9 +220,9 @@ class ActionServer:
         response.accepted = answer is GoalResponse.ACCEPT and key not in self._goals
         if response.accepted:
             response.stamp = now.to_msg()
-            goal = self._goals.add(key, GoalInfo(goal_id=request.goal_id, stamp=response.stamp))
-            handle = self._handles[key] = ServerGoalHandle(self, goal, request.goal)
-            self._begin_after_response(handle)
+            info = GoalInfo(goal_id=request.goal_id, stamp=response.stamp)
+            self._goals[key] = ServerGoalHandle(self, info, request.goal)
+            self._begin_after_response(self._goals[key])
         return response
 
     def _begin_after_response(self, handle: ServerGoalHandle) -> None:
@@ -263,39 +235,33 @@ class ActionServer:
         submit(self._node.mailbox, begin)
 
     async def _on_cancel(self, request: CancelGoal.Request, response: CancelGoal.Response) -> Message:
-        self._forget_old()
-        stamp_ns = request.goal_info.stamp.sec * S_TO_NS + request.goal_info.stamp.nanosec
-        response.return_code, keys = self._goals.select(_key(request.goal_info.goal_id), stamp_ns)
+        self._goals.expire(self._now_ns())
+        response.return_code, handles = self._goals.select(request.goal_info)
         canceling = []
-        for key in keys:
-            handle = self._handles[key]
+        for handle in handles:
             answer = await _outcome(self._cancel_callback(handle))
             # The goal may have ended while the callback was waiting.
-            if answer is CancelResponse.ACCEPT and self._goals.can(key, GoalEvent.CANCEL):
-                self._goals.change(key, GoalEvent.CANCEL, self._now_ns())
-                canceling.append(self._goals[key].info)
+            if answer is CancelResponse.ACCEPT and handle.can(GoalEvent.CANCEL):
+                handle.advance(GoalEvent.CANCEL, self._now_ns())
+                canceling.append(handle.info)
         if canceling:
             self._publish_status()
-        elif keys:
+        elif handles:
             response.return_code = CancelGoal.Response.ERROR_REJECTED
         response.goals_canceling = canceling
         return response
 
     async def _on_result(self, request: AnyMessage, response: AnyMessage) -> Message:
-        self._forget_old()
-        handle = self._handles.get(_key(request.goal_id))
+        self._goals.expire(self._now_ns())
+        handle = self._goals.get(key_of(request.goal_id))
         if handle is None:
             response.status = GoalStatus.STATUS_UNKNOWN
             return response
         result: Message = await handle.result_future
         return result
 
-    def _forget_old(self) -> None:
-        for key in self._goals.expire(self._now_ns()):
-            del self._handles[key]
-
     def _publish_status(self) -> None:
-        self._forget_old()
+        self._goals.expire(self._now_ns())
         status_list = [GoalStatus(goal_info=goal.info, status=goal.status) for goal in self._goals.values()]
         self._status.publish(GoalStatusArray(status_list=status_list))
 
@@ -306,7 +272,3 @@ class ActionServer:
 async def _outcome(value: Any) -> Any:
     """Return value of a callback, which is waited for if the callback is a coroutine function."""
     return await value if hasattr(value, "__await__") else value
-
-
-def _key(goal_id: UUID) -> bytes:
-    return bytes(goal_id.uuid)

@@ -183,7 +183,7 @@ def _require(name: str) -> None:
     if is_plausible and path not in _READ and path.is_file():
         _READ.add(path)
         parts = path.read_text().split("---\n")
-        {"msg": _add_message, "srv": _add_service, "action": _add_action}[kind](package, whole, parts)
+        {"msg": _add_message, "srv": _add_service, "action": _add_action}[kind](f"{package}/{kind}/{whole}", parts)
     if name not in _FIELDDEFS and name in _JAZZY:
         constants, fields = _JAZZY[name]
         _add(name, [(field, _read_description(description)) for field, description in fields], constants)
@@ -218,9 +218,10 @@ def _char_to_uint8(description: Any) -> Any:
     return "uint8" if description == "char" else description
 
 
-def _parse(package: str, name: str, text: str) -> None:
+def _parse(name: str, text: str) -> None:
     # Relative names resolve to messages of the package, so all parts are parsed as if they were one.
-    message = MSGParser(f"MSG: {package}/msg/{name.rpartition('/')[2]}\n{text}").specification()[0]
+    package, _, short = name.split("/")
+    message = MSGParser(f"MSG: {package}/msg/{short}\n{text}").specification()[0]
     _DEFAULTS[name] = {
         field.name: field.value
         for field in message.fields
@@ -238,14 +239,13 @@ def _add(name: str, fields: list[tuple[str, object]], constants: list[tuple[str,
     _FIELDDEFS[name] = (constants or [], content or [(PLACEHOLDER, (_BASE, ("uint8", 0)))])
 
 
-def _add_message(package: str, name: str, parts: list[str]) -> None:
-    _parse(package, f"{package}/msg/{name}", parts[0])
+def _add_message(full: str, parts: list[str]) -> None:
+    _parse(full, parts[0])
 
 
-def _add_service(package: str, name: str, parts: list[str]) -> None:
-    full = f"{package}/srv/{name}"
-    _parse(package, f"{full}_Request", parts[0])
-    _parse(package, f"{full}_Response", parts[1])
+def _add_service(full: str, parts: list[str]) -> None:
+    _parse(f"{full}_Request", parts[0])
+    _parse(f"{full}_Response", parts[1])
     _derive_service(full)
 
 
@@ -262,10 +262,9 @@ def _derive_service(full: str) -> None:
     )
 
 
-def _add_action(package: str, name: str, parts: list[str]) -> None:
-    full = f"{package}/action/{name}"
+def _add_action(full: str, parts: list[str]) -> None:
     for part, text in zip(("Goal", "Result", "Feedback"), parts, strict=True):
-        _parse(package, f"{full}_{part}", text)
+        _parse(f"{full}_{part}", text)
     goal_id = ("goal_id", (_NAME, "unique_identifier_msgs/msg/UUID"))
     goal, result, feedback = ((_NAME, f"{full}_{part}") for part in ("Goal", "Result", "Feedback"))
     stamp = (_NAME, "builtin_interfaces/msg/Time")

@@ -102,15 +102,9 @@ def message_class(name: str) -> type[AnyMessage]:
 
 
 def as_numbers(value: Any, field: Field, where: str) -> NDArray[Any]:
-    """Value of a number sequence as an array.
+    """Value of a number sequence as a contiguous one-dimensional array of the field's type; itself if it is one.
 
-    Args:
-        value: Array, list, tuple, ``array.array``, or bytes for octets.
-        field: The field.
-        where: Name of the structure, for errors.
-
-    Returns:
-        One-dimensional contiguous array of the field's type; ``value`` itself if it is one already.
+    It is an array, a list, a tuple, an ``array.array``, or bytes for octets. Errors begin with ``where`` the field is.
 
     Raises:
         TypeError: If the value is no sequence of such numbers.

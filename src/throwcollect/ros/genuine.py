@@ -11,6 +11,7 @@ import threading
 import traceback
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
+from functools import partial
 from importlib import import_module
 from typing import Any
 
@@ -139,34 +140,12 @@ def _environment(variables: Mapping[str, str]) -> Iterator[None]:
                     os.environ[name] = value
 
 
-def get_message(name: str) -> Any:
-    """Class of a message, such as ``sensor_msgs/msg/JointState``.
+def _find_interface(kind: str, name: str) -> Any:
+    """Class of an interface, such as ``sensor_msgs/msg/JointState``.
 
     Raises:
-        ValueError: If no such message is installed, or the name is not one of a message.
+        ValueError: If no such interface is installed, or the name is not one of this kind.
     """
-    return _interface(name, "msg")
-
-
-def get_service(name: str) -> Any:
-    """Class of a service, such as ``std_srvs/srv/Trigger``.
-
-    Raises:
-        ValueError: If no such service is installed, or the name is not one of a service.
-    """
-    return _interface(name, "srv")
-
-
-def get_action(name: str) -> Any:
-    """Class of an action, such as ``control_msgs/action/FollowJointTrajectory``.
-
-    Raises:
-        ValueError: If no such action is installed, or the name is not one of an action.
-    """
-    return _interface(name, "action")
-
-
-def _interface(name: str, kind: str) -> Any:
     package, separator, short = name.partition(f"/{kind}/")
     if not (separator and package.isidentifier() and short.isidentifier()):
         raise ValueError(f"expected a name of the form package/{kind}/Name, got {name!r}")
@@ -174,6 +153,11 @@ def _interface(name: str, kind: str) -> Any:
         return getattr(import_module(f"{package}.{kind}"), short)
     except (AttributeError, ModuleNotFoundError) as error:
         raise ValueError(f"unknown interface {name!r}: it is not installed") from error
+
+
+get_message = partial(_find_interface, "msg")
+get_service = partial(_find_interface, "srv")
+get_action = partial(_find_interface, "action")
 
 
 def graph_changes(_node: Node) -> int:

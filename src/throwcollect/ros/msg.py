@@ -5,4 +5,4 @@ from functools import partial
 from rclzenoh.interfaces.typed_names import MESSAGES, look_up_in
 from throwcollect.ros.backend_names import find_class
 
-__getattr__ = look_up_in(MESSAGES, partial(find_class, "get_message"), __name__)
+__getattr__ = look_up_in(MESSAGES, partial(find_class, "msg"), __name__)

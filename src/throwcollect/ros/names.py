@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import itertools
 import os
-import re
-from collections.abc import Callable
 from typing import Any
 
+from rclzenoh.exceptions import NameValidationException
+from rclzenoh.names import resolve
 from throwcollect.errors import ConfigError
+from throwcollect.ros.backend_names import Kind, find_class
 
 _numbers = itertools.count()
-_ABSOLUTE = re.compile(r"(/[A-Za-z_][A-Za-z0-9_]*)+")
 
 
 def absolute_name(name: str) -> str:
@@ -20,12 +20,11 @@ def absolute_name(name: str) -> str:
     Raises:
         ConfigError: If ROS does not allow such names.
     """
-    whole = name if name.startswith("/") else f"/{name}"
-    if not _ABSOLUTE.fullmatch(whole):
-        raise ConfigError(
-            f"{name!r} is no name in ROS", expected="letters, digits and underscores between single slashes"
-        )
-    return whole
+    try:
+        return resolve(name, "/", "")
+    except NameValidationException as error:
+        expected = "letters, digits and underscores between single slashes"
+        raise ConfigError(f"{name!r} is no name in ROS", expected=expected) from error
 
 
 def is_hidden(name: str) -> bool:
@@ -38,18 +37,18 @@ def make_own_name() -> str:
     return f"_throwcollect_{os.getpid()}_{next(_numbers)}"
 
 
-def full_name(kind: str, name: str) -> str:
+def full_name(kind: Kind, name: str) -> str:
     """Full name of a type that may be named without its kind, as ``std_msgs/String`` for ``std_msgs/msg/String``."""
     return name.replace("/", f"/{kind}/") if name.count("/") == 1 else name
 
 
-def find_interface(kind: str, get: Callable[[str], Any], name: str) -> Any:
+def find_interface(kind: Kind, name: str) -> Any:
     """Class of a message, service or action that a user names in full, or without its ``kind``.
 
     Raises:
         ConfigError: If there is no such type.
     """
     try:
-        return get(full_name(kind, name))
+        return find_class(kind, full_name(kind, name))
     except ValueError as error:
         raise ConfigError(f"{name}: {error}") from error

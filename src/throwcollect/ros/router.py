@@ -35,11 +35,7 @@ _PORT_ATTEMPTS = 5
 
 @contextmanager
 def router(listen: str = DEFAULT_LISTEN, key: RunKey | None = None) -> Iterator[str]:
-    """Run a router in this process; yields the endpoint that nodes connect to.
-
-    Args:
-        listen: Endpoint to listen on; port 0 takes a free one.
-        key: Key that an endpoint ``tls/...`` lets nobody in without.
+    """Run a router in this process; yields the endpoint that nodes connect to. Port 0 takes a free one.
 
     Raises:
         ConfigError: If the endpoint is malformed, the router cannot listen on it, or its key cannot be read.
@@ -67,9 +63,10 @@ def _discovery_server(listen: str) -> Iterator[str]:
 
 def _open(listen: str, key: RunKey | None) -> tuple[zenoh.Session, str]:
     address, _, port = listen.rpartition(":")
-    takes_any = port == "0"
-    for attempt in range(_PORT_ATTEMPTS):
-        endpoint = f"{address}:{_free_port(address)}" if takes_any else listen
+    attempts_left = _PORT_ATTEMPTS if port == "0" else 1
+    while True:
+        attempts_left -= 1
+        endpoint = f"{address}:{_free_port(address)}" if port == "0" else listen
         with zenoh_errors():
             config = router_config(endpoint, session_key(endpoint, key) if key is not None else None)
         if endpoint.startswith(PROTECTED) and key is None:
@@ -81,13 +78,12 @@ def _open(listen: str, key: RunKey | None) -> tuple[zenoh.Session, str]:
             return zenoh.open(config), endpoint
         except zenoh.ZError as error:
             # Another process may have taken the free port in between.
-            if not takes_any or attempt == _PORT_ATTEMPTS - 1:
+            if not attempts_left:
                 raise ConfigError(
                     f"the router cannot listen on {endpoint}: {in_words(error).rpartition(': ')[2]}",
                     expected="an address of this machine with a free port, such as tcp/127.0.0.1:0, which takes any",
                     hint="if another router listens there, use that one",
                 ) from error
-    raise ConfigError(f"no free port for {listen}")
 
 
 def _free_port(address: str) -> int:

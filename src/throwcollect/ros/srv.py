@@ -5,4 +5,4 @@ from functools import partial
 from rclzenoh.interfaces.typed_names import SERVICES, look_up_in
 from throwcollect.ros.backend_names import find_class
 
-__getattr__ = look_up_in(SERVICES, partial(find_class, "get_service"), __name__)
+__getattr__ = look_up_in(SERVICES, partial(find_class, "srv"), __name__)

@@ -62,8 +62,8 @@ def fill(message: Any, values: object, where: str = "") -> None:
             continue
         try:
             setattr(message, name, _convert(types[name], value, path, current))
-        # Classes that rosidl generates check what a field is set to by assertions.
-        except (TypeError, ValueError, AssertionError) as error:
+        # Classes that rosidl generates check fields by assertions, and no float is as large as some integers.
+        except (TypeError, ValueError, AssertionError, OverflowError) as error:
             raise ConfigError(f"{path}: should be {types[name]}, got {value!r:.80}") from error
 
 

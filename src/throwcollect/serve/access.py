@@ -87,11 +87,7 @@ class Keys:
 class Access:
     """Lets only permitted requests and sockets through to an application.
 
-    Args:
-        app: The application.
-        keys: The tokens of the server.
-        hosts: Accepted values of the header Host, with ports.
-        origins: Further origins of pages that may connect.
+    The header Host has to be one of ``hosts``, with their ports, and Origin one of these or of the further ``origins``.
     """
 
     def __init__(self, app: Any, keys: Keys, hosts: frozenset[str], origins: frozenset[str] = frozenset()) -> None:

@@ -59,21 +59,19 @@ def make_app(instances: Instances, models: Models, keys: Keys) -> FastAPI:
     add_handlers(app)
     lookout = Lookout(instances.catalogue)
     watch = StateWatch(lookout.look)
-    app.include_router(_public(keys), prefix=PREFIX, responses=describe_problems(*_ALWAYS))
-    app.include_router(_general(watch, keys), prefix=PREFIX, responses=describe_problems(*_ALWAYS, 401))
-    app.include_router(
-        make_component_routes(watch), prefix=PREFIX, responses=describe_problems(*_ALWAYS, 401, 404, 422)
-    )
-    of_runs = describe_problems(*_ALWAYS, 401, 404, 409, 422, 503)
-    for routes in (
-        make_instance_routes(instances, lookout),
-        make_log_routes(instances),
-        make_dataset_routes(instances),
-        make_description_routes(instances),
-        make_view_routes(instances),
+    of_runs = (401, 404, 409, 422, 503)
+    for routes, statuses in (
+        (_public(keys), ()),
+        (_general(watch, keys), (401,)),
+        (make_component_routes(watch), (401, 404, 422)),
+        (make_instance_routes(instances, lookout), of_runs),
+        (make_log_routes(instances), of_runs),
+        (make_dataset_routes(instances), of_runs),
+        (make_description_routes(instances), of_runs),
+        (make_view_routes(instances), of_runs),
+        (make_model_routes(models), (401, 404, 422)),
     ):
-        app.include_router(routes, prefix=PREFIX, responses=of_runs)
-    app.include_router(make_model_routes(models), prefix=PREFIX, responses=describe_problems(*_ALWAYS, 401, 404, 422))
+        app.include_router(routes, prefix=PREFIX, responses=describe_problems(*_ALWAYS, *statuses))
     app.include_router(make_rosbridge_routes(instances, Bridges()))
     # Routes are tried in their order, and this one takes every path that is left.
     app.mount("/", StaticFiles(directory=_PAGE, html=True))

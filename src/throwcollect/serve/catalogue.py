@@ -31,7 +31,8 @@ from throwcollect.errors import ConfigError, NotFoundError, Problem
 from throwcollect.robots.appearance import read_urdf
 from throwcollect.runs.record import Kind
 
-NAME = r"[a-z0-9][a-z0-9_-]{0,62}"
+LONGEST_NAME = 63
+NAME = rf"[a-z0-9][a-z0-9_-]{{0,{LONGEST_NAME - 1}}}"
 """Names of components and ids of instances, which become names of files and containers, and parts of URLs."""
 
 

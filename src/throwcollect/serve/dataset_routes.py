@@ -174,15 +174,15 @@ def _read_landings(directory: Path) -> Landings:
     table = read_parquet(directory / THROWS)
     recorded = table.filter(table["digest"].is_valid())
     outcomes = {each["values"]: each["counts"] for each in recorded["outcome"].value_counts().to_pylist()}
-    if not set(_LANDING) <= set(table.column_names):
-        return Landings(landings=[], total=0, outcomes=outcomes, following=0, is_finished=True, has_more=False)
-    landed = table.select([*_LANDING]).drop_null()
-    # The step is rounded up, so that there are never more landings than allowed.
-    some = landed.take([*range(0, len(landed), max(1, -(-len(landed) // _MOST_LANDINGS)))])
-    rows: Any = zip(*(column.to_pylist() for column in some.columns), strict=True)
-    return Landings(
-        landings=list(rows), total=len(landed), outcomes=outcomes, following=0, is_finished=True, has_more=False
-    )
+    rows: list[Any] = []
+    total = 0
+    if set(_LANDING) <= set(table.column_names):
+        landed = table.select([*_LANDING]).drop_null()
+        total = len(landed)
+        # The step is rounded up, so that there are never more landings than allowed.
+        some = landed.take([*range(0, total, max(1, -(-total // _MOST_LANDINGS)))])
+        rows = list(zip(*(column.to_pylist() for column in some.columns), strict=True))
+    return Landings(landings=rows, total=total, outcomes=outcomes, following=0, is_finished=True, has_more=False)
 
 
 def _read_landings_so_far(directory: Path, first: int) -> Landings:

@@ -51,12 +51,7 @@ class Address:
     certificate: str | None = None
 
     def page(self, code: str, run: str | None = None) -> str:
-        """Address of the page, with a one-time code in the fragment, which browsers send to nobody.
-
-        Args:
-            code: The code.
-            run: Id of the run that the page is to show; None for all.
-        """
+        """Address of the page, on one run or all; browsers send the fragment, with the one-time code, to nobody."""
         return f"{self.url}/#code={code}" + (f"&run={run}" if run else "")
 
 
@@ -165,11 +160,7 @@ def ensure_server() -> Address:
 
 
 def make_page_address(address: Address, run: str | None = None) -> str:
-    """Make an address of the page that can be opened once, within ten minutes.
-
-    Args:
-        address: Address of the server.
-        run: Id of the run that the page is to show; None for all.
+    """Make an address of the page, on one run or all, that can be opened once, within ten minutes.
 
     Raises:
         WorkerError: If the server does not answer.

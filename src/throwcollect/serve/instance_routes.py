@@ -18,6 +18,7 @@ from throwcollect.files import open_log
 from throwcollect.runs.events import EVENTS
 from throwcollect.runs.record import Origin
 from throwcollect.runtimes.node_logs import NodeLogs
+from throwcollect.serve.catalogue import LONGEST_NAME
 from throwcollect.serve.instances import Instances
 from throwcollect.serve.problems import describe_bytes, problem
 from throwcollect.serve.state import ComponentState, InstanceState, Lookout, describe
@@ -105,8 +106,7 @@ def make_instance_routes(instances: Instances, lookout: Lookout) -> APIRouter:
     @router.post("", status_code=202)
     def post(wish: Wish, response: Response) -> InstanceState:
         """Begin an instance of a component, with an id that is chosen here."""
-        made = f"{wish.component}-{time.time_ns() // 1_000_000:x}"
-        run, _ = instances.put(made, wish.origin)
+        run, _ = instances.put(make_id(wish.component), wish.origin)
         response.headers["Location"] = f"/api/v1/instances/{run.id}"
         return describe(run)
 
@@ -126,6 +126,12 @@ def make_instance_routes(instances: Instances, lookout: Lookout) -> APIRouter:
         return describe(instances.scale(instance, scaling.simulations))
 
     return router
+
+
+def make_id(component: str) -> str:
+    """Make an id for an instance of a component, from its name, as far as that fits, and the present time."""
+    suffix = f"-{time.time_ns() // 1_000_000:x}"
+    return component[: LONGEST_NAME - len(suffix)] + suffix
 
 
 def make_log_routes(instances: Instances) -> APIRouter:

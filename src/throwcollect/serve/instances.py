@@ -72,14 +72,7 @@ class Instances:
             raise ConflictError(error.problems, hint=error.hint) from error
 
     def put(self, instance: str, origin: Origin) -> tuple[Run, bool]:
-        """Begin an instance, unless the same request has begun it already.
-
-        Args:
-            instance: Id of the instance.
-            origin: The client's request.
-
-        Returns:
-            The run, and whether it is new.
+        """Begin an instance, unless the same request has begun it already; returns the run, and whether it is new.
 
         Raises:
             NotFoundError: If there is no such component.
@@ -184,15 +177,12 @@ class Instances:
         return run.now()
 
     def show(self, instance: str, urdf: str | None) -> None:
-        """Set the description of the robot that viewers of an instance draw.
-
-        Args:
-            instance: Id of the instance.
-            urdf: URDF text, which may differ in what is seen; None for the description of the configuration.
+        """Set the description of the robot that viewers of an instance draw; None for that of the configuration.
 
         Raises:
             NotFoundError: If there is no such run.
-            ConflictError: If it has ended or has no simulation that runs, or more than what is seen differs.
+            ConflictError: If it has ended or has no simulation that runs, or more than what is seen differs from the
+                description of the configuration.
             ConfigError: If the text is no URDF.
             WorkerError: If a simulation does not answer.
         """
@@ -277,14 +267,11 @@ def _check_room(component: Component) -> None:
     runs = (run for run in Records().all() if run.record.origin and run.record.origin.component == component.name)
     living = [run.id for run in runs if run.status == "running"]
     if len(living) >= component.max_instances:
+        live = "1 instance lives" if len(living) == 1 else f"{len(living)} instances live"
         raise ConflictError(
-            f"component {component.name}: {_count_living(len(living))}, as many as max_instances allows",
+            f"component {component.name}: {live}, as many as max_instances allows",
             hint=f"stop one of {', '.join(living)}",
         )
-
-
-def _count_living(number: int) -> str:
-    return "1 instance lives" if number == 1 else f"{number} instances live"
 
 
 @contextmanager

@@ -56,21 +56,14 @@ class ProblemResponse(JSONResponse):
 
 
 def problem(status: int, title: str, headers: dict[str, str] | None = None, **facts: Any) -> ProblemResponse:
-    """Make the answer that tells of a problem.
-
-    Args:
-        status: Status of HTTP.
-        title: Where and what.
-        headers: Further headers.
-        facts: Further members, such as ``hint``; those that are None are left out.
-    """
+    """Make the answer that tells of a problem: where and what, and further ``facts`` that are not None."""
     content = {"title": title, "status": status, **{key: value for key, value in facts.items() if value is not None}}
     return ProblemResponse(content, status_code=status, headers=headers)
 
 
-def describe_bytes(*media_types: str) -> dict[int | str, dict[str, Any]]:
+def describe_bytes(media_type: str) -> dict[int | str, dict[str, Any]]:
     """Describe an answer that is no JSON, for the description of a request."""
-    return {200: {"description": "OK", "content": {each: {} for each in media_types}}}
+    return {200: {"description": "OK", "content": {media_type: {}}}}
 
 
 def describe_problems(*statuses: int) -> dict[int | str, dict[str, Any]]:

@@ -20,7 +20,8 @@ from throwcollect.robots.robot import Robot
 from throwcollect.runs.component_container import DESCRIPTION
 from throwcollect.runs.records import Run
 
-_PACKAGE = "package://"
+_MESH = re.compile(r"package://([\w.-]+)/([^\"'<>]+)")
+"""URL of a mesh in a description: its package, and its path in there."""
 
 
 def description_of(run: Run) -> str:
@@ -91,11 +92,7 @@ def _describe(path: Path, _changed_ns: int) -> str:
 
 
 def find_mesh(package: str, path: str) -> Path:
-    """Find the file of a mesh of one of the robots.
-
-    Args:
-        package: Name of the package in its URL.
-        path: Path within the package.
+    """Find the file of a mesh of one of the robots, whose URL is ``package://PACKAGE/PATH``.
 
     Raises:
         NotFoundError: If no robot's description names such a package, or it has no such file.
@@ -133,7 +130,7 @@ def list_meshes(description: str) -> list[MeshFile]:
         ConfigError: If the description of a robot cannot be read.
     """
     return [
-        MeshFile(f"{_PACKAGE}{package}/{path}", _digest(file, stat.st_mtime_ns), stat.st_size)
+        MeshFile(f"package://{package}/{path}", _digest(file, stat.st_mtime_ns), stat.st_size)
         for package, path, file in _find_files(description)
         for stat in [file.stat()]
     ]
@@ -155,8 +152,7 @@ def find_mesh_by_content(sha256: str) -> Path:
 
 def _find_files(description: str) -> Iterator[tuple[str, str, Path]]:
     """Find the mesh files that a description names, each with its package and its path in there."""
-    named = dict.fromkeys(re.findall(_PACKAGE + r"([\w.-]+)/([^\"'<>]+)", description))
-    for package, path in named:
+    for package, path in dict.fromkeys(_MESH.findall(description)):
         with suppress(NotFoundError):
             yield package, path, find_mesh(package, path)
 
@@ -174,9 +170,7 @@ def _find_packages() -> Mapping[str, Path]:
         ConfigError: If the description of a robot cannot be read.
     """
     return {
-        package: robot.share() / package
-        for text, robot in _read_descriptions()
-        for package in re.findall(_PACKAGE + r"([\w.-]+)/", text)
+        package: robot.share() / package for text, robot in _read_descriptions() for package, _ in _MESH.findall(text)
     }
 
 

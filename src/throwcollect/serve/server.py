@@ -185,9 +185,11 @@ def _listen(host: str, port: int | None) -> Iterator[socket.socket]:
                     raise
                 listener.bind((host, 0))
             listener.listen()
-        except OSError as error:
+        # A host name that no name can have is a TypeError.
+        except (OSError, TypeError) as error:
+            why = error.strerror if isinstance(error, OSError) else error
             raise ConfigError(
-                f"--host {host} --port {_PORT if port is None else port}: nobody can be served there: {error.strerror}",
+                f"--host {host} --port {_PORT if port is None else port}: nobody can be served there: {why}",
                 hint="--port 0 takes one that is free; throwcollect view finds who serves already",
             ) from error
         yield listener

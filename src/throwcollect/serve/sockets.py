@@ -26,10 +26,7 @@ _MOST_REASON = 123
 async def refuse(socket: WebSocket, code: int, reason: str) -> None:
     """Accept a socket and close it at once, because browsers tell a page nothing of a socket that was not accepted.
 
-    Args:
-        socket: The socket, not accepted yet.
-        code: The close code.
-        reason: The reason; the frame holds its first line, as far as that fits.
+    The frame that closes it holds the first line of the reason, as far as that fits.
     """
     await socket.accept()
     await socket.close(code, _cut(reason))
@@ -42,12 +39,7 @@ def _cut(reason: str) -> str:
 
 
 async def keep_telling(socket: WebSocket, telling: Coroutine[Any, Any, object]) -> None:
-    """Send to a client until it has gone, or there is nothing more to send.
-
-    Args:
-        socket: The socket of the client, accepted.
-        telling: Sends everything, one message after the other.
-    """
+    """Have ``telling`` send to a client until the client has gone, or there is nothing more to send."""
 
     async def wait_until_gone() -> None:
         # What the client sends is ignored, but only reading shows that it has gone.

@@ -32,12 +32,7 @@ _LANDING = ("landing_x_m", "landing_y_m", "landing_z_m")
 
 
 def encode_throw(delivery: Delivery, simulation: str, values: Mapping[str, float]) -> bytes:
-    """Encode an episode for the page.
-
-    Args:
-        delivery: The episode and its result.
-        simulation: Name of the simulation that recorded it.
-        values: Swept values of the trial, by dotted key.
+    """Encode an episode for the page, with the name of its simulation and the swept values by their dotted keys.
 
     Returns:
         Length of a JSON header as uint32, the header, zero bytes up to a multiple of four, then float32: angles of the

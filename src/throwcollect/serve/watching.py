@@ -38,15 +38,12 @@ class StateWatch:
         # One at a time, so that an older state can never get a higher revision than a newer one.
         async with self._one_look:
             state = await asyncio.to_thread(self._look)
-            return await self._take(state)
-
-    async def _take(self, state: State) -> State:
-        async with self._changed:
-            if self._state is None or state != replace(self._state, revision=0):
-                self._revision += 1
-                self._state = replace(state, revision=self._revision)
-                self._changed.notify_all()
-            return self._state
+            async with self._changed:
+                if self._state is None or state != replace(self._state, revision=0):
+                    self._revision += 1
+                    self._state = replace(state, revision=self._revision)
+                    self._changed.notify_all()
+                return self._state
 
     async def states(self) -> AsyncIterator[bytes]:
         """The state as JSON, at first as it is and then after each change; a slow listener gets only the latest."""

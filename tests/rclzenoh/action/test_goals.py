@@ -2,11 +2,16 @@ import itertools
 
 import pytest
 
-from rclzenoh.action.goals import GoalEvent, GoalInfo, GoalStatus, GoalTable
+from rclzenoh.action.goals import GoalEvent, GoalInfo, GoalStatus, GoalTable, TrackedGoal
+from rclzenoh.interfaces.msg import UUID, Time
 
 KEYS = [bytes([i]) * 16 for i in range(1, 5)]
 NONE = bytes(16)
 S = GoalStatus
+
+
+def info(key, second):
+    return GoalInfo(goal_id=UUID(uuid=key), stamp=Time(sec=second))
 
 
 @pytest.fixture
@@ -14,11 +19,9 @@ def table():
     """Four goals, accepted at 1 s, 2 s, 3 s and 4 s; the last one has been reached."""
     table = GoalTable(100)
     for second, key in enumerate(KEYS, 1):
-        info = GoalInfo()
-        info.stamp.sec = second
-        table.add(key, info)
-        table.change(key, GoalEvent.EXECUTE, 0)
-    table.change(KEYS[3], GoalEvent.SUCCEED, 50)
+        table[key] = TrackedGoal(info(key, second))
+        table[key].advance(GoalEvent.EXECUTE, 0)
+    table[KEYS[3]].advance(GoalEvent.SUCCEED, 50)
     return table
 
 
@@ -33,22 +36,23 @@ def test_only_the_moves_of_the_state_machine_are_possible():
     }
     moves = set()
     for (status, path), event in itertools.product(paths.items(), GoalEvent):
-        table = GoalTable(1)
-        goal = table.add(KEYS[0], GoalInfo())
+        goal = TrackedGoal(GoalInfo())
         for step in path:
-            table.change(KEYS[0], step, 0)
+            goal.advance(step, 0)
         assert goal.status == status
-        if table.can(KEYS[0], event):
-            table.change(KEYS[0], event, 0)
+        if goal.can(event):
+            goal.advance(event, 0)
             moves.add((status, goal.status))
     assert moves == {(1, 2), (1, 3), (2, 3), (2, 4), (2, 6), (3, 4), (3, 5), (3, 6)}
 
 
 def test_an_impossible_move_is_refused_in_words(table):
-    with pytest.raises(RuntimeError, match="is succeeded and cannot be aborted"):
-        table.change(KEYS[3], GoalEvent.ABORT, 0)
+    goal = table[KEYS[3]]
+    with pytest.raises(RuntimeError, match=r"goal 0404.* is succeeded and cannot be aborted"):
+        goal.advance(GoalEvent.ABORT, 0)
+    table.expire(10**9)
     with pytest.raises(RuntimeError, match="is unknown and cannot be aborted"):
-        table.change(NONE, GoalEvent.ABORT, 0)
+        goal.advance(GoalEvent.ABORT, 0)
 
 
 @pytest.mark.parametrize(
@@ -64,23 +68,26 @@ def test_an_impossible_move_is_refused_in_words(table):
     ],
 )
 def test_a_wish_to_cancel_means_the_goals_that_the_protocol_says(table, key, stamp_s, code, meant):
-    assert table.select(key, stamp_s * 10**9) == (code, [KEYS[i] for i in meant])
+    assert table.select(info(key, stamp_s)) == (code, [table[KEYS[i]] for i in meant])
 
 
 def test_a_goal_that_is_being_cancelled_cannot_be_cancelled_again(table):
-    table.change(KEYS[0], GoalEvent.CANCEL, 0)
-    assert table.select(KEYS[0], 0) == (3, [])
+    table[KEYS[0]].advance(GoalEvent.CANCEL, 0)
+    assert table.select(info(KEYS[0], 0)) == (3, [])
 
 
 def test_goals_are_forgotten_some_time_after_their_end(table):
     goal = table[KEYS[3]]
-    assert table.expire(150) == []
-    assert table.expire(151) == [KEYS[3]]
+    table.expire(150)
+    assert list(table) == KEYS
+    table.expire(151)
     assert goal.status == S.STATUS_UNKNOWN
     assert list(table) == KEYS[:3]
 
 
 def test_a_clock_that_was_turned_back_does_not_keep_goals_for_ever(table):
-    assert table.expire(10) == []
-    assert table.expire(110) == []
-    assert table.expire(111) == [KEYS[3]]
+    table.expire(10)
+    table.expire(110)
+    assert list(table) == KEYS
+    table.expire(111)
+    assert list(table) == KEYS[:3]

@@ -166,7 +166,7 @@ def test_a_number_that_does_not_fit_is_refused():
 def test_bounded_strings_of_arrays_are_checked_one_by_one(monkeypatch):
     monkeypatch.setattr("rclzenoh.interfaces.catalog._FIELDDEFS", {**_FIELDDEFS})
     name = "made_up_msgs/msg/Bounded"
-    catalog._add_message("made_up_msgs", "Bounded", ["string<=3[5] names\nstring<=2[] more\n"])
+    catalog._add_message("made_up_msgs/msg/Bounded", ["string<=3[5] names\nstring<=2[] more\n"])
     kind = message_class(name)
     names, more = ["abc", "", "a", "b", "c"], ["x", "y", "z"]
     message = kind(names=names, more=more)

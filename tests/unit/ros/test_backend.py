@@ -155,8 +155,10 @@ def test_another_value_is_one_clear_message_and_exit_code_2(tmp_path):
 
 def test_both_backends_offer_the_same_names():
     tree = ast.parse(Path(throwcollect.ros.__file__).with_name("genuine.py").read_text())
-    bound = {
-        alias.asname or alias.name for node in tree.body if isinstance(node, ast.ImportFrom) for alias in node.names
-    } | {node.name for node in tree.body if isinstance(node, ast.FunctionDef)}
+    imports = [node for node in tree.body if isinstance(node, ast.ImportFrom)]
+    imported = {each.asname or each.name for node in imports for each in node.names}
+    made = {node.name for node in tree.body if isinstance(node, ast.FunctionDef)}
+    set_to = {ast.unparse(node.targets[0]) for node in tree.body if isinstance(node, ast.Assign)}
+    bound = imported | made | set_to
     assert set(embedded.__all__) - bound == set()
     assert all(hasattr(embedded, name) for name in embedded.__all__)

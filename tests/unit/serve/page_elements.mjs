@@ -31,6 +31,7 @@ function makeElement() {
     textContent: "",
     addEventListener: (name, act) => acts.set(name, act),
     click: () => acts.get("click")(),
+    change: () => acts.get("change")(),
     append(...parts) {
       this.textContent += parts.map((part) => part?.textContent ?? part).join("");
     },
@@ -86,6 +87,7 @@ const { showProblem } = await load("dom.js");
 const { LandingMap } = await load("landing_map.js");
 const { Landings } = await load("landings.js");
 const { PlotPanel } = await load("plot_panel.js");
+const { RunRecords } = await load("run_records.js");
 
 /** Let everything that waits for nothing but its turn have it. */
 const settle = () => new Promise((resolve) => setTimeout(resolve, 5));
@@ -136,6 +138,31 @@ test("a description that could not be had is asked for again with the next state
   }
 });
 
+test("what a run lacks that is watched no longer is not told", async () => {
+  const { watching, note, put } = watch(new Set(["scene", "urdf"]));
+  const whole = put();
+  watching.put(undefined);
+  await whole;
+  assert.equal(note.text, "");
+});
+
+test("an answer that comes late does not take the place of what was chosen since", async () => {
+  const answers = new Map();
+  const ask = (_method, path) => new Promise((resolve) => answers.set(path.split("/").at(-1), (text) => resolve({ text: async () => text })));
+  const records = new RunRecords({ ask });
+  Object.assign(records.element, { open: true, isConnected: true });
+  records.put({ id: "run", status: "ended", nodes: [{ name: "sim_0" }] });
+  for (const node of ["", "sim_0"]) {
+    records.choice.value = node;
+    records.choice.change();
+  }
+  answers.get("sim_0?tail=200")("a line of the log");
+  await settle();
+  answers.get("events")("");
+  await settle();
+  assert.equal(records.text.textContent, "a line of the log");
+});
+
 /** How many landings are drawn of each third of the ground before the robot, up to the farthest. */
 function countThirds(map, farthest) {
   arcs.length = 0;
@@ -171,11 +198,11 @@ function follow() {
   const map = new LandingMap(() => {});
   const server = { answer: async () => null };
   const asked = [];
-  const ask = async (_method, path) => {
+  const read = async (_method, path) => {
     asked.push(path);
-    return { json: server.answer };
+    return server.answer();
   };
-  const landings = new Landings({ ask }, map);
+  const landings = new Landings({ read }, map);
   landings.begin("run");
   const put = async (facts) => {
     landings.follow({ id: "run", kind: "collection", status: "ended", progress: { ended: 3 }, summary: null, ...facts });

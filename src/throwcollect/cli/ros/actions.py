@@ -41,7 +41,7 @@ def send_goal(
     from throwcollect.cli.ros.yaml_values import parse
     from throwcollect.ros.values import fill
 
-    action_type = find_interface("action", ros.get_action, kind)
+    action_type = find_interface("action", kind)
     message = action_type.Goal()
     fill(message, parse(goal, "GOAL"))
     with join_graph(run) as session:

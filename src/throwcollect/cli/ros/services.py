@@ -6,7 +6,6 @@ from typing import Annotated
 
 import typer
 
-from throwcollect import ros
 from throwcollect.cli.ros.options import HiddenOption, RunOption, TypesOption
 from throwcollect.cli.ros.session import join_graph, print_names, require_name
 from throwcollect.errors import ConfigError
@@ -35,7 +34,7 @@ def call_service(
     from throwcollect.cli.ros.yaml_values import parse
     from throwcollect.ros.values import fill
 
-    service_type = find_interface("srv", ros.get_service, kind)
+    service_type = find_interface("srv", kind)
     request = service_type.Request()
     fill(request, parse(values, "VALUES"))
     with join_graph(run) as session:

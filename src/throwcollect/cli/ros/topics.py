@@ -157,7 +157,7 @@ def _find_message_type(session: Session, topic: str, kind: str | None) -> tuple[
         if len(kinds) > 1:
             raise ConfigError(f"{name} has {len(kinds)} types", expected=f"one of {', '.join(kinds)}")
         (kind,) = kinds
-    message_type = find_interface("msg", ros.get_message, kind)
+    message_type = find_interface("msg", kind)
     if kinds and (full := full_name("msg", kind)) not in kinds:
         raise ConfigError(f"{name} is no {full}", expected=", ".join(kinds))
     return name, message_type

@@ -30,7 +30,7 @@ export async function takeToken() {
   if (code === null) return kept;
   history.replaceState(null, "", location.pathname + location.search);
   try {
-    const { token } = await (await ask(null, "POST", "/exchange", { code })).json();
+    const { token } = await new Connection(null).read("POST", "/exchange", { code });
     keepToken(token);
     return token;
   } catch (error) {
@@ -45,24 +45,6 @@ export function keepToken(token) {
   else sessionStorage.setItem(KEPT, token);
 }
 
-/**
- * @param {string | null} token
- * @param {string} method
- * @param {string} path below the interface
- * @param {unknown} [body] what is sent as JSON
- * @returns {Promise<Response>}
- * @throws {Problem}
- */
-async function ask(token, method, path, body) {
-  const headers = token === null ? {} : { Authorization: `Bearer ${token}` };
-  if (body !== undefined) headers["Content-Type"] = "application/json";
-  const request = { method, headers, body: body === undefined ? null : JSON.stringify(body) };
-  // Only a request that changes nothing may be sent again.
-  const response = await attempt(() => fetch(PREFIX + path, request), method === "GET" ? TRIES : 1);
-  if (!response.ok) throw new Problem(response.status, await response.json().catch(() => ({})));
-  return response;
-}
-
 /** Try a request again: browsers break requests off when any network of the machine changes. */
 async function attempt(act, tries) {
   try {
@@ -74,9 +56,9 @@ async function attempt(act, tries) {
   }
 }
 
-/** Requests and sockets of somebody who has a token. */
+/** Requests and sockets. */
 export class Connection {
-  /** @param {string} token */
+  /** @param {string | null} token null for somebody who has none yet */
   constructor(token) {
     this.token = token;
   }
@@ -84,13 +66,24 @@ export class Connection {
   /**
    * Ask the server.
    * @param {string} method
-   * @param {string} path
-   * @param {unknown} [body]
+   * @param {string} path below the interface
+   * @param {unknown} [body] what is sent as JSON
    * @returns {Promise<Response>}
    * @throws {Problem}
    */
-  ask(method, path, body) {
-    return ask(this.token, method, path, body);
+  async ask(method, path, body) {
+    const headers = this.token === null ? {} : { Authorization: `Bearer ${this.token}` };
+    if (body !== undefined) headers["Content-Type"] = "application/json";
+    const request = { method, headers, body: body === undefined ? null : JSON.stringify(body) };
+    // Only a request that changes nothing may be sent again.
+    const response = await attempt(() => fetch(PREFIX + path, request), method === "GET" ? TRIES : 1);
+    if (!response.ok) throw new Problem(response.status, await response.json().catch(() => ({})));
+    return response;
+  }
+
+  /** Ask the server as `ask` does; returns what the answer says in JSON. */
+  async read(method, path, body) {
+    return (await this.ask(method, path, body)).json();
   }
 
   /**

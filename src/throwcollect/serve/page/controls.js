@@ -1,6 +1,6 @@
 /** Components to start, and runs to look after. */
 
-import { get, make, setChoices, setText, showProblem } from "./dom.js";
+import { get, make, makeButton, setChoices, setText, showProblem } from "./dom.js";
 import { legendItem } from "./landing_map.js";
 import { RunRecords } from "./run_records.js";
 import { lives, steps } from "./state.js";
@@ -128,7 +128,7 @@ class ComponentCard {
         body.set = readChanges(this.changes.value);
         if (this.simulations.value) body.simulations = Number(this.simulations.value);
       }
-      const instance = await (await this.controls.connection.ask("POST", "/instances", body)).json();
+      const instance = await this.controls.connection.read("POST", "/instances", body);
       if (instance.kind !== "container") this.controls.watch(instance.id);
     } catch (error) {
       showProblem(this.problem, error);
@@ -149,12 +149,12 @@ class InstanceCard {
     this.outcomes = make("ul", { className: "legend", "aria-label": "outcomes" });
     this.nodes = make("p", { className: "muted" });
     this.problem = make("div", { className: "problem", role: "alert" });
-    this.watch = button("Watch", () => controls.watch(this.instance.id));
-    this.stop = button("Stop", () => this.#ask("DELETE", ""));
-    this.force = button("End now", () => this.#force());
-    this.resume = button("Resume", () => this.#resume());
-    this.report = button("Report", () => this.#save("report", "html"));
-    this.download = button("Download", () => this.#save("dataset.tar", "tar"));
+    this.watch = makeButton("Watch", () => controls.watch(this.instance.id));
+    this.stop = makeButton("Stop", () => this.#ask("DELETE", ""));
+    this.force = makeButton("End now", () => this.#force());
+    this.resume = makeButton("Resume", () => this.#resume());
+    this.report = makeButton("Report", () => this.#save("report", "html"));
+    this.download = makeButton("Download", () => this.#save("dataset.tar", "tar"));
     this.simulations = make("input", { type: "number", min: "0", max: "256", inputMode: "numeric" });
     this.scale = make("form", { className: "row" }, make("label", {}, "Simulations ", this.simulations),
       make("button", { type: "submit" }, "Scale"));
@@ -234,8 +234,8 @@ class InstanceCard {
 
   #resume() {
     return this.#attempt(async () => {
-      const answer = await this.controls.connection.ask("POST", `/collections/${this.#id}/resume`);
-      this.controls.watch((await answer.json()).id);
+      const resumed = await this.controls.connection.read("POST", `/collections/${this.#id}/resume`);
+      this.controls.watch(resumed.id);
     });
   }
 
@@ -261,12 +261,6 @@ class InstanceCard {
       showProblem(this.problem, error);
     }
   }
-}
-
-function button(text, act) {
-  const made = make("button", { type: "button" }, text);
-  made.addEventListener("click", act);
-  return made;
 }
 
 /**

@@ -29,6 +29,19 @@ export function make(tag, properties = {}, ...children) {
 }
 
 /**
+ * Make a button.
+ * @param {string} text
+ * @param {() => void} act called when it is pressed
+ * @param {Record<string, unknown>} [properties] as `make` takes them
+ * @returns {any} the button
+ */
+export function makeButton(text, act, properties = {}) {
+  const button = make("button", { type: "button", ...properties }, text);
+  button.addEventListener("click", act);
+  return button;
+}
+
+/**
  * Set the text of an element only if it differs, because screen readers read out each change.
  * @param {Element} element
  * @param {string} text

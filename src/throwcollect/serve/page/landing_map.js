@@ -113,7 +113,7 @@ export class LandingMap {
     const [, , outcome, trial] = landing;
     if (this.#trials.has(trial)) return;
     this.#trials.add(trial);
-    this.#count(outcome);
+    this.#outcomes.set(outcome, (this.#outcomes.get(outcome) ?? 0) + 1);
     if (!isPlaced(landing)) return;
     this.#total += 1;
     if ((this.#total - 1) % this.#stride) return;
@@ -121,10 +121,6 @@ export class LandingMap {
     if (this.#landings.length <= MOST) return;
     this.#landings = this.#landings.filter((_, i) => i % 2 === 0);
     this.#stride *= 2;
-  }
-
-  #count(outcome) {
-    this.#outcomes.set(outcome, (this.#outcomes.get(outcome) ?? 0) + 1);
   }
 
   /** @param {import("./throws.js").Throw | null} shown the throw to mark */

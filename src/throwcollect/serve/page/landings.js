@@ -49,7 +49,7 @@ export class Landings {
     const path = `/collections/${encodeURIComponent(id)}/landings`;
     try {
       for (let hasMore = true; hasMore && id === this.#id && !this.#hasAll;) {
-        const found = await (await this.connection.ask("GET", `${path}?first=${this.#following}`)).json();
+        const found = await this.connection.read("GET", `${path}?first=${this.#following}`);
         if (id !== this.#id) return;
         this.#hasAll = found.is_finished;
         this.#following = found.following;

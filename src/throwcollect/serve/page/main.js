@@ -2,7 +2,7 @@
 
 import { Connection, Problem, keepToken, takeToken } from "./connection.js";
 import { Controls } from "./controls.js";
-import { get, setChoices, setText } from "./dom.js";
+import { get, makeButton, setChoices, setText } from "./dom.js";
 import { listenForKeys } from "./keys.js";
 import { LandingMap } from "./landing_map.js";
 import { Live } from "./live.js";
@@ -184,14 +184,7 @@ class Page {
     const place = get("tiles");
     if (place.dataset.names !== names.join()) {
       place.dataset.names = names.join();
-      place.replaceChildren(...names.map((name) => {
-        const button = document.createElement("button");
-        button.type = "button";
-        button.append(name);
-        button.title = `show ${name} alone`;
-        button.addEventListener("click", () => this.#alone(name));
-        return button;
-      }));
+      place.replaceChildren(...names.map((name) => makeButton(name, () => this.#alone(name), { title: `show ${name} alone` })));
     }
     names.forEach((name, i) => {
       const { left, top } = this.view.tileOf(name);

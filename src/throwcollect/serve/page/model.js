@@ -43,7 +43,7 @@ export class Models {
   /** Fetch the names of all models, and the shown model again. */
   async list() {
     try {
-      this.#names = await this.#ask("/models");
+      this.#names = await this.connection.read("GET", "/models");
     } catch {
       // The page says already that the connection is lost.
       return;
@@ -66,17 +66,13 @@ export class Models {
     this.#aim();
   }
 
-  async #ask(path) {
-    return (await this.connection.ask("GET", path)).json();
-  }
-
   async #choose() {
     const name = get("model").value;
     const asked = ++this.#chosen;
     let model = null;
     let problem = "";
     try {
-      if (name) model = await this.#ask(`/models/${encodeURIComponent(name)}`);
+      if (name) model = await this.connection.read("GET", `/models/${encodeURIComponent(name)}`);
     } catch (error) {
       problem = error.message;
     }
@@ -133,7 +129,7 @@ export class Models {
     let text;
     let values = {};
     try {
-      const found = await this.#ask(`/models/${encodeURIComponent(model.name)}/aim?${at}`);
+      const found = await this.connection.read("GET", `/models/${encodeURIComponent(model.name)}/aim?${at}`);
       const isFar = !found.reachable;
       text = isFar ? `Out of reach; the nearest throw ended at ${inPlaces(found.nearest)}.` : `Throw with these; it should end at ${inPlaces(found.predicted)}.`;
       values = isFar ? {} : found.parameters;

@@ -1,7 +1,7 @@
 /** One plot: a curve over a throw with the time of its replay, or over the last seconds of a live simulation. */
 
 import uPlot from "./vendor/uplot/dist/uPlot.esm.js";
-import { get, make, setText } from "./dom.js";
+import { get, make, makeButton, setText } from "./dom.js";
 import { EDGE_PX, placeApart } from "./places.js";
 import { seriesOf } from "./throws.js";
 
@@ -33,11 +33,7 @@ export class PlotPanel {
   constructor(choice, follows, closed) {
     this.choice = choice;
     const title = `${choice.field === "ball" ? `ball ${choice.name}` : `${choice.name} ${choice.field}`} [${UNITS[choice.field]}]`;
-    const button = (text, label, act) => {
-      const made = make("button", { type: "button", title: label, "aria-label": `${label}: ${title}` }, text);
-      made.addEventListener("click", act);
-      return made;
-    };
+    const button = (text, label, act) => makeButton(text, act, { title: label, "aria-label": `${label}: ${title}` });
     this.now = make("output", { className: "now" });
     this.title = title;
     this.collapser = button("–", "collapse", () => this.collapse());

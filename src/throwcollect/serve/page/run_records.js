@@ -37,14 +37,16 @@ export class RunRecords {
     if (!this.element.open || !this.element.isConnected) return;
     const { id } = this.#instance;
     const node = this.choice.value;
+    // The user may choose something else meanwhile, which another request fetches.
+    const isChosen = () => node === this.choice.value;
     const run = `/instances/${encodeURIComponent(id)}`;
     try {
       const path = node ? `${run}/log/${encodeURIComponent(node)}?tail=${TAIL}` : `${run}/events`;
       const text = await (await this.connection.ask("GET", path)).text();
-      this.#show(node ? text : inWords(text));
-      showProblem(this.problem, null);
+      if (isChosen()) this.#show(node ? text : inWords(text));
+      if (isChosen()) showProblem(this.problem, null);
     } catch (error) {
-      showProblem(this.problem, error);
+      if (isChosen()) showProblem(this.problem, error);
     }
     if (lives(this.#instance)) this.#timer = setTimeout(() => this.#fetch(), PERIOD_MS);
   }

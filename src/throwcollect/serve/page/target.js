@@ -111,7 +111,7 @@ export class Target {
     showProblem(problem, null);
     try {
       const body = { component: name, set: coverPlace(this.place, targets) };
-      const instance = await (await this.connection.ask("POST", "/instances", body)).json();
+      const instance = await this.connection.read("POST", "/instances", body);
       this.#say(`${instance.id} collects around the target`);
       this.watch(instance.id);
     } catch (error) {

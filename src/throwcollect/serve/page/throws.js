@@ -33,31 +33,18 @@ export function decodeThrow(buffer) {
 }
 
 /**
- * Rows at a time, between which values are interpolated.
- * @param {Throw} shown
- * @param {number} time [s]
- * @returns {[number, number, number]} row before, row after, share of the row after
- */
-function rowsAt(shown, time) {
-  const at = Math.min(Math.max(time * shown.rate_hz, 0), shown.samples - 1);
-  const before = Math.floor(at);
-  return [before, Math.min(before + 1, shown.samples - 1), at - before];
-}
-
-/**
  * @param {Float32Array} values rows side by side
  * @param {number} width values of a row
  * @param {Throw} shown
  * @param {number} time [s]
- * @returns {number[]} the row at that time
+ * @returns {number[]} the row at that time, interpolated between the samples before and after it
  */
 function valuesAt(values, width, shown, time) {
-  const [before, after, share] = rowsAt(shown, time);
-  const row = [];
-  for (let i = 0; i < width; i++) {
-    row.push(values[before * width + i] * (1 - share) + values[after * width + i] * share);
-  }
-  return row;
+  const at = Math.min(Math.max(time * shown.rate_hz, 0), shown.samples - 1);
+  const before = Math.floor(at);
+  const after = Math.min(before + 1, shown.samples - 1);
+  const share = at - before;
+  return Array.from({ length: width }, (_, i) => values[before * width + i] * (1 - share) + values[after * width + i] * share);
 }
 
 /**

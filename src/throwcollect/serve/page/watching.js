@@ -133,8 +133,8 @@ export class Watching {
     const run = `/instances/${encodeURIComponent(id)}`;
     if (this.#urdf === null && instance.robots.length) {
       this.#urdf = "";
-      const scene = await this.#ask(`${run}/scene`, (response) => response.json());
-      const urdf = await this.#ask(`${run}/urdf`, (response) => response.text());
+      const scene = await this.#ask(id, `${run}/scene`, (response) => response.json());
+      const urdf = await this.#ask(id, `${run}/urdf`, (response) => response.text());
       if (this.id !== id) return;
       const isWhole = scene !== null && urdf !== null;
       // The next state asks again for what the server has not given.
@@ -149,12 +149,12 @@ export class Watching {
     }
   }
 
-  /** What the server answers; null if it has nothing. */
-  async #ask(path, read) {
+  /** What the server answers on a run; null if it has nothing, which is told as long as the run is watched. */
+  async #ask(id, path, read) {
     try {
       return await read(await this.connection.ask("GET", path));
     } catch (error) {
-      this.tell(error.message);
+      if (this.id === id) this.tell(error.message);
       return null;
     }
   }

@@ -9,17 +9,15 @@ import threading
 import time
 from collections.abc import Callable
 from queue import Empty, SimpleQueue
-from typing import TYPE_CHECKING
 
 from throwcollect import ros
 from throwcollect.errors import ThrowcollectError
+from throwcollect.ros.connection import Connection
 from throwcollect.ros.endpoint import answers
 from throwcollect.serve.rosbridge.client import Client
 from throwcollect.serve.rosbridge.codec import Frame
+from throwcollect.serve.rosbridge.offered_actions import FAREWELL_S
 from throwcollect.serve.rosbridge.session import Session
-
-if TYPE_CHECKING:
-    from throwcollect.ros.connection import Connection
 
 _logger = logging.getLogger(__name__)
 
@@ -56,14 +54,9 @@ class Bridge:
         self._thread.start()
 
     def attach(self, send: Callable[[Frame], None], *, read_only: bool = False) -> Client:
-        """Add a client.
+        """Add a client, which the caller has to close.
 
-        Args:
-            send: Called with each frame for the client, in the bridge's thread; it may neither wait nor fail.
-            read_only: Whether the client may only look.
-
-        Returns:
-            The client, which the caller has to close.
+        Each frame for the client is given to ``send`` in the bridge's thread, so that may neither wait nor fail.
         """
         client = Client(self, send, read_only=read_only)
         self.submit(lambda: self._clients.append(client))
@@ -126,6 +119,11 @@ class Bridge:
             client.close()
         while not self._work.empty():
             self._do_next()
+        # Nodes that wait for results of clients' actions get them before the actions are withdrawn.
+        end = time.monotonic() + FAREWELL_S
+        while self._session is not None and self._timers and self._timers[0][0] <= end:
+            self._spin(self._session, max(self._timers[0][0] - time.monotonic(), 0.0))
+            self._call_timers()
         self._leave()
 
     def _spin(self, session: Session, seconds: float) -> None:

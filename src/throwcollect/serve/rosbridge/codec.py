@@ -57,12 +57,7 @@ def _read_array(tag: cbor2.CBORTag, _immutable: bool) -> Any:
 
 
 def plain_values(message: Any, compression: str = "none") -> Any:
-    """Turn a message into values that `encode` writes.
-
-    Args:
-        message: The message.
-        compression: ``none`` for values of JSON, in which arrays of numbers are still NumPy's; otherwise those of CBOR.
-    """
+    """Turn a message into values that `encode` writes with the same ``compression``; JSON's have arrays of NumPy."""
     return plain(message, _json_numbers if compression == "none" else _cbor_numbers)
 
 
@@ -79,13 +74,7 @@ def json_text(fields: object) -> str:
 
 
 def fragments(text: str, size: int, number: str) -> Iterator[str]:
-    """Split a text frame that is longer than a client wants into fragments.
-
-    Args:
-        text: The frame.
-        size: Characters in each fragment, at most.
-        number: Tells the fragments of different frames apart.
-    """
+    """Split a text frame into fragments of at most ``size`` characters, which have the frame's ``number`` in common."""
     total = -(-len(text) // size)
     for index in range(total):
         part = text[index * size : (index + 1) * size]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from abc import ABC, abstractmethod
 from collections.abc import Callable
 from functools import partial
 from typing import Generic, TypeVar
@@ -16,21 +15,19 @@ _POLL_S = 0.02
 _WATCH_S = 1.0
 
 
-class Errand(ABC):
+class Errand:
     """One thing that a client has asked of a node; it ends once.
 
     Attributes:
         name: Absolute name of the service or action.
+        fail: Tells the client why there is no answer.
         is_open: Whether it has not ended.
     """
 
-    def __init__(self, name: str) -> None:
+    def __init__(self, name: str, fail: Callable[[str], None]) -> None:
         self.name = name
+        self.fail = fail
         self.is_open = True
-
-    @abstractmethod
-    def fail(self, why: str) -> None:
-        """Tell the client why there is no answer."""
 
 
 AnErrand = TypeVar("AnErrand", bound=Errand)

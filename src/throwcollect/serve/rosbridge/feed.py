@@ -14,13 +14,7 @@ from throwcollect.units import NS_PER_S
 
 
 class Sample:
-    """One message of a topic, as it came.
-
-    Args:
-        data: Its bytes in CDR.
-        message_type: Class of the message.
-        received_ns: Time of receipt on the node's clock [ns].
-    """
+    """One message of a topic, as it came: bytes in CDR, with the time of receipt on the node's clock [ns]."""
 
     def __init__(self, data: bytes, message_type: Any, received_ns: int) -> None:
         self._data = data
@@ -30,11 +24,7 @@ class Sample:
         self._frames: dict[tuple[str, str], Frame] = {}
 
     def frame(self, topic: str, compression: str) -> Frame:
-        """The message as a client gets it.
-
-        Args:
-            topic: The client's name for the topic.
-            compression: ``none``, ``cbor`` or ``cbor-raw``.
+        """The message as a client gets it that calls the topic like this.
 
         Raises:
             ValueError: If the bytes are malformed.
@@ -61,13 +51,9 @@ Listener = Callable[[Sample], None]
 
 
 class Feed:
-    """Subscribes to a topic for all clients that listen to it.
+    """Subscribes to a topic for all clients that listen to it; ``on_end`` is called when nobody listens any more.
 
-    Args:
-        node: The node of the bridge.
-        topic: Absolute name of the topic.
-        type_name: Full name of its type.
-        on_end: Called when nobody listens any more.
+    The topic has its absolute name, and its type the full one.
     """
 
     def __init__(self, node: ros.Node, topic: str, type_name: str, on_end: Callable[[], object]) -> None:

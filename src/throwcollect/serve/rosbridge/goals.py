@@ -35,7 +35,7 @@ class Goal(Errand):
         self._client = client
         self.id: RequestId = request.id
         self._given = request.text("action")
-        super().__init__(absolute_name(self._given))
+        super().__init__(absolute_name(self._given), self._tell_failure)
         self.form = Form()
         self.handle: Any = None
         self.is_cancelled = False
@@ -49,8 +49,7 @@ class Goal(Errand):
         """Send the result to the client."""
         self._answer("action_result", plain_values(result, self.form.compression), status=status, result=True)
 
-    def fail(self, why: str) -> None:
-        """Tell the client why there is no result."""
+    def _tell_failure(self, why: str) -> None:
         self._answer("action_result", why, status=_UNKNOWN, result=False)
 
     def _answer(self, op: str, values: Any, **more: object) -> None:
@@ -74,7 +73,7 @@ class Goals(Errands[Goal]):
         goal.form = request.form()
         on_feedback = goal.tell_feedback if request.flag("feedback") else None
         type_name = request.text("action_type")
-        action_type = find_interface("action", ros.get_action, type_name)
+        action_type = find_interface("action", type_name)
         if goal.name not in dict(ros.get_action_names_and_types(self._client.session.node)):
             raise ConfigError(f"nobody offers an action {goal.name}")
         message = action_type.Goal()

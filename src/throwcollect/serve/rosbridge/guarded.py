@@ -47,11 +47,7 @@ def refuse_leases(parameter: str) -> None:
 
 
 def refuse_secrets(type_name: str, request: Any) -> None:
-    """Refuse a request to a node that would read or set the parameter by which trials are leased.
-
-    Args:
-        type_name: Full name of the service's type.
-        request: The request, as it would be sent.
+    """Refuse a request to a service of this type that would read or set the parameter by which trials are leased.
 
     Raises:
         ConfigError: If it would do so.

@@ -16,7 +16,8 @@ from throwcollect.serve.rosbridge.request import Form, Request
 
 _SUCCEEDED, _CANCELED, _ABORTED = 4, 5, 6
 """Of action_msgs/msg/GoalStatus."""
-_FAREWELL_S = 0.2
+FAREWELL_S = 0.2
+"""Time in which nodes get the last results of an action, before it is withdrawn."""
 _numbers = itertools.count(1)
 
 
@@ -32,7 +33,7 @@ class OfferedAction:
         self._given = given
         self._type_name = type_name
         self._name = absolute_name(given)
-        self._type = find_interface("action", ros.get_action, type_name)
+        self._type = find_interface("action", type_name)
         self._goals: dict[str, tuple[Any, ros.Future]] = {}
         self._server: ros.ActionServer | None = None
 
@@ -53,7 +54,7 @@ class OfferedAction:
         for number in list(self._goals):
             self._finish(number, self._type.Result(), _ABORTED)
         # Nodes that wait for a result get it first.
-        self._client.later(_FAREWELL_S, server.destroy)
+        self._client.later(FAREWELL_S, server.destroy)
 
     def lose(self) -> None:
         """Forget the session, which is gone, and all goals that came by it."""

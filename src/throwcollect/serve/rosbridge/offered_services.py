@@ -28,7 +28,7 @@ class OfferedService:
         self._client = client
         self._given = given
         self._name = absolute_name(given)
-        self._type = find_interface("srv", ros.get_service, type_name)
+        self._type = find_interface("srv", type_name)
         self._pending: dict[str, tuple[ros.Future, Any]] = {}
         self._service: Any = None
 

@@ -14,18 +14,7 @@ _MOST = 1000
 """Questions of one client that may wait for an answer."""
 
 
-class _Question(Errand):
-    """A request to a service that has no answer yet."""
-
-    def __init__(self, service: str, failed: Callable[[str], None]) -> None:
-        super().__init__(service)
-        self._failed = failed
-
-    def fail(self, why: str) -> None:
-        self._failed(why)
-
-
-class Questions(Errands[_Question]):
+class Questions(Errands[Errand]):
     """All requests of one client to services that wait for an answer."""
 
     def __init__(self, client: Peer) -> None:
@@ -56,7 +45,7 @@ class Questions(Errands[_Question]):
         if len(self._open) >= _MOST:
             raise ConfigError(f"{service}: {_MOST} requests wait for an answer already")
         client = self._client.session.service_client(service, type_name)
-        question = _Question(service, failed)
+        question = Errand(service, failed)
 
         def finish(future: Any) -> None:
             if self.end(question):

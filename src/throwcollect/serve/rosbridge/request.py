@@ -33,12 +33,7 @@ _LONGEST = 200
 
 
 class Fields:
-    """Fields by name, as a client gives them.
-
-    Args:
-        fields: The fields.
-        what: What they belong to, for the beginning of messages.
-    """
+    """Fields by name, as a client gives them; messages begin with ``what`` they belong to."""
 
     def __init__(self, fields: Mapping[Any, Any], what: str) -> None:
         self._fields = fields
@@ -114,9 +109,6 @@ class Fields:
 
 class Request(Fields):
     """One operation of the protocol.
-
-    Args:
-        fields: Its fields.
 
     Attributes:
         op: The operation.

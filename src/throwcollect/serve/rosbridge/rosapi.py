@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import Literal
 
 from rclzenoh.interfaces import message_definition
+from rclzenoh.names import join
 from throwcollect import ros
 from throwcollect.ros.names import absolute_name, full_name, is_hidden
 from throwcollect.serve.rosbridge.guarded import is_guarded
@@ -82,7 +83,7 @@ class Rosapi:
     def _nodes(self) -> list[tuple[str, str]]:
         """Names and namespaces."""
         found = sorted(set(self._node.get_node_names_and_namespaces()))
-        return [(name, namespace) for name, namespace in found if not is_hidden(_join(namespace, name))]
+        return [(name, namespace) for name, namespace in found if not is_hidden(join(namespace, name))]
 
     def _list_topics(self, _call: Call) -> Values:
         topics = self._topics()
@@ -120,7 +121,7 @@ class Rosapi:
     def _providers(self, name: str, type_name: str | None = None) -> list[str]:
         """Nodes that offer a service of this name, or one of this type."""
         return [
-            _join(namespace, node)
+            join(namespace, node)
             for node, namespace in self._nodes()
             if any(
                 service == name or type_name in types
@@ -147,7 +148,7 @@ class Rosapi:
         return {"action_servers": [name for name in actions if f"{name}/_action/send_goal" in offered]}
 
     def _list_nodes(self, _call: Call) -> Values:
-        return {"nodes": [_join(namespace, name) for name, namespace in self._nodes()]}
+        return {"nodes": [join(namespace, name) for name, namespace in self._nodes()]}
 
     def _describe_node(self, call: Call) -> Values:
         namespace, _, name = absolute_name(call.fields.text("node")).rpartition("/")
@@ -178,12 +179,8 @@ def _visible(found: NamesAndTypes) -> list[tuple[str, list[str]]]:
     return sorted((name, types) for name, types in found if not is_hidden(name))
 
 
-def _join(namespace: str, name: str) -> str:
-    return f"{namespace.removesuffix('/')}/{name}"
-
-
 def _names(infos: Iterable[object]) -> list[str]:
-    names = {_join(info.node_namespace, info.node_name) for info in infos}  # type: ignore[attr-defined]
+    names = {join(info.node_namespace, info.node_name) for info in infos}  # type: ignore[attr-defined]
     return sorted(name for name in names if not is_hidden(name))
 
 

@@ -20,7 +20,7 @@ def describe_message(name: str) -> list[Definition]:
     Raises:
         ConfigError: If there is no such message.
     """
-    return _describe(full_name("msg", name), find_interface("msg", ros.get_message, name), [])
+    return _describe(full_name("msg", name), find_interface("msg", name), [])
 
 
 def describe_service(name: str, part: Literal["Request", "Response"]) -> list[Definition]:
@@ -29,7 +29,7 @@ def describe_service(name: str, part: Literal["Request", "Response"]) -> list[De
     Raises:
         ConfigError: If there is no such service.
     """
-    service = find_interface("srv", ros.get_service, name)
+    service = find_interface("srv", name)
     return _describe(f"{full_name('srv', name)}_{part}", getattr(service, part), [])
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from throwcollect import ros
 from throwcollect.errors import ConfigError
 from throwcollect.ros.names import absolute_name, find_interface, full_name
 from throwcollect.ros.values import fill
@@ -65,7 +64,7 @@ def call_node(client: Peer, questions: Questions, call: Call, request: Request) 
         raise ConfigError(f"nobody offers a service {service}")
     named = full_name("srv", request.text_or("type", ""))
     type_name = named if named in types else types[0]
-    message = find_interface("srv", ros.get_service, type_name).Request()
+    message = find_interface("srv", type_name).Request()
     _fill_arguments(message, call.arguments)
     refuse_secrets(type_name, message)
 

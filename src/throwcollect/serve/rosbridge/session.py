@@ -2,26 +2,17 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from throwcollect import ros
 from throwcollect.errors import ConfigError
+from throwcollect.ros.connection import Connection
 from throwcollect.ros.names import find_interface, full_name, make_own_name
 from throwcollect.serve.rosbridge.feed import Feed, Listener
 
-if TYPE_CHECKING:
-    from throwcollect.ros.connection import Connection
-
 
 class Session:
-    """A context, a node in it, and its executor; all are used by one thread.
-
-    Args:
-        connection: The way into the graph.
-
-    Attributes:
-        node: The node, which is hidden.
-        executor: Its executor.
+    """A context, a hidden node in it, and the node's executor; all are used by one thread.
 
     Raises:
         ConfigError: If the connection cannot be used.
@@ -53,11 +44,7 @@ class Session:
             ros.shutdown(context=self._context)
 
     def type_of(self, topic: str, wanted: str) -> str:
-        """Full name of the type of a topic.
-
-        Args:
-            topic: Absolute name of the topic.
-            wanted: Type that a client names, in full or as ``pkg/Type``; empty if it names none.
+        """Full name of the type of a topic, which a client may name in full, as ``pkg/Type``, or not at all.
 
         Raises:
             ConfigError: If the topic has another type, or none is named and it has none or several.
@@ -69,7 +56,7 @@ class Session:
                 raise ConfigError(f"{topic} {what}", expected=f"one of {', '.join(types)}" if types else "a type")
             return types[0]
         name = full_name("msg", wanted)
-        find_interface("msg", ros.get_message, name)
+        find_interface("msg", name)
         if types and name not in types:
             raise ConfigError(f"{topic} is no {name}", expected=", ".join(types))
         return name
@@ -94,7 +81,7 @@ class Session:
         """
         key = service, type_name
         if key not in self._clients:
-            self._clients[key] = self.node.create_client(find_interface("srv", ros.get_service, type_name), service)
+            self._clients[key] = self.node.create_client(find_interface("srv", type_name), service)
         return self._clients[key]
 
     def is_offered_by_others(self, service: str) -> bool:

@@ -74,14 +74,8 @@ class Outbox:
         self._bytes += len(frame)
 
 
-async def attend(websocket: WebSocket, bridge: Bridge, *, read_only: bool = False) -> None:
-    """Connect a client to a bridge until it leaves.
-
-    Args:
-        websocket: The WebSocket of the client, not accepted yet.
-        bridge: The bridge.
-        read_only: Whether the client may only look.
-    """
+async def attend(websocket: WebSocket, bridge: Bridge, *, read_only: bool) -> None:
+    """Accept the WebSocket of a client, and connect it to a bridge until it leaves."""
     await websocket.accept()
     outbox = Outbox(asyncio.get_running_loop())
     client = bridge.attach(outbox.put, read_only=read_only)

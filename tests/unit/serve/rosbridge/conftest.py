@@ -107,7 +107,7 @@ def url(bridge: Bridge) -> Iterator[str]:
     """Where the bridge is, over WebSockets."""
 
     async def route(websocket: WebSocket) -> None:
-        await attend(websocket, bridge)
+        await attend(websocket, bridge, read_only=False)
 
     app = Starlette(routes=[WebSocketRoute("/", route)])
     options: dict[str, Any] = {"lifespan": "off", "ws_per_message_deflate": False, "timeout_graceful_shutdown": 1}

@@ -9,6 +9,7 @@ import pytest
 from tests.unit.serve.rosbridge.conftest import Party, wait_for
 
 from throwcollect.ros import ActionClient, ActionServer, CancelResponse, Future, GoalResponse, Node, get_action
+from throwcollect.ros.connection import Connection
 from throwcollect.serve.rosbridge import Bridge
 
 FJT: Any = get_action("control_msgs/action/FollowJointTrajectory")
@@ -179,6 +180,22 @@ def test_goals_are_aborted_when_the_action_is_withdrawn_and_when_the_client_leav
     assert sent.end == (ABORTED, "")
     # On DDS, services that somebody would call are among the names, too.
     wait_for(lambda: "/swing" not in party.call("rosapi/action_servers")["action_servers"])
+
+
+def test_goals_are_aborted_when_the_last_client_leaves(connection: Connection, node: Node) -> None:
+    bridge = Bridge(connection)
+    party = Party(bridge)
+    client = ActionClient(node, FJT, "/wave")
+    party.ask(op="advertise_action", action="wave", type=KIND)
+    assert client.wait_for_server(5)
+    accepted = client.send_goal_async(FJT.Goal())
+    ended = (wait_for(accepted.done) and accepted.result()).get_result_async()
+    party.next(op="send_action_goal")
+    party.client.close()
+    bridge.close()
+    wait_for(ended.done)
+    assert ended.result().status == ABORTED
+    client.destroy()
 
 
 def test_an_action_of_a_node_is_not_offered_once_more(party: Party, arm: Arm) -> None:

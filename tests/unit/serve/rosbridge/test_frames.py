@@ -159,3 +159,9 @@ def test_the_parts_of_types_are_found() -> None:
     assert array_parts("sequence<std_msgs/Header>") == ("std_msgs/Header", None, None)
     assert array_parts("float[36]") == ("float", None, 36)
     assert array_parts("string<5>") is None
+
+
+@pytest.mark.parametrize(("name", "values"), [("Float64", 10**400), ("Float64MultiArray", [10**400])])
+def test_a_number_that_no_float_can_be_is_refused(name: str, values: object) -> None:
+    with pytest.raises(ConfigError, match=r"data: should be .*double"):
+        fill(message_class(f"std_msgs/msg/{name}")(), {"data": values})
