@@ -21,7 +21,7 @@ from throwcollect.dataset.shard import FinishedShard, OpenShard, path_of_part, w
 from throwcollect.dataset.throws_table import Place
 from throwcollect.episode.channels import Channels
 from throwcollect.errors import DatasetError
-from throwcollect.files import is_there, remove, unwritable
+from throwcollect.files import remove, unwritable
 from throwcollect.side_by_side import work_side_by_side
 from throwcollect.sweep.plan import Plan
 from throwcollect.tasks.result import Result
@@ -172,8 +172,6 @@ def find_episodes(path: Path, plan: Plan, channels: Channels | None = None) -> d
         DatasetError: If the file cannot be read.
     """
     episodes: dict[int, RecoveredEpisode] = {}
-    if not is_there(path):
-        return episodes
     trials_to_run = frozenset(plan.trials.numbers_to_run)
     for found in scan_whole(path):
         episode = found.stored.episode

@@ -58,5 +58,7 @@ def _list_rows(directory: Path, plan: Plan) -> Iterator[Row]:
     yield from (table.make_refused_row(plan.trial(number)) for number in plan.trials.refused)
     for name in list_shards(plan):
         final = directory / name
-        for found in find_episodes(final if is_there(final) else path_of_part(final), plan).values():
+        # The unfinished file comes first: when it vanishes in this moment, the final one is there.
+        episodes = find_episodes(path_of_part(final), plan) | find_episodes(final, plan)
+        for found in episodes.values():
             yield table.row(plan.trial(found.trial), found.result, found.place)
