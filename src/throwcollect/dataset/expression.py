@@ -206,7 +206,8 @@ class _Evaluation:
         column = self._table[name]
         if pa.types.is_string(column.type):
             return _Value("text", column)
-        return _Value("a number", column.cast(pa.float64()))
+        # The numbers of a damaged table may be too large for a float to be exact.
+        return _Value("a number", column.cast(pa.float64(), safe=False))
 
     def _name(self, node: ast.expr) -> str:
         match node:

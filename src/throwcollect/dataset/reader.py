@@ -208,10 +208,10 @@ class Dataset(Sequence[Throw]):
         Raises:
             DatasetError: If the metadata do not have them.
         """
-        try:
-            return tuple(self._bag["relative_file_paths"])
-        except (KeyError, TypeError) as error:
-            raise DatasetError(f"{error} is missing", path=self.directory / METADATA) from error
+        names = self._bag.get("relative_file_paths")
+        if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
+            raise self._lacks("relative_file_paths")
+        return tuple(names)
 
     @property
     def topics(self) -> Mapping[str, int]:
@@ -224,7 +224,10 @@ class Dataset(Sequence[Throw]):
             counts = self._bag["topics_with_message_count"]
             return {each["topic_metadata"]["name"]: each["message_count"] for each in counts}
         except (KeyError, TypeError) as error:
-            raise DatasetError(f"{error} is missing", path=self.directory / METADATA) from error
+            raise self._lacks("topics_with_message_count") from error
+
+    def _lacks(self, name: str) -> DatasetError:
+        return DatasetError(f"{name} is missing", path=self.directory / METADATA)
 
     def _custom(self, name: str) -> str:
         """Return what the product itself wrote into the metadata.
@@ -235,7 +238,7 @@ class Dataset(Sequence[Throw]):
         custom = self._bag.get("custom_data")
         value = custom.get(name) if isinstance(custom, dict) else None
         if not isinstance(value, str):
-            raise DatasetError(f"{name} is missing", path=self.directory / METADATA)
+            raise self._lacks(name)
         return value
 
     @property
@@ -350,10 +353,7 @@ class Dataset(Sequence[Throw]):
         """Where the episode of each throw lies; None where there is none."""
         columns = (self.throws[name].to_pylist() for name in ("trial", "shard", "chunk_offset", "samples"))
         rows = list(zip(*columns, strict=True))
-        # The table may come from anybody: only names of files in the directory itself are followed.
-        paths = {
-            name: self.directory / Path(name).name for name in {shard for _, shard, *_ in rows} if name is not None
-        }
+        paths = {name: self.directory / name for name in {shard for _, shard, *_ in rows} if name is not None}
         start_ns, joints = self.config.trial_start_ns, self.joints
         return [
             None if shard is None else StoredThrow(trial, start_ns(trial), paths[shard], offset, samples, joints)

@@ -22,7 +22,7 @@ from throwcollect.dataset.mcap_file import McapFile, Run, episode_run
 from throwcollect.episode.channels import Channels
 from throwcollect.episode.message import Episode
 from throwcollect.errors import DatasetError
-from throwcollect.files import open_regular, replacing, unwritable, write_all
+from throwcollect.files import open_regular, remove, replacing, unwritable, write_all
 from throwcollect.sweep.plan import Plan
 
 
@@ -80,7 +80,8 @@ def shard_of(plan: Plan, trial: int) -> str:
 
 def list_shards(plan: Plan) -> list[str]:
     """Names of the files that a plan's trials may have, in order."""
-    return list(dict.fromkeys(shard_of(plan, trial) for trial in plan.trials.numbers))
+    numbers, size = plan.trials.numbers, plan.config.record.trials_per_shard
+    return [shard_of(plan, trial) for trial in range(numbers.start // size * size, numbers.stop, size)]
 
 
 def path_of_part(path: Path) -> Path:
@@ -160,22 +161,15 @@ class OpenShard:
         Raises:
             DatasetError: If the shard cannot be written.
         """
-        if self._descriptor is None:
-            return FinishedShard(None, {})
-        if not self._runs:
-            # The first episode could not be written, and its trial and all others were lost.
+        finished = FinishedShard(None, {})
+        if self._runs:
+            # The final file is on the disk before the unfinished one is removed, so no moment is without all episodes.
+            with replacing(self.path) as descriptor:
+                write = partial(write_all, descriptor)
+                finished = write_in_order(write, self._channels, self._runs, self._read, name=self.path.name)
+        if self._descriptor is not None:
             self.close()
-            self.part.unlink(missing_ok=True)
-            return FinishedShard(None, {})
-        # The final file is on the disk before the unfinished one is removed, so no moment is without all episodes.
-        with replacing(self.path) as descriptor:
-            write = partial(write_all, descriptor)
-            finished = write_in_order(write, self._channels, self._runs, self._read, name=self.path.name)
-        self.close()
-        try:
-            self.part.unlink()
-        except OSError as error:
-            raise unwritable(self.part, error) from error
+            remove(self.part)
         return finished
 
     def sync(self) -> None:
