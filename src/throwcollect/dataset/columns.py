@@ -28,7 +28,7 @@ from throwcollect.episode.trajectory_rows import (
     trajectory_rows,
     view_as_bytes,
 )
-from throwcollect.errors import ConfigError, DatasetError
+from throwcollect.errors import DatasetError
 from throwcollect.units import NS_PER_S
 
 TIMES = "time_s"
@@ -117,17 +117,6 @@ class StoredThrow:
         """Read the rows of its samples from its file; see `Recorded`."""
         (rows,) = read_stored_rows([self])
         return rows
-
-
-def check_columns(columns: Sequence[str]) -> None:
-    """Refuse names that are none of `COLUMNS`.
-
-    Raises:
-        ConfigError: If there is such a name.
-    """
-    for column in columns:
-        if column not in COLUMNS:
-            raise ConfigError(f"a trajectory has no column {column!r}", expected=", ".join(COLUMNS))
 
 
 def name_components(column: str, joints: Sequence[str]) -> tuple[str, ...]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 
 from throwcollect.errors import DatasetError
 
@@ -28,7 +28,3 @@ class Finding:
 
     def __str__(self) -> str:
         return ": ".join(part for part in (self.file, self.place, self.problem) if part)
-
-    def as_dict(self) -> dict[str, str]:
-        """The fields by name, for JSON."""
-        return asdict(self)

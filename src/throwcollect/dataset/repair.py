@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -77,10 +77,6 @@ class Repaired:
     differing: tuple[DifferingEpisode, ...]
     remarks: tuple[str, ...]
 
-    def as_dict(self) -> dict[str, object]:
-        """The fields by name, for JSON."""
-        return asdict(self)
-
 
 def repair(directory: Path, output: Path, *, remake: Remake) -> Repaired:
     """Write a sound dataset with all whole and correct episodes of a damaged one.
@@ -114,7 +110,7 @@ def repair(directory: Path, output: Path, *, remake: Remake) -> Repaired:
                     sorting.take(path)
             sorting.settle(directory)
             lost = sorting.give_up(earlier)
-            writer.finish(wall_s=None)
+            writer.finish()
         finally:
             writer.close()
     return Repaired(len(plan.trials), len(sorting.taken), lost, tuple(sorting.differing), tuple(remarks))

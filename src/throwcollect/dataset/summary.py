@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 
 from throwcollect.errors import LossError
 from throwcollect.tasks.result import LOST
@@ -71,10 +71,6 @@ class Info:
     success: str = "landed"
     noun: str = "throw"
     misses: Mapping[str, MissSummary] = field(default_factory=dict)
-
-    def as_dict(self) -> dict[str, object]:
-        """The fields by name, for JSON."""
-        return asdict(self)
 
 
 def explain_loss(outcomes: Mapping[str, int], *, hint: str | None) -> LossError | None:

@@ -39,9 +39,10 @@ _MANY_EPISODES = 1000
 _TELL_EVERY_S = 2.0
 _UNFINISHED = (".part", ".new")
 _short = reprlib.Repr()
-"""Shortens values from files, which somebody may have made as large and as deep as possible."""
 _short.maxstring = _short.maxother = 120
 _short.maxlevel = _short.maxdict = _short.maxlist = 3
+_shorten = _short.repr
+"""A value of a file in words; somebody may have made it as large and as deep as possible."""
 
 
 def verify(
@@ -208,16 +209,13 @@ def _list_shards(directory: Path) -> set[str]:
 def _find_bag_problems(bag: Mapping[str, Any], checks: Mapping[str, ShardReport]) -> Iterator[Finding]:
     summaries = [check.summary for check in checks.values() if check.summary is not None]
     channels = next((check.channels for check in checks.values() if check.channels is not None), None)
-    whole = len(summaries) == len(checks)
-    expected = bag_information(
-        summaries, channels.all if channels else (), {"throwcollect.format": FORMAT, "throwcollect.digest": ""}
-    )
+    expected = bag_information(summaries, channels.all if channels else (), {})
     if unknown := sorted(map(str, set(bag) - set(expected))):
         yield Finding(METADATA, "", f"has unknown keys: {_shorten(unknown)}")
     del expected["custom_data"]
     if not channels:
         del expected["topics_with_message_count"]
-    if not whole:
+    if len(summaries) < len(checks):
         # Other findings report the unreadable files; without them, the totals over all files are not known.
         yield from _find_file_problems(bag, summaries)
         return
@@ -276,10 +274,6 @@ def _find_stray_files(directory: Path, checks: Mapping[str, ShardReport]) -> Ite
             yield Finding(path.name, "", "no row of throws.parquet has its episode in this file")
     if not (directory / CARD).is_file():
         yield Finding(CARD, "", "is missing")
-
-
-def _shorten(value: object) -> str:
-    return _short.repr(value)
 
 
 def _find_damage_without_manifest(directory: Path, plan: Plan, *, in_full: bool) -> Iterator[Finding]:

@@ -21,8 +21,6 @@ from throwcollect.sweep.point_file import read_points
 from throwcollect.sweep.points import Points
 from throwcollect.tasks.result import LOST
 
-WITHOUT_EPISODE = (REFUSED, LOST)
-
 
 @dataclass
 class Tables:
@@ -152,6 +150,6 @@ def _plan_findings(plan: Plan, rows: Mapping[int, Row], doubtful: Collection[int
             yield Finding(THROWS, place, f"is {row['outcome']}, the plan says {trial.refused or 'nothing against it'}")
         elif trial.refused is not None and row["reason"] != trial.refused:
             yield Finding(THROWS, place, f"was refused as {row['reason']!r}, in the plan as {trial.refused!r}")
-        expected = None if row["outcome"] in WITHOUT_EPISODE else shard_of(plan, trial.number)
+        expected = None if row["outcome"] in (REFUSED, LOST) else shard_of(plan, trial.number)
         if row["shard"] != expected:
             yield Finding(THROWS, place, f"is {row['outcome']} with shard {row['shard']}, not {expected}")

@@ -8,7 +8,7 @@ import struct
 import zlib
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -81,7 +81,7 @@ def test_a_planted_defect_is_found_and_named(dataset: Path, plant: Callable[[Pat
         if finding.file == file and place in finding.place and re.search(problem, finding.problem)
     ], "\n".join(map(str, findings))
     assert {finding.file for finding in findings} <= {file, *CONSEQUENCES.get(plant, ())}
-    assert json.loads(json.dumps([finding.as_dict() for finding in findings]))
+    assert json.loads(json.dumps([asdict(finding) for finding in findings]))
 
 
 def test_what_is_sound_beside_a_defect_is_not_accused(dataset: Path) -> None:
