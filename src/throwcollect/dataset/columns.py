@@ -120,11 +120,9 @@ class StoredThrow:
 
 
 def name_components(column: str, joints: Sequence[str]) -> tuple[str, ...]:
-    """Names, with units, of the components of a column of joints or of the ball, where each has a column of its own.
+    """Names, with units, of the components of a column, where each has a column of its own.
 
-    Args:
-        column: One of `COLUMNS`, but neither times nor stamps.
-        joints: Joints that columns of joints have.
+    The column is any of `COLUMNS` but times and stamps. If it is one of joints, it has these joints.
     """
     series, _, quantity = column.partition(".")
     if series == "joints":

@@ -74,11 +74,7 @@ class _Value:
 
 
 class Expression:
-    """An expression on the columns of a table.
-
-    Args:
-        text: The expression.
-        place: What it was given as, for messages: ``--where``.
+    """An expression on the columns of a table; messages say that it was given as `place`, such as ``--where``.
 
     Raises:
         ConfigError: If it is no expression; all methods raise it for what cannot be evaluated.

@@ -64,10 +64,7 @@ class Record(NamedTuple):
         return Opcode(self.opcode).name.lower() if self.opcode in set(Opcode) else f"record 0x{self.opcode:02x}"
 
     def parse(self, kind: _Kind[_R]) -> _R:
-        """Read its fields.
-
-        Args:
-            kind: Class of the record; not Message, which has no length of its own.
+        """Read its fields; `kind` is its class, which cannot be Message, as that has no length of its own.
 
         Raises:
             DatasetError: If it is not such a record.

@@ -54,14 +54,11 @@ class Rejudged:
 
 @dataclass(frozen=True)
 class Rebuilt:
-    """The result of a rebuild.
+    """The result of a rebuild: how many trials and episodes there are, and the names of the files that were written.
 
     Attributes:
-        trials: Number of trials of the plan.
-        episodes: Number of episodes.
         lost: Trials that should have an episode and have none.
         rejudged: Trials whose outcome is another one than before.
-        written: Names of the files that were written.
     """
 
     trials: int
@@ -89,11 +86,11 @@ def rebuild(directory: Path) -> Rebuilt:
 
 
 def _read_config(directory: Path) -> Config:
-    """Read the configuration.
+    """Read the configuration, and refuse one that is not as the manifest says.
 
     Raises:
         ConfigError: If it is wrong.
-        DatasetError: If its file is not there, or not as the manifest says.
+        DatasetError: If its file is missing, or was changed.
     """
     config = read_config(directory)
     # A line that equals its default can be lost without a change of the plan's digest. A new manifest would then hide

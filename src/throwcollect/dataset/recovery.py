@@ -34,11 +34,7 @@ _MANY_EPISODES = 1000
 class RecoveredEpisode:
     """An episode on disk that is as a new simulation of its trial would record it, so the trial need not run again.
 
-    Attributes:
-        trial: Number of its trial.
-        result: How its trial ended.
-        place: Where it lies now.
-        run: Its records, without their bytes.
+    It lies at `place` now, and `run` has its records without their bytes.
     """
 
     trial: int
@@ -90,11 +86,7 @@ def remove_unfinished(directory: Path) -> None:
 def find_left(parts: Sequence[Part], channels: Channels, *, processes: int = 1) -> Iterator[LeftOfShard]:
     """Look for what is left of shards, in several of them at a time if there are many episodes. Changes nothing.
 
-    Args:
-        parts: The shards.
-        channels: What is recorded.
-        processes: How many processes may look; more than one import the program that calls this, as those of
-            `multiprocessing` do.
+    More than one process import the program that calls this, as those of `multiprocessing` do.
 
     Yields:
         What is left of each, in order.

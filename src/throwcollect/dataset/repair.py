@@ -44,14 +44,7 @@ class LostTrial:
 
 @dataclass(frozen=True)
 class DifferingEpisode:
-    """An episode that was kept although the table of throws has another one, which no file holds.
-
-    Attributes:
-        trial: Number of its trial.
-        file: Name of the file that it was found in.
-        digest: Its digest.
-        expected: The digest in the table of throws.
-    """
+    """An episode that was kept, as no file holds the one whose digest the table of throws has (`expected`)."""
 
     trial: int
     file: str
@@ -61,11 +54,9 @@ class DifferingEpisode:
 
 @dataclass(frozen=True)
 class Repaired:
-    """The result of a repair.
+    """The result of a repair: how many trials there are, and how many of their episodes were kept.
 
     Attributes:
-        trials: Number of trials of the plan.
-        episodes: Number of episodes that were kept.
         lost: Trials that have no whole episode, and had one or may have had one.
         differing: Episodes that were kept although the table of throws has others.
         remarks: Everything else that was wrong, a sentence each.

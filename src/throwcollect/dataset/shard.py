@@ -25,37 +25,36 @@ from throwcollect.errors import DatasetError
 from throwcollect.files import open_regular, remove, replacing, unwritable, write_all
 from throwcollect.sweep.plan import Plan
 
+Recording = tuple[FileSummary, FileEntry]
+"""What bag's metadata and manifest say of an MCAP file."""
+Runs = Mapping[int, tuple[int, Run]]
+"""By trial, where the run of its episode begins in a file [bytes], and its records without their bytes."""
+
 
 @dataclass(frozen=True)
 class FinishedShard:
     """A shard in trial order under its final name.
 
     Attributes:
-        recording: What bag's metadata and manifest say of its file; None if no trial has an episode, and so there is
-            none.
+        recording: Its file; None if no trial has an episode, and so there is none.
         offsets: Where the chunk of each trial's episode begins [bytes].
     """
 
-    recording: tuple[FileSummary, FileEntry] | None
+    recording: Recording | None
     offsets: dict[int, int]
 
 
 def write_in_order(
     write: Callable[[bytes], None],
     channels: Channels,
-    runs: Mapping[int, tuple[int, Run]],
+    runs: Runs,
     read: Callable[[int, int], bytes],
     *,
     name: str,
 ) -> FinishedShard:
     """Write the finished file of some episodes, which depends on nothing but them.
 
-    Args:
-        write: Called with the bytes of the file, in order.
-        channels: What is recorded.
-        runs: By trial, where the run of an episode begins in another file [bytes], and its records without their bytes.
-        read: Reads that other file: given an offset and a length, returns the bytes.
-        name: Name of the file.
+    The runs lie in another file, of which `read` gives the bytes from an offset on, of a certain length.
     """
     sha256 = RunningHash()
 
@@ -112,11 +111,8 @@ class OpenShard:
         """Wait for the episodes, or losses, of more trials."""
         self.missing.update(trials)
 
-    def adopt(self, runs: Mapping[int, tuple[int, Run]]) -> None:
-        """Go on with the unfinished file of a shard; what follows its last whole episode is cut off.
-
-        Args:
-            runs: By trial, where the run of an episode begins in the file [bytes], and its records.
+    def adopt(self, runs: Runs) -> None:
+        """Go on with the unfinished file of a shard, which has these runs; what follows the last of them is cut off.
 
         Raises:
             DatasetError: If the file cannot be written.

@@ -15,13 +15,7 @@ from throwcollect.sweep.plan import Plan
 
 @dataclass
 class ShardLayout:
-    """The shards of a dataset by their numbers, before and after they are begun.
-
-    Attributes:
-        directory: Directory of the dataset.
-        plan: The trials, which may become more.
-        growing: Whether they may still become more.
-    """
+    """The shards of a dataset by their numbers, before and after they are begun; a growing plan gets more trials."""
 
     directory: Path
     plan: Plan

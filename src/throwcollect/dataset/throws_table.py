@@ -102,10 +102,7 @@ class ThrowsTable:
         schema: Columns with their types and descriptions.
         later: Names of the columns that datasets of earlier versions lack.
 
-    Args:
-        parameters: Swept dotted configuration keys, in the order of their columns.
-        config: Configuration of the collection.
-        targets: Names of the columns of targets.
+    The parameters are the swept keys, and the targets columns of targets, in their order.
 
     Raises:
         ConfigError: If the task lacks an outcome that it needs, or a column of its results has the name of another.

@@ -102,14 +102,9 @@ def read_trajectories(
     *,
     threads: int | None = None,
 ) -> Trajectories:
-    """Read the trajectories of many throws.
+    """Read the trajectories of trials, whose episodes lie at these places; None for a trial that has none.
 
-    Args:
-        trials: Numbers of the trials.
-        places: Where their episodes lie; None for a trial that has none.
-        columns: Which of `COLUMNS`; nothing else is copied.
-        joints: Joints that the columns of joints have, in this order; some of those of the episodes.
-        threads: How many of them work; None for one a core, up to 4.
+    All else is as `Dataset.trajectories` takes it.
 
     Raises:
         ConfigError: If there is no such column.

@@ -99,11 +99,7 @@ def verify(
 
 
 def find_unchecked(config: Config) -> tuple[str, ...]:
-    """What `verify` leaves out of a dataset, as packages of the extra ``collect`` are not installed; empty if nothing.
-
-    Args:
-        config: Configuration of the dataset.
-    """
+    """What `verify` leaves out, as packages of the extra ``collect`` are not installed; empty if it is nothing."""
     left_out: tuple[str, ...] = () if can_draw(config) else ("whether the configuration draws these trials",)
     if not robot_is_available(config):
         left_out += ("whether the robot can do them", "how its joints moved", "what came of the throws")
@@ -117,7 +113,7 @@ def find_damage(directory: Path, plan: Plan | None, *, in_full: bool) -> list[Fi
     names have to begin and end as MCAP files do, or, in full, the dataset is verified.
 
     Args:
-        directory: Directory of a dataset that has its ``metadata.yaml``.
+        directory: Its directory.
         plan: Its trials; None if they cannot be read.
         in_full: Whether all bytes are compared, and not only the sizes.
     """
