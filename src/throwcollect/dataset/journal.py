@@ -100,10 +100,10 @@ class Entry:
 def read_journal(path: Path) -> Iterator[Entry]:
     """Read the events of a journal, in order; a missing file has none, and damaged lines are left out."""
     for entry in _read_lines(path):
-        event, time_s, outcome = entry.get("event"), _read_number(entry.get("time")), entry.get("outcome")
-        if event in get_args(Event) and time_s is not None:
+        time_s, outcome = _read_number(entry.get("time")), entry.get("outcome")
+        if entry.get("event") in get_args(Event) and time_s is not None:
             wall_s = _read_number(entry.get("wall_s"))
-            yield Entry(event, time_s, wall_s, outcome if isinstance(outcome, str) else None)
+            yield Entry(entry["event"], time_s, wall_s, outcome if isinstance(outcome, str) else None)
 
 
 def _read_lines(path: Path, mark: bytes = b"") -> Iterator[dict[str, Any]]:

@@ -12,12 +12,23 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from throwcollect.dataset.directory import CARD, CONFIG, MANIFEST, METADATA, PLAN, PROVENANCE, SOURCES, THROWS, TRIALS
+from throwcollect.dataset.directory import (
+    CARD,
+    CONFIG,
+    MANIFEST,
+    METADATA,
+    PLAN,
+    PROVENANCE,
+    SOURCES,
+    THROWS,
+    TRIALS,
+    path_of_part,
+)
 from throwcollect.dataset.judging import judge_episode
 from throwcollect.dataset.mcap_file import Run
 from throwcollect.dataset.mcap_reader import map_file
 from throwcollect.dataset.scan import scan_whole
-from throwcollect.dataset.shard import FinishedShard, OpenShard, path_of_part, write_in_order
+from throwcollect.dataset.shard import FinishedShard, OpenShard, write_in_order
 from throwcollect.dataset.throws_table import Place
 from throwcollect.episode.channels import Channels
 from throwcollect.errors import DatasetError
@@ -61,9 +72,9 @@ class LeftOfShard:
 
 @dataclass(frozen=True)
 class Part:
-    """A shard of which something may be left: its final path, and its trials.
+    """A shard of which something may be left: its final path, its trials, and whether no trial will be added to it.
 
-    It is settled if no trial will be added, so that its final file may stay if it has an episode of each.
+    Then its final file may stay if it has an episode of each.
     """
 
     path: Path

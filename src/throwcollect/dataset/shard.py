@@ -16,14 +16,13 @@ from operator import itemgetter
 from pathlib import Path
 
 from throwcollect.dataset.bag import FileSummary
-from throwcollect.dataset.directory import shard_name
+from throwcollect.dataset.directory import path_of_part
 from throwcollect.dataset.manifest import FileEntry, RunningHash
 from throwcollect.dataset.mcap_file import McapFile, Run, episode_run
 from throwcollect.episode.channels import Channels
 from throwcollect.episode.message import Episode
 from throwcollect.errors import DatasetError
 from throwcollect.files import open_regular, remove, replacing, unwritable, write_all
-from throwcollect.sweep.plan import Plan
 
 Recording = tuple[FileSummary, FileEntry]
 """What bag's metadata and manifest say of an MCAP file."""
@@ -70,22 +69,6 @@ def write_in_order(
         file.append(replace(run, data=read(offset, run.length)))
     summary = file.finish(name)
     return FinishedShard((summary, FileEntry(name, file.size, sha256.hexdigest())), offsets)
-
-
-def shard_of(plan: Plan, trial: int) -> str:
-    """Name of the file that holds the episode of a trial, if it has one."""
-    return shard_name(plan.config.name, trial // plan.config.record.trials_per_shard)
-
-
-def list_shards(plan: Plan) -> list[str]:
-    """Names of the files that a plan's trials may have, in order."""
-    numbers, size = plan.trials.numbers, plan.config.record.trials_per_shard
-    return [shard_of(plan, trial) for trial in range(numbers.start // size * size, numbers.stop, size)]
-
-
-def path_of_part(path: Path) -> Path:
-    """Path of a shard while it is filled; `path` is its final one."""
-    return path.with_name(f"{path.name}.part")
 
 
 class OpenShard:

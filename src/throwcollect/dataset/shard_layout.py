@@ -6,9 +6,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from throwcollect.dataset.directory import shard_name
+from throwcollect.dataset.directory import path_of_part, shard_name
 from throwcollect.dataset.recovery import Part
-from throwcollect.dataset.shard import path_of_part
 from throwcollect.files import is_there, remove
 from throwcollect.sweep.plan import Plan
 

@@ -13,9 +13,8 @@ import pyarrow.compute as pc
 
 from throwcollect.config.schema import Config
 from throwcollect.config.shape import unit_of_key
-from throwcollect.dataset.directory import THROWS
+from throwcollect.dataset.directory import THROWS, list_shards
 from throwcollect.dataset.misses import Misses
-from throwcollect.dataset.shard import list_shards
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.sweep.arrow_column import make_table
 from throwcollect.sweep.parquet_file import read_parquet

@@ -7,10 +7,9 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from throwcollect.dataset.configuration import read_config
-from throwcollect.dataset.directory import METADATA, PLAN
+from throwcollect.dataset.directory import METADATA, PLAN, list_shards, path_of_part
 from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.recovery import find_episodes
-from throwcollect.dataset.shard import list_shards, path_of_part
 from throwcollect.dataset.throws_table import Row, ThrowsTable
 from throwcollect.dataset.way_on import find_way_on
 from throwcollect.files import StrPath, is_there

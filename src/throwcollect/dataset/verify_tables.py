@@ -10,9 +10,8 @@ import numpy as np
 
 from throwcollect.config.loader import load
 from throwcollect.config.schema import Config
-from throwcollect.dataset.directory import CONFIG, PLAN, THROWS, TRIALS, config_path
+from throwcollect.dataset.directory import CONFIG, PLAN, THROWS, TRIALS, config_path, shard_of
 from throwcollect.dataset.findings import Finding
-from throwcollect.dataset.shard import shard_of
 from throwcollect.dataset.throws_table import REFUSED, Row, read_throws_table
 from throwcollect.errors import ConfigError, DatasetError, ForeignPlanError
 from throwcollect.sweep.digest import trial_digests
