@@ -9,12 +9,9 @@ from throwcollect.errors import DatasetError
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing that is wrong.
+    """One thing that is wrong with a file in the dataset's directory.
 
-    Attributes:
-        file: Name of the file in the dataset's directory.
-        place: The place in it: a trial, a byte, a field; empty if it is the file as a whole.
-        problem: What is wrong.
+    Its place there is a trial, a byte or a field; it is empty if the problem is with the file as a whole.
     """
 
     file: str
