@@ -222,8 +222,8 @@ class Dataset(Sequence[Throw]):
         """
         try:
             counts = self._bag["topics_with_message_count"]
-            return {each["topic_metadata"]["name"]: each["message_count"] for each in counts}
-        except (KeyError, TypeError) as error:
+            return {str(each["topic_metadata"]["name"]): int(each["message_count"]) for each in counts}
+        except (KeyError, TypeError, ValueError, OverflowError) as error:
             raise self._lacks("topics_with_message_count") from error
 
     def _lacks(self, name: str) -> DatasetError:

@@ -137,14 +137,14 @@ def _rebuild(directory: Path) -> Rebuilt:
             "was changed since the plan was made", path=directory / PLAN, place=f"trial {min(wrong)}", hint=repair
         )
     earlier = read_earlier_rows(directory, plan)
-    recordings = _Recordings(plan)
+    recordings, named = _Recordings(plan), {row["shard"] for row in earlier.values()}
     for name in list_shards(plan):
         if (directory / name).exists():
             # A new table and a new manifest would make the damage look as if it had been collected.
             if findings := recordings.read(directory / name):
                 raise DatasetError(str(findings[0]), path=directory, hint=repair)
         # A file that no row names may be missing: all of its trials were refused, or lost.
-        elif any(row["shard"] == name for row in earlier.values()):
+        elif name in named:
             raise DatasetError(f"{name} is missing", path=directory, hint=repair)
     table, task = ThrowsTable.of(plan), task_of(config)
     rows = [

@@ -232,14 +232,13 @@ def _find_bag_problems(bag: Mapping[str, Any], checks: Mapping[str, ShardReport]
 
 def _find_file_problems(bag: Mapping[str, Any], summaries: list[FileSummary]) -> Iterator[Finding]:
     entries = bag.get("files")
-    entries_by_path = (
-        {each.get("path"): each for each in entries if isinstance(each, dict)} if isinstance(entries, list) else {}
-    )
+    known = [each for each in entries if isinstance(each, dict)] if isinstance(entries, list) else []
     for summary in summaries:
         (expected,) = bag_information([summary], (), {})["files"]
-        if entries_by_path.get(summary.path) != expected:
-            found = _shorten(entries_by_path.get(summary.path))
-            yield Finding(METADATA, f"files: {summary.path}", f"is {found}, the file gives {_shorten(expected)}")
+        found = next((each for each in known if each.get("path") == summary.path), None)
+        if found != expected:
+            problem = f"is {_shorten(found)}, the file gives {_shorten(expected)}"
+            yield Finding(METADATA, f"files: {summary.path}", problem)
 
 
 def _find_digest_problems(

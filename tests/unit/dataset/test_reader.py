@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import multiprocessing
 import pickle
+import re
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
@@ -304,6 +305,15 @@ def test_names_of_recordings_that_are_none_are_not_looked_for(dataset: Path, nam
     (dataset / "metadata.yaml").write_text(text)
     with pytest.raises(DatasetError, match=r"metadata\.yaml: relative_file_paths is missing"):
         check_recordings_are_there(dataset)
+
+
+@pytest.mark.parametrize("count", ["2001-01-01", ".inf", "[1]", "many"])
+def test_numbers_of_messages_that_are_none_are_refused(dataset: Path, count: str) -> None:
+    before, topics = (dataset / "metadata.yaml").read_text().split("topics_with_message_count:")
+    topics = re.sub(r"message_count: \d+", f"message_count: {count}", topics, count=1)
+    (dataset / "metadata.yaml").write_text(f"{before}topics_with_message_count:{topics}")
+    with pytest.raises(DatasetError, match=r"metadata\.yaml: topics_with_message_count is missing"):
+        _ = Dataset.open(dataset).topics
 
 
 def test_a_missing_shard_is_named(dataset: Path) -> None:
