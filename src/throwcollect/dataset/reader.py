@@ -377,7 +377,7 @@ def _as_array(which: Any) -> pa.Array:
         which = which.combine_chunks()
     try:
         values = which if isinstance(which, pa.Array) else pa.array(which if hasattr(which, "__len__") else list(which))
-    except (pa.ArrowException, TypeError) as error:
+    except (pa.ArrowException, TypeError, OverflowError) as error:
         raise ConfigError(f"select: {error}", expected=_SELECTION) from error
     # An empty list becomes an array of the type null, which is neither boolean nor integer.
     if not len(values):

@@ -128,6 +128,7 @@ def test_selecting_from_a_selection_goes_by_trial_and_slices_by_position(loaded:
         (["landed"], "values of type string"),
         ([1, "a"], "select: "),
         (3, "not iterable"),
+        ([2**64], "int too large"),
     ],
 )
 def test_what_selects_nothing_is_named(loaded: Dataset, which: Any, message: str) -> None:
