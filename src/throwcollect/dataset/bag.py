@@ -35,12 +35,9 @@ _MOST_NEARBY = 5
 
 @dataclass(frozen=True)
 class FileSummary:
-    """What a bag's metadata say of one file.
+    """What a bag's metadata say of one file: its name, and the times of its first and last message [ns].
 
     Attributes:
-        path: Name of the file.
-        start_ns: Time of its first message [ns].
-        end_ns: Time of its last message [ns].
         counts: Number of messages of each channel, by the channel's number.
     """
 
@@ -58,13 +55,7 @@ class FileSummary:
 def bag_information(
     files: Sequence[FileSummary], channels: Sequence[Channel], custom_data: Mapping[str, str]
 ) -> dict[str, Any]:
-    """The fields of a bag's metadata.
-
-    Args:
-        files: The files of the bag, in order.
-        channels: All channels.
-        custom_data: Further entries, which rosbag2 does not read.
-    """
+    """The fields of the metadata of a bag with these files, in order; rosbag2 does not read `custom_data`."""
     start = min((file.start_ns for file in files), default=0)
     end = max((file.end_ns for file in files), default=0)
     return {

@@ -28,7 +28,7 @@ from throwcollect.episode.trajectory_rows import (
     trajectory_rows,
     view_as_bytes,
 )
-from throwcollect.errors import ConfigError, DatasetError
+from throwcollect.errors import DatasetError
 from throwcollect.units import NS_PER_S
 
 TIMES = "time_s"
@@ -119,23 +119,10 @@ class StoredThrow:
         return rows
 
 
-def check_columns(columns: Sequence[str]) -> None:
-    """Refuse names that are none of `COLUMNS`.
-
-    Raises:
-        ConfigError: If there is such a name.
-    """
-    for column in columns:
-        if column not in COLUMNS:
-            raise ConfigError(f"a trajectory has no column {column!r}", expected=", ".join(COLUMNS))
-
-
 def name_components(column: str, joints: Sequence[str]) -> tuple[str, ...]:
-    """Names, with units, of the components of a column of joints or of the ball, where each has a column of its own.
+    """Names, with units, of the components of a column, where each has a column of its own.
 
-    Args:
-        column: One of `COLUMNS`, but neither times nor stamps.
-        joints: Joints that columns of joints have.
+    The column is any of `COLUMNS` but times and stamps. If it is one of joints, it has these joints.
     """
     series, _, quantity = column.partition(".")
     if series == "joints":

@@ -28,11 +28,7 @@ def read_config(directory: Path) -> Config:
 
 
 def refuse_damaged_config(directory: Path, error: ConfigError) -> None:
-    """Refuse a dataset whose configuration is damaged; the error of a sound one is that of whoever reads it.
-
-    Args:
-        directory: Directory of the dataset.
-        error: What reading its configuration has ended with.
+    """Refuse a dataset if its configuration is damaged, and this is why reading it has ended with an error.
 
     Raises:
         DatasetError: If the file is missing, cannot be read, or is not as it was written.

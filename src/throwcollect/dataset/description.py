@@ -7,11 +7,12 @@ from pathlib import Path
 
 import pyarrow as pa
 
-from throwcollect.dataset.bag import FileSummary, bag_information, to_yaml
+from throwcollect.dataset.bag import bag_information, to_yaml
 from throwcollect.dataset.digest import combine_digests
 from throwcollect.dataset.directory import CONFIG, FORMAT, MANIFEST, METADATA, PLAN, SOURCES, THROWS, TRIALS
-from throwcollect.dataset.manifest import FileEntry, entry_of, entry_of_file, manifest_text
+from throwcollect.dataset.manifest import entry_of, entry_of_file, manifest_text
 from throwcollect.dataset.misses import read_targets
+from throwcollect.dataset.shard import Recording
 from throwcollect.episode.channels import Channels
 from throwcollect.files import replacing, write_all, write_file
 from throwcollect.sweep.parquet_file import encode_pieces
@@ -27,7 +28,7 @@ def write_description(
     name: str,
     throws: pa.Table,
     channels: Channels,
-    recordings: Sequence[tuple[FileSummary, FileEntry]],
+    recordings: Sequence[Recording],
     *,
     on_piece: Callable[[], object] = lambda: None,
 ) -> None:
@@ -36,9 +37,9 @@ def write_description(
     Args:
         directory: Directory of the dataset, with its configuration, plan and recordings.
         name: Name of the collection.
-        throws: The table of throws, one row a trial and in order of trials.
+        throws: The table of throws.
         channels: What is recorded.
-        recordings: What bag's metadata and manifest say of each MCAP file, in order of files.
+        recordings: The MCAP files, in their order.
         on_piece: Called after each piece of the table, which is read column by column, so that its memory can be freed.
 
     Raises:

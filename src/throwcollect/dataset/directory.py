@@ -4,8 +4,12 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from throwcollect.files import check_regular
+
+if TYPE_CHECKING:
+    from throwcollect.sweep.plan import Plan
 
 DIRECTORY_VARIABLE = "THROWCOLLECT_DIRECTORY"
 """Directory of the dataset as its user knows it, for processes that see it elsewhere; empty if there is none."""
@@ -35,6 +39,22 @@ FORMAT = "1"
 def shard_name(collection: str, number: int) -> str:
     """File name of the shard of a collection that has this number, counted from 0."""
     return f"{collection}_{number:05d}{SHARD_SUFFIX}"
+
+
+def shard_of(plan: Plan, trial: int) -> str:
+    """Name of the file that holds the episode of a trial, if it has one."""
+    return shard_name(plan.config.name, trial // plan.config.record.trials_per_shard)
+
+
+def list_shards(plan: Plan) -> list[str]:
+    """Names of the files that a plan's trials may have, in order."""
+    numbers, size = plan.trials.numbers, plan.config.record.trials_per_shard
+    return [shard_of(plan, trial) for trial in range(numbers.start // size * size, numbers.stop, size)]
+
+
+def path_of_part(path: Path) -> Path:
+    """Path of a shard while it is filled; `path` is its final one."""
+    return path.with_name(f"{path.name}.part")
 
 
 def has_files(directory: Path) -> bool:

@@ -74,11 +74,7 @@ class _Value:
 
 
 class Expression:
-    """An expression on the columns of a table.
-
-    Args:
-        text: The expression.
-        place: What it was given as, for messages: ``--where``.
+    """An expression on the columns of a table; messages say that it was given as `place`, such as ``--where``.
 
     Raises:
         ConfigError: If it is no expression; all methods raise it for what cannot be evaluated.
@@ -206,7 +202,8 @@ class _Evaluation:
         column = self._table[name]
         if pa.types.is_string(column.type):
             return _Value("text", column)
-        return _Value("a number", column.cast(pa.float64()))
+        # The numbers of a damaged table may be too large for a float to be exact.
+        return _Value("a number", column.cast(pa.float64(), safe=False))
 
     def _name(self, node: ast.expr) -> str:
         match node:

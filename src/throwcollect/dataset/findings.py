@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 
 from throwcollect.errors import DatasetError
 
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing that is wrong.
+    """One thing that is wrong with a file in the dataset's directory.
 
-    Attributes:
-        file: Name of the file in the dataset's directory.
-        place: The place in it: a trial, a byte, a field; empty if it is the file as a whole.
-        problem: What is wrong.
+    Its place there is a trial, a byte or a field; it is empty if the problem is with the file as a whole.
     """
 
     file: str
@@ -28,7 +25,3 @@ class Finding:
 
     def __str__(self) -> str:
         return ": ".join(part for part in (self.file, self.place, self.problem) if part)
-
-    def as_dict(self) -> dict[str, str]:
-        """The fields by name, for JSON."""
-        return asdict(self)

@@ -49,18 +49,8 @@ THROW: Mapping[str, str] = {
 
 
 def refuse_attribute(owner: object, name: str, guesses: Mapping[str, str]) -> AttributeError:
-    """Make the error for a missing attribute, which names the one that is meant if it can be guessed.
-
-    Args:
-        owner: The object without such an attribute.
-        name: Name of the attribute.
-        guesses: Attributes that people try, and the ones that they look for.
-    """
-    kind = type(owner).__name__
-    meant = guesses.get(name) or next(iter(get_close_matches(name, _list_public(type(owner)), 1)), None)
+    """Make the error for an attribute that `owner` has not, which names the one that is meant if it can be guessed."""
+    public = [each for each in dir(type(owner)) if not each.startswith("_")]
+    meant = guesses.get(name) or next(iter(get_close_matches(name, public, 1)), None)
     hint = f"; try .{meant}" if meant and not name.startswith("_") else ""
-    return AttributeError(f"a {kind} has no {name!r}{hint}")
-
-
-def _list_public(kind: type) -> list[str]:
-    return [name for name in dir(kind) if not name.startswith("_")]
+    return AttributeError(f"a {type(owner).__name__} has no {name!r}{hint}")

@@ -13,6 +13,7 @@ import time
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from math import isfinite
 from pathlib import Path
 from typing import Any, Literal, get_args
 
@@ -98,20 +99,29 @@ class Entry:
 
 def read_journal(path: Path) -> Iterator[Entry]:
     """Read the events of a journal, in order; a missing file has none, and damaged lines are left out."""
+    for entry in _read_lines(path):
+        time_s, outcome = _read_number(entry.get("time")), entry.get("outcome")
+        if entry.get("event") in get_args(Event) and time_s is not None:
+            wall_s = _read_number(entry.get("wall_s"))
+            yield Entry(entry["event"], time_s, wall_s, outcome if isinstance(outcome, str) else None)
+
+
+def _read_lines(path: Path, mark: bytes = b"") -> Iterator[dict[str, Any]]:
+    """Read the fields of the lines that hold `mark`: there are several lines for each trial, and parsing takes long."""
     try:
         descriptor = open_log(path, os.O_RDONLY)
     except OSError:
         return
     with open(descriptor, "rb") as file:
-        for entry in map(_parse, file):
-            if entry.get("event") in get_args(Event) and isinstance(entry.get("time"), int | float):
-                wall_s, outcome = entry.get("wall_s"), entry.get("outcome")
-                yield Entry(
-                    entry["event"],
-                    entry["time"],
-                    wall_s if isinstance(wall_s, int | float) else None,
-                    outcome if isinstance(outcome, str) else None,
-                )
+        yield from (_parse(line) for line in file if mark in line)
+
+
+def _read_number(value: object) -> float | None:
+    """A number that can be computed with; None for anything else, as a journal may come from anybody."""
+    with suppress(OverflowError):
+        if isinstance(value, int | float) and isfinite(value):
+            return value
+    return None
 
 
 def read_commits(
@@ -154,7 +164,8 @@ def read_commits(
 
 def _parse(line: bytes) -> dict[str, Any]:
     """The fields of a line; none if it was cut off or damaged."""
-    with suppress(ValueError):
+    # Brackets in brackets without end are a RecursionError.
+    with suppress(ValueError, RecursionError):
         entry = json.loads(line)
         if isinstance(entry, dict):
             return entry
@@ -163,20 +174,14 @@ def _parse(line: bytes) -> dict[str, Any]:
 
 def find_lost(directory: Path) -> frozenset[int]:
     """Find the trials that no simulation brought back in one of the collections into a dataset."""
-    try:
-        descriptor = open_log(directory / JOURNAL, os.O_RDONLY)
-    except OSError:
-        return frozenset()
-    with open(descriptor, "rb") as file:
-        # Lines of other events are not parsed, as there are several for each trial.
-        entries = [_parse(line) for line in file if b'"lost"' in line]
+    entries = _read_lines(directory / JOURNAL, b'"lost"')
     numbers = [entry.get("trial") for entry in entries if entry.get("event") == "lost"]
     return frozenset(number for number in numbers if isinstance(number, int))
 
 
 def was_open(directory: Path) -> bool:
     """Whether anybody who reached the router could join one of the collections into a dataset."""
-    return any(entry.event == "exposed" for entry in read_journal(directory / JOURNAL))
+    return any(entry.get("event") == "exposed" for entry in _read_lines(directory / JOURNAL, b'"exposed"'))
 
 
 def measure_collected_s(directory: Path) -> float | None:

@@ -15,12 +15,9 @@ from throwcollect.tasks.task import task_of, trajectory_of
 
 
 def judge_episode(config: Config, episode: Episode, trajectory: JointTrajectory | None = None) -> Result:
-    """Say how a trial ended, from its episode.
+    """Say how a trial with this configuration ended, from its episode.
 
-    Args:
-        config: Configuration of the trial.
-        episode: Its episode.
-        trajectory: The joint trajectory that its controllers were sent; None to compute it here.
+    The trajectory is the one that its controllers were sent; it is computed here if it is None.
 
     Raises:
         DatasetError: If the episode is damaged, or another robot's.

@@ -176,8 +176,8 @@ def is_as_written(directory: Path, name: str) -> bool:
 def was_changed(directory: Path, name: str) -> bool:
     """Whether there is a manifest, and it says of a file of a dataset that it is another one than was written."""
     try:
-        written = {entry.path: entry for entry in read_manifest(directory)}
-        return name in written and written[name] != entry_of_file(directory / name)
+        entries = [entry for entry in read_manifest(directory) if entry.path == name]
+        return any(entry != entry_of_file(directory / name) for entry in entries)
     except DatasetError:
         return False
 

@@ -63,7 +63,6 @@ class Run:
     """Records that follow each other without a gap: chunks, each with its message indexes, and maybe a Metadata record.
 
     Attributes:
-        data: The bytes.
         chunk_indexes: Index of each chunk, as if the run began at offset 0.
         counts: Number of messages on each channel, by its number.
         metadata_length: Size of the Metadata record at the end [bytes]; 0 if there is none.
@@ -145,10 +144,7 @@ def episode_run(episode: Episode) -> Run:
 
 
 class McapFile:
-    """Writes one file from its beginning.
-
-    Attributes:
-        size: Bytes written so far.
+    """Writes one file from its beginning; `size` is the number of bytes so far.
 
     Args:
         write: Called with the bytes of whole records, in order.

@@ -40,13 +40,7 @@ class _Kind(Protocol[_R]):
 
 
 class Record(NamedTuple):
-    """One record where it lies.
-
-    Attributes:
-        offset: Where it begins in the file [bytes].
-        opcode: Its kind.
-        data: Its bytes, with opcode and length.
-    """
+    """One record: where it begins in the file [bytes], its kind, and its bytes, with opcode and length."""
 
     offset: int
     opcode: int
@@ -64,10 +58,7 @@ class Record(NamedTuple):
         return Opcode(self.opcode).name.lower() if self.opcode in set(Opcode) else f"record 0x{self.opcode:02x}"
 
     def parse(self, kind: _Kind[_R]) -> _R:
-        """Read its fields.
-
-        Args:
-            kind: Class of the record; not Message, which has no length of its own.
+        """Read its fields; `kind` is its class, which cannot be Message, as that has no length of its own.
 
         Raises:
             DatasetError: If it is not such a record.
@@ -88,13 +79,9 @@ class StoredChunk:
 
 @dataclass(frozen=True)
 class StoredEpisode:
-    """An episode's run of records as it lies in a file.
+    """An episode's run of records as it lies in a file: its chunks, the state chunk first, and a Metadata record.
 
-    Attributes:
-        episode: The episode.
-        chunks: Its chunks, the state chunk first.
-        facts: The Metadata record at its end.
-        said_digest: Its digest as that record has it; None if it has none.
+    `said_digest` is its digest as this record, `facts`, has it; None if it has none.
     """
 
     episode: Episode

@@ -25,12 +25,9 @@ class UnknownNameError(ConfigError, KeyError):
 
 
 def refuse_name(what: str, name: object, known: Iterable[str]) -> UnknownNameError:
-    """Make the error for an unknown name, which tells the known names that are like it, or all.
+    """Make the error for an unknown name, which tells the known names that are like it, or all of them.
 
-    Args:
-        what: What has no such name, as the beginning of a sentence: ``no column``.
-        name: The name.
-        known: All names that there are.
+    Its sentence begins with `what`, such as ``no column``.
     """
     names = list(known)
     near = get_close_matches(str(name), names, 3, 0.5) or [each for each in names if str(name) in each]

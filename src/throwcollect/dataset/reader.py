@@ -208,10 +208,10 @@ class Dataset(Sequence[Throw]):
         Raises:
             DatasetError: If the metadata do not have them.
         """
-        try:
-            return tuple(self._bag["relative_file_paths"])
-        except (KeyError, TypeError) as error:
-            raise DatasetError(f"{error} is missing", path=self.directory / METADATA) from error
+        names = self._bag.get("relative_file_paths")
+        if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
+            raise self._lacks("relative_file_paths")
+        return tuple(names)
 
     @property
     def topics(self) -> Mapping[str, int]:
@@ -222,9 +222,12 @@ class Dataset(Sequence[Throw]):
         """
         try:
             counts = self._bag["topics_with_message_count"]
-            return {each["topic_metadata"]["name"]: each["message_count"] for each in counts}
-        except (KeyError, TypeError) as error:
-            raise DatasetError(f"{error} is missing", path=self.directory / METADATA) from error
+            return {str(each["topic_metadata"]["name"]): int(each["message_count"]) for each in counts}
+        except (KeyError, TypeError, ValueError, OverflowError) as error:
+            raise self._lacks("topics_with_message_count") from error
+
+    def _lacks(self, name: str) -> DatasetError:
+        return DatasetError(f"{name} is missing", path=self.directory / METADATA)
 
     def _custom(self, name: str) -> str:
         """Return what the product itself wrote into the metadata.
@@ -235,7 +238,7 @@ class Dataset(Sequence[Throw]):
         custom = self._bag.get("custom_data")
         value = custom.get(name) if isinstance(custom, dict) else None
         if not isinstance(value, str):
-            raise DatasetError(f"{name} is missing", path=self.directory / METADATA)
+            raise self._lacks(name)
         return value
 
     @property
@@ -350,10 +353,7 @@ class Dataset(Sequence[Throw]):
         """Where the episode of each throw lies; None where there is none."""
         columns = (self.throws[name].to_pylist() for name in ("trial", "shard", "chunk_offset", "samples"))
         rows = list(zip(*columns, strict=True))
-        # The table may come from anybody: only names of files in the directory itself are followed.
-        paths = {
-            name: self.directory / Path(name).name for name in {shard for _, shard, *_ in rows} if name is not None
-        }
+        paths = {name: self.directory / name for name in {shard for _, shard, *_ in rows} if name is not None}
         start_ns, joints = self.config.trial_start_ns, self.joints
         return [
             None if shard is None else StoredThrow(trial, start_ns(trial), paths[shard], offset, samples, joints)
@@ -377,7 +377,7 @@ def _as_array(which: Any) -> pa.Array:
         which = which.combine_chunks()
     try:
         values = which if isinstance(which, pa.Array) else pa.array(which if hasattr(which, "__len__") else list(which))
-    except (pa.ArrowException, TypeError) as error:
+    except (pa.ArrowException, TypeError, OverflowError) as error:
         raise ConfigError(f"select: {error}", expected=_SELECTION) from error
     # An empty list becomes an array of the type null, which is neither boolean nor integer.
     if not len(values):

@@ -15,7 +15,7 @@ from throwcollect.dataset.bag import FileSummary, refuse_other_directory
 from throwcollect.dataset.configuration import read_config
 from throwcollect.dataset.data_card import data_card, outcome_lines
 from throwcollect.dataset.description import WRITTEN, write_description
-from throwcollect.dataset.directory import CARD, CONFIG, MANIFEST, PLAN, THROWS
+from throwcollect.dataset.directory import CARD, CONFIG, MANIFEST, PLAN, THROWS, list_shards, shard_of
 from throwcollect.dataset.findings import Finding
 from throwcollect.dataset.journal import was_open
 from throwcollect.dataset.lock import hold_lock
@@ -23,7 +23,6 @@ from throwcollect.dataset.manifest import entry_of_file, was_changed
 from throwcollect.dataset.mcap_reader import StoredEpisode
 from throwcollect.dataset.provenance import Provenance, read_provenance, write_provenance
 from throwcollect.dataset.recovery import remove_unfinished
-from throwcollect.dataset.shard import list_shards, shard_of
 from throwcollect.dataset.throws_table import Row, ThrowsTable, read_throws_table
 from throwcollect.dataset.verify_episode import EpisodeCheck
 from throwcollect.dataset.verify_shard import check_shard
@@ -54,14 +53,11 @@ class Rejudged:
 
 @dataclass(frozen=True)
 class Rebuilt:
-    """The result of a rebuild.
+    """The result of a rebuild: how many trials and episodes there are, and the names of the files that were written.
 
     Attributes:
-        trials: Number of trials of the plan.
-        episodes: Number of episodes.
         lost: Trials that should have an episode and have none.
         rejudged: Trials whose outcome is another one than before.
-        written: Names of the files that were written.
     """
 
     trials: int
@@ -89,11 +85,11 @@ def rebuild(directory: Path) -> Rebuilt:
 
 
 def _read_config(directory: Path) -> Config:
-    """Read the configuration.
+    """Read the configuration, and refuse one that is not as the manifest says.
 
     Raises:
         ConfigError: If it is wrong.
-        DatasetError: If its file is not there, or not as the manifest says.
+        DatasetError: If its file is missing, or was changed.
     """
     config = read_config(directory)
     # A line that equals its default can be lost without a change of the plan's digest. A new manifest would then hide
@@ -141,14 +137,14 @@ def _rebuild(directory: Path) -> Rebuilt:
             "was changed since the plan was made", path=directory / PLAN, place=f"trial {min(wrong)}", hint=repair
         )
     earlier = read_earlier_rows(directory, plan)
-    recordings = _Recordings(plan)
+    recordings, named = _Recordings(plan), {row["shard"] for row in earlier.values()}
     for name in list_shards(plan):
         if (directory / name).exists():
             # A new table and a new manifest would make the damage look as if it had been collected.
             if findings := recordings.read(directory / name):
                 raise DatasetError(str(findings[0]), path=directory, hint=repair)
         # A file that no row names may be missing: all of its trials were refused, or lost.
-        elif any(row["shard"] == name for row in earlier.values()):
+        elif name in named:
             raise DatasetError(f"{name} is missing", path=directory, hint=repair)
     table, task = ThrowsTable.of(plan), task_of(config)
     rows = [

@@ -12,16 +12,27 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from throwcollect.dataset.directory import CARD, CONFIG, MANIFEST, METADATA, PLAN, PROVENANCE, SOURCES, THROWS, TRIALS
+from throwcollect.dataset.directory import (
+    CARD,
+    CONFIG,
+    MANIFEST,
+    METADATA,
+    PLAN,
+    PROVENANCE,
+    SOURCES,
+    THROWS,
+    TRIALS,
+    path_of_part,
+)
 from throwcollect.dataset.judging import judge_episode
 from throwcollect.dataset.mcap_file import Run
 from throwcollect.dataset.mcap_reader import map_file
 from throwcollect.dataset.scan import scan_whole
-from throwcollect.dataset.shard import FinishedShard, OpenShard, path_of_part, write_in_order
+from throwcollect.dataset.shard import FinishedShard, OpenShard, write_in_order
 from throwcollect.dataset.throws_table import Place
 from throwcollect.episode.channels import Channels
 from throwcollect.errors import DatasetError
-from throwcollect.files import is_there, remove, unwritable
+from throwcollect.files import remove, unwritable
 from throwcollect.side_by_side import work_side_by_side
 from throwcollect.sweep.plan import Plan
 from throwcollect.tasks.result import Result
@@ -34,11 +45,7 @@ _MANY_EPISODES = 1000
 class RecoveredEpisode:
     """An episode on disk that is as a new simulation of its trial would record it, so the trial need not run again.
 
-    Attributes:
-        trial: Number of its trial.
-        result: How its trial ended.
-        place: Where it lies now.
-        run: Its records, without their bytes.
+    It lies at `place` now, and `run` has its records without their bytes.
     """
 
     trial: int
@@ -65,9 +72,9 @@ class LeftOfShard:
 
 @dataclass(frozen=True)
 class Part:
-    """A shard of which something may be left: its final path, and its trials.
+    """A shard of which something may be left: its final path, its trials, and whether no trial will be added to it.
 
-    It is settled if no trial will be added, so that its final file may stay if it has an episode of each.
+    Then its final file may stay if it has an episode of each.
     """
 
     path: Path
@@ -90,11 +97,7 @@ def remove_unfinished(directory: Path) -> None:
 def find_left(parts: Sequence[Part], channels: Channels, *, processes: int = 1) -> Iterator[LeftOfShard]:
     """Look for what is left of shards, in several of them at a time if there are many episodes. Changes nothing.
 
-    Args:
-        parts: The shards.
-        channels: What is recorded.
-        processes: How many processes may look; more than one import the program that calls this, as those of
-            `multiprocessing` do.
+    More than one process import the program that calls this, as those of `multiprocessing` do.
 
     Yields:
         What is left of each, in order.
@@ -172,8 +175,6 @@ def find_episodes(path: Path, plan: Plan, channels: Channels | None = None) -> d
         DatasetError: If the file cannot be read.
     """
     episodes: dict[int, RecoveredEpisode] = {}
-    if not is_there(path):
-        return episodes
     trials_to_run = frozenset(plan.trials.numbers_to_run)
     for found in scan_whole(path):
         episode = found.stored.episode

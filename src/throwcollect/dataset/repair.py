@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -44,14 +44,7 @@ class LostTrial:
 
 @dataclass(frozen=True)
 class DifferingEpisode:
-    """An episode that was kept although the table of throws has another one, which no file holds.
-
-    Attributes:
-        trial: Number of its trial.
-        file: Name of the file that it was found in.
-        digest: Its digest.
-        expected: The digest in the table of throws.
-    """
+    """An episode that was kept, as no file holds the one whose digest the table of throws has (`expected`)."""
 
     trial: int
     file: str
@@ -61,11 +54,9 @@ class DifferingEpisode:
 
 @dataclass(frozen=True)
 class Repaired:
-    """The result of a repair.
+    """The result of a repair: how many trials there are, and how many of their episodes were kept.
 
     Attributes:
-        trials: Number of trials of the plan.
-        episodes: Number of episodes that were kept.
         lost: Trials that have no whole episode, and had one or may have had one.
         differing: Episodes that were kept although the table of throws has others.
         remarks: Everything else that was wrong, a sentence each.
@@ -76,10 +67,6 @@ class Repaired:
     lost: tuple[LostTrial, ...]
     differing: tuple[DifferingEpisode, ...]
     remarks: tuple[str, ...]
-
-    def as_dict(self) -> dict[str, object]:
-        """The fields by name, for JSON."""
-        return asdict(self)
 
 
 def repair(directory: Path, output: Path, *, remake: Remake) -> Repaired:
@@ -114,7 +101,7 @@ def repair(directory: Path, output: Path, *, remake: Remake) -> Repaired:
                     sorting.take(path)
             sorting.settle(directory)
             lost = sorting.give_up(earlier)
-            writer.finish(wall_s=None)
+            writer.finish()
         finally:
             writer.close()
     return Repaired(len(plan.trials), len(sorting.taken), lost, tuple(sorting.differing), tuple(remarks))

@@ -76,13 +76,18 @@ def scan(contents: McapContents, start: int = 0) -> Iterator[Found]:
 
 
 def scan_whole(path: Path) -> Iterator[Found]:
-    """Find all whole episodes of an MCAP file or of its beginning, in the order in which they lie there.
+    """Find all whole episodes of an MCAP file or of its beginning, in order; a missing file has none.
 
     Raises:
-        DatasetError: If the file is missing or cannot be read.
+        DatasetError: If the file cannot be read.
     """
-    with map_file(path) as contents:
-        yield from (found for found in scan(contents) if found.damage is None)
+    try:
+        with map_file(path) as contents:
+            yield from (found for found in scan(contents) if found.damage is None)
+    except DatasetError as error:
+        # Only opening tells whether it is there: another process may remove it after a look for it.
+        if not isinstance(error.__cause__, FileNotFoundError):
+            raise
 
 
 def _find(contents: McapContents, first: Record, facts: int) -> Found | None:

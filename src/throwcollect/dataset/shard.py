@@ -16,14 +16,18 @@ from operator import itemgetter
 from pathlib import Path
 
 from throwcollect.dataset.bag import FileSummary
-from throwcollect.dataset.directory import shard_name
+from throwcollect.dataset.directory import path_of_part
 from throwcollect.dataset.manifest import FileEntry, RunningHash
 from throwcollect.dataset.mcap_file import McapFile, Run, episode_run
 from throwcollect.episode.channels import Channels
 from throwcollect.episode.message import Episode
 from throwcollect.errors import DatasetError
-from throwcollect.files import open_regular, replacing, unwritable, write_all
-from throwcollect.sweep.plan import Plan
+from throwcollect.files import open_regular, remove, replacing, unwritable, write_all
+
+Recording = tuple[FileSummary, FileEntry]
+"""What bag's metadata and manifest say of an MCAP file."""
+Runs = Mapping[int, tuple[int, Run]]
+"""By trial, where the run of its episode begins in a file [bytes], and its records without their bytes."""
 
 
 @dataclass(frozen=True)
@@ -31,31 +35,25 @@ class FinishedShard:
     """A shard in trial order under its final name.
 
     Attributes:
-        recording: What bag's metadata and manifest say of its file; None if no trial has an episode, and so there is
-            none.
+        recording: Its file; None if no trial has an episode, and so there is none.
         offsets: Where the chunk of each trial's episode begins [bytes].
     """
 
-    recording: tuple[FileSummary, FileEntry] | None
+    recording: Recording | None
     offsets: dict[int, int]
 
 
 def write_in_order(
     write: Callable[[bytes], None],
     channels: Channels,
-    runs: Mapping[int, tuple[int, Run]],
+    runs: Runs,
     read: Callable[[int, int], bytes],
     *,
     name: str,
 ) -> FinishedShard:
     """Write the finished file of some episodes, which depends on nothing but them.
 
-    Args:
-        write: Called with the bytes of the file, in order.
-        channels: What is recorded.
-        runs: By trial, where the run of an episode begins in another file [bytes], and its records without their bytes.
-        read: Reads that other file: given an offset and a length, returns the bytes.
-        name: Name of the file.
+    The runs lie in another file, of which `read` gives the bytes from an offset on, of a certain length.
     """
     sha256 = RunningHash()
 
@@ -71,21 +69,6 @@ def write_in_order(
         file.append(replace(run, data=read(offset, run.length)))
     summary = file.finish(name)
     return FinishedShard((summary, FileEntry(name, file.size, sha256.hexdigest())), offsets)
-
-
-def shard_of(plan: Plan, trial: int) -> str:
-    """Name of the file that holds the episode of a trial, if it has one."""
-    return shard_name(plan.config.name, trial // plan.config.record.trials_per_shard)
-
-
-def list_shards(plan: Plan) -> list[str]:
-    """Names of the files that a plan's trials may have, in order."""
-    return list(dict.fromkeys(shard_of(plan, trial) for trial in plan.trials.numbers))
-
-
-def path_of_part(path: Path) -> Path:
-    """Path of a shard while it is filled; `path` is its final one."""
-    return path.with_name(f"{path.name}.part")
 
 
 class OpenShard:
@@ -111,11 +94,8 @@ class OpenShard:
         """Wait for the episodes, or losses, of more trials."""
         self.missing.update(trials)
 
-    def adopt(self, runs: Mapping[int, tuple[int, Run]]) -> None:
-        """Go on with the unfinished file of a shard; what follows its last whole episode is cut off.
-
-        Args:
-            runs: By trial, where the run of an episode begins in the file [bytes], and its records.
+    def adopt(self, runs: Runs) -> None:
+        """Go on with the unfinished file of a shard, which has these runs; what follows the last of them is cut off.
 
         Raises:
             DatasetError: If the file cannot be written.
@@ -160,22 +140,15 @@ class OpenShard:
         Raises:
             DatasetError: If the shard cannot be written.
         """
-        if self._descriptor is None:
-            return FinishedShard(None, {})
-        if not self._runs:
-            # The first episode could not be written, and its trial and all others were lost.
+        finished = FinishedShard(None, {})
+        if self._runs:
+            # The final file is on the disk before the unfinished one is removed, so no moment is without all episodes.
+            with replacing(self.path) as descriptor:
+                write = partial(write_all, descriptor)
+                finished = write_in_order(write, self._channels, self._runs, self._read, name=self.path.name)
+        if self._descriptor is not None:
             self.close()
-            self.part.unlink(missing_ok=True)
-            return FinishedShard(None, {})
-        # The final file is on the disk before the unfinished one is removed, so no moment is without all episodes.
-        with replacing(self.path) as descriptor:
-            write = partial(write_all, descriptor)
-            finished = write_in_order(write, self._channels, self._runs, self._read, name=self.path.name)
-        self.close()
-        try:
-            self.part.unlink()
-        except OSError as error:
-            raise unwritable(self.part, error) from error
+            remove(self.part)
         return finished
 
     def sync(self) -> None:

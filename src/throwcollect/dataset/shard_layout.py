@@ -6,22 +6,15 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from throwcollect.dataset.directory import shard_name
+from throwcollect.dataset.directory import path_of_part, shard_name
 from throwcollect.dataset.recovery import Part
-from throwcollect.dataset.shard import path_of_part
 from throwcollect.files import is_there, remove
 from throwcollect.sweep.plan import Plan
 
 
 @dataclass
 class ShardLayout:
-    """The shards of a dataset by their numbers, before and after they are begun.
-
-    Attributes:
-        directory: Directory of the dataset.
-        plan: The trials, which may become more.
-        growing: Whether they may still become more.
-    """
+    """The shards of a dataset by their numbers, before and after they are begun; a growing plan gets more trials."""
 
     directory: Path
     plan: Plan

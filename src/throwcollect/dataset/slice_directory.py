@@ -121,12 +121,7 @@ def remove_stopped(attempts: Sequence[Path]) -> None:
 
 
 def publish(attempt: Path, directory: Path, slice: Slice) -> bool:
-    """Put a finished attempt into the place of its slice, and remove what remains of it.
-
-    Args:
-        attempt: Directory of the attempt, a finished dataset.
-        directory: Directory of the whole dataset.
-        slice: Which slice it is.
+    """Put a finished attempt into the place of its slice in the directory of a dataset, and remove what remains of it.
 
     Returns:
         Whether it was the first one; if not, it is removed.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 
 from throwcollect.errors import LossError
 from throwcollect.tasks.result import LOST
@@ -16,10 +16,8 @@ class MissSummary:
 
     Attributes:
         targets: Number of trials with such a target.
-        measured: Number of those that ended somewhere.
-        median: Median of their misses; None if there is none, like all that follow.
+        measured: Number of those that ended somewhere; without any, all that follows is None.
         share90: The miss that nine of ten trials stay below.
-        largest: The largest one.
     """
 
     targets: int
@@ -31,12 +29,9 @@ class MissSummary:
 
 @dataclass(frozen=True)
 class Info:
-    """Summary of a dataset.
+    """Summary of a dataset: its name, how many trials were planned, how many of them have an episode, and more.
 
     Attributes:
-        name: Name of the collection.
-        trials: Number of planned trials.
-        episodes: Number of trials with an episode.
         outcomes: Number of trials of each outcome, most frequent first.
         wanted: Number of trials that were to succeed; None if there was no such number.
         landing: Lowest and highest ``x_m`` and ``y_m`` at which a ball landed [m], in world; None if none did, or
@@ -44,8 +39,7 @@ class Info:
         samples: Number of samples in all episodes.
         duration_s: Simulated time of all episodes together [s].
         shards: Number of MCAP files.
-        size_bytes: Size of all files of the dataset.
-        recordings_bytes: Size of the MCAP files.
+        recordings_bytes: Size of these files; `size_bytes` is that of all files.
         topics: Number of messages of each topic.
         digest: Hash over all episodes in order of trials, and their targets, as it was written.
         wall_s: Real time for which it was collected, without pauses [s]; None if no journal tells.
@@ -71,10 +65,6 @@ class Info:
     success: str = "landed"
     noun: str = "throw"
     misses: Mapping[str, MissSummary] = field(default_factory=dict)
-
-    def as_dict(self) -> dict[str, object]:
-        """The fields by name, for JSON."""
-        return asdict(self)
 
 
 def explain_loss(outcomes: Mapping[str, int], *, hint: str | None) -> LossError | None:

@@ -9,10 +9,11 @@ from pathlib import Path
 from typing import Any
 
 import pyarrow as pa
+import pyarrow.compute as pc
 
 from throwcollect.config.schema import Config
 from throwcollect.config.shape import unit_of_key
-from throwcollect.dataset.directory import THROWS
+from throwcollect.dataset.directory import THROWS, list_shards
 from throwcollect.dataset.misses import Misses
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.sweep.arrow_column import make_table
@@ -100,10 +101,7 @@ class ThrowsTable:
         schema: Columns with their types and descriptions.
         later: Names of the columns that datasets of earlier versions lack.
 
-    Args:
-        parameters: Swept dotted configuration keys, in the order of their columns.
-        config: Configuration of the collection.
-        targets: Names of the columns of targets.
+    The parameters are the swept keys, and the targets columns of targets, in their order.
 
     Raises:
         ConfigError: If the task lacks an outcome that it needs, or a column of its results has the name of another.
@@ -195,4 +193,23 @@ def read_throws(directory: Path, plan: Plan) -> pa.Table:
     table = read_throws_table(path, plan)
     if table["trial"].to_pylist() != list(plan.trials.numbers):
         raise DatasetError(f"its rows are not the {len(plan.trials)} trials of the plan in order", path=path)
+    if problem := _explain_unusable(table, plan):
+        raise DatasetError(problem, path=path)
     return table
+
+
+def _explain_unusable(table: pa.Table, plan: Plan) -> str | None:
+    """Say what in a table, which may come from anybody, cannot be worked with; None if all can be, right or not."""
+    known = {
+        "outcome": {REFUSED, *(each.value for each in task_of(plan.config).outcomes)},
+        "shard": {None, *list_shards(plan)},
+    }
+    for name, values in known.items():
+        if strange := set(table[name].unique().to_pylist()) - values:
+            return f"{name} is {min(map(repr, strange))} in some row, which no row of this plan can have"
+    without = table["shard"].is_null()
+    if not all(table[name].is_null().equals(without) for name in ("chunk_offset", "samples", "digest")):
+        return "some row has only a part of the place of an episode"
+    if pc.any(pc.less(table["samples"], 1)).as_py():
+        return "some row has an episode without samples"
+    return None

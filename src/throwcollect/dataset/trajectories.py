@@ -12,7 +12,8 @@ from typing import overload
 import numpy as np
 from numpy.typing import NDArray
 
-from throwcollect.dataset.columns import Column, StoredThrow, check_columns, empty_columns, fill, read_stored_rows
+from throwcollect.dataset.columns import COLUMNS, Column, StoredThrow, empty_columns, fill, read_stored_rows
+from throwcollect.errors import ConfigError
 from throwcollect.wording import format_count
 
 _BLOCK = 16
@@ -101,20 +102,17 @@ def read_trajectories(
     *,
     threads: int | None = None,
 ) -> Trajectories:
-    """Read the trajectories of many throws.
+    """Read the trajectories of trials, whose episodes lie at these places; None for a trial that has none.
 
-    Args:
-        trials: Numbers of the trials.
-        places: Where their episodes lie; None for a trial that has none.
-        columns: Which of `COLUMNS`; nothing else is copied.
-        joints: Joints that the columns of joints have, in this order; some of those of the episodes.
-        threads: How many of them work; None for one a core, up to 4.
+    All else is as `Dataset.trajectories` takes it.
 
     Raises:
         ConfigError: If there is no such column.
         DatasetError: If an episode is not where it should be, or its chunk is damaged; its CRC is compared.
     """
-    check_columns(columns)
+    for column in columns:
+        if column not in COLUMNS:
+            raise ConfigError(f"a trajectory has no column {column!r}", expected=", ".join(COLUMNS))
     stored = [place for place in places if place is not None]
     offsets = np.zeros(len(places) + 1, np.int64)
     np.cumsum([place.samples if place else 0 for place in places], out=offsets[1:])

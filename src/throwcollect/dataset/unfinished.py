@@ -7,10 +7,9 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from throwcollect.dataset.configuration import read_config
-from throwcollect.dataset.directory import METADATA, PLAN
+from throwcollect.dataset.directory import METADATA, PLAN, list_shards, path_of_part
 from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.recovery import find_episodes
-from throwcollect.dataset.shard import list_shards, path_of_part
 from throwcollect.dataset.throws_table import Row, ThrowsTable
 from throwcollect.dataset.way_on import find_way_on
 from throwcollect.files import StrPath, is_there
@@ -58,5 +57,7 @@ def _list_rows(directory: Path, plan: Plan) -> Iterator[Row]:
     yield from (table.make_refused_row(plan.trial(number)) for number in plan.trials.refused)
     for name in list_shards(plan):
         final = directory / name
-        for found in find_episodes(final if is_there(final) else path_of_part(final), plan).values():
+        # The unfinished file comes first: when it vanishes in this moment, the final one is there.
+        episodes = find_episodes(path_of_part(final), plan) | find_episodes(final, plan)
+        for found in episodes.values():
             yield table.row(plan.trial(found.trial), found.result, found.place)

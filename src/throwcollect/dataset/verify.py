@@ -15,12 +15,22 @@ from typing import Any
 from throwcollect.config.schema import Config
 from throwcollect.dataset.bag import FileSummary, bag_information, read_bag_metadata
 from throwcollect.dataset.digest import combine_digests
-from throwcollect.dataset.directory import CARD, CONFIG, FORMAT, MANIFEST, METADATA, PLAN, SHARD_SUFFIX, THROWS, TRIALS
+from throwcollect.dataset.directory import (
+    CARD,
+    CONFIG,
+    FORMAT,
+    MANIFEST,
+    METADATA,
+    PLAN,
+    SHARD_SUFFIX,
+    THROWS,
+    TRIALS,
+    shard_of,
+)
 from throwcollect.dataset.findings import Finding
 from throwcollect.dataset.manifest import find_changed_files, find_manifest_problems, read_manifest
 from throwcollect.dataset.mcap_file import MAGIC
 from throwcollect.dataset.mcap_reader import open_mcap
-from throwcollect.dataset.shard import shard_of
 from throwcollect.dataset.throws_table import read_throws_table
 from throwcollect.dataset.verify_episode import EpisodeCheck
 from throwcollect.dataset.verify_plan import CheckOf, can_draw, find_drawing_problems, find_refusal_problems
@@ -39,9 +49,10 @@ _MANY_EPISODES = 1000
 _TELL_EVERY_S = 2.0
 _UNFINISHED = (".part", ".new")
 _short = reprlib.Repr()
-"""Shortens values from files, which somebody may have made as large and as deep as possible."""
 _short.maxstring = _short.maxother = 120
 _short.maxlevel = _short.maxdict = _short.maxlist = 3
+_shorten = _short.repr
+"""A value of a file in words; somebody may have made it as large and as deep as possible."""
 
 
 def verify(
@@ -98,11 +109,7 @@ def verify(
 
 
 def find_unchecked(config: Config) -> tuple[str, ...]:
-    """What `verify` leaves out of a dataset, as packages of the extra ``collect`` are not installed; empty if nothing.
-
-    Args:
-        config: Configuration of the dataset.
-    """
+    """What `verify` leaves out, as packages of the extra ``collect`` are not installed; empty if it is nothing."""
     left_out: tuple[str, ...] = () if can_draw(config) else ("whether the configuration draws these trials",)
     if not robot_is_available(config):
         left_out += ("whether the robot can do them", "how its joints moved", "what came of the throws")
@@ -116,7 +123,7 @@ def find_damage(directory: Path, plan: Plan | None, *, in_full: bool) -> list[Fi
     names have to begin and end as MCAP files do, or, in full, the dataset is verified.
 
     Args:
-        directory: Directory of a dataset that has its ``metadata.yaml``.
+        directory: Its directory.
         plan: Its trials; None if they cannot be read.
         in_full: Whether all bytes are compared, and not only the sizes.
     """
@@ -208,16 +215,13 @@ def _list_shards(directory: Path) -> set[str]:
 def _find_bag_problems(bag: Mapping[str, Any], checks: Mapping[str, ShardReport]) -> Iterator[Finding]:
     summaries = [check.summary for check in checks.values() if check.summary is not None]
     channels = next((check.channels for check in checks.values() if check.channels is not None), None)
-    whole = len(summaries) == len(checks)
-    expected = bag_information(
-        summaries, channels.all if channels else (), {"throwcollect.format": FORMAT, "throwcollect.digest": ""}
-    )
+    expected = bag_information(summaries, channels.all if channels else (), {})
     if unknown := sorted(map(str, set(bag) - set(expected))):
         yield Finding(METADATA, "", f"has unknown keys: {_shorten(unknown)}")
     del expected["custom_data"]
     if not channels:
         del expected["topics_with_message_count"]
-    if not whole:
+    if len(summaries) < len(checks):
         # Other findings report the unreadable files; without them, the totals over all files are not known.
         yield from _find_file_problems(bag, summaries)
         return
@@ -228,14 +232,13 @@ def _find_bag_problems(bag: Mapping[str, Any], checks: Mapping[str, ShardReport]
 
 def _find_file_problems(bag: Mapping[str, Any], summaries: list[FileSummary]) -> Iterator[Finding]:
     entries = bag.get("files")
-    entries_by_path = (
-        {each.get("path"): each for each in entries if isinstance(each, dict)} if isinstance(entries, list) else {}
-    )
+    known = [each for each in entries if isinstance(each, dict)] if isinstance(entries, list) else []
     for summary in summaries:
         (expected,) = bag_information([summary], (), {})["files"]
-        if entries_by_path.get(summary.path) != expected:
-            found = _shorten(entries_by_path.get(summary.path))
-            yield Finding(METADATA, f"files: {summary.path}", f"is {found}, the file gives {_shorten(expected)}")
+        found = next((each for each in known if each.get("path") == summary.path), None)
+        if found != expected:
+            problem = f"is {_shorten(found)}, the file gives {_shorten(expected)}"
+            yield Finding(METADATA, f"files: {summary.path}", problem)
 
 
 def _find_digest_problems(
@@ -276,10 +279,6 @@ def _find_stray_files(directory: Path, checks: Mapping[str, ShardReport]) -> Ite
             yield Finding(path.name, "", "no row of throws.parquet has its episode in this file")
     if not (directory / CARD).is_file():
         yield Finding(CARD, "", "is missing")
-
-
-def _shorten(value: object) -> str:
-    return _short.repr(value)
 
 
 def _find_damage_without_manifest(directory: Path, plan: Plan, *, in_full: bool) -> Iterator[Finding]:

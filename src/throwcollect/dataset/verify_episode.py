@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping
 from functools import lru_cache
 from typing import Any
 
@@ -175,12 +175,14 @@ def _find_row_problems(expected: Mapping[str, Any], row: Mapping[str, Any]) -> I
 
 
 def _find_message_problems(episode: Episode, channels: Channels) -> Iterator[str]:
-    expected = {channel.id: topic for channel, topic in channels.recorded.items()}
-    if problems := list(_find_channel_problems(episode, channels)):
-        yield from problems
+    if not channels.fit(episode.channels()):
+        found, expected = (
+            " and ".join(str(list(chunk)) for chunk in numbers) for numbers in (episode.channels(), channels.numbers)
+        )
+        yield f"has the channels {found} instead of {expected}"
         return
-    for channel, topic in expected.items():
-        messages = episode.table.messages(channel)
+    for channel, topic in channels.recorded.items():
+        messages = episode.table.messages(channel.id)
         if not topic.layout.describes(messages):
             yield f"messages of {topic.name} are not laid out as {topic.type_name} is written here"
             continue
@@ -237,17 +239,6 @@ def _find_stamp_problems(episode: Episode, samples: Samples, config: Config) -> 
     # Stamps are whole nanoseconds, so their distances may differ by one.
     if len(steps) and np.abs(steps - NS_PER_S / config.record.rate_hz).max() > 1:
         yield f"stamps are not spaced by 1/{config.record.rate_hz} s: {steps.min()} to {steps.max()} ns"
-
-
-def _find_channel_problems(episode: Episode, channels: Channels) -> Iterator[str]:
-    """Compare the channels of the chunks of an episode with those that are recorded; a sentence if they differ."""
-    if not channels.fit(episode.channels()):
-        yield f"has the channels {_list(episode.channels())} instead of {_list(channels.numbers)}"
-
-
-def _list(numbers: Sequence[Sequence[int]]) -> str:
-    """Describe the channels of each chunk in words."""
-    return " and ".join(str(list(chunk)) for chunk in numbers)
 
 
 def _same(value: object, other: object) -> bool:

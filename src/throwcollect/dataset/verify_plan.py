@@ -39,13 +39,8 @@ def find_drawing_problems(directory: Path, plan: Plan, rows: Mapping[int, Row] |
 
     The rounds of a plan that grows are drawn from the results in the table of throws, which other checks compare with
     the episodes. Those behind a lost trial are not compared if they are not those that follow from its loss, as they
-    may follow from the episode that it had. A plan that cannot be drawn here (see `can_draw`) is not compared.
-
-    Args:
-        directory: Directory of the dataset.
-        plan: Its plan.
-        rows: Rows of the table of throws, by trial; None if they are not known, and then only what depends on no
-            result is drawn again.
+    may follow from the episode that it had. If the rows of the table of throws are not known, only what depends on no
+    result is drawn again. A plan that cannot be drawn here (see `can_draw`) is not compared.
     """
     if not can_draw(plan.config):
         return
@@ -71,12 +66,8 @@ def find_drawing_problems(directory: Path, plan: Plan, rows: Mapping[int, Row] |
 def find_refusal_problems(plan: Plan, doubtful: Collection[int], check_of: CheckOf) -> Iterator[Finding]:
     """Find refusals that the plan should not have, and ones that it lacks.
 
-    All refused trials are checked again, and `CHECKED_AGAIN` others that the seed of the configuration chooses.
-
-    Args:
-        plan: The plan.
-        doubtful: Trials whose values are not known.
-        check_of: Makes the check that the plan was made with.
+    All refused trials are checked again, and `CHECKED_AGAIN` others that the seed of the configuration chooses, except
+    the doubtful ones, whose values are not known.
     """
     refused = plan.trials.refused
     others = [number for number in plan.trials.numbers if number not in refused]

@@ -61,102 +61,109 @@ class ShardReport:
 def check_shard(
     path: Path, config: Config | None, trials: Sequence[int] | None, find_problems: FindProblems
 ) -> ShardReport:
-    """Check one file.
+    """Check one file; everything that is wrong with it is a finding, and never an error.
 
     Args:
         path: The file.
         config: Configuration of the dataset; None if it is not known, and then only episodes and checksums are checked.
         trials: Trials whose episodes the file should hold, in order; None if they are not known.
         find_problems: Finds what is wrong with an episode.
+
+    Raises:
+        MemberError: If the task is of another package and fails; that says nothing of the file.
     """
-    return _ShardCheck(path, config, trials, find_problems).run()
+    report = ShardReport()
+    try:
+        with map_file(path) as contents:
+            waiting = None if trials is None else dict.fromkeys(trials)
+            _ShardCheck(path.name, contents, config, waiting, find_problems, report).run()
+    except DatasetError as error:
+        report.findings.append(Finding.of(path.name, error))
+    except MemberError:
+        raise
+    except ThrowcollectError as error:
+        report.findings.append(Finding(path.name, "", str(error)))
+    return report
 
 
+@dataclass
 class _ShardCheck:
-    """Checks one file once; see `check_shard`."""
+    """Checks the contents of one file once, and fills in the result; see `check_shard`.
 
-    def __init__(
-        self, path: Path, config: Config | None, trials: Sequence[int] | None, find_problems: FindProblems
-    ) -> None:
-        self._result = ShardReport()
-        self._path = path
-        self._config = config
-        self._waiting = None if trials is None else list(trials)
-        self._find_problems = find_problems
-        self._damaged = False
-        self._expected = bytearray()
-        self._model: McapFile | None = None
+    `waiting` are the trials whose episodes have not come yet, and `places` has the offset of each episode that has
+    [bytes]; `latest` is the highest trial of these. `model` writes the file once more into `expected`.
+    """
 
-    def run(self) -> ShardReport:
-        """Check the file and return the findings; everything that is wrong with it is one, and never an error.
-
-        Raises:
-            MemberError: If the task is of another package and fails; that says nothing of the file.
-        """
-        try:
-            with map_file(self._path) as contents:
-                self._check(contents)
-        except DatasetError as error:
-            self._report(error.place, error.details)
-        except MemberError:
-            raise
-        except ThrowcollectError as error:
-            self._report("", str(error))
-        return self._result
+    name: str
+    contents: McapContents
+    config: Config | None
+    waiting: dict[int, None] | None
+    find_problems: FindProblems
+    result: ShardReport
+    damaged: bool = False
+    expected: bytearray = field(default_factory=bytearray)
+    model: McapFile | None = None
+    places: dict[int, int] = field(default_factory=dict)
+    latest: int = -1
 
     def _report(self, place: str, problem: str) -> None:
-        self._result.findings.append(Finding(self._path.name, place, problem))
+        self.result.findings.append(Finding(self.name, place, problem))
 
     def _report_damage(self, error: DatasetError, *, start: int | None = None, resumed: int = -1) -> None:
         """Report that records cannot be read.
 
-        Args:
-            error: The reason.
-            start: Where the damaged run of records begins [bytes], if it is not where the error says.
-            resumed: Where the next one begins [bytes]; -1 if there is none.
+        They begin at `start` [bytes] if the error does not say where, and the next episode at `resumed`; -1 if there is
+        none.
         """
-        self._damaged = True
+        self.damaged = True
         place = error.place if start is None else f"byte {start}"
         problem = error.details if error.place == place else f"{error.place}: {error.details}"
         self._report(place, problem + (f"; the next episode is at byte {resumed}" if resumed >= 0 else ""))
 
-    def _check(self, contents: McapContents) -> None:
+    def run(self) -> None:
+        """Check everything.
+
+        Raises:
+            DatasetError: If the file is too short to be looked at.
+        """
+        contents = self.contents
         if len(contents) < len(MAGIC):
             raise DatasetError(f"has {len(contents)} bytes: the file is cut off")
         if contents.slice(0, len(MAGIC)) != MAGIC:
             self._report("byte 0", "the file does not begin as an MCAP file does")
-        start = self._check_opening(contents)
-        end = self._check_episodes(contents, start)
-        for trial in self._waiting or ():
+        start = self._check_opening()
+        end = self._check_episodes(start)
+        for trial in self.waiting or ():
             self._report(f"trial {trial}", f"{THROWS} places an episode here, but the file has no whole one")
         try:
-            if self._damaged or self._model is None:
-                self._check_footer(contents)
+            if self.damaged or self.model is None:
+                self._check_footer()
             else:
                 # From here on, the model writes what follows the last episode.
-                self._expected.clear()
-                summary = self._model.finish(self._path.name)
-                self._compare(contents, end, bytes(self._expected[: -len(MAGIC)]))
-                self._check_magic(contents)
-                if len(contents) != self._model.size:
-                    self._report("", f"has {len(contents)} bytes, its records have {self._model.size}")
-                self._result.summary = summary
+                self.expected.clear()
+                summary = self.model.finish(self.name)
+                self._compare(end, bytes(self.expected[: -len(MAGIC)]))
+                self._check_magic()
+                if len(contents) != self.model.size:
+                    self._report("", f"has {len(contents)} bytes, its records have {self.model.size}")
+                self.result.summary = summary
         except DatasetError as error:
             self._report_damage(error)
 
-    def _check_opening(self, contents: McapContents) -> int:
+    def _check_opening(self) -> int:
         """Check everything before the first episode; returns where that should begin [bytes], -1 if nowhere."""
+        contents = self.contents
         latched = contents.next_chunk(0)
         first = next((found.stored for found in scan(contents) if found.readable), None)
         try:
-            if self._config is not None:
-                self._result.channels = _read_channels(contents, self._config)
+            if self.config is not None:
+                self.result.channels = _read_channels(contents, self.config)
             if first is not None and first.offset == latched:
                 raise DatasetError("latched topics: missing, an episode is here", place=f"byte {latched}")
-            if self._result.channels is not None and first is not None:
+            if self.result.channels is not None and first is not None:
                 start_ns = first.episode.chunk.start_ns
-                self._model = McapFile(self._expected.extend, self._result.channels, start_ns=start_ns)
-                return self._compare(contents, len(MAGIC), bytes(self._expected[len(MAGIC) :]))
+                self.model = McapFile(self.expected.extend, self.result.channels, start_ns=start_ns)
+                return self._compare(len(MAGIC), bytes(self.expected[len(MAGIC) :]))
             if latched >= 0:
                 return contents.message_indexes(contents.record(latched).end)[1].offset
             for record in contents.records():
@@ -167,13 +174,8 @@ class _ShardCheck:
         # The episodes can still be checked; the damage before the first of them is reported above.
         return first.offset if first else -1
 
-    def _compare(self, contents: McapContents, start: int, expected: bytes) -> int:
-        """Compare records with those that should be there; returns where the record after them begins [bytes].
-
-        Args:
-            contents: The contents of the file.
-            start: Where the records begin [bytes].
-            expected: The bytes that should be there.
+    def _compare(self, start: int, expected: bytes) -> int:
+        """Compare the records from `start` on with those that should be there; returns where they end [bytes].
 
         Raises:
             DatasetError: If the file ends before they do, or holds records of other kinds.
@@ -181,10 +183,10 @@ class _ShardCheck:
         offset = start
         for wanted in McapContents(expected).records(0):
             # The closing magic is no record and cannot be read as one.
-            if wanted.opcode == Opcode.FOOTER and offset >= len(contents) - len(MAGIC):
+            if wanted.opcode == Opcode.FOOTER and offset >= len(self.contents) - len(MAGIC):
                 self._report("summary", f"a {wanted.kind} is missing")
                 return offset
-            actual = contents.record(offset)
+            actual = self.contents.record(offset)
             if actual.opcode != wanted.opcode:
                 problem = f"a {actual.kind} where a {wanted.kind} should be"
                 raise DatasetError(problem, place=f"byte {actual.offset}")
@@ -226,28 +228,26 @@ class _ShardCheck:
         else:
             self._report(place, "latched topics: their times are not that of the first sample")
 
-    def _check_episodes(self, contents: McapContents, start: int) -> int:
-        """Check all episodes; returns where the record after the last of them begins, -1 if that is not known.
+    def _check_episodes(self, start: int) -> int:
+        """Check all episodes, of which the first should begin at `start` [bytes]; -1 if there is none.
 
-        Args:
-            contents: The contents of the file.
-            start: Where the first episode should begin [bytes]; -1 if there is none.
+        Returns:
+            Where the record after the last of them begins [bytes]; -1 if that is not known.
         """
-        places: dict[int, int] = {}
-        expected = start
+        contents, expected = self.contents, start
         for found in scan(contents, start) if start >= 0 else ():
             stored = found.stored
             if stored.offset < expected or not found.readable:
                 # Within the records of an episode that is damaged, or damaged so that its records lead nowhere.
                 continue
             if stored.offset > expected:
-                self._report_gap(contents, expected, resumed=stored.offset)
-            if self._model is not None:
+                self._report_gap(expected, resumed=stored.offset)
+            if self.model is not None:
                 # The model gets the bytes as they lie here, as its indexes and its CRC are compared with those here.
-                self._model.append(replace(stored.run(), data=contents.slice(stored.offset, stored.end)))
+                self.model.append(replace(stored.run(), data=contents.slice(stored.offset, stored.end)))
                 # The bytes of episodes are checked elsewhere, so here only those before and behind them are kept.
-                self._expected.clear()
-            self._check_place(stored, places)
+                self.expected.clear()
+            self._check_place(stored)
             expected = stored.end
         if expected < 0:
             return -1
@@ -257,58 +257,53 @@ class _ShardCheck:
                 return expected
         except DatasetError:
             pass  # `_report_gap` reports it, as an episode could begin there
-        self._report_gap(contents, expected)
+        self._report_gap(expected)
         return -1
 
-    def _report_gap(self, contents: McapContents, start: int, *, resumed: int = -1) -> None:
-        """Report a stretch of the file in which no episode can be read.
-
-        Args:
-            contents: The contents of the file.
-            start: Where an episode should begin [bytes].
-            resumed: Where the next episode begins [bytes]; -1 if there is none.
-        """
+    def _report_gap(self, start: int, *, resumed: int = -1) -> None:
+        """Report that no episode can be read from `start` on; the next one begins at `resumed` [bytes], -1 if none."""
+        reason = DatasetError("so much is damaged that the rest is not looked at", place=f"byte {start}")
         try:
-            contents.episode(start)
+            self.contents.episode(start)
         except DatasetError as error:
-            self._report_damage(error, start=start, resumed=resumed)
-        else:
-            given_up = DatasetError("so much is damaged that the rest is not looked at", place=f"byte {start}")
-            self._report_damage(given_up)
+            reason = error
+        self._report_damage(reason, start=start, resumed=resumed)
 
-    def _check_place(self, stored: StoredEpisode, places: dict[int, int]) -> None:
-        """Check an episode, and that it should come now; `places` has the offsets of earlier ones [bytes]."""
+    def _check_place(self, stored: StoredEpisode) -> None:
+        """Check an episode, and that it should come now."""
         trial, offset = stored.episode.header.trial, stored.offset
         place = f"trial {trial}"
-        if trial in places:
-            self._report(
-                place, f"byte {offset}: the file has an episode of this trial already, at byte {places[trial]}"
-            )
-        elif self._waiting is not None and trial not in self._waiting:
+        if trial in self.places:
+            earlier = self.places[trial]
+            self._report(place, f"byte {offset}: the file has an episode of this trial already, at byte {earlier}")
+        elif self.waiting is not None and trial not in self.waiting:
             self._report(place, f"byte {offset}: an episode that {THROWS} does not place here")
         else:
-            if places and trial < max(places):
-                self._report(place, f"byte {offset}: comes after trial {max(places)}")
-            for problem in self._find_problems(stored, self._path.name, self._result.channels):
+            if trial < self.latest:
+                self._report(place, f"byte {offset}: comes after trial {self.latest}")
+            for problem in self.find_problems(stored, self.name, self.result.channels):
                 self._report(place, problem)
-            self._result.digests[trial] = stored.episode.digest
-            if self._waiting is not None:
-                self._waiting.remove(trial)
-        places.setdefault(trial, offset)
+            self.result.digests[trial] = stored.episode.digest
+            if self.waiting is not None:
+                del self.waiting[trial]
+        self.places.setdefault(trial, offset)
+        self.latest = max(self.latest, trial)
 
-    def _check_magic(self, contents: McapContents) -> bool:
-        ends = contents.slice(len(contents) - len(MAGIC), len(contents)) == MAGIC
+    def _check_magic(self) -> bool:
+        offset = len(self.contents) - len(MAGIC)
+        ends = self.contents.slice(offset, len(self.contents)) == MAGIC
         if not ends:
-            self._report(f"byte {len(contents) - len(MAGIC)}", "the file does not end as an MCAP file does")
+            self._report(f"byte {offset}", "the file does not end as an MCAP file does")
         return ends
 
-    def _check_footer(self, contents: McapContents) -> None:
+    def _check_footer(self) -> None:
         """Check only the CRC of the summary, as nobody knows the contents that it should have.
 
         Raises:
             DatasetError: If the file does not end with a footer.
         """
-        if not self._check_magic(contents) or len(contents) < len(MAGIC) + len(_FOOTER):
+        contents = self.contents
+        if not self._check_magic() or len(contents) < len(MAGIC) + len(_FOOTER):
             return
         footer = contents.record(len(contents) - len(MAGIC) - len(_FOOTER))
         if footer.opcode != Opcode.FOOTER or len(footer.data) != len(_FOOTER):

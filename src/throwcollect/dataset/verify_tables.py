@@ -10,9 +10,8 @@ import numpy as np
 
 from throwcollect.config.loader import load
 from throwcollect.config.schema import Config
-from throwcollect.dataset.directory import CONFIG, PLAN, THROWS, TRIALS, config_path
+from throwcollect.dataset.directory import CONFIG, PLAN, THROWS, TRIALS, config_path, shard_of
 from throwcollect.dataset.findings import Finding
-from throwcollect.dataset.shard import shard_of
 from throwcollect.dataset.throws_table import REFUSED, Row, read_throws_table
 from throwcollect.errors import ConfigError, DatasetError, ForeignPlanError
 from throwcollect.sweep.digest import trial_digests
@@ -20,8 +19,6 @@ from throwcollect.sweep.plan import Plan
 from throwcollect.sweep.point_file import read_points
 from throwcollect.sweep.points import Points
 from throwcollect.tasks.result import LOST
-
-WITHOUT_EPISODE = (REFUSED, LOST)
 
 
 @dataclass
@@ -152,6 +149,6 @@ def _plan_findings(plan: Plan, rows: Mapping[int, Row], doubtful: Collection[int
             yield Finding(THROWS, place, f"is {row['outcome']}, the plan says {trial.refused or 'nothing against it'}")
         elif trial.refused is not None and row["reason"] != trial.refused:
             yield Finding(THROWS, place, f"was refused as {row['reason']!r}, in the plan as {trial.refused!r}")
-        expected = None if row["outcome"] in WITHOUT_EPISODE else shard_of(plan, trial.number)
+        expected = None if row["outcome"] in (REFUSED, LOST) else shard_of(plan, trial.number)
         if row["shard"] != expected:
             yield Finding(THROWS, place, f"is {row['outcome']} with shard {row['shard']}, not {expected}")

@@ -2,22 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 from throwcollect.dataset.lock import is_locked
 from throwcollect.wording import command
 
 
-@dataclass(frozen=True)
-class WayOn:
-    """The state of an unfinished dataset, and the way to a finished one.
-
-    Attributes:
-        state: Predicate of a sentence about the dataset, such as ``is not finished``.
-        command: The command that leads to a finished dataset.
-        purpose: What that command does.
-    """
+class WayOn(NamedTuple):
+    """The state of an unfinished dataset, such as ``is not finished``; a command to go on with, and what it does."""
 
     state: str
     command: str

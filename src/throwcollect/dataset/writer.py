@@ -17,7 +17,6 @@ import pyarrow as pa
 
 from throwcollect.config.loader import dump_yaml
 from throwcollect.config.schema import Config
-from throwcollect.dataset.bag import FileSummary
 from throwcollect.dataset.configuration import read_config
 from throwcollect.dataset.creation import create
 from throwcollect.dataset.data_card import count_outcomes, data_card
@@ -25,11 +24,10 @@ from throwcollect.dataset.description import write_description
 from throwcollect.dataset.directory import CARD, CONFIG, MANIFEST, METADATA, PLAN, THROWS
 from throwcollect.dataset.journal import Event, Journal, was_open
 from throwcollect.dataset.lock import hold_lock
-from throwcollect.dataset.manifest import FileEntry
 from throwcollect.dataset.provenance import Provenance, write_provenance
 from throwcollect.dataset.recovery import LeftOfShard, RecoveredEpisode, find_left, recover_shard, remove_unfinished
 from throwcollect.dataset.row_store import Digests, RowStore
-from throwcollect.dataset.shard import FinishedShard, OpenShard
+from throwcollect.dataset.shard import FinishedShard, OpenShard, Recording
 from throwcollect.dataset.shard_layout import ShardLayout
 from throwcollect.dataset.throws_table import Place, Row, ThrowsTable
 from throwcollect.episode.channels import Channels
@@ -82,8 +80,8 @@ class DatasetWriter:
         """Unfinished shards with at least one trial that has ended."""
         self._rows: dict[int, dict[int, Row]] = {}
         """Rows of their trials that have ended."""
-        self._recordings: dict[int, tuple[FileSummary, FileEntry]] = {}
-        """What bag's metadata and manifest say of the file of each finished shard that has one."""
+        self._recordings: dict[int, Recording] = {}
+        """The file of each finished shard that has one."""
         self._finished_rows = RowStore(directory, self._table.schema)
         self._held = ExitStack()
         self._expect(plan.trials)
@@ -211,14 +209,8 @@ class DatasetWriter:
         for number in list(self._shards):
             self._finish_shard_if_complete(number)
 
-    def take_shard(self, number: int, recording: tuple[FileSummary, FileEntry] | None, rows: pa.Table) -> None:
-        """Take in a finished shard that lies under its name already.
-
-        Args:
-            number: Its number.
-            recording: What bag's metadata and manifest say of its file; None if no trial of it has an episode, and so
-                there is no file.
-            rows: The rows of its trials in the table of throws.
+    def take_shard(self, number: int, recording: Recording | None, rows: pa.Table) -> None:
+        """Take in a finished shard, with the rows of its trials, whose file lies under its name already if it has one.
 
         Raises:
             DatasetError: If the disk fails.

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -32,7 +33,7 @@ def test_info_counts_what_is_there(collection: Any, tmp_path: Path) -> None:
         min(each.position[0] for each in landings),
         max(each.position[0] for each in landings),
     )
-    assert json.loads(json.dumps(found.as_dict()))["outcomes"] == found.outcomes
+    assert json.loads(json.dumps(asdict(found)))["outcomes"] == found.outcomes
 
 
 def test_info_of_a_dataset_in_which_no_ball_landed(collection: Any, tmp_path: Path) -> None:

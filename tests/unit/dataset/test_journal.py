@@ -9,7 +9,7 @@ import pytest
 
 from throwcollect.dataset import journal as journal_module
 from throwcollect.dataset.directory import JOURNAL
-from throwcollect.dataset.journal import Journal, find_lost, measure_collected_s, read_journal
+from throwcollect.dataset.journal import Journal, find_lost, measure_collected_s, read_journal, was_open
 from throwcollect.errors import DatasetError
 
 
@@ -56,10 +56,29 @@ def test_a_line_that_was_cut_off_does_not_spoil_the_next(tmp_path: Path) -> None
     assert events_of(tmp_path) == ["opened", "opened", "finished"]
 
 
-@pytest.mark.parametrize("damaged", ["\x00\xff", "[1]", '{"event": "nonsense", "time": 1}', '{"event": "commit"}', "7"])
+DAMAGED = {
+    "no text": "\x00\xff",
+    "a list": "[1]",
+    "another event": '{"event": "nonsense", "time": 1}',
+    "no time": '{"event": "commit"}',
+    "no fields": "7",
+    "a time beyond all numbers": f'{{"event": "commit", "time": {"9" * 400}}}',
+    "a time that is none": '{"event": "commit", "time": NaN}',
+    "a list without end": f'["lost", "exposed", {"[" * 100_000}',
+}
+
+
+@pytest.mark.parametrize("damaged", DAMAGED.values(), ids=DAMAGED)
 def test_what_is_no_event_is_left_out(tmp_path: Path, damaged: str) -> None:
-    journal_of(tmp_path, line("opened", 1.0), f"{damaged}\n", line("commit", 2.0))
+    journal_of(tmp_path, line("opened", 1.0), f"{damaged}\n", line("commit", 2.5))
     assert events_of(tmp_path) == ["opened", "commit"]
+    assert (measure_collected_s(tmp_path), find_lost(tmp_path), was_open(tmp_path)) == (1.5, frozenset(), False)
+
+
+def test_a_collection_that_anybody_could_join_is_known_by_its_journal(tmp_path: Path) -> None:
+    assert not was_open(tmp_path)
+    journal_of(tmp_path, line("opened", 1.0), line("exposed", 1.0), line("commit", 2.0))
+    assert was_open(tmp_path)
 
 
 def test_pauses_between_processes_do_not_count_as_time_of_collecting(tmp_path: Path) -> None:

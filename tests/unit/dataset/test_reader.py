@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import multiprocessing
 import pickle
+import re
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
@@ -14,8 +15,10 @@ import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.parquet as pq
 import pytest
+from tests.unit.dataset.damage import change_table
 
 import throwcollect
+from throwcollect.dataset.inspect import check_recordings_are_there
 from throwcollect.dataset.mcap_reader import open_mcap
 from throwcollect.dataset.reader import Dataset
 from throwcollect.errors import ConfigError, DatasetError
@@ -125,6 +128,7 @@ def test_selecting_from_a_selection_goes_by_trial_and_slices_by_position(loaded:
         (["landed"], "values of type string"),
         ([1, "a"], "select: "),
         (3, "not iterable"),
+        ([2**64], "int too large"),
     ],
 )
 def test_what_selects_nothing_is_named(loaded: Dataset, which: Any, message: str) -> None:
@@ -266,6 +270,51 @@ def test_a_damaged_table_of_throws_is_made_again_as_a_missing_one_is(dataset: Pa
     with pytest.raises(DatasetError, match="is damaged") as caught:
         throwcollect.load(dataset)
     assert caught.value.hint == f"throwcollect dataset rebuild {dataset}"
+
+
+@pytest.mark.parametrize(
+    ("column", "value", "problem"),
+    [
+        ("outcome", None, "outcome is None in some row"),
+        ("outcome", "flown", "outcome is 'flown' in some row"),
+        ("shard", "../quick_00001.mcap", r"shard is '\.\./quick_00001\.mcap' in some row"),
+        ("shard", "quick\0.mcap", r"shard is 'quick\\x00\.mcap' in some row"),
+        ("shard", None, "only a part of the place"),
+        ("chunk_offset", None, "only a part of the place"),
+        ("digest", None, "only a part of the place"),
+        ("samples", None, "only a part of the place"),
+        ("samples", -1, "without samples"),
+    ],
+)
+def test_a_table_that_cannot_be_worked_with_is_refused(dataset: Path, column: str, value: object, problem: str) -> None:
+    change_table(dataset / "throws.parquet", column, 4, value)
+    with pytest.raises(DatasetError, match=rf"throws\.parquet: .*{problem}") as caught:
+        Dataset.open(dataset)
+    assert caught.value.hint == f"throwcollect dataset rebuild {dataset}"
+
+
+def test_numbers_that_no_float_has_can_be_compared(dataset: Path) -> None:
+    change_table(dataset / "throws.parquet", "chunk_offset", 4, 2**62 + 1)
+    assert [throw.trial for throw in Dataset.open(dataset).select("chunk_offset > 1e18")] == [4]
+
+
+@pytest.mark.parametrize("names", ["[1]", "7", "{}"])
+def test_names_of_recordings_that_are_none_are_not_looked_for(dataset: Path, names: str) -> None:
+    text = (dataset / "metadata.yaml").read_text()
+    begin = text.index("  relative_file_paths:")
+    text = f"{text[:begin]}  relative_file_paths: {names}\n{text[text.index('  files:', begin) :]}"
+    (dataset / "metadata.yaml").write_text(text)
+    with pytest.raises(DatasetError, match=r"metadata\.yaml: relative_file_paths is missing"):
+        check_recordings_are_there(dataset)
+
+
+@pytest.mark.parametrize("count", ["2001-01-01", ".inf", "[1]", "many"])
+def test_numbers_of_messages_that_are_none_are_refused(dataset: Path, count: str) -> None:
+    before, topics = (dataset / "metadata.yaml").read_text().split("topics_with_message_count:")
+    topics = re.sub(r"message_count: \d+", f"message_count: {count}", topics, count=1)
+    (dataset / "metadata.yaml").write_text(f"{before}topics_with_message_count:{topics}")
+    with pytest.raises(DatasetError, match=r"metadata\.yaml: topics_with_message_count is missing"):
+        _ = Dataset.open(dataset).topics
 
 
 def test_a_missing_shard_is_named(dataset: Path) -> None:

@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 
 import throwcollect
+from throwcollect.dataset import recovery, unfinished
 from throwcollect.dataset.creation import create
 from throwcollect.dataset.inspect import info
 from throwcollect.dataset.verify import verify
@@ -72,6 +73,35 @@ def test_what_was_written_last_may_be_cut_off(collection: Any, tmp_path: Path) -
     part.write_bytes(part.read_bytes()[:-100])
     with pytest.warns(throwcollect.UnfinishedDatasetWarning, match="it has 1 of 7 trials"):
         assert [throw.trial for throw in throwcollect.load(directory)] == [0]
+
+
+def test_what_lies_in_a_finished_and_an_unfinished_file_of_a_shard_is_all_found(
+    collection: Any, tmp_path: Path
+) -> None:
+    directory = begin(collection, tmp_path / "dataset", [3])
+    other = begin(collection, tmp_path / "other", [4])
+    (other / "quick_00001.mcap.part").rename(directory / "quick_00001.mcap")
+    with pytest.warns(throwcollect.UnfinishedDatasetWarning, match="it has 2 of 7 trials"):
+        assert [throw.trial for throw in throwcollect.load(directory).recorded] == [3, 4]
+
+
+def test_a_shard_that_is_finished_while_the_dataset_is_loaded_is_not_left_out(
+    collection: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    create(tmp_path / "dataset", collection.plan)
+    with closing(DatasetWriter.open(tmp_path / "dataset")) as writer:
+        collection.fill(writer, [0, 1])
+        waiting = [2]
+
+        def find_episodes(path: Path, *arguments: Any) -> Any:
+            if waiting:
+                collection.fill(writer, [waiting.pop()])
+            return recovery.find_episodes(path, *arguments)
+
+        monkeypatch.setattr(unfinished, "find_episodes", find_episodes)
+        with pytest.warns(throwcollect.UnfinishedDatasetWarning, match="it has 3 of 7 trials"):
+            dataset = throwcollect.load(tmp_path / "dataset")
+        assert all(len(throw.ball) for throw in dataset)
 
 
 def test_nothing_yet_is_no_throw(collection: Any, tmp_path: Path) -> None:

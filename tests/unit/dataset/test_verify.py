@@ -8,7 +8,7 @@ import struct
 import zlib
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +16,7 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 import zstandard
-from tests.unit.dataset.damage import SHARD, flip, stored
+from tests.unit.dataset.damage import SHARD, flip, replace_text, stored
 from tests.unit.dataset.mutations import fit_manifest
 from tests.unit.dataset.shard_defects import (
     SHARD_CONSEQUENCES,
@@ -81,7 +81,7 @@ def test_a_planted_defect_is_found_and_named(dataset: Path, plant: Callable[[Pat
         if finding.file == file and place in finding.place and re.search(problem, finding.problem)
     ], "\n".join(map(str, findings))
     assert {finding.file for finding in findings} <= {file, *CONSEQUENCES.get(plant, ())}
-    assert json.loads(json.dumps([finding.as_dict() for finding in findings]))
+    assert json.loads(json.dumps([asdict(finding) for finding in findings]))
 
 
 def test_what_is_sound_beside_a_defect_is_not_accused(dataset: Path) -> None:
@@ -226,6 +226,12 @@ def test_huge_announced_sizes_are_refused_without_being_believed(dataset: Path) 
     struct.pack_into("<Q", data, chunk.offset + 9 + 16, 1 << 62)
     path.write_bytes(data)
     assert any("as announced" in str(finding) for finding in verify(dataset))
+
+
+def test_a_list_in_place_of_a_files_name_is_told_beside_a_file_that_cannot_be_read(dataset: Path) -> None:
+    (dataset / "quick_00000.mcap").write_bytes(b"")
+    replace_text(dataset / "metadata.yaml", "path: quick_00001.mcap", "path: [1]")
+    assert ("metadata.yaml", "files: quick_00001.mcap") in {(each.file, each.place) for each in verify(dataset)}
 
 
 def test_only_a_finished_dataset_is_verified(collection: Any, tmp_path: Path) -> None:

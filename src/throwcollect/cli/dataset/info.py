@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json as jsonlib
 from collections.abc import Mapping
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -24,7 +25,7 @@ def show_info(directory: DatasetArgument, json: JsonOption = False) -> None:
     from throwcollect.dataset.inspect import check_recordings_are_there, info
 
     found = info(directory)
-    print_result(found.as_dict(), describe(found), json=json)
+    print_result(asdict(found), describe(found), json=json)
     # The summary follows from the tables, which are there all the same.
     check_recordings_are_there(directory)
 
@@ -56,7 +57,7 @@ def print_summary(found: Info, directory: Path | None, *, as_json: bool) -> None
     Raises:
         OutputError: If it cannot be printed.
     """
-    print_result(found.as_dict(), describe(found), json=as_json)
+    print_result(asdict(found), describe(found), json=as_json)
     look = command("dataset", "info", directory) if directory is not None else None
     if look is not None and not as_json:
         typer.echo(f"look into it: {look}   (or open the .mcap files in Foxglove)")

@@ -45,7 +45,7 @@ def repair_dataset(directory: DatasetArgument, output: OutputArgument, json: Jso
 
     repaired = repair(directory, output, remake=lambda config: draw_plan(config, directory=directory))
     if json:
-        print_json(repaired.as_dict())
+        print_json(asdict(repaired))
     else:
         for remark in repaired.remarks:
             typer.echo(remark)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -35,7 +36,7 @@ def verify_dataset(
 
     findings = verify(directory, replay=replay, processes=count_cores(), say=tell)
     if findings:
-        print_result([finding.as_dict() for finding in findings], "\n".join(map(str, findings)), json=json)
+        print_result([asdict(finding) for finding in findings], "\n".join(map(str, findings)), json=json)
         raise DatasetError(f"{directory}: {format_count(len(findings), 'finding')}")
     dataset = Dataset.open(directory)
     print_result([], f"{directory}: nothing wrong\n{_describe_unchecked(dataset, replay)}", json=json)
