@@ -30,7 +30,8 @@ class NodeLogs:
 
     def skip_earlier(self) -> None:
         """Leave what is in the files by now out of `tail` and `said_ready`: nodes of an earlier run printed it."""
-        self._earlier_bytes = {name: path.stat().st_size for name, path in self.files().items() if path.is_file()}
+        for name in self.files():
+            self.skip(name)
 
     def skip(self, name: str) -> None:
         """Leave what a node has printed so far out as well: another one of the same name may come."""

@@ -79,7 +79,7 @@ class ForkedNode:
         """Wait for the end of the node; None if it still runs after this time [s]."""
         deadline = time.monotonic() + timeout_s
         while self.poll() is None and (left := deadline - time.monotonic()) > 0:
-            self._server.await_news(left)
+            self.returncode = self._server.take_end(self.pid, patience_s=left)
         return self.returncode
 
 
@@ -102,9 +102,8 @@ class NodeServer:
     def begin(self, config: Config, *, fork: bool = False) -> None:
         """Start the process that forks, so that the first node waits less for imports.
 
-        Args:
-            config: Configuration of the nodes, from which the process computes once what all of them need.
-            fork: Whether the process is forked off this one, which spares it the imports that this one has done.
+        It computes once what all nodes of this configuration need. With `fork`, it is forked off this process, which
+        spares it the imports that this one has done.
         """
         with contextlib.suppress(OSError), open(os.devnull, "wb") as nowhere:
             connection = self._launch(self._fork) if fork else self._connect(nowhere)
@@ -115,13 +114,9 @@ class NodeServer:
     def start(
         self, arguments: Sequence[str], *, log: BinaryIO, core: int | None, environment: Mapping[str, str]
     ) -> ForkedNode:
-        """Start a node.
+        """Start a node, a `throwcollect` command with these arguments and these further environment variables.
 
-        Args:
-            arguments: Arguments of the `throwcollect` command.
-            log: File to which the node prints.
-            core: Processor core to which the node is bound; None for any.
-            environment: Further environment variables.
+        It prints to the log, and is bound to a processor core unless that is None.
 
         Raises:
             OSError: If the node cannot be started.
@@ -135,14 +130,13 @@ class NodeServer:
             self.close()
         return self._request(request, log)
 
-    def take_end(self, pid: int) -> int | None:
-        """How a node ended, as `subprocess.Popen.returncode` tells it, and forget the node; None while it runs."""
-        self._read(0.0)
-        return self._ends.pop(pid, None)
+    def take_end(self, pid: int, *, patience_s: float = 0.0) -> int | None:
+        """How a node ended, as `subprocess.Popen.returncode` tells it, and forget the node; None while it runs.
 
-    def await_news(self, timeout_s: float) -> None:
-        """Wait until a node ends, but no longer than this time [s]."""
-        self._read(timeout_s)
+        If no node has ended, this waits for the end of any, but no longer than `patience_s` [s].
+        """
+        self._read(patience_s)
+        return self._ends.pop(pid, None)
 
     def close(self) -> None:
         """End the process, and with it all nodes that still run, by force."""

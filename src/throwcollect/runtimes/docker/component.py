@@ -47,10 +47,9 @@ _OVER_S = 3.0
 
 @dataclass(frozen=True)
 class Way:
-    """The way for a container into the ROS graph of a run.
+    """The way for a container into the ROS graph of a run, whose id is `run`.
 
     Attributes:
-        run: Id of the run.
         environment: Environment variables with which the container joins.
         key: The run's key, as a mount.
         network: The engine's network in which the router is; None if the container needs the network of this machine.
