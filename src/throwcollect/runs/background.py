@@ -226,7 +226,7 @@ def carry_out(run: str, lock: int, order: bytes, *, onlooker: Onlooker, interrup
         if prepared.record.run != opened.run:
             # `resume` has taken over a run whose containers outlived their launcher; that run keeps its own id.
             opened.forget()
-        prepared.launch(interruptions=interruptions)
+        prepared.collect(interruptions=interruptions)
 
 
 class _Planner(Onlooker):

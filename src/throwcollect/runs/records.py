@@ -22,7 +22,7 @@ import time
 from collections.abc import Iterable
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass, field, replace
-from datetime import datetime, timezone
+from datetime import datetime, timedelta, timezone
 from pathlib import Path
 from typing import Any, Literal
 
@@ -43,7 +43,7 @@ from throwcollect.runtimes.runtime import NodeState, Place
 from throwcollect.units import NS_PER_S
 from throwcollect.wording import command
 
-_REMEMBERED_S = 7 * 24 * 3600.0
+_REMEMBERED = timedelta(days=7)
 """Records of runs that have ended are kept for this long."""
 _LOCK_PATIENCE_S = 1.0
 """`Records.take` tries for this long, because another process may hold the lock for a moment in `is_locked`."""
@@ -141,18 +141,6 @@ class OpenRun:
             self._record = _read(self._runs / f"{self.run}.json")
         return self._record
 
-    def make(self) -> None:
-        """Make the directory of the run, and the key in it.
-
-        Raises:
-            ConfigError: If they cannot be written.
-        """
-        try:
-            self.directory.mkdir(mode=0o700, exist_ok=True)
-        except OSError as error:
-            raise unusable(self.directory, error) from error
-        self.key.create()
-
     def write(self, record: Record) -> None:
         """Write the record.
 
@@ -227,9 +215,7 @@ class Records:
     def new(self, name: str, *, run: str | None = None) -> OpenRun:
         """Make a new run, with a key but without a record yet; forget runs that ended a week ago.
 
-        Args:
-            name: Name of the collection, with which an id begins that is made here.
-            run: Id of the run; None makes a new one.
+        If no id is given, one is made that begins with `name`, that of the collection.
 
         Raises:
             ConflictError: If there is a run of that id.
@@ -251,7 +237,11 @@ class Records:
             opened = OpenRun(self._runs, chosen, lock)
             with ExitStack() as undo:
                 undo.callback(opened.forget)
-                opened.make()
+                try:
+                    opened.directory.mkdir(mode=0o700, exist_ok=True)
+                except OSError as error:
+                    raise unusable(opened.directory, error) from error
+                opened.key.create()
                 undo.pop_all()
             return opened
 
@@ -333,26 +323,24 @@ class Records:
         except OSError:
             return None
 
-    def _age_s(self, run: str) -> float:
-        """Time since the record of a run was written [s]; 0 if it is gone."""
-        changed_ns = self.read_change_ns(run)
-        return 0.0 if changed_ns is None else time.time() - changed_ns / NS_PER_S
-
     def lives(self, run: str) -> bool:
         """Whether the launcher of a run lives."""
         return is_locked(self._runs / f"{run}.lock")
 
     def _forget_old(self) -> None:
-        now = datetime.now(timezone.utc)
-        # The age of the file tells without reading which records may be old.
-        for run in self._read_all(name for name in self.ids() if self._age_s(name) >= _REMEMBERED_S):
+        before = datetime.now(timezone.utc) - _REMEMBERED
+
+        def may_be_old(run: str) -> bool:
+            """Whether a record was written long ago, which its file tells without being read."""
+            changed_ns = self.read_change_ns(run)
+            return changed_ns is not None and changed_ns / NS_PER_S <= before.timestamp()
+
+        for run in self._read_all(filter(may_be_old, self.ids())):
             record = run.record
             # As long as nodes outlive their launcher, only this record tells what they are.
             over = run.status == "ended" or (run.status == "died" and not _may_outlive(record))
-            if over and (now - (record.ended or record.started)).total_seconds() >= _REMEMBERED_S:
-                opened = self.take(record.run)
-                if opened is not None:
-                    opened.forget()
+            if over and (record.ended or record.started) <= before and (opened := self.take(record.run)) is not None:
+                opened.forget()
 
 
 def _may_outlive(record: Record) -> bool:
