@@ -87,8 +87,8 @@ def up(
     """Collect a dataset: start the simulations, run all trials, write the files."""
     changes = overrides(settings, trials=trials, run__simulations=simulations, run__runtime=runtime, run__listen=listen)
     if slice is not None:
-        unfit = {"CONFIG": config, "--resume": resume, "--detach": detach or None, "--view": view or None}
-        if wrong := next((name for name, value in unfit.items() if value is not None), None):
+        unfit = {"CONFIG": config, "--resume": resume, "--token-file": token_file, "--detach": detach, "--view": view}
+        if wrong := next((name for name, value in unfit.items() if value not in (None, False)), None):
             raise ConfigError(f"{wrong}: should be left out with --slice, which goes by the plan in --output DIR")
         if output is None:
             raise ConfigError(f"--slice {slice}: needs --output DIR, in which the plan lies")
