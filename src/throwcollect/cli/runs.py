@@ -52,12 +52,12 @@ def ps(
     unrecorded = [each for run, each in held.items() if run not in ids]
     if json:
         documents = [_make_document(run) for run in shown] + [_make_unrecorded_document(*each) for each in unrecorded]
-        documents += cluster_runs.documents()
+        documents += cluster_runs.list_queued(cluster_runs.make_document)
         typer.echo(jsonlib.dumps(documents, indent=2, default=_in_json))
         return
     rows = [(_make_row(run), _node_lines(run, held.get(run.id))) for run in shown]
     rows += [(_make_unrecorded_row(*each), _list_held_nodes(*each)) for each in unrecorded]
-    rows += [(row, []) for row in cluster_runs.rows()]
+    rows += [(row, []) for row in cluster_runs.list_queued(cluster_runs.make_row)]
     for line in _table(rows):
         typer.echo(line)
 
