@@ -210,13 +210,7 @@ def _collect(
 ) -> None:
     """Launch a run and print its summary or, if it is detached, its id.
 
-    Args:
-        prepare_run: Prepares the run; returns None if its dataset is finished already.
-        directory: Directory of the dataset that the run goes on with; None for a new one.
-        detach: Whether to return as soon as the nodes are started.
-        json: Whether to print JSON.
-        token_file: File for the token; None prints it.
-        view: Whether to print the address of a page that shows the run.
+    `prepare_run` returns None if the dataset in the directory, with which the run was to go on, is finished already.
     """
     with ExitStack() as held:
         with display(quiet=json, bar=not detach) as shown:

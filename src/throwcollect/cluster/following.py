@@ -30,12 +30,7 @@ _MOST_NAMED = 5
 
 @dataclass(frozen=True)
 class ClusterRun:
-    """A dataset that was submitted.
-
-    Attributes:
-        directory: Its directory.
-        submission: The record of what was submitted for it.
-    """
+    """A dataset that was submitted, with the record of that."""
 
     directory: Path
     submission: Submission

@@ -23,12 +23,9 @@ _TELL_EVERY_S = 10.0
 
 
 def run(directory: Path) -> None:
-    """Collect every trial of the plan in `directory` that has no episode yet, and finish the dataset.
+    """Collect all trials of a dataset's plan that have no episode yet, and finish the dataset.
 
     SIGINT, SIGTERM and SIGHUP drain: running trials are finished and written within `run.grace_s`, none is started.
-
-    Args:
-        directory: Directory of the dataset, as `prepare` or `resume` left it.
 
     Raises:
         DatasetError: If the directory holds no plan, or cannot be written, or a trial came out otherwise when it was

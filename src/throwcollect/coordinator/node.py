@@ -33,11 +33,7 @@ _REACH_S = 6.0
 
 
 class Coordinator(Node):
-    """Leases the trials of a collection to the simulations in the ROS graph.
-
-    Args:
-        collection: The trials, and the dataset that they fill.
-    """
+    """Leases the trials of a collection to the simulations in the ROS graph."""
 
     def __init__(self, collection: TrialCollection) -> None:
         super().__init__("coordinator")

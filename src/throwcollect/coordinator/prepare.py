@@ -218,13 +218,8 @@ def prepare(
 ) -> Plan:
     """Freeze the plan: write a dataset directory that holds the resolved configuration and all trials.
 
-    Args:
-        config: The configuration.
-        directory: Directory of the dataset, new or empty.
-        sweep_directory: Where a relative `sweep.file` is looked for.
-        processes: As `draw_plan` takes it.
-        say: As `draw_plan` takes it.
-        update_plan: Is called often with how many trials have been checked; see `UpdatePlan`.
+    The directory has to be new or empty. A relative `sweep.file` is looked for in `sweep_directory`. `update_plan` is
+    called often with how many trials have been checked (see `UpdatePlan`); the rest is as for `draw_plan`.
 
     Raises:
         ConfigError: If the sweep or the directory cannot be used; nothing stays on the disk then.

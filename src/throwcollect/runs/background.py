@@ -49,14 +49,7 @@ _WRITE_PLANNING_S = 1.0
 
 @dataclass(frozen=True)
 class Order:
-    """The order that `begin_run` sends to the new process.
-
-    Attributes:
-        config: Absolute path of the configuration's file.
-        overrides: Keys to change: ``key=value`` pairs, as ``--set`` takes them.
-        output: Absolute path of the dataset's directory; a session does not use it.
-        resumed: Whether the directory holds a dataset with which the run goes on.
-    """
+    """What `begin_run` sends to the new process: its arguments, with absolute paths."""
 
     config: Path
     overrides: tuple[str, ...]
@@ -110,11 +103,7 @@ def begin_run(
 def begin_container(order: ContainerOrder, *, run: str, origin: Origin, urdf: Path | None) -> Run:
     """Begin a run that is a container of the catalogue, in a process of its own, as `begin_run` does.
 
-    Args:
-        order: The order for the container.
-        run: Id of the run.
-        origin: The request of the client.
-        urdf: File with a description of the robot for viewers; None if the component has none.
+    `urdf` is a file with a description of the robot for viewers; None if the component has none.
 
     Raises:
         ConflictError: If there is a run of that id, or the run that the container is to join has ended.
@@ -230,13 +219,7 @@ def carry_out(run: str, lock: int, order: bytes, *, onlooker: Onlooker, interrup
 
 
 class _Planner(Onlooker):
-    """Writes into the record how far the plan is, gives it up if somebody asks to stop, and passes all else on.
-
-    Args:
-        run: The run, with a record.
-        onlooker: To whom all else is passed on.
-        interruptions: How often somebody has asked to stop.
-    """
+    """Writes into the record how far the plan is, gives it up if somebody asks to stop, and passes all else on."""
 
     def __init__(self, run: OpenRun, onlooker: Onlooker, interruptions: Callable[[], int]) -> None:
         self._onlooker = onlooker

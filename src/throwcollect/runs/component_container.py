@@ -30,13 +30,7 @@ _ANSWER_S = 5.0
 
 @dataclass(frozen=True)
 class ContainerOrder:
-    """The order for a container.
-
-    Attributes:
-        component: Name of the component.
-        spec: The container, as the catalogue describes it.
-        joins: Id of the run that the container joins; None if it joins none.
-    """
+    """The order for a container of a component, as the catalogue describes it; `joins` is a run that it joins."""
 
     component: str
     spec: ContainerSpec

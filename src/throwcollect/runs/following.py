@@ -21,10 +21,9 @@ _READ_S = 0.2
 
 @dataclass(frozen=True)
 class Look:
-    """One look at a run.
+    """One look at a run, as it was at that moment.
 
     Attributes:
-        run: The run, as it was at that moment.
         progress: The latest report of the coordinator since the last look; None if there was none.
         events: Events since the last look.
     """
@@ -86,13 +85,9 @@ def wait(run: Run) -> Summary:
 def read_logs(
     run: Run, nodes: Collection[str], *, follow: bool, keep_on: Callable[[], bool] = lambda: True
 ) -> Iterator[tuple[str, str, int]]:
-    """Read the logs of nodes of a run.
+    """Read the logs of these nodes of a run; of all nodes if none is named.
 
-    Args:
-        run: The run.
-        nodes: Names of the nodes; empty takes all.
-        follow: Whether to go on with new lines until the run ends, or `keep_on` refuses to.
-        keep_on: Whether somebody still wants new lines.
+    With `follow`, it goes on with new lines until the run ends, or `keep_on` refuses to.
 
     Yields:
         The name of a node, a line that it printed, and the length of the longest name so far.

@@ -79,13 +79,7 @@ def launch_host(
 ) -> Summary | None:
     """Let the host of a run do its work, and write the events and the end of the run; the rest is as for `launch`.
 
-    Args:
-        run: The run, with a record.
-        make_host: Makes the host.
-        onlooker: Is told what goes on.
-        interruptions: How often the user has asked to stop.
-        is_open: Whether anybody can join the run.
-        end: Is called after the host is closed; None calls nothing.
+    With `is_open`, anybody can join the run. `end` is called when the host is closed.
 
     Raises:
         ThrowcollectError: As `launch`.

@@ -25,7 +25,6 @@ class PreparedRun:
     Until it is launched, nobody else can prepare a run into its directory.
 
     Attributes:
-        config: The configuration.
         directory: Directory of the dataset, as the user named it; None if the dataset is in a volume.
 
     Args:

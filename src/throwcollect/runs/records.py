@@ -57,7 +57,6 @@ class Run:
         record: The record of the run, as it was when it was read.
         lives: Whether the launcher lived at that time.
         key: The key that the router asks for.
-        records: The records from which this run was read, so that `now` can read it again.
     """
 
     record: Record
@@ -111,9 +110,7 @@ class OpenRun:
     """A run that this process launches; the process holds the lock of the run until `close` or until it dies.
 
     Attributes:
-        run: Id of the run.
         directory: Directory of the key, and of the files of a run whose dataset has no directory on this machine.
-        key: The key that the router asks for.
         lock: Descriptor of the locked file, which a process that takes the run over inherits; -1 once it is closed.
     """
 

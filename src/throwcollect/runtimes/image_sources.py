@@ -79,10 +79,7 @@ def are_others(sources: str | None) -> bool:
 def check_wheelhouse(root: Path, wheelhouse: Path | None, *, ros: bool) -> None:
     """Make sure that a directory of wheels holds some; None takes them from the package index.
 
-    Args:
-        root: Root of the clone.
-        wheelhouse: The directory.
-        ros: Whether the wheels of genuine ROS 2 must be there, too, some of which are in no package index.
+    With `ros`, the wheels of genuine ROS 2 must be there, too, some of which are in no package index.
 
     Raises:
         ConfigError: If it does not hold them.

@@ -96,8 +96,7 @@ class Tail:
     def lines(self, *, torn: bool = False) -> Iterator[str]:
         """Read the lines that were added since the last call, without line ends.
 
-        Args:
-            torn: Whether to read a last line without a line end, too.
+        A last line without a line end is read only if `torn` is true.
         """
         try:
             file = self._path.open("rb")

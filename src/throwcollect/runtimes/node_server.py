@@ -53,9 +53,7 @@ _LIBRARIES = (
 class ForkedNode:
     """A node that a `NodeServer` has forked, with the part of the interface of `subprocess.Popen` that hosts need.
 
-    Attributes:
-        pid: Process id.
-        returncode: As `subprocess.Popen.returncode`; None until `poll` or `wait` has seen the end.
+    `returncode` is None until `poll` or `wait` has seen the end.
     """
 
     def __init__(self, server: NodeServer, pid: int) -> None:
@@ -84,10 +82,9 @@ class ForkedNode:
 
 
 class NodeServer:
-    """Has nodes forked by a process of its own. If that process dies, its nodes die, and the next node has a new one.
+    """Has nodes forked by a process of its own, which has this environment, and so have all nodes.
 
-    Args:
-        environment: Environment variables for that process, and so for all nodes.
+    If that process dies, its nodes die, and the next node has a new one.
     """
 
     def __init__(self, environment: Mapping[str, str]) -> None:
