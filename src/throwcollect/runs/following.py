@@ -47,7 +47,7 @@ def follow(run: Run, *, keep_on: Callable[[], bool] = lambda: True) -> Iterator[
     run.record.middleware.joining.settle()
     from throwcollect.runtimes.run_listener import RunListener
 
-    events = Tail(Path(run.record.logs) / EVENTS)
+    events = Tail(_events_of(run))
     events.skip()
     reports: list[Progress] = []
     with RunListener(reports.append) as listener:
@@ -57,7 +57,9 @@ def follow(run: Run, *, keep_on: Callable[[], bool] = lambda: True) -> Iterator[
             listener.spin(run.connection, _POLL_S)
             # The launcher writes an event before the record, so after the last record all events are there.
             run = run.now()
-            happened = tuple(event for line in events.lines() if (event := parse(line)))
+            events.path = _events_of(run)
+            # Where a dataset is resumed, the file has the events of earlier runs, too.
+            happened = tuple(event for line in events.lines() if (event := parse(line)) and event.run == run.id)
             yield Look(run, reports[-1] if reports else None, happened)
 
 
@@ -95,19 +97,20 @@ def read_logs(
     Raises:
         ConfigError: If there is no such node, or the record vanishes.
     """
-    logs = NodeLogs(Path(run.record.logs))
-    files = logs.files()
+    files = NodeLogs(Path(run.record.logs)).files()
     known = {*files, *(state.name for state in run.record.nodes)}
     if unknown := [node for node in nodes if node not in known]:
         message = f"run {run.id}: no node {unknown[0]!r} has printed anything"
         raise ConfigError(message, expected=", ".join(files) or None)
     tails: dict[str, Tail] = {}
-    for last in _looks(run, follow=follow, keep_on=keep_on):
-        files = logs.files()
+    for now, last in _looks(run, follow=follow, keep_on=keep_on):
+        files = NodeLogs(Path(now.record.logs)).files()
         width = max(map(len, files), default=0)
         for name, path in files.items():
             if not nodes or name in nodes:
-                for line in tails.setdefault(name, Tail(path)).lines(torn=last):
+                tail = tails.setdefault(name, Tail(path))
+                tail.path = path
+                for line in tail.lines(torn=last):
                     yield name, line, width
 
 
@@ -120,17 +123,27 @@ def read_events(run: Run, *, keep_on: Callable[[], bool] = lambda: True) -> Iter
     Raises:
         ConfigError: If the record vanishes.
     """
-    tail = Tail(Path(run.record.logs) / EVENTS)
-    for _ in _looks(run, follow=True, keep_on=keep_on):
+    tail = Tail(_events_of(run))
+    for now, _ in _looks(run, follow=True, keep_on=keep_on):
+        tail.path = _events_of(now)
         for line in tail.lines():
             if (event := parse(line)) is not None:
                 yield event, line
 
 
-def _looks(run: Run, *, follow: bool, keep_on: Callable[[], bool]) -> Iterator[bool]:
-    """Yield False several times a second while a run lives (if it is to be followed), and True once at the end."""
-    while follow and keep_on() and run.now().status == "running":
-        yield False
+def _events_of(run: Run) -> Path:
+    # Events and logs of a run that is begun in the background have another place once its plan is made.
+    return Path(run.record.logs) / EVENTS
+
+
+def _looks(run: Run, *, follow: bool, keep_on: Callable[[], bool]) -> Iterator[tuple[Run, bool]]:
+    """Look at a run several times a second while it lives (if it is to be followed), and once at the end.
+
+    Yields:
+        The run as it is now, and whether this is the last look.
+    """
+    while follow and keep_on() and (run := run.now()).status == "running":
+        yield run, False
         time.sleep(_READ_S)
     # The logs are read once more after the end, because nodes may have printed since the last look.
-    yield True
+    yield run, True
