@@ -188,9 +188,8 @@ class ProgressOfSlices:
     The speed is that since the first look, as nobody wrote down how fast trials ended before.
     """
 
-    def __init__(self, run: ClusterRun, *, clock: Callable[[], float] = time.monotonic) -> None:
+    def __init__(self, run: ClusterRun) -> None:
         self._run = run
-        self._clock = clock
         self._first: tuple[float, int] | None = None
         self._outcomes: Counter[str] = Counter()
         self._read: set[Slice] = set()
@@ -223,7 +222,7 @@ class ProgressOfSlices:
         )
 
     def _measure_speed(self, ended: int) -> float:
-        now = self._clock()
+        now = time.monotonic()
         if self._first is None:
             self._first = now, ended
         began, before = self._first

@@ -186,11 +186,7 @@ def _submit(scripts: BatchScripts, submission: Submission, slices: tuple[int, ..
 
 
 def _write(directory: Path, name: str, text: str) -> Path:
-    """Write a script into the directory of a dataset, and check that Slurm would take it.
-
-    Raises:
-        DatasetError: If it cannot be written.
-    """
+    """Write a script into the directory of a dataset, and check that Slurm would take it."""
     path = directory / CLUSTER / name
     write_file(path, text.encode())
     slurm.check(path)

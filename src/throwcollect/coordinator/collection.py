@@ -348,11 +348,7 @@ class TrialCollection:
         return True
 
     def _cut_plan(self, say: Callable[[str], object]) -> bool:
-        """Remove the trials that an earlier collection has planned and results do not give; False if there are none.
-
-        Raises:
-            DatasetError: If the disk fails.
-        """
+        """Remove the trials that an earlier collection has planned and results do not give; False if there are none."""
         wrong = self._growth.take_wrong() if self._growth is not None else None
         if wrong is None:
             return False

@@ -80,12 +80,7 @@ def _collect(
     *,
     is_to_drain: Callable[[], bool],
 ) -> None:
-    """Collect until all trials have ended, or those that run when it drains.
-
-    Raises:
-        WorkerError: If every simulation refuses every trial.
-        DatasetError: If the dataset cannot be written.
-    """
+    """Collect until all trials have ended, or those that run when it drains."""
     told = time.monotonic()
     while not collection.finished:
         heartbeat.beat()

@@ -43,10 +43,6 @@ UpdatePlan = Callable[[int, int], object]
 """Is called with how many trials of how many have been checked; an error that it raises gives the plan up."""
 
 
-def _ignore_update(_checked: int, _trials: int) -> None:
-    """Take in how far a plan is, where nobody wants to know."""
-
-
 def draw_plan(config: Config, *, directory: Path, processes: int = 1, say: Say = lambda _: None) -> Plan:
     """Draw all trials that are known before anything runs, and refuse those that the robot cannot do.
 
@@ -62,7 +58,7 @@ def draw_plan(config: Config, *, directory: Path, processes: int = 1, say: Say =
         WorkerError: If a process that checks trials is killed.
     """
     points = _draw_points(config, directory, say)
-    return _check_trials(config, points, processes=processes, say=say, update_plan=_ignore_update)
+    return _check_trials(config, points, processes=processes, say=say, update_plan=lambda *_: None)
 
 
 def _draw_points(config: Config, directory: Path, say: Say) -> Points:
@@ -214,7 +210,7 @@ def prepare(
     sweep_directory: Path,
     processes: int = 1,
     say: Say = lambda _: None,
-    update_plan: UpdatePlan = _ignore_update,
+    update_plan: UpdatePlan = lambda *_: None,
 ) -> Plan:
     """Freeze the plan: write a dataset directory that holds the resolved configuration and all trials.
 

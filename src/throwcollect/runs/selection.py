@@ -188,17 +188,13 @@ def describe_death(run: Run) -> WorkerError:
             f"run {run.id}: its launcher died, but the dataset is complete: {run.place.dataset}", hint=hint
         )
     what = f"run {run.id}: its launcher died"
-    if _may_have_throws(run.record):
+    # No runtime is chosen before there is a plan, and no trial has run before.
+    is_planned = run.record.runtime != "" or config_path(run.place.directory).is_file()
+    if run.record.kind == "collection" and is_planned:
         what = f"{what}; finished throws are in {run.place.dataset}"
         if again := run.place.way_on:
             hint = f"{again} goes on where it ended, or with its containers if they live; {hint}"
     return WorkerError(what, evidence=f"the logs are in {run.record.logs}", hint=hint)
-
-
-def _may_have_throws(record: Record) -> bool:
-    """Whether a run collects and has got as far as its plan, before which no runtime is chosen."""
-    is_planned = record.runtime != "" or config_path(Path(record.directory)).is_file()
-    return record.kind == "collection" and is_planned
 
 
 def has_complete_dataset(run: Run) -> bool:

@@ -120,14 +120,14 @@ def write_context(archive: IO[bytes], root: Path, wheelhouse: Path | None) -> No
 
 def find_revision(root: Path) -> str | None:
     """Commit of a clone, with ``-dirty`` if files differ from it; None if git does not tell."""
-    if not (root / ".git").exists() or not (revision := _git(root, "rev-parse", "HEAD")):
+    if not (revision := _git(root, "rev-parse", "HEAD")):
         return None
     return revision + ("-dirty" if _git(root, "status", "--porcelain", "--", "docker", *_SOURCES) else "")
 
 
 def find_address(root: Path) -> str | None:
     """Address at which others find the sources, without the name and the password that it may hold in the clone."""
-    origin = (_git(root, "remote", "get-url", "origin") if (root / ".git").exists() else None) or ""
+    origin = _git(root, "remote", "get-url", "origin") or ""
     if short := _SSH_ADDRESS.fullmatch(origin):
         return f"ssh://{short[1]}/{short[2]}"
     parts = urlsplit(origin)
@@ -137,7 +137,9 @@ def find_address(root: Path) -> str | None:
 
 
 def _git(root: Path, *arguments: str) -> str | None:
-    """Run git, and return what it prints; None if it fails."""
+    """Run git in a clone, and return what it prints; None if it fails, or the directory is only a part of a clone."""
+    if not (root / ".git").exists():
+        return None
     try:
         answer = subprocess.run(["git", "-C", root, *arguments], capture_output=True, text=True, check=True)
     except (OSError, subprocess.CalledProcessError):

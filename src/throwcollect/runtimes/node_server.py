@@ -146,11 +146,7 @@ class NodeServer:
             self._process = None
 
     def _request(self, request: bytes, log: BinaryIO) -> ForkedNode:
-        """Let the process fork a node.
-
-        Raises:
-            OSError: If it does not.
-        """
+        """Let the process fork a node."""
         socket.send_fds(self._connect(log), [request], [log.fileno()])
         pid = self._await_pid()
         self._running.add(pid)
@@ -163,11 +159,7 @@ class NodeServer:
         return self._launch(partial(self._start_program, log))
 
     def _launch(self, start: Callable[[socket.socket], subprocess.Popen[bytes] | ForkedProcess]) -> socket.socket:
-        """Start the process with one end of a new connection, and return the other end.
-
-        Raises:
-            OSError: If the process cannot be started.
-        """
+        """Start the process with one end of a new connection, and return the other end."""
         # Sockets of this kind keep messages apart, as datagrams do, but also tell when the other side has closed its
         # end.
         here, there = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
