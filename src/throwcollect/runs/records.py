@@ -338,6 +338,12 @@ class Records:
             over = run.status == "ended" or (run.status == "died" and not _may_outlive(record))
             if over and (record.ended or record.started) <= before and (opened := self.take(record.run)) is not None:
                 opened.forget()
+        # Whoever is killed while the plan is made leaves a key and no record. The lock is as old as the key.
+        for lock in self._runs.glob("*.lock"):
+            with suppress(FileNotFoundError):
+                unrecorded = lock.stat().st_mtime <= before.timestamp() and not lock.with_suffix(".json").exists()
+                if unrecorded and (opened := self.take(lock.stem)) is not None:
+                    opened.forget()
 
 
 def _may_outlive(record: Record) -> bool:

@@ -226,6 +226,19 @@ def test_runs_are_remembered_for_a_week_after_their_end(
     assert (name in records.ids()) == remembered
 
 
+@pytest.mark.parametrize(("days", "remembered"), [(6, True), (8, False)])
+def test_the_key_of_a_run_that_was_killed_before_it_had_a_record_is_removed(
+    days: int, remembered: bool, state: Path
+) -> None:
+    records = Records()
+    run = records.new("small")
+    run.close()
+    then = (NOW - timedelta(days=days)).timestamp()
+    os.utime(state / "runs" / f"{run.run}.lock", times=(then, then))
+    records.new("small")
+    assert [run.key.exists, (state / "runs" / f"{run.run}.lock").exists()] == [remembered, remembered]
+
+
 def test_a_long_run_is_not_forgotten_while_it_lives(state: Path) -> None:
     records = Records()
     run = records.new("small")
