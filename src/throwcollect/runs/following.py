@@ -57,9 +57,7 @@ def follow(run: Run, *, keep_on: Callable[[], bool] = lambda: True) -> Iterator[
             listener.spin(run.connection, _POLL_S)
             # The launcher writes an event before the record, so after the last record all events are there.
             run = run.now()
-            events.path = _events_of(run)
-            # Where a dataset is resumed, the file has the events of earlier runs, too.
-            happened = tuple(event for line in events.lines() if (event := parse(line)) and event.run == run.id)
+            happened = tuple(event for event, _ in _new_events(events, run))
             yield Look(run, reports[-1] if reports else None, happened)
 
 
@@ -125,14 +123,20 @@ def read_events(run: Run, *, keep_on: Callable[[], bool] = lambda: True) -> Iter
     """
     tail = Tail(_events_of(run))
     for now, _ in _looks(run, follow=True, keep_on=keep_on):
-        tail.path = _events_of(now)
-        for line in tail.lines():
-            if (event := parse(line)) is not None:
-                yield event, line
+        yield from _new_events(tail, now)
+
+
+def _new_events(tail: Tail, run: Run) -> Iterator[tuple[Event, str]]:
+    """The events of a run that were written since the last call, and the line of each."""
+    # Events and logs of a run that is begun in the background have another place once its plan is made.
+    tail.path = _events_of(run)
+    for line in tail.lines():
+        # Where a dataset is resumed, the file has the events of earlier runs, too.
+        if (event := parse(line)) is not None and event.run == run.id:
+            yield event, line
 
 
 def _events_of(run: Run) -> Path:
-    # Events and logs of a run that is begun in the background have another place once its plan is made.
     return Path(run.record.logs) / EVENTS
 
 

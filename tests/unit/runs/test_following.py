@@ -80,7 +80,7 @@ def test_logs_are_followed_to_where_they_move(planned: tuple[Run, Callable[[], b
 
 def test_events_are_followed_to_where_they_are_written(planned: tuple[Run, Callable[[], bool]]) -> None:
     run, go_on = planned
-    assert run.id in [event.run for event, _ in read_events(run, keep_on=go_on)]
+    assert [event.run for event, _ in read_events(run, keep_on=go_on)] == [run.id]
 
 
 def test_who_waits_is_told_what_happens_in_this_run_from_where_it_is_written(
