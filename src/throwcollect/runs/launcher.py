@@ -163,17 +163,18 @@ class _Session:
         elif code == Interrupted.exit_code:
             event = "stopped"
         self.event(event, reason=failure and str(failure.error(code)), exit_code=code)
-        changes = {
-            "nodes": (),
-            "endpoint": None,
-            "progress": self._progress or self._run.record.progress,
-            "ended": datetime.now(timezone.utc),
-            "exit_code": code,
-            "failure": failure,
-            "summary": summary,
-            "left": left,
-        }
-        self._write(lambda: self._run.update(**changes))
+        self._write(
+            lambda: self._run.update(
+                nodes=(),
+                endpoint=None,
+                progress=self._progress or self._run.record.progress,
+                ended=datetime.now(timezone.utc),
+                exit_code=code,
+                failure=failure,
+                summary=summary,
+                left=left,
+            )
+        )
 
     def _write(self, write: Callable[[], None]) -> None:
         try:

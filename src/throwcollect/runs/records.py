@@ -229,12 +229,12 @@ class Records:
                 continue
             except OSError as error:
                 raise unusable(self._runs / f"{chosen}.lock", error) from error
-            # This waits only for `is_locked` of another process, which may have the lock of the new file for a moment.
-            fcntl.flock(lock, fcntl.LOCK_EX)
             opened = OpenRun(self._runs, chosen, lock)
             with ExitStack() as undo:
                 undo.callback(opened.forget)
                 try:
+                    # This waits only for `is_locked` of another process, which may have the new lock for a moment.
+                    fcntl.flock(lock, fcntl.LOCK_EX)
                     opened.directory.mkdir(mode=0o700, exist_ok=True)
                 except OSError as error:
                     raise unusable(opened.directory, error) from error

@@ -1,3 +1,4 @@
+import errno
 import fcntl
 import json
 import os
@@ -68,6 +69,17 @@ def test_what_is_written_is_read_by_others(state: Path) -> None:
     run.update(progress=replace(PROGRESS, ended=5), failure=Failure("ä"))
     assert Records().get(run.run).record == replace(written, progress=replace(PROGRESS, ended=5), failure=Failure("ä"))
     assert Records().ids() == [run.run]
+
+
+def test_a_file_system_without_locks_is_named(state: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(_descriptor: int, _how: int) -> None:
+        raise OSError(errno.ENOSYS, os.strerror(errno.ENOSYS))
+
+    records = Records()
+    monkeypatch.setattr(fcntl, "flock", refuse)
+    with pytest.raises(ConfigError, match="runs cannot be remembered there: Function not implemented"):
+        records.new("small")
+    assert list((state / "runs").iterdir()) == []
 
 
 def test_a_run_is_named_after_its_collection_and_never_like_another(
