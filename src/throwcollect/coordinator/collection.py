@@ -255,8 +255,7 @@ class TrialCollection:
             return True
         trials = self._growth.step()
         if trials:
-            # The plan is on the disk before its trials are leased, so that no crash can leave an episode of a trial
-            # that no plan has.
+            # This comes before trials are leased, so that no crash can leave an episode of a trial that no plan has.
             self.writer.extend(trials)
             self._leases.add(trials.numbers_to_run)
             self.on_change()

@@ -150,8 +150,7 @@ class Leases:
             self._returned.append(trial)
             return None
         self.ended += 1
-        # While no trial was ever done, refusals are kept whatever becomes of their trials, because `hopeless` counts
-        # them.
+        # While no trial was ever done, refusals are kept whatever becomes of their trials: `hopeless` counts them.
         if self._completed:
             # No simulation could do the trial, so its refusals are not held against them.
             for name, refusals in self._refusals.items():

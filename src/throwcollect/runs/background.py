@@ -172,8 +172,7 @@ def _begin(opened: OpenRun, record: Record, order: bytes, lay_out: Callable[[], 
         if isinstance(error, OSError):
             raise WorkerError(f"run {opened.run} cannot be begun: {error}") from error
         raise
-    # The new process has inherited the lock. If this one kept it, too, the run would seem to live after its launcher
-    # died.
+    # The launcher has inherited the lock. If this process kept it, too, the run would seem to outlive its launcher.
     opened.close()
     return Records().get(opened.run)
 

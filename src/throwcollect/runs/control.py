@@ -57,10 +57,9 @@ def stop(run: Run, *, keep_on: Callable[[], bool] = lambda: True) -> Run:
 def down(named: str | Run | None, *, volumes: bool = False) -> tuple[str, list[str]]:
     """End all nodes of a run, by force if need be, and forget the run; a dataset in a directory stays.
 
-    Args:
-        named: A run, or a name as for `to_change`, or the id of a run that has no record, but of which a runtime holds
-            containers. None takes the only run of the current directory that lives, or whose launcher died.
-        volumes: Whether a volume that holds the dataset is removed, too.
+    It is named as for `to_change`, or by the id of a run that has no record, but of which a runtime holds containers.
+    None takes the only run of the current directory that lives, or whose launcher died. A volume that holds the dataset
+    is removed only if `volumes` is true.
 
     Returns:
         Id of the run, and names of the containers, networks and volumes that were removed.

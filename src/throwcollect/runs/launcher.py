@@ -41,14 +41,9 @@ def launch(
 ) -> Summary | None:
     """Launch a prepared run until its last trial has ended, or go on with a run whose launcher died.
 
-    A run that collects no dataset goes on until the user stops it.
-
-    Args:
-        run: The run, with a record; this function writes the end of the run there, and closes it.
-        config: Configuration of the run.
-        onlooker: Is told what goes on.
-        interruptions: How often the user has asked to stop: the first time, running trials are still finished.
-        runtime: The runtime, if it has begun something for the run, which this function closes; else None.
+    A run that collects no dataset goes on until the user stops it. The end of the run is written into its record, and
+    the run and the runtime are closed; a runtime is given if it has begun something for the run. `interruptions` tells
+    how often the user has asked to stop: the first time, running trials are still finished.
 
     Returns:
         The summary of the dataset, whose outcomes tell whether trials are lost; None if the run collects none.
@@ -213,8 +208,7 @@ def start_launcher(records: Records, opened: OpenRun, *, interruptions: Callable
     except OSError as error:
         raise WorkerError(f"the launcher cannot be started: {error}") from error
     finally:
-        # The launcher has inherited the lock. If this process kept it, too, the run would seem to live after its
-        # launcher died.
+        # The launcher has inherited the lock. If this process kept it, too, the run would seem to outlive its launcher.
         opened.close()
     forwarded = 0
     while (run := records.get(opened.run)).status == "running":

@@ -58,8 +58,7 @@ def digest_sources(root: Path) -> str:
         inside = path.relative_to(root)
         if path.is_file() and not any(map(_LEFT_OUT.fullmatch, inside.parts)):
             content = path.read_bytes()
-            # The zero byte and the length keep two lists of files apart that have the same bytes when put behind each
-            # other.
+            # The zero byte and the length keep lists of files apart that have the same bytes in a row.
             digest.update(f"{inside.as_posix()}\0{len(content)}\0".encode() + content)
     return digest.hexdigest()
 

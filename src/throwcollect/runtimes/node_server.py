@@ -160,8 +160,7 @@ class NodeServer:
 
     def _launch(self, start: Callable[[socket.socket], subprocess.Popen[bytes] | ForkedProcess]) -> socket.socket:
         """Start the process with one end of a new connection, and return the other end."""
-        # Sockets of this kind keep messages apart, as datagrams do, but also tell when the other side has closed its
-        # end.
+        # Sockets of this kind keep messages apart, as datagrams do, but also tell when the other end is closed.
         here, there = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         # A copy of the other end that stayed open here would hide that the process has ended.
         with there:
@@ -280,8 +279,7 @@ def serve(connection: socket.socket) -> list[str]:
 def _report_ends(connection: socket.socket) -> None:
     """Tell the launcher of all nodes that have ended."""
     with contextlib.suppress(ChildProcessError):
-        # One signal may stand for several ended processes, because the kernel keeps no second SIGCHLD while one is
-        # pending.
+        # One SIGCHLD may stand for several ended processes, because the kernel keeps no second one while it is pending.
         while (ended := os.waitpid(-1, os.WNOHANG))[0]:
             _send(connection, ended=ended[0], code=os.waitstatus_to_exitcode(ended[1]))
 

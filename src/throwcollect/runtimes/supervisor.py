@@ -98,8 +98,7 @@ class Supervisor:
         """
         end = None
         news = self._end_frozen()
-        # Readiness is asked before ends are taken, because a simulation that was ready once may be started again more
-        # often.
+        # This comes before ends are taken, because a simulation that was ready once may be started again more often.
         self._ready |= {name for name in self._expendables if name not in self._ready and self.host.ready(name)}
         for node in self.host.exits():
             if node.name not in self._roster:

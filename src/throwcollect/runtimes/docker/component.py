@@ -144,8 +144,7 @@ class ComponentContainer:
         try:
             self._watch = EngineWatch(self._client, self._place, self._clock)
             session.event("started")
-            # Up to version 1.43 of the engine's API, a container is made in one network, and joins others before it
-            # starts.
+            # Up to version 1.43 of the engine's API, a container is made in one network, and joins others afterwards.
             self._container.start(self._options(), networks=self._networks[1:])
             while not session.interruptions():
                 session.nodes([self._look()], endpoint=None, simulations=0)
