@@ -22,10 +22,10 @@ from tests.cluster.conftest import BUILD, SHARED, USER
 from tests.e2e.collection import CONFIG, FAST, fingerprints, write_config
 from throwcollect import runs
 from throwcollect.errors import ConfigError
-from throwcollect.runtimes.apptainer.contents import check_sif, read_contents
+from throwcollect.runtimes.apptainer.contents import check_sif, read_labels
 from throwcollect.runtimes.apptainer.sif import make_sif
 from throwcollect.runtimes.docker.image import save_image
-from throwcollect.runtimes.image_sources import SOURCES_LABEL
+from throwcollect.runtimes.image_sources import SOURCES_LABEL, VERSION_LABEL
 
 pytestmark = pytest.mark.cluster
 ROOT = Path(__file__).parents[2]
@@ -121,7 +121,7 @@ def test_arguments_are_not_evaluated_once_more(place: Path) -> None:
 
 def test_a_sif_says_what_is_in_it(sif: Path) -> None:
     check_sif(sif)
-    assert read_contents(sif).version == throwcollect.__version__
+    assert read_labels(sif)[VERSION_LABEL] == throwcollect.__version__
 
 
 def test_labels_of_an_archive_are_those_of_the_sif(tmp_path: Path) -> None:

@@ -6,20 +6,23 @@ They do the same as for runs of this machine, as far as the queue and the files 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import typer
 
 from throwcollect.cli.dataset.info import print_collected
 from throwcollect.cli.interruptions import count_interruptions
+from throwcollect.cli.printing import tell
 from throwcollect.cli.streams import has_reader
 from throwcollect.cli.terminal import display
 from throwcollect.cluster.following import ClusterRun, Look, ProgressOfSlices, find_queued, follow
 from throwcollect.dataset.inspect import info
-from throwcollect.errors import ConfigError, Interrupted
+from throwcollect.errors import ConfigError, Interrupted, ThrowcollectError
 from throwcollect.wording import command, format_count
+
+_Described = TypeVar("_Described")
 
 
 def follow_to_the_end(directory: Path, *, as_json: bool) -> None:
@@ -39,14 +42,14 @@ def follow_to_the_end(directory: Path, *, as_json: bool) -> None:
 def print_logs(run: ClusterRun, tasks: list[str]) -> None:
     """Print the logs of tasks; of all tasks if none is named."""
     logs = run.logs
+    numbers = [*map(str, range(run.submission.tasks))]
     for text in tasks or logs:
-        if not text.isdigit() or int(text) >= run.submission.tasks:
-            last = run.submission.tasks - 1
-            raise ConfigError(f"{run.directory}: has no task {text!r}", expected=f"0 to {last}")
+        if text not in numbers:
+            raise ConfigError(f"{run.directory}: has no task {text!r}", expected=f"0 to {numbers[-1]}")
         if text not in logs:
             raise ConfigError(f"{run.directory}: task {text} has printed nothing yet")
         for line in logs[text].read_text(encoding="utf-8", errors="replace").splitlines():
-            typer.echo(f"{text:>{len(str(run.submission.tasks))}} | {line}")
+            typer.echo(f"{text:>{len(str(len(numbers)))}} | {line}")
 
 
 def print_events(run: ClusterRun, *, as_json: bool) -> None:
@@ -78,37 +81,41 @@ def end(run: ClusterRun) -> None:
     typer.echo(f"{run.directory}: stopped; the dataset {complete}")
 
 
-def rows() -> Iterator[tuple[str, ...]]:
-    """The rows of the runs in the queue, for the table that `ps` prints."""
-    for run in find_queued():
-        look = run.look()
-        yield (
-            _number_of(run),
-            "slurm",
-            str(look.running * run.simulations_per_task),
-            f"{ProgressOfSlices(run).at(look).ended}/{run.trials}",
-            _status(look, run),
-            str(run.directory),
-        )
+def list_queued(describe: Callable[[ClusterRun, Look], _Described]) -> Iterator[_Described]:
+    """Describe each run in the queue by `make_row` or `make_document`; of one that cannot be read, tell the error."""
+    for directory in find_queued():
+        try:
+            run = ClusterRun.open(directory)
+            described = describe(run, run.look())
+        except ThrowcollectError as error:
+            tell(f"throwcollect: {error}")
+        else:
+            yield described
 
 
-def documents() -> list[dict[str, Any]]:
-    """The runs in the queue, for the JSON document that `ps` prints."""
-    found = []
-    for run in find_queued():
-        look = run.look()
-        found.append(
-            {
-                "run": _number_of(run),
-                "runtime": "slurm",
-                "directory": str(run.directory),
-                "tasks": run.submission.tasks,
-                "finished": len(look.finished),
-                "running": look.running,
-                "waiting": look.waiting,
-            }
-        )
-    return found
+def make_row(run: ClusterRun, look: Look) -> tuple[str, ...]:
+    """The row of a run, for the table that `ps` prints."""
+    return (
+        _number_of(run),
+        "slurm",
+        str(look.running * run.simulations_per_task),
+        f"{ProgressOfSlices(run).at(look).ended}/{run.trials}",
+        _status(look, run),
+        str(run.directory),
+    )
+
+
+def make_document(run: ClusterRun, look: Look) -> dict[str, Any]:
+    """A run for the JSON document that `ps` prints."""
+    return {
+        "run": _number_of(run),
+        "runtime": "slurm",
+        "directory": str(run.directory),
+        "tasks": run.submission.tasks,
+        "finished": len(look.finished),
+        "running": look.running,
+        "waiting": look.waiting,
+    }
 
 
 def _number_of(run: ClusterRun) -> str:

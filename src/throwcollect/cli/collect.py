@@ -87,8 +87,8 @@ def up(
     """Collect a dataset: start the simulations, run all trials, write the files."""
     changes = overrides(settings, trials=trials, run__simulations=simulations, run__runtime=runtime, run__listen=listen)
     if slice is not None:
-        unfit = {"CONFIG": config, "--resume": resume, "--detach": detach or None, "--view": view or None}
-        if wrong := next((name for name, value in unfit.items() if value is not None), None):
+        unfit = {"CONFIG": config, "--resume": resume, "--token-file": token_file, "--detach": detach, "--view": view}
+        if wrong := next((name for name, value in unfit.items() if value not in (None, False)), None):
             raise ConfigError(f"{wrong}: should be left out with --slice, which goes by the plan in --output DIR")
         if output is None:
             raise ConfigError(f"--slice {slice}: needs --output DIR, in which the plan lies")
@@ -210,13 +210,7 @@ def _collect(
 ) -> None:
     """Launch a run and print its summary or, if it is detached, its id.
 
-    Args:
-        prepare_run: Prepares the run; returns None if its dataset is finished already.
-        directory: Directory of the dataset that the run goes on with; None for a new one.
-        detach: Whether to return as soon as the nodes are started.
-        json: Whether to print JSON.
-        token_file: File for the token; None prints it.
-        view: Whether to print the address of a page that shows the run.
+    `prepare_run` returns None if the dataset in the directory, with which the run was to go on, is finished already.
     """
     with ExitStack() as held:
         with display(quiet=json, bar=not detach) as shown:

@@ -28,11 +28,9 @@ RunOption = Annotated[
 
 
 def overrides(settings: list[str] | None, **options: str | None) -> list[str]:
-    """Turn options into overrides of configuration keys, as ``--set`` takes them.
+    """Turn options into overrides of configuration keys, ``key=value``, as ``--set`` takes them.
 
-    Args:
-        settings: ``key=value`` pairs.
-        options: Values of further keys, whose dots are written as ``__``; None for options that were not given.
+    Keys of options have ``__`` for a dot, and None if they were not given.
     """
     named = (f"{key.replace('__', '.')}={value}" for key, value in options.items() if value is not None)
     return [*(settings or []), *named]

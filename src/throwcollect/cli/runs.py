@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json as jsonlib
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict
 from datetime import datetime, timezone
@@ -13,7 +12,7 @@ import typer
 
 from throwcollect.cli.interruptions import count_interruptions
 from throwcollect.cli.options import JsonOption, RunOption
-from throwcollect.cli.printing import tell
+from throwcollect.cli.printing import print_json, tell
 from throwcollect.cli.streams import end_with_reader, has_reader
 from throwcollect.cli.terminal import display
 from throwcollect.errors import ConfigError, Interrupted
@@ -51,13 +50,16 @@ def ps(
     held = find_held_runs()
     unrecorded = [each for run, each in held.items() if run not in ids]
     if json:
-        documents = [_make_document(run) for run in shown] + [_make_unrecorded_document(*each) for each in unrecorded]
-        documents += cluster_runs.documents()
-        typer.echo(jsonlib.dumps(documents, indent=2, default=_in_json))
+        documents = [_make_document(run) for run in shown]
+        for runtime, found in unrecorded:
+            documents.append({"run": found.run_id, "runtime": runtime, "status": "unrecorded", **asdict(found)})
+        documents += cluster_runs.list_queued(cluster_runs.make_document)
+        # Times have the form of those of events.
+        print_json(documents, default=lambda time: time.isoformat(timespec="milliseconds"))
         return
     rows = [(_make_row(run), _node_lines(run, held.get(run.id))) for run in shown]
     rows += [(_make_unrecorded_row(*each), _list_held_nodes(*each)) for each in unrecorded]
-    rows += [(row, []) for row in cluster_runs.rows()]
+    rows += [(row, []) for row in cluster_runs.list_queued(cluster_runs.make_row)]
     for line in _table(rows):
         typer.echo(line)
 
@@ -209,21 +211,12 @@ def _find_run(named: str | None) -> Run:
     return to_watch(Records(), named, say=tell)
 
 
-def _in_json(value: datetime) -> str:
-    """A time by RFC 3339, in the form that events have."""
-    return value.isoformat(timespec="milliseconds")
-
-
 def _make_document(run: Run) -> dict[str, Any]:
     from throwcollect.runs.selection import has_complete_dataset
 
     error = run.record.error if run.record.failure else None
     complete = has_complete_dataset(run)
     return {**asdict(run.record), "message": str(error or ""), "status": run.status, "complete": complete}
-
-
-def _make_unrecorded_document(runtime: str, held: HeldRun) -> dict[str, Any]:
-    return {"run": held.run_id, "runtime": runtime, "status": "unrecorded", **asdict(held)}
 
 
 def _make_row(run: Run) -> tuple[str, ...]:

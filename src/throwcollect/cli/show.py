@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from throwcollect.cli.options import ConfigArgument, JsonOption, SetOption, TrialsOption, overrides
-from throwcollect.cli.printing import print_json, print_result, tell
+from throwcollect.cli.printing import format_number, print_json, print_result, tell
 from throwcollect.cli.streams import end_with_reader
 from throwcollect.config.default_path import DEFAULT_CONFIG
 from throwcollect.errors import ConfigError
@@ -94,15 +94,12 @@ def plan(
     if shown:
         typer.echo("  ".join(["trial", *names]))
     for trial in shown:
-        numbers = [_show(name, {**trial.values, **trial.target}.get(name)) for name in names]
+        values = {**trial.values, **trial.target}
+        numbers = [format_number(values.get(name)).rjust(len(name)) for name in names]
         note = f"  refused: {trial.refused}" if trial.refused else ""
         typer.echo("  ".join([str(trial.number).rjust(len("trial")), *numbers]) + note)
     planned, refused = format_count(len(found.trials), "trial"), len(found.trials.refused)
     tell(f"{planned}, {refused} refused{more_trials(found)}")
-
-
-def _show(name: str, value: float | None) -> str:
-    return ("-" if value is None else f"{value:.6g}").rjust(len(name))
 
 
 def doctor(json: JsonOption = False) -> None:

@@ -45,8 +45,7 @@ class _Stream(io.FileIO):
                 self.failure = error
                 if self.kind == "lines" and self.reader_is_gone:
                     raise ReaderGone from error
-        # The buffer has to believe that all was written; it would keep the rest, and try again at the end of the
-        # process.
+        # The buffer has to believe that all was written; it would keep the rest, and try again at the end.
         return memoryview(data).nbytes
 
     @property

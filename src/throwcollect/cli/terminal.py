@@ -22,11 +22,9 @@ _TEXT_COLUMNS = 72
 
 
 def display(*, quiet: bool, bar: bool = True) -> _Lines | _Bar:
-    """Choose a display by where standard error goes.
+    """Choose a display by where standard error goes; a quiet one shows nothing but warnings.
 
-    Args:
-        quiet: Whether to show nothing but warnings.
-        bar: Whether to show a bar; a run that is detached has no progress.
+    A run that is detached has no progress, and so no bar.
     """
     if sys.stderr.isatty() and bar and not quiet:
         return _Bar()

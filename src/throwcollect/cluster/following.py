@@ -30,12 +30,7 @@ _MOST_NAMED = 5
 
 @dataclass(frozen=True)
 class ClusterRun:
-    """A dataset that was submitted.
-
-    Attributes:
-        directory: Its directory.
-        submission: The record of what was submitted for it.
-    """
+    """A dataset that was submitted, with the record of that."""
 
     directory: Path
     submission: Submission
@@ -78,11 +73,12 @@ class ClusterRun:
             DatasetError: If the directory cannot be read.
         """
         # The queue comes first: a task that has left the queue has put its slice into place before.
+        queue = slurm.find_tasks()
         tasks: dict[int | None, Task] = {}
         joining: Task | None = None
         for job in self.submission.jobs:
-            tasks |= {task.index: task for task in (slurm.find_tasks(job.array) if job.array else ())}
-            joining = next(iter(slurm.find_tasks(job.join) if job.join else ()), joining)
+            tasks |= {task.index: task for task in queue.get(job.array, ())}
+            joining = next(iter(queue.get(job.join, ())), joining)
         complete = (self.directory / METADATA).exists()
         finished = frozenset(self.submission.slices) if complete else find_finished(self.directory)
         return Look(finished, tuple(tasks.values()), joining, complete)
@@ -192,9 +188,8 @@ class ProgressOfSlices:
     The speed is that since the first look, as nobody wrote down how fast trials ended before.
     """
 
-    def __init__(self, run: ClusterRun, *, clock: Callable[[], float] = time.monotonic) -> None:
+    def __init__(self, run: ClusterRun) -> None:
         self._run = run
-        self._clock = clock
         self._first: tuple[float, int] | None = None
         self._outcomes: Counter[str] = Counter()
         self._read: set[Slice] = set()
@@ -227,7 +222,7 @@ class ProgressOfSlices:
         )
 
     def _measure_speed(self, ended: int) -> float:
-        now = self._clock()
+        now = time.monotonic()
         if self._first is None:
             self._first = now, ended
         began, before = self._first
@@ -259,23 +254,20 @@ def follow(run: ClusterRun, *, keep_on: Callable[[], bool] = lambda: True) -> It
 
 
 def find_cluster_run(named: str | None) -> ClusterRun | None:
-    """Find the submitted dataset that a command means; None if it means none.
+    """Find the submitted dataset that a command names by its directory; None if the name is another one.
 
-    Args:
-        named: Directory of the dataset, or any other name of a run; None for the only dataset in the queue that lies
-            below the current directory.
+    Without a name, the command means the only dataset in the queue that lies below the current directory.
     """
     if named is not None:
         directory = Path(named)
         return ClusterRun.open(directory.absolute()) if is_submitted(directory) else None
-    here = [each for each in find_queued() if each.directory.is_relative_to(Path.cwd())]
-    return here[0] if len(here) == 1 else None
+    here = [each for each in find_queued() if each.is_relative_to(Path.cwd())]
+    return ClusterRun.open(here[0]) if len(here) == 1 else None
 
 
-def find_queued() -> list[ClusterRun]:
-    """Find the submitted datasets of this user that have jobs in the queue, by directory; none without Slurm."""
+def find_queued() -> list[Path]:
+    """Find the directories of this user's submitted datasets that have jobs in the queue; none without Slurm."""
     try:
-        directories = sorted(set(slurm.find_directories().values()))
+        return [path for path in map(Path, slurm.find_directories()) if is_submitted(path)]
     except (ConfigError, WorkerError):
         return []
-    return [ClusterRun.open(path) for path in map(Path, directories) if is_submitted(path)]

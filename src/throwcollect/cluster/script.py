@@ -27,14 +27,12 @@ _EXPANDED = re.compile(r"\$SLURM_|cluster\.scratch=|tcp/0\.0\.0\.0:\$PORT$")
 
 @dataclass(frozen=True)
 class BatchScripts:
-    """Makes the scripts of one dataset.
+    """Makes the scripts of one dataset, whose paths are absolute.
 
     Attributes:
-        config: Its configuration.
-        directory: Its directory, absolute.
         logs: Directory of the logs of tasks.
         program: Words that start ``throwcollect`` outside of an image.
-        image: Image that tasks run in, absolute; None for none.
+        image: Image that tasks run in; None for none.
     """
 
     config: Config
@@ -44,12 +42,7 @@ class BatchScripts:
     image: Path | None
 
     def collect(self, tasks: int, indexes: str) -> str:
-        """Write the script of a task that collects a slice.
-
-        Args:
-            tasks: Number of slices.
-            indexes: Indexes of the slices to collect, as ``sbatch --array`` takes them.
-        """
+        """Write the script of a task that collects a slice, for indexes of slices as ``sbatch --array`` takes them."""
         cluster = self.config.cluster
         directives = {
             "job-name": f"throwcollect-{self.config.name}",

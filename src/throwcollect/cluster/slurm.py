@@ -102,8 +102,8 @@ def check(script: Path) -> None:
         raise ConfigError(error.message, hint=hint) from error
 
 
-def find_tasks(job: str) -> tuple[Task, ...]:
-    """Find the tasks of a job that Slurm remembers: those that live, and those that ended some minutes ago.
+def find_tasks() -> dict[str, list[Task]]:
+    """Find the tasks of this user, by number of the job: those that live, and those that ended some minutes ago.
 
     Raises:
         ConfigError: If there is no Slurm here.
@@ -112,10 +112,11 @@ def find_tasks(job: str) -> tuple[Task, ...]:
     # squeue fails if it is asked for a job that Slurm has forgotten, and not if it is asked for all jobs of this user.
     # Number of the array, index in it, state, node, and reason.
     format_ = "%F|%K|%T|%N|%r"
-    lines = _run("squeue", "--noheader", "--array", "--me", "--states=all", f"--format={format_}").splitlines()
-    rows = (line.strip().split("|") for line in lines)
-    found = [Task(_index(index), state, node, reason) for of, index, state, node, reason in rows if of == job]
-    return tuple(found)
+    found: dict[str, list[Task]] = {}
+    for line in _run("squeue", "--noheader", "--array", "--me", "--states=all", f"--format={format_}").splitlines():
+        job, index, state, node, reason = line.strip().split("|")
+        found.setdefault(job, []).append(Task(_index(index), state, node, reason))
+    return found
 
 
 def find_ended(job: str) -> dict[int | None, Task]:
@@ -155,8 +156,8 @@ def _find_accounted(job: str) -> dict[int | None, Task]:
     return found
 
 
-def find_directories() -> dict[str, str]:
-    """Find the directories of the datasets that jobs of this user in the queue collect, by number of the job.
+def find_directories() -> list[str]:
+    """Find the directories of the datasets that jobs of this user in the queue collect, sorted.
 
     Raises:
         ConfigError: If there is no Slurm here.
@@ -164,7 +165,7 @@ def find_directories() -> dict[str, str]:
     """
     lines = _run("squeue", "--noheader", "--me", "--format=%F|%k", patience_s=_GLANCE_S).splitlines()
     rows = (line.strip().partition(f"|{MARK}") for line in lines)
-    return {job: directory for job, mark, directory in rows if mark}
+    return sorted({directory for _, mark, directory in rows if mark})
 
 
 def cancel(jobs: Sequence[str]) -> None:

@@ -94,11 +94,7 @@ def write_submission(directory: Path, submission: Submission) -> None:
 
 
 def format_indexes(indexes: tuple[int, ...]) -> str:
-    """Write indexes as ``sbatch --array`` takes them, such as ``0-4,7``.
-
-    Args:
-        indexes: The indexes in ascending order, at least one.
-    """
+    """Write indexes, which ascend, as ``sbatch --array`` takes them, such as ``0-4,7``."""
     ranges: list[list[int]] = []
     for index in indexes:
         if ranges and index == ranges[-1][1] + 1:

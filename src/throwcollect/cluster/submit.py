@@ -44,13 +44,7 @@ Say = Callable[[str], object]
 
 @dataclass(frozen=True)
 class Submitted:
-    """The result of a submission, or of a dry run.
-
-    Attributes:
-        directory: Directory of the dataset, absolute.
-        script: Text of the script of a task.
-        job: The array and its joining job; None after a dry run.
-    """
+    """The result of a submission to the absolute path of a dataset; a dry run has no job, but the script of a task."""
 
     directory: Path
     script: str
@@ -192,11 +186,7 @@ def _submit(scripts: BatchScripts, submission: Submission, slices: tuple[int, ..
 
 
 def _write(directory: Path, name: str, text: str) -> Path:
-    """Write a script into the directory of a dataset, and check that Slurm would take it.
-
-    Raises:
-        DatasetError: If it cannot be written.
-    """
+    """Write a script into the directory of a dataset, and check that Slurm would take it."""
     path = directory / CLUSTER / name
     write_file(path, text.encode())
     slurm.check(path)

@@ -15,24 +15,16 @@ _MOST_TOLD = 3
 
 
 class Acceptance:
-    """Works out the conditions that each trial of a plan has to be simulated under.
-
-    Args:
-        config: Configuration of the collection.
-    """
+    """Works out the conditions that each trial of a plan has to be simulated under."""
 
     def __init__(self, config: Config) -> None:
         self._build = build_digest(config.sim.engine)
         self._settings = Settings(config)
 
     def find_difference(self, text: str, plan: Plan, trial: Trial, *, token: str) -> str | None:
-        """Why an episode is not the one that was asked for; None if it is.
+        """Why an episode is not the one that was asked for by the lease with this token; None if it is.
 
-        Args:
-            text: The conditions that the simulation names, in JSON.
-            plan: The plan.
-            trial: Its trial.
-            token: Token of the lease.
+        `text` has the conditions that the simulation names, in JSON.
         """
         try:
             conditions = conditions_from_json(text)

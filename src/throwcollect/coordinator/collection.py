@@ -49,10 +49,6 @@ class TrialCollection:
         warn: Called with a warning when a trial goes to another simulation; the coordinator's node sets it to its log.
         on_change: Called when the trials of simulations may have changed: the plan has grown, or no further trial shall
             begin.
-
-    Args:
-        writer: A dataset that is open.
-        directory: Its directory.
     """
 
     def __init__(self, writer: DatasetWriter, directory: Path) -> None:
@@ -81,13 +77,10 @@ class TrialCollection:
 
     @classmethod
     def open(cls, directory: Path, *, say: Callable[[str], object], processes: int = 1) -> TrialCollection:
-        """Open a dataset to collect into, and count what an earlier collection has left there as done.
+        """Open a dataset to collect into, as `prepare` or `resume` left it, and count what is there already as done.
 
-        Args:
-            directory: Directory of the dataset, as `prepare` or `resume` left it.
-            say: Called with how many episodes were found, and before that with how far the search has come, if it takes
-                long.
-            processes: As `DatasetWriter.recover` takes it.
+        `say` is called with how many episodes were found, and before that with how far the search has come, if it takes
+        long; `processes` is as `DatasetWriter.recover` takes it.
 
         Raises:
             DatasetError: If the directory holds no plan, or another process collects into it.
@@ -197,10 +190,7 @@ class TrialCollection:
     def take_in(self, simulation: str, delivery: Delivery, token: str = "") -> bool:
         """Take in an episode, which `write_one` writes later; refuse one that is not what was asked for.
 
-        Args:
-            simulation: The simulation that has handed it over, which holds its trial.
-            delivery: The episode, with its result and its conditions.
-            token: Token of the lease; empty if there was none.
+        The simulation that has handed it over holds its trial. The token is that of the lease; empty if there was none.
 
         Returns:
             Whether it was taken in.
@@ -229,10 +219,7 @@ class TrialCollection:
     def take_back(self, simulation: str, reason: str, *, refused: bool = False) -> None:
         """Take all trials back from a simulation, which failed with the first and had not begun the others.
 
-        Args:
-            simulation: Its address.
-            reason: What happened, kept as evidence.
-            refused: Whether the simulation refused them, so that it may refuse all others, too.
+        The reason is kept as evidence. If the simulation refused them, it may refuse all others, too.
         """
         self._leases.release(simulation)
         for trial in self._leases.find_held(simulation):
@@ -268,8 +255,7 @@ class TrialCollection:
             return True
         trials = self._growth.step()
         if trials:
-            # The plan is on the disk before its trials are leased, so that no crash can leave an episode of a trial
-            # that no plan has.
+            # This comes before trials are leased, so that no crash can leave an episode of a trial that no plan has.
             self.writer.extend(trials)
             self._leases.add(trials.numbers_to_run)
             self.on_change()
@@ -294,11 +280,7 @@ class TrialCollection:
             self._replay.begin(list(self.writer.plan.trials.numbers_to_run))
 
     def progress(self, hung: Iterable[str] = ()) -> Progress:
-        """How far the collection has come.
-
-        Args:
-            hung: Names of the simulations that took too long for a trial.
-        """
+        """How far the collection has come; `hung` has the names of the simulations that took too long for a trial."""
         ended = self._leases.ended
         self._rate.note(ended)
         # The number of trials of a plan that ends when enough have succeeded is not known.
@@ -319,9 +301,7 @@ class TrialCollection:
     def finish(self, *, meanwhile: Callable[[], None], say: Callable[[str], object]) -> None:
         """Simulate some trials again in a fresh process, and write what describes the dataset as a whole.
 
-        Args:
-            meanwhile: Called again and again while that process works.
-            say: Called with a sentence on what was simulated again.
+        `meanwhile` is called again and again while that process works, and `say` with what came of it.
 
         Raises:
             Interrupted: If the collection was drained before its last trial.
@@ -367,11 +347,7 @@ class TrialCollection:
         return True
 
     def _cut_plan(self, say: Callable[[str], object]) -> bool:
-        """Remove the trials that an earlier collection has planned and results do not give; False if there are none.
-
-        Raises:
-            DatasetError: If the disk fails.
-        """
+        """Remove the trials that an earlier collection has planned and results do not give; False if there are none."""
         wrong = self._growth.take_wrong() if self._growth is not None else None
         if wrong is None:
             return False

@@ -88,12 +88,7 @@ class Leases:
         return tuple(self._held.get(simulation, ()))
 
     def lease(self, simulation: str, *, others: Collection[str] = ()) -> int | None:
-        """Give the next trial to a simulation; None when none is waiting for it.
-
-        Args:
-            simulation: Name of a simulation.
-            others: Names of the other simulations that there are.
-        """
+        """Give the next trial to a simulation, of whose rivals `others` has the names; None when none waits for it."""
         # Where nobody is free of doubt, doubted simulations go on, because the trials may be to blame and not they.
         rivals = [other for other in others if other != simulation and not self._is_doubted(other)]
         if self.why_set_aside(simulation) is not None or (rivals and self._is_doubted(simulation)):
@@ -136,13 +131,9 @@ class Leases:
         self._completed += 1
 
     def fail(self, simulation: str, trial: int, reason: str, *, refused: bool = False) -> list[str] | None:
-        """A simulation was lost with a trial, or could not do it; the trial goes back, or is given up.
+        """A simulation was lost with a trial that it holds, or could not do it; the trial goes back, or is given up.
 
-        Args:
-            simulation: Name of the simulation.
-            trial: A trial that it holds.
-            reason: What happened, kept as evidence.
-            refused: Whether the simulation refused the trial, so that it may refuse all others, too.
+        The reason is kept as evidence. A simulation that refused the trial may refuse all others, too.
 
         Returns:
             All reasons when its retries are used up, else None.
@@ -159,8 +150,7 @@ class Leases:
             self._returned.append(trial)
             return None
         self.ended += 1
-        # While no trial was ever done, refusals are kept whatever becomes of their trials, because `hopeless` counts
-        # them.
+        # While no trial was ever done, refusals are kept whatever becomes of their trials: `hopeless` counts them.
         if self._completed:
             # No simulation could do the trial, so its refusals are not held against them.
             for name, refusals in self._refusals.items():

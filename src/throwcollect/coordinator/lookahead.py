@@ -43,10 +43,7 @@ class Lookahead:
     def count_for(self, simulation: str, *, waiting: int, simulations: int) -> int:
         """Number of trials that a simulation should have.
 
-        Args:
-            simulation: The simulation.
-            waiting: Number of trials that wait or that this simulation holds.
-            simulations: Number of simulations in the run.
+        `waiting` is the number of trials that wait or that this simulation holds; `simulations` is that of the run.
         """
         duration = self._durations.get(simulation)
         if duration is None:

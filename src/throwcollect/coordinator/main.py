@@ -23,12 +23,9 @@ _TELL_EVERY_S = 10.0
 
 
 def run(directory: Path) -> None:
-    """Collect every trial of the plan in `directory` that has no episode yet, and finish the dataset.
+    """Collect all trials of a dataset's plan that have no episode yet, and finish the dataset.
 
     SIGINT, SIGTERM and SIGHUP drain: running trials are finished and written within `run.grace_s`, none is started.
-
-    Args:
-        directory: Directory of the dataset, as `prepare` or `resume` left it.
 
     Raises:
         DatasetError: If the directory holds no plan, or cannot be written, or a trial came out otherwise when it was
@@ -83,12 +80,7 @@ def _collect(
     *,
     is_to_drain: Callable[[], bool],
 ) -> None:
-    """Collect until all trials have ended, or those that run when it drains.
-
-    Raises:
-        WorkerError: If every simulation refuses every trial.
-        DatasetError: If the dataset cannot be written.
-    """
+    """Collect until all trials have ended, or those that run when it drains."""
     told = time.monotonic()
     while not collection.finished:
         heartbeat.beat()

@@ -33,11 +33,7 @@ _REACH_S = 6.0
 
 
 class Coordinator(Node):
-    """Leases the trials of a collection to the simulations in the ROS graph.
-
-    Args:
-        collection: The trials, and the dataset that they fill.
-    """
+    """Leases the trials of a collection to the simulations in the ROS graph."""
 
     def __init__(self, collection: TrialCollection) -> None:
         super().__init__("coordinator")
@@ -78,8 +74,7 @@ class Coordinator(Node):
                 self._take_back(namespace, f"no episode within {self._patience_s:g} s{besides}")
             elif (missing := simulation.remind()) is not None:
                 self.get_logger().warning(f"{namespace}: no answer to the lease of {missing}, which is sent again")
-            # This is done each time, because trials of others may have come back, or the simulation may have become
-            # reachable.
+            # Each time, trials of others may have come back, or the simulation may have become reachable.
             self._lease(namespace)
         self._notice_unreached(now)
 

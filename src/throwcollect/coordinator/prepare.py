@@ -43,10 +43,6 @@ UpdatePlan = Callable[[int, int], object]
 """Is called with how many trials of how many have been checked; an error that it raises gives the plan up."""
 
 
-def _ignore_update(_checked: int, _trials: int) -> None:
-    """Take in how far a plan is, where nobody wants to know."""
-
-
 def draw_plan(config: Config, *, directory: Path, processes: int = 1, say: Say = lambda _: None) -> Plan:
     """Draw all trials that are known before anything runs, and refuse those that the robot cannot do.
 
@@ -62,7 +58,7 @@ def draw_plan(config: Config, *, directory: Path, processes: int = 1, say: Say =
         WorkerError: If a process that checks trials is killed.
     """
     points = _draw_points(config, directory, say)
-    return _check_trials(config, points, processes=processes, say=say, update_plan=_ignore_update)
+    return _check_trials(config, points, processes=processes, say=say, update_plan=lambda *_: None)
 
 
 def _draw_points(config: Config, directory: Path, say: Say) -> Points:
@@ -214,17 +210,12 @@ def prepare(
     sweep_directory: Path,
     processes: int = 1,
     say: Say = lambda _: None,
-    update_plan: UpdatePlan = _ignore_update,
+    update_plan: UpdatePlan = lambda *_: None,
 ) -> Plan:
     """Freeze the plan: write a dataset directory that holds the resolved configuration and all trials.
 
-    Args:
-        config: The configuration.
-        directory: Directory of the dataset, new or empty.
-        sweep_directory: Where a relative `sweep.file` is looked for.
-        processes: As `draw_plan` takes it.
-        say: As `draw_plan` takes it.
-        update_plan: Is called often with how many trials have been checked; see `UpdatePlan`.
+    The directory has to be new or empty. A relative `sweep.file` is looked for in `sweep_directory`. `update_plan` is
+    called often with how many trials have been checked (see `UpdatePlan`); the rest is as for `draw_plan`.
 
     Raises:
         ConfigError: If the sweep or the directory cannot be used; nothing stays on the disk then.

@@ -28,7 +28,6 @@ class ReplayCheck:
         begun: Whether `begin` has been called.
 
     Args:
-        directory: Directory of the dataset.
         count: How many trials are simulated again.
         seed: Root seed of the collection, by which they are chosen.
     """
@@ -41,10 +40,7 @@ class ReplayCheck:
         self._early: _Process | None = None
 
     def begin(self, trials: Sequence[int]) -> None:
-        """Begin with the trials that are chosen if all of these get an episode.
-
-        Args:
-            trials: Numbers of all trials of the plan that are to run.
+        """Begin with the trials that are chosen if all of these, which the plan has to run, get an episode.
 
         Raises:
             OSError: If no process can be started.
@@ -56,9 +52,7 @@ class ReplayCheck:
     def compare(self, digests: Mapping[int, str], *, meanwhile: Callable[[], None]) -> str | None:
         """Compare some of the episodes, and return a sentence on that; None if there was nothing to compare.
 
-        Args:
-            digests: Digest of each episode, by trial.
-            meanwhile: Called again and again while a process works.
+        `digests` has the digest of each episode, by trial; `meanwhile` is called again and again while a process works.
 
         Raises:
             DatasetError: If an episode came out otherwise.
@@ -100,7 +94,6 @@ class _Process:
     """A process that simulates trials and prints their digests.
 
     Attributes:
-        trials: The trials.
         digests: Those that it has printed, by trial; empty until `end`.
         errors: Text of its standard error; empty until `end`.
         exit_code: Its exit code; None until `end`.

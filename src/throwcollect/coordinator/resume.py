@@ -180,8 +180,7 @@ def _read_stored_config(directory: Path) -> Config | None:
     try:
         path = config_path(directory)
         config = load(path)
-        # The text is compared as a whole: a file that a power cut has shortened may still be valid, with defaults for
-        # what is gone.
+        # The whole text is compared: one that a power cut has shortened may be valid, with defaults for what is gone.
         # A finished dataset of an earlier version has fewer keys, and counts as complete if its manifest says so.
         complete = path.read_text(encoding="utf-8") == dump_yaml(config) or is_as_written(directory, CONFIG)
     except (ConfigError, DatasetError, OSError):
@@ -258,8 +257,7 @@ def _extend(directory: Path, old: Plan | None, new: Plan) -> Plan:
             expected=f"{len(old.trials)}, as {directory} was begun with",
             hint="sobol and uniform go on where they ended; or merge datasets: throwcollect dataset merge",
         )
-    # A plan that grows is drawn anew up to its first rounds only. What was added by results cannot be drawn again and
-    # is kept.
+    # A plan that grows is drawn anew up to its first rounds only. What results have added is kept.
     if count < len(old.trials):
         trials = new.trials[:]
         trials.extend(old.trials[count:])

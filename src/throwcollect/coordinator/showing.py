@@ -13,11 +13,7 @@ _PERIOD_S = 1.0
 
 
 class Showing:
-    """Publishes the newest episode of one simulation after the other, each on the topic of its simulation.
-
-    Args:
-        node: The coordinator.
-    """
+    """Publishes the newest episode of one simulation after the other, each on the topic of its simulation."""
 
     def __init__(self, node: Node) -> None:
         self._node = node
@@ -27,11 +23,9 @@ class Showing:
         node.create_timer(_PERIOD_S, self._show)
 
     def offer(self, simulation: str, message: bytes) -> None:
-        """Take in an episode, to be shown when it is its simulation's turn, unless there is a newer one by then.
+        """Take in the serialised message of an episode, to be shown at its simulation's turn unless a newer one comes.
 
-        Args:
-            simulation: Name of its node.
-            message: Serialised message of the episode.
+        The simulation is given by the name of its node.
         """
         if simulation not in self._publishers:
             # The publisher is made before anybody watches, because onlookers find the topic by it.

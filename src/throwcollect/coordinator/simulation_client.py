@@ -80,10 +80,7 @@ class SimulationClient:
         return self._parameters.service_is_ready()
 
     def ask(self, trials: Sequence[int]) -> bool:
-        """Ask for trials instead of those that were asked for before; one that runs goes on if it is among them.
-
-        Args:
-            trials: All trials that it shall do, in their order.
+        """Ask for these trials, in their order, instead of those before; one that runs goes on if it is among them.
 
         Returns:
             Whether that is another request than the last one.

@@ -20,41 +20,29 @@ if TYPE_CHECKING:
     from throwcollect.runs.records import Run as Run
     from throwcollect.runs.selection import find as find
 else:
+    _PLACES = {
+        "Look": "following",
+        "Onlooker": "onlooker",
+        "PreparedRun": "prepared_run",
+        "Run": "records",
+        "Summary": "record",
+        "down": "control",
+        "find": "selection",
+        "follow": "following",
+        "prepare": "preparation",
+        "resume": "preparation",
+        "scale": "control",
+        "stop": "control",
+        "wait": "following",
+    }
+    __all__ = list(_PLACES)
 
     def __getattr__(name: str) -> object:
         from importlib import import_module
 
-        modules = {
-            "control": ("down", "scale", "stop"),
-            "following": ("Look", "follow", "wait"),
-            "onlooker": ("Onlooker",),
-            "preparation": ("prepare", "resume"),
-            "prepared_run": ("PreparedRun",),
-            "record": ("Summary",),
-            "records": ("Run",),
-            "selection": ("find",),
-        }
-        for module, names in modules.items():
-            if name in names:
-                return getattr(import_module(f"throwcollect.runs.{module}"), name)
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        if name not in _PLACES:
+            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        return getattr(import_module(f"{__name__}.{_PLACES[name]}"), name)
 
     def __dir__() -> list[str]:
         return sorted({*globals(), *__all__})
-
-
-__all__ = [
-    "Look",
-    "Onlooker",
-    "PreparedRun",
-    "Run",
-    "Summary",
-    "down",
-    "find",
-    "follow",
-    "prepare",
-    "resume",
-    "scale",
-    "stop",
-    "wait",
-]

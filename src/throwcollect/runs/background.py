@@ -49,14 +49,7 @@ _WRITE_PLANNING_S = 1.0
 
 @dataclass(frozen=True)
 class Order:
-    """The order that `begin_run` sends to the new process.
-
-    Attributes:
-        config: Absolute path of the configuration's file.
-        overrides: Keys to change: ``key=value`` pairs, as ``--set`` takes them.
-        output: Absolute path of the dataset's directory; a session does not use it.
-        resumed: Whether the directory holds a dataset with which the run goes on.
-    """
+    """What `begin_run` sends to the new process: its arguments, with absolute paths."""
 
     config: Path
     overrides: tuple[str, ...]
@@ -110,11 +103,7 @@ def begin_run(
 def begin_container(order: ContainerOrder, *, run: str, origin: Origin, urdf: Path | None) -> Run:
     """Begin a run that is a container of the catalogue, in a process of its own, as `begin_run` does.
 
-    Args:
-        order: The order for the container.
-        run: Id of the run.
-        origin: The request of the client.
-        urdf: File with a description of the robot for viewers; None if the component has none.
+    `urdf` is a file with a description of the robot for viewers; None if the component has none.
 
     Raises:
         ConflictError: If there is a run of that id, or the run that the container is to join has ended.
@@ -183,8 +172,7 @@ def _begin(opened: OpenRun, record: Record, order: bytes, lay_out: Callable[[], 
         if isinstance(error, OSError):
             raise WorkerError(f"run {opened.run} cannot be begun: {error}") from error
         raise
-    # The new process has inherited the lock. If this one kept it, too, the run would seem to live after its launcher
-    # died.
+    # The launcher has inherited the lock. If this process kept it, too, the run would seem to outlive its launcher.
     opened.close()
     return Records().get(opened.run)
 
@@ -226,17 +214,11 @@ def carry_out(run: str, lock: int, order: bytes, *, onlooker: Onlooker, interrup
         if prepared.record.run != opened.run:
             # `resume` has taken over a run whose containers outlived their launcher; that run keeps its own id.
             opened.forget()
-        prepared.launch(interruptions=interruptions)
+        prepared.collect(interruptions=interruptions)
 
 
 class _Planner(Onlooker):
-    """Writes into the record how far the plan is, gives it up if somebody asks to stop, and passes all else on.
-
-    Args:
-        run: The run, with a record.
-        onlooker: To whom all else is passed on.
-        interruptions: How often somebody has asked to stop.
-    """
+    """Writes into the record how far the plan is, gives it up if somebody asks to stop, and passes all else on."""
 
     def __init__(self, run: OpenRun, onlooker: Onlooker, interruptions: Callable[[], int]) -> None:
         self._onlooker = onlooker

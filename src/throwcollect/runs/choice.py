@@ -46,13 +46,9 @@ def choose(
 ) -> Choice:
     """Choose the runtime that a configuration asks for, and make sure that it can be used.
 
-    With ``auto``, that is containers where there is an engine for them. rclpy is used where it is installed.
-
-    Args:
-        config: The configuration.
-        say: Is told in one line what was chosen, and before that what is done to get it.
-        warn: Is told in one line of what may be wrong, such as an image that was made from other sources.
-        begun: The runtime that `begin` returned.
+    With ``auto``, that is containers where there is an engine for them. rclpy is used where it is installed. `say` is
+    told what is chosen, and before that what is done to get it; `warn` of what may be wrong, such as an image that was
+    made from other sources. `begun` is what `begin` returned.
 
     Raises:
         ConfigError: If rclpy is asked for, and is not there, or there is no such runtime.

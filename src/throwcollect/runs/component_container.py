@@ -30,13 +30,7 @@ _ANSWER_S = 5.0
 
 @dataclass(frozen=True)
 class ContainerOrder:
-    """The order for a container.
-
-    Attributes:
-        component: Name of the component.
-        spec: The container, as the catalogue describes it.
-        joins: Id of the run that the container joins; None if it joins none.
-    """
+    """The order for a container of a component, as the catalogue describes it; `joins` is a run that it joins."""
 
     component: str
     spec: ContainerSpec
@@ -83,8 +77,7 @@ def launch_container(
         from throwcollect.runtimes.docker.component import ComponentContainer
 
         way = None if order.joins is None else _wait_for_way(order.joins, order.spec, interruptions)
-        goes_on = lambda: order.joins is not None and _goes_on(order.joins)  # noqa: E731
-        return ComponentContainer(place, order.component, order.spec, way, goes_on=goes_on, warn=onlooker.warn)
+        return ComponentContainer(place, order.component, order.spec, way, goes_on=_goes_on, warn=onlooker.warn)
 
     launch_host(run, host, onlooker=onlooker, interruptions=interruptions)
 

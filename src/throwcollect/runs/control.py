@@ -5,8 +5,8 @@ from __future__ import annotations
 import os
 import signal
 import time
-from collections.abc import Callable, Sequence
-from contextlib import ExitStack, suppress
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager, suppress
 from typing import TYPE_CHECKING
 
 from throwcollect.errors import ConfigError, ThrowcollectError, WorkerError
@@ -20,6 +20,8 @@ from throwcollect.runtimes.registry import get_runtime
 from throwcollect.wording import command
 
 if TYPE_CHECKING:
+    from throwcollect.ros import Executor, Node
+    from throwcollect.ros.connection import Connection
     from throwcollect.ros.msg import SetParametersResult
 
 _POLL_S = 0.05
@@ -55,10 +57,9 @@ def stop(run: Run, *, keep_on: Callable[[], bool] = lambda: True) -> Run:
 def down(named: str | Run | None, *, volumes: bool = False) -> tuple[str, list[str]]:
     """End all nodes of a run, by force if need be, and forget the run; a dataset in a directory stays.
 
-    Args:
-        named: A run, or a name as for `to_change`, or the id of a run that has no record, but of which a runtime holds
-            containers. None takes the only run of the current directory that lives, or whose launcher died.
-        volumes: Whether a volume that holds the dataset is removed, too.
+    It is named as for `to_change`, or by the id of a run that has no record, but of which a runtime holds containers.
+    None takes the only run of the current directory that lives, or whose launcher died. A volume that holds the dataset
+    is removed only if `volumes` is true.
 
     Returns:
         Id of the run, and names of the containers, networks and volumes that were removed.
@@ -124,19 +125,11 @@ def set_parameter(run: Run, nodes: Sequence[str], name: str, value: float | str)
     connection = run.connection
     if connection is None or not answers(connection.endpoint, patience_s=_ANSWER_S):
         raise _silent(run, nodes[0])
-    connection.middleware.joining.settle()
-    from throwcollect import ros
-    from throwcollect.ros.srv import SetParameters
+    with join_for_a_moment(connection) as (asking, executor):
+        from throwcollect.ros import Parameter
+        from throwcollect.ros.srv import SetParameters
 
-    context = ros.Context()
-    ros.init(context=context, connection=connection)
-    with ExitStack() as undo:
-        undo.callback(ros.shutdown, context=context)
-        asking = ros.Node(make_own_name(), context=context)
-        undo.callback(asking.destroy_node)
-        executor = ros.SingleThreadedExecutor(context=context)
-        executor.add_node(asking)
-        request = SetParameters.Request(parameters=[ros.Parameter(name, value=value).to_parameter_msg()])
+        request = SetParameters.Request(parameters=[Parameter(name, value=value).to_parameter_msg()])
         futures = []
         for node in nodes:
             client = asking.create_client(SetParameters, f"{node}/set_parameters")
@@ -150,6 +143,23 @@ def set_parameter(run: Run, nodes: Sequence[str], name: str, value: float | str)
             if not future.done():
                 raise _silent(run, node)
         return [future.result().results[0] for future in futures]
+
+
+@contextmanager
+def join_for_a_moment(connection: Connection) -> Iterator[tuple[Node, Executor]]:
+    """Join the ROS graph of a run, on its middleware, with a hidden node and the executor that it spins in."""
+    connection.middleware.joining.settle()
+    from throwcollect import ros
+
+    context = ros.Context()
+    ros.init(context=context, connection=connection)
+    with ExitStack() as undo:
+        undo.callback(ros.shutdown, context=context)
+        node = ros.Node(make_own_name(), context=context)
+        undo.callback(node.destroy_node)
+        executor = ros.SingleThreadedExecutor(context=context)
+        executor.add_node(node)
+        yield node, executor
 
 
 def _silent(run: Run, node: str) -> WorkerError:

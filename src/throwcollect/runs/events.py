@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from datetime import datetime, timezone
 from pathlib import Path
@@ -26,9 +26,7 @@ class Event:
 
     Attributes:
         time: Time of the event, in the form of RFC 3339.
-        run: Id of the run.
         event: Kind of the event: a `RunEvent`, or a `NodeEvent` if there is a node.
-        node: Name of the node.
         handle: Process or container id of a node that was started.
         reason: Why a node or the run ended, in words.
         simulations: Number of simulations that the run is to have from now on.
@@ -78,7 +76,7 @@ class EventLog:
         Raises:
             OSError: If the file cannot be written.
         """
-        self._append([Event(_now(), self._run, event, None, None, reason, simulations, exit_code)])
+        self._append([Event(_now(), self._run, event, reason=reason, simulations=simulations, exit_code=exit_code)])
 
     def node_events(self, before: Sequence[NodeState], after: Sequence[NodeState]) -> None:
         """Append an event for each difference between two lists of states of the nodes.
@@ -87,10 +85,12 @@ class EventLog:
             OSError: If the file cannot be written.
         """
         now = _now()
-        self._append(
-            Event(now, self._run, event, state.name, handle, reason)
-            for state, event, handle, reason in _changes(before, after)
-        )
+        known = {state.name: state for state in before}
+        happened = [
+            (state.name, *change) for state in after for change in _find_changes(known.pop(state.name, None), state)
+        ]
+        happened += [(name, "removed", None, None) for name in known]
+        self._append(Event(now, self._run, event, name, handle, reason) for name, event, handle, reason in happened)
 
     def _append(self, events: Iterable[Event]) -> None:
         lines = [
@@ -109,33 +109,20 @@ def parse(line: str) -> Event | None:
         return None
 
 
-_Change = tuple[NodeState, NodeEvent, str | None, str | None]
-
-
-def _changes(before: Sequence[NodeState], after: Sequence[NodeState]) -> list[_Change]:
-    """Compare two lists of states: node, event, handle and reason of each change."""
-    known = {state.name: state for state in before}
-    changes: list[_Change] = []
-    for state in after:
-        changes += _node_changes(known.pop(state.name, None), state)
-    return changes + [(state, "removed", None, None) for state in known.values()]
-
-
-def _node_changes(old: NodeState | None, new: NodeState) -> list[_Change]:
+def _find_changes(old: NodeState | None, new: NodeState) -> Iterator[tuple[NodeEvent, str | None, str | None]]:
+    """Compare two states of a node: event, handle and reason of each change."""
     old = old or NodeState(new.name, "starting", 0, None, None)
-    changes: list[_Change] = []
     # A node may have ended and started again between two looks, so ends are seen by the number of restarts.
     if new.restarts > old.restarts or (new.status == "lost" and old.status != "lost"):
-        changes.append((new, "lost", None, new.last_end))
-        changes.append((new, "given up" if new.status == "lost" else "restarting", None, None))
+        yield "lost", None, new.last_end
+        yield "given up" if new.status == "lost" else "restarting", None, None
     if new.handle is not None and new.handle != old.handle:
-        changes.append((new, "started", new.handle, None))
+        yield "started", new.handle, None
     if new.status == "frozen" and old.status != "frozen":
-        changes.append((new, "frozen", None, None))
+        yield "frozen", None, None
     # Router and coordinator count as running as soon as they have a handle, so that they have no event `ready`.
     if new.status == "running" and new.handle == old.handle and old.status in ("starting", "frozen"):
-        changes.append((new, "ready" if old.status == "starting" else "continued", None, None))
-    return changes
+        yield "ready" if old.status == "starting" else "continued", None, None
 
 
 def _now() -> str:

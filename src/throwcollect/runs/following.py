@@ -21,10 +21,9 @@ _READ_S = 0.2
 
 @dataclass(frozen=True)
 class Look:
-    """One look at a run.
+    """One look at a run, as it was at that moment.
 
     Attributes:
-        run: The run, as it was at that moment.
         progress: The latest report of the coordinator since the last look; None if there was none.
         events: Events since the last look.
     """
@@ -48,7 +47,7 @@ def follow(run: Run, *, keep_on: Callable[[], bool] = lambda: True) -> Iterator[
     run.record.middleware.joining.settle()
     from throwcollect.runtimes.run_listener import RunListener
 
-    events = Tail(Path(run.record.logs) / EVENTS)
+    events = Tail(_events_of(run))
     events.skip()
     reports: list[Progress] = []
     with RunListener(reports.append) as listener:
@@ -58,7 +57,7 @@ def follow(run: Run, *, keep_on: Callable[[], bool] = lambda: True) -> Iterator[
             listener.spin(run.connection, _POLL_S)
             # The launcher writes an event before the record, so after the last record all events are there.
             run = run.now()
-            happened = tuple(event for line in events.lines() if (event := parse(line)))
+            happened = tuple(event for event, _ in _new_events(events, run))
             yield Look(run, reports[-1] if reports else None, happened)
 
 
@@ -86,13 +85,9 @@ def wait(run: Run) -> Summary:
 def read_logs(
     run: Run, nodes: Collection[str], *, follow: bool, keep_on: Callable[[], bool] = lambda: True
 ) -> Iterator[tuple[str, str, int]]:
-    """Read the logs of nodes of a run.
+    """Read the logs of these nodes of a run; of all nodes if none is named.
 
-    Args:
-        run: The run.
-        nodes: Names of the nodes; empty takes all.
-        follow: Whether to go on with new lines until the run ends, or `keep_on` refuses to.
-        keep_on: Whether somebody still wants new lines.
+    With `follow`, it goes on with new lines until the run ends, or `keep_on` refuses to.
 
     Yields:
         The name of a node, a line that it printed, and the length of the longest name so far.
@@ -100,19 +95,20 @@ def read_logs(
     Raises:
         ConfigError: If there is no such node, or the record vanishes.
     """
-    logs = NodeLogs(Path(run.record.logs))
-    files = logs.files()
+    files = NodeLogs(Path(run.record.logs)).files()
     known = {*files, *(state.name for state in run.record.nodes)}
     if unknown := [node for node in nodes if node not in known]:
         message = f"run {run.id}: no node {unknown[0]!r} has printed anything"
         raise ConfigError(message, expected=", ".join(files) or None)
     tails: dict[str, Tail] = {}
-    for last in _looks(run, follow=follow, keep_on=keep_on):
-        files = logs.files()
+    for now, last in _looks(run, follow=follow, keep_on=keep_on):
+        files = NodeLogs(Path(now.record.logs)).files()
         width = max(map(len, files), default=0)
         for name, path in files.items():
             if not nodes or name in nodes:
-                for line in tails.setdefault(name, Tail(path)).lines(torn=last):
+                tail = tails.setdefault(name, Tail(path))
+                tail.path = path
+                for line in tail.lines(torn=last):
                     yield name, line, width
 
 
@@ -125,17 +121,33 @@ def read_events(run: Run, *, keep_on: Callable[[], bool] = lambda: True) -> Iter
     Raises:
         ConfigError: If the record vanishes.
     """
-    tail = Tail(Path(run.record.logs) / EVENTS)
-    for _ in _looks(run, follow=True, keep_on=keep_on):
-        for line in tail.lines():
-            if (event := parse(line)) is not None:
-                yield event, line
+    tail = Tail(_events_of(run))
+    for now, _ in _looks(run, follow=True, keep_on=keep_on):
+        yield from _new_events(tail, now)
 
 
-def _looks(run: Run, *, follow: bool, keep_on: Callable[[], bool]) -> Iterator[bool]:
-    """Yield False several times a second while a run lives (if it is to be followed), and True once at the end."""
-    while follow and keep_on() and run.now().status == "running":
-        yield False
+def _new_events(tail: Tail, run: Run) -> Iterator[tuple[Event, str]]:
+    """The events of a run that were written since the last call, and the line of each."""
+    # Events and logs of a run that is begun in the background have another place once its plan is made.
+    tail.path = _events_of(run)
+    for line in tail.lines():
+        # Where a dataset is resumed, the file has the events of earlier runs, too.
+        if (event := parse(line)) is not None and event.run == run.id:
+            yield event, line
+
+
+def _events_of(run: Run) -> Path:
+    return Path(run.record.logs) / EVENTS
+
+
+def _looks(run: Run, *, follow: bool, keep_on: Callable[[], bool]) -> Iterator[tuple[Run, bool]]:
+    """Look at a run several times a second while it lives (if it is to be followed), and once at the end.
+
+    Yields:
+        The run as it is now, and whether this is the last look.
+    """
+    while follow and keep_on() and (run := run.now()).status == "running":
+        yield run, False
         time.sleep(_READ_S)
     # The logs are read once more after the end, because nodes may have printed since the last look.
-    yield True
+    yield run, True

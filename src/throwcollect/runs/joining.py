@@ -15,13 +15,13 @@ from throwcollect.files import write_file
 from throwcollect.ros.connection import Connection
 from throwcollect.ros.endpoint import answers
 from throwcollect.ros.middleware import Middleware
-from throwcollect.ros.names import make_own_name
 from throwcollect.run_key import RunKey
+from throwcollect.runs.control import join_for_a_moment
 from throwcollect.runs.onlooker import SILENT, Onlooker
 from throwcollect.runs.own_directory import make_own_directory
 from throwcollect.runs.token import JoinToken
 from throwcollect.runtimes.local import LocalNodes
-from throwcollect.runtimes.nodes import LAUNCHER, NodeSpec, Role, simulation_name_of
+from throwcollect.runtimes.nodes import LAUNCHER, simulation_name_of, simulation_nodes
 from throwcollect.runtimes.runtime import Place
 from throwcollect.runtimes.supervisor import Supervisor
 from throwcollect.wording import format_count
@@ -42,13 +42,9 @@ def join_run(
     onlooker: Onlooker = SILENT,
     interruptions: Callable[[], int] = lambda: 0,
 ) -> None:
-    """Simulate trials of a run that another machine has begun, until the run is over.
+    """Simulate trials of a run that another machine has begun, and of which `word` is the token, until it is over.
 
-    Args:
-        word: The token of the run.
-        simulations: Number of simulations that are started here.
-        onlooker: Is told what goes on.
-        interruptions: How often somebody has asked to stop; other simulations then do the running trials again.
+    If somebody asks to stop, as `interruptions` counts, other simulations do the running trials again.
 
     Raises:
         ConfigError: If the word is no token, or this machine would compute other throws.
@@ -80,17 +76,7 @@ def _simulate(
     reports = _Reports(onlooker)
     # Names of nodes have to be unique, and several processes of one machine may join.
     name = simulation_name_of(f"{socket.gethostname()}_{os.getpid()}")
-    cores = sorted(os.sched_getaffinity(0))
-    bound = host.place.simulations >= len(cores)
-    roster = [
-        NodeSpec(
-            f"{name}_{index}",
-            ("sim", f"{host.data}/config.yaml", "--name", f"{name}_{index}"),
-            Role.EXPENDABLE,
-            core=cores[index % len(cores)] if bound else None,
-        )
-        for index in range(host.place.simulations)
-    ]
+    roster = simulation_nodes([f"{name}_{index}" for index in range(host.place.simulations)], host.data)
     with Supervisor(host, config.run, roster) as supervisor, RunListener(reports.update) as listener:
         supervisor.start()
         while not reports.over and not interruptions():
@@ -136,17 +122,10 @@ def _read_configuration(connection: Connection, token: JoinToken) -> str:
             f"run {token.run}: no router answers at {connection.endpoint}",
             hint="is the run over, or does a firewall keep its port closed?",
         )
-    connection.middleware.joining.settle()
-    from throwcollect import ros
-    from throwcollect.ros.srv import GetParameters
-    from throwcollect.runtimes.node_collection import CONFIGURATION
+    with join_for_a_moment(connection) as (node, executor):
+        from throwcollect.ros.srv import GetParameters
+        from throwcollect.runtimes.node_collection import CONFIGURATION
 
-    context = ros.Context()
-    ros.init(context=context, connection=connection)
-    try:
-        node = ros.Node(make_own_name(), context=context)
-        executor = ros.SingleThreadedExecutor(context=context)
-        executor.add_node(node)
         client = node.create_client(GetParameters, f"/{LAUNCHER}/get_parameters")
         if not client.wait_for_service(_ANSWER_S):
             raise WorkerError(f"run {token.run}: its launcher is not to be found at {connection.endpoint}")
@@ -157,5 +136,3 @@ def _read_configuration(connection: Connection, token: JoinToken) -> str:
             raise WorkerError(f"run {token.run}: its launcher does not answer at {connection.endpoint}")
         text: str = future.result().values[0].string_value
         return text
-    finally:
-        ros.shutdown(context=context)

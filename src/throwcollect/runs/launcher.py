@@ -41,14 +41,9 @@ def launch(
 ) -> Summary | None:
     """Launch a prepared run until its last trial has ended, or go on with a run whose launcher died.
 
-    A run that collects no dataset goes on until the user stops it.
-
-    Args:
-        run: The run, with a record; this function writes the end of the run there, and closes it.
-        config: Configuration of the run.
-        onlooker: Is told what goes on.
-        interruptions: How often the user has asked to stop: the first time, running trials are still finished.
-        runtime: The runtime, if it has begun something for the run, which this function closes; else None.
+    A run that collects no dataset goes on until the user stops it. The end of the run is written into its record, and
+    the run and the runtime are closed; a runtime is given if it has begun something for the run. `interruptions` tells
+    how often the user has asked to stop: the first time, running trials are still finished.
 
     Returns:
         The summary of the dataset, whose outcomes tell whether trials are lost; None if the run collects none.
@@ -79,13 +74,7 @@ def launch_host(
 ) -> Summary | None:
     """Let the host of a run do its work, and write the events and the end of the run; the rest is as for `launch`.
 
-    Args:
-        run: The run, with a record.
-        make_host: Makes the host.
-        onlooker: Is told what goes on.
-        interruptions: How often the user has asked to stop.
-        is_open: Whether anybody can join the run.
-        end: Is called after the host is closed; None calls nothing.
+    With `is_open`, anybody can join the run. `end` is called when the host is closed.
 
     Raises:
         ThrowcollectError: As `launch`.
@@ -169,17 +158,18 @@ class _Session:
         elif code == Interrupted.exit_code:
             event = "stopped"
         self.event(event, reason=failure and str(failure.error(code)), exit_code=code)
-        changes = {
-            "nodes": (),
-            "endpoint": None,
-            "progress": self._progress or self._run.record.progress,
-            "ended": datetime.now(timezone.utc),
-            "exit_code": code,
-            "failure": failure,
-            "summary": summary,
-            "left": left,
-        }
-        self._write(lambda: self._run.update(**changes))
+        self._write(
+            lambda: self._run.update(
+                nodes=(),
+                endpoint=None,
+                progress=self._progress or self._run.record.progress,
+                ended=datetime.now(timezone.utc),
+                exit_code=code,
+                failure=failure,
+                summary=summary,
+                left=left,
+            )
+        )
 
     def _write(self, write: Callable[[], None]) -> None:
         try:
@@ -218,8 +208,7 @@ def start_launcher(records: Records, opened: OpenRun, *, interruptions: Callable
     except OSError as error:
         raise WorkerError(f"the launcher cannot be started: {error}") from error
     finally:
-        # The launcher has inherited the lock. If this process kept it, too, the run would seem to live after its
-        # launcher died.
+        # The launcher has inherited the lock. If this process kept it, too, the run would seem to outlive its launcher.
         opened.close()
     forwarded = 0
     while (run := records.get(opened.run)).status == "running":

@@ -39,7 +39,6 @@ class Request:
     """The run that a user or a client asks for.
 
     Attributes:
-        config: The configuration.
         sweep_directory: Directory of the configuration's file, in which lists of trials are looked for.
         directory: Directory of the dataset.
         started: Time at which it was asked for.

@@ -25,7 +25,6 @@ class PreparedRun:
     Until it is launched, nobody else can prepare a run into its directory.
 
     Attributes:
-        config: The configuration.
         directory: Directory of the dataset, as the user named it; None if the dataset is in a volume.
 
     Args:
@@ -96,20 +95,8 @@ class PreparedRun:
     def collect(self, *, interruptions: Callable[[], int] = lambda: 0) -> Summary:
         """Launch the run in this process, and return when it has ended; see `launcher.launch`.
 
-        Args:
-            interruptions: How often the user has asked to stop.
-
         Returns:
             The summary of the dataset; its outcomes tell whether trials are lost.
-
-        Raises:
-            ThrowcollectError: As `launcher.launch`.
-        """
-        # Only `background` begins runs that collect no dataset.
-        return cast(Summary, self.launch(interruptions=interruptions))
-
-    def launch(self, *, interruptions: Callable[[], int]) -> Summary | None:
-        """Do the same as `collect`, for a run of any kind: a run without a dataset has no summary.
 
         Raises:
             ThrowcollectError: As `launcher.launch`.
@@ -118,15 +105,16 @@ class PreparedRun:
 
         # From here on the launcher answers for the run and writes its end, so nothing of the run may be removed here.
         self._undo.pop_all()
-        return launch(
+        summary = launch(
             self._run, self.config, onlooker=self._onlooker, interruptions=interruptions, runtime=self._runtime
         )
+        # Only `background` begins runs without a dataset, which have no summary, and takes none.
+        return cast(Summary, summary)
 
     def start(self, *, interruptions: Callable[[], int] = lambda: 0) -> Run:
         """Launch the run in a process of its own, which outlives this one, and return when its nodes are started.
 
-        Args:
-            interruptions: How often the user has asked to stop; if so, the launcher is asked, and waited for.
+        If the user asks to stop, as `interruptions` counts, the launcher is asked, and waited for.
 
         Raises:
             WorkerError: If the launcher cannot be started.

@@ -26,11 +26,7 @@ _KINDS = (ConfigError, WorkerError, DatasetError, LossError, Interrupted)
 
 @dataclass(frozen=True)
 class Summary(Info):
-    """Summary of a run's dataset.
-
-    Attributes:
-        open: Whether anybody could join the run.
-    """
+    """Summary of a run's dataset; `open` tells whether anybody could join the run."""
 
     open: bool = False
 
@@ -76,12 +72,7 @@ class Origin:
 
 @dataclass(frozen=True)
 class Planning:
-    """How far the plan of a run is.
-
-    Attributes:
-        checked: Number of trials that have been checked.
-        trials: Number of trials that the plan will have.
-    """
+    """How far the plan of a run is: how many of its trials have been checked."""
 
     checked: int
     trials: int
@@ -92,14 +83,11 @@ class Record:
     """The record of a run; its launcher changes it, everybody else reads it.
 
     Attributes:
-        run: Id of the run.
         name: Name of the collection.
         runtime: Name of the runtime; empty until one is chosen.
         directory: Absolute path of the dataset; if the dataset is in a volume, of the files from which it was made.
         volume: Name of the volume that holds the dataset; None if a directory does.
         logs: Absolute path of the directory with the logs.
-        domain_id: ROS domain.
-        started: Time of the start.
         launcher: Process id of the launcher.
         simulations: Number of simulations that the run is to have.
         endpoint: Zenoh endpoint at which this machine reaches the router; None while there is no router.
@@ -112,7 +100,6 @@ class Record:
         summary: Summary of the dataset; None if the dataset is not finished.
         begun_in: Absolute path of the directory in which the run was begun; empty if an older version did not note it.
         middleware: The middleware that carries the messages of the nodes.
-        kind: Purpose of the run.
         origin: The request of a client; None if a command or a program began the run.
         stopping: Whether somebody has asked the run to stop; it still finishes the trials that run.
         planning: How far the plan is while a large one is made in the background; else None.

@@ -22,7 +22,7 @@ import time
 from collections.abc import Iterable
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass, field, replace
-from datetime import datetime, timezone
+from datetime import datetime, timedelta, timezone
 from pathlib import Path
 from typing import Any, Literal
 
@@ -43,7 +43,7 @@ from throwcollect.runtimes.runtime import NodeState, Place
 from throwcollect.units import NS_PER_S
 from throwcollect.wording import command
 
-_REMEMBERED_S = 7 * 24 * 3600.0
+_REMEMBERED = timedelta(days=7)
 """Records of runs that have ended are kept for this long."""
 _LOCK_PATIENCE_S = 1.0
 """`Records.take` tries for this long, because another process may hold the lock for a moment in `is_locked`."""
@@ -57,7 +57,6 @@ class Run:
         record: The record of the run, as it was when it was read.
         lives: Whether the launcher lived at that time.
         key: The key that the router asks for.
-        records: The records from which this run was read, so that `now` can read it again.
     """
 
     record: Record
@@ -111,9 +110,7 @@ class OpenRun:
     """A run that this process launches; the process holds the lock of the run until `close` or until it dies.
 
     Attributes:
-        run: Id of the run.
         directory: Directory of the key, and of the files of a run whose dataset has no directory on this machine.
-        key: The key that the router asks for.
         lock: Descriptor of the locked file, which a process that takes the run over inherits; -1 once it is closed.
     """
 
@@ -140,18 +137,6 @@ class OpenRun:
         if self._record is None:
             self._record = _read(self._runs / f"{self.run}.json")
         return self._record
-
-    def make(self) -> None:
-        """Make the directory of the run, and the key in it.
-
-        Raises:
-            ConfigError: If they cannot be written.
-        """
-        try:
-            self.directory.mkdir(mode=0o700, exist_ok=True)
-        except OSError as error:
-            raise unusable(self.directory, error) from error
-        self.key.create()
 
     def write(self, record: Record) -> None:
         """Write the record.
@@ -227,9 +212,7 @@ class Records:
     def new(self, name: str, *, run: str | None = None) -> OpenRun:
         """Make a new run, with a key but without a record yet; forget runs that ended a week ago.
 
-        Args:
-            name: Name of the collection, with which an id begins that is made here.
-            run: Id of the run; None makes a new one.
+        If no id is given, one is made that begins with `name`, that of the collection.
 
         Raises:
             ConflictError: If there is a run of that id.
@@ -246,12 +229,16 @@ class Records:
                 continue
             except OSError as error:
                 raise unusable(self._runs / f"{chosen}.lock", error) from error
-            # This waits only for `is_locked` of another process, which may have the lock of the new file for a moment.
-            fcntl.flock(lock, fcntl.LOCK_EX)
             opened = OpenRun(self._runs, chosen, lock)
             with ExitStack() as undo:
                 undo.callback(opened.forget)
-                opened.make()
+                try:
+                    # This waits only for `is_locked` of another process, which may have the new lock for a moment.
+                    fcntl.flock(lock, fcntl.LOCK_EX)
+                    opened.directory.mkdir(mode=0o700, exist_ok=True)
+                except OSError as error:
+                    raise unusable(opened.directory, error) from error
+                opened.key.create()
                 undo.pop_all()
             return opened
 
@@ -333,25 +320,29 @@ class Records:
         except OSError:
             return None
 
-    def _age_s(self, run: str) -> float:
-        """Time since the record of a run was written [s]; 0 if it is gone."""
-        changed_ns = self.read_change_ns(run)
-        return 0.0 if changed_ns is None else time.time() - changed_ns / NS_PER_S
-
     def lives(self, run: str) -> bool:
         """Whether the launcher of a run lives."""
         return is_locked(self._runs / f"{run}.lock")
 
     def _forget_old(self) -> None:
-        now = datetime.now(timezone.utc)
-        # The age of the file tells without reading which records may be old.
-        for run in self._read_all(name for name in self.ids() if self._age_s(name) >= _REMEMBERED_S):
+        before = datetime.now(timezone.utc) - _REMEMBERED
+
+        def may_be_old(run: str) -> bool:
+            """Whether a record was written long ago, which its file tells without being read."""
+            changed_ns = self.read_change_ns(run)
+            return changed_ns is not None and changed_ns / NS_PER_S <= before.timestamp()
+
+        for run in self._read_all(filter(may_be_old, self.ids())):
             record = run.record
             # As long as nodes outlive their launcher, only this record tells what they are.
             over = run.status == "ended" or (run.status == "died" and not _may_outlive(record))
-            if over and (now - (record.ended or record.started)).total_seconds() >= _REMEMBERED_S:
-                opened = self.take(record.run)
-                if opened is not None:
+            if over and (record.ended or record.started) <= before and (opened := self.take(record.run)) is not None:
+                opened.forget()
+        # Whoever is killed while the plan is made leaves a key and no record. The lock is as old as the key.
+        for lock in self._runs.glob("*.lock"):
+            with suppress(FileNotFoundError):
+                unrecorded = lock.stat().st_mtime <= before.timestamp() and not lock.with_suffix(".json").exists()
+                if unrecorded and (opened := self.take(lock.stem)) is not None:
                     opened.forget()
 
 

@@ -20,14 +20,10 @@ _MOST_LISTED = 5
 
 
 def to_change(records: Records, named: str | None, *, command: str, died: bool = False) -> Run:
-    """Find the run that a command is to change.
+    """Find the run that a command is to change, whose name without its option ``--run`` is `command`.
 
-    Args:
-        records: All runs.
-        named: Id of the run, the beginning of its id, or directory of its dataset (see `id_of`). None takes the only
-            run that lives and belongs to the current directory, because it was begun there or its dataset lies below.
-        command: The command without its option ``--run``, for a hint.
-        died: Whether None may also take a run whose launcher died.
+    The user names it as for `id_of`. None takes the only run that lives, or with `died` whose launcher died, and that
+    belongs to the current directory, because it was begun there or its dataset lies below.
 
     Raises:
         ConfigError: If there is no such run, or more than one, or the only one belongs to another directory.
@@ -57,13 +53,10 @@ def find(named: str | os.PathLike[str]) -> Run:
 
 
 def to_watch(records: Records, named: str | None, *, say: Callable[[str], object]) -> Run:
-    """Find the run that a command is to look at.
+    """Find the run that a command is to look at, and `say` which it is if it belongs to another directory.
 
-    Args:
-        records: All runs.
-        named: As for `to_change`. None takes the only run that lives, or else the latest run, of the current directory;
-            if no run belongs to that, of any directory.
-        say: Is told which run was found if it belongs to another directory.
+    The user names it as for `id_of`. None takes the only run that lives, or else the latest run, of the current
+    directory; if no run belongs to that, of any directory.
 
     Raises:
         ConfigError: If there is no such run, or more than one.
@@ -84,10 +77,8 @@ def _only(living: Sequence[Run], runs: Sequence[Run]) -> Run:
     if len(living) == 1:
         return living[0]
     if living:
-        raise ConfigError(
-            f"{len(living)} runs live", expected=_list(_latest_first(living)), hint="name one of them with --run"
-        )
-    over = f"; of those that are over, there is {_list(_latest_first(runs))}" if runs else ""
+        raise ConfigError(f"{len(living)} runs live", expected=_list(living), hint="name one of them with --run")
+    over = f"; of those that are over, there is {_list(runs)}" if runs else ""
     raise ConfigError(f"no run lives{over}", hint="throwcollect up -d starts one" if not runs else "name it with --run")
 
 
@@ -123,7 +114,7 @@ def id_of(records: Records, named: str) -> str:
         return matches[0]
     if matches:
         return _find_only_living(records, matches, named)
-    known = _list(_latest_first(records.all()))
+    known = _list(records.all())
     hint = "throwcollect ps -a lists all" if known else None
     raise NotFoundError(f"no run {named!r}", expected=f"one of {known}" if known else None, hint=hint)
 
@@ -148,13 +139,10 @@ def _find_only_living(records: Records, ids: Sequence[str], named: str) -> str:
     raise ConfigError(f"{len(ids)} runs begin with {named!r}", expected="\n".join(["one of", *lines]))
 
 
-def _latest_first(runs: Sequence[Run]) -> list[str]:
-    return [run.id for run in reversed(runs)]
-
-
-def _list(ids: Sequence[str]) -> str:
-    more = len(ids) - _MOST_LISTED
-    return ", ".join(ids[:_MOST_LISTED]) + (f" and {more} more" if more > 0 else "")
+def _list(runs: Sequence[Run]) -> str:
+    """The ids of the latest runs, of which the last is the latest, and how many there are besides."""
+    more = len(runs) - _MOST_LISTED
+    return ", ".join(run.id for run in runs[: -_MOST_LISTED - 1 : -1]) + (f" and {more} more" if more > 0 else "")
 
 
 def find_left_in(records: Records, directory: Path, *, own: str | None = None) -> Run | None:
@@ -200,17 +188,13 @@ def describe_death(run: Run) -> WorkerError:
             f"run {run.id}: its launcher died, but the dataset is complete: {run.place.dataset}", hint=hint
         )
     what = f"run {run.id}: its launcher died"
-    if _may_have_throws(run.record):
+    # No runtime is chosen before there is a plan, and no trial has run before.
+    is_planned = run.record.runtime != "" or config_path(run.place.directory).is_file()
+    if run.record.kind == "collection" and is_planned:
         what = f"{what}; finished throws are in {run.place.dataset}"
         if again := run.place.way_on:
             hint = f"{again} goes on where it ended, or with its containers if they live; {hint}"
     return WorkerError(what, evidence=f"the logs are in {run.record.logs}", hint=hint)
-
-
-def _may_have_throws(record: Record) -> bool:
-    """Whether a run collects and has got as far as its plan, before which no runtime is chosen."""
-    is_planned = record.runtime != "" or config_path(Path(record.directory)).is_file()
-    return record.kind == "collection" and is_planned
 
 
 def has_complete_dataset(run: Run) -> bool:

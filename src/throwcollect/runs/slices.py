@@ -76,8 +76,7 @@ def collect_slice(
     attempt = make_attempt(directory, slice, scratch=scratch)
     create(attempt, plan)
     take_recordings(earlier, attempt)
-    # With a scratch directory, the copies lie on the disk of one machine, and the earlier attempts are the only safe
-    # ones.
+    # The copies in a scratch directory lie on the disk of one machine, so that only the earlier attempts are safe.
     if scratch is None:
         remove_stopped(earlier)
     onlooker.say(f"slice {slice}: trials {plan.trials.first} to {plan.trials.numbers[-1]}")

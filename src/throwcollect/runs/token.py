@@ -21,11 +21,8 @@ class JoinToken:
     """The facts of a run that another machine needs to join it. It holds the key of the run, so it is a secret, too.
 
     Attributes:
-        run: Id of the run.
         endpoint: Endpoint at which other machines reach the router.
         secret: Secret of the key of the run, in hexadecimal.
-        domain_id: ROS domain.
-        engine: Name of the physics engine of the run.
         build: Digest over the code that computes the run's throws; see `throwcollect.build`.
     """
 

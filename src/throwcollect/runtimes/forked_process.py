@@ -78,8 +78,7 @@ def _start_afresh(parent: int, environment: Mapping[str, str], kept: int) -> Non
     setproctitle.getproctitle()
     os.environ.clear()
     os.environ.update(environment)
-    # Nothing may reach the terminal, and files, locks and sockets of the parent must not stay open as long as this
-    # lives.
+    # Nothing may reach the terminal, and files, locks and sockets of the parent must not stay open here.
     nowhere = os.open(os.devnull, os.O_RDWR)
     for stream in (0, 1, 2):
         os.dup2(nowhere, stream)

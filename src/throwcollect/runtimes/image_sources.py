@@ -58,8 +58,7 @@ def digest_sources(root: Path) -> str:
         inside = path.relative_to(root)
         if path.is_file() and not any(map(_LEFT_OUT.fullmatch, inside.parts)):
             content = path.read_bytes()
-            # The zero byte and the length keep two lists of files apart that have the same bytes when put behind each
-            # other.
+            # The zero byte and the length keep lists of files apart that have the same bytes in a row.
             digest.update(f"{inside.as_posix()}\0{len(content)}\0".encode() + content)
     return digest.hexdigest()
 
@@ -79,10 +78,7 @@ def are_others(sources: str | None) -> bool:
 def check_wheelhouse(root: Path, wheelhouse: Path | None, *, ros: bool) -> None:
     """Make sure that a directory of wheels holds some; None takes them from the package index.
 
-    Args:
-        root: Root of the clone.
-        wheelhouse: The directory.
-        ros: Whether the wheels of genuine ROS 2 must be there, too, some of which are in no package index.
+    With `ros`, the wheels of genuine ROS 2 must be there, too, some of which are in no package index.
 
     Raises:
         ConfigError: If it does not hold them.
@@ -123,14 +119,14 @@ def write_context(archive: IO[bytes], root: Path, wheelhouse: Path | None) -> No
 
 def find_revision(root: Path) -> str | None:
     """Commit of a clone, with ``-dirty`` if files differ from it; None if git does not tell."""
-    if not (root / ".git").exists() or not (revision := _git(root, "rev-parse", "HEAD")):
+    if not (revision := _git(root, "rev-parse", "HEAD")):
         return None
     return revision + ("-dirty" if _git(root, "status", "--porcelain", "--", "docker", *_SOURCES) else "")
 
 
 def find_address(root: Path) -> str | None:
     """Address at which others find the sources, without the name and the password that it may hold in the clone."""
-    origin = (_git(root, "remote", "get-url", "origin") if (root / ".git").exists() else None) or ""
+    origin = _git(root, "remote", "get-url", "origin") or ""
     if short := _SSH_ADDRESS.fullmatch(origin):
         return f"ssh://{short[1]}/{short[2]}"
     parts = urlsplit(origin)
@@ -140,7 +136,9 @@ def find_address(root: Path) -> str | None:
 
 
 def _git(root: Path, *arguments: str) -> str | None:
-    """Run git, and return what it prints; None if it fails."""
+    """Run git in a clone, and return what it prints; None if it fails, or the directory is only a part of a clone."""
+    if not (root / ".git").exists():
+        return None
     try:
         answer = subprocess.run(["git", "-C", root, *arguments], capture_output=True, text=True, check=True)
     except (OSError, subprocess.CalledProcessError):

@@ -99,12 +99,7 @@ class InProcess:
         return info(directory)
 
     def _simulate(self, collection: TrialCollection, simulation: Replayer, session: Session) -> None:
-        """Simulate all trials, or drain.
-
-        Raises:
-            WorkerError: If the simulation refuses every trial.
-            DatasetError: If the dataset cannot be written.
-        """
+        """Simulate all trials, or drain."""
         handle = str(os.getpid())
         states = [NodeState(name, "running", 0, handle, None) for name in (_SIMULATION, COORDINATOR)]
         collection.join(_SIMULATION, _SIMULATION)

@@ -33,7 +33,6 @@ if TYPE_CHECKING:
     from throwcollect.config.schema import Config
     from throwcollect.dataset.summary import Info
 
-
 _KILLED_S = 5.0
 """Time in which a process ends that got SIGKILL."""
 
@@ -122,8 +121,7 @@ class LocalNodes(NodeHost):
         Raises:
             WorkerError: If the process cannot be started or its log cannot be written.
         """
-        # The router binds the port by itself. Until now, the reservation has kept other processes of this machine from
-        # it.
+        # The router binds the port by itself. Until now, the reservation has kept other processes from it.
         if node.name == ROUTER and self._reserved is not None:
             self._reserved.close()
         try:

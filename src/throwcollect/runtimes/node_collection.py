@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import importlib
 import math
-import os
 import time
 from collections.abc import Callable
 
@@ -27,6 +26,7 @@ from throwcollect.runtimes.nodes import (
     NodeSpec,
     Role,
     simulation_name,
+    simulation_nodes,
 )
 from throwcollect.runtimes.run_listener import RunListener
 from throwcollect.runtimes.runtime import Session
@@ -46,35 +46,15 @@ _MEET_S = 12.0
 def roster(host: NodeHost, simulations: int) -> list[NodeSpec]:
     """List the nodes of a run: a router, simulations, and a coordinator if the run collects a dataset."""
     rest_s = SERVER_REST_S if host.place.middleware.is_fast_dds else 0.0
-    cores = sorted(os.sched_getaffinity(0))
-    # Where simulations fill all cores, letting them move between cores was measured to cost a tenth of the speed.
-    bound = simulations >= len(cores)
     return [
         NodeSpec(ROUTER, ("router", "--listen", host.listen), Role.VITAL, rest_s=rest_s),
-        *(
-            NodeSpec(
-                name := simulation_name(index),
-                ("sim", f"{host.data}/config.yaml", "--name", name),
-                Role.EXPENDABLE,
-                core=cores[index % len(cores)] if bound else None,
-            )
-            for index in range(simulations)
-        ),
+        *simulation_nodes([*map(simulation_name, range(simulations))], host.data),
         *([NodeSpec(COORDINATOR, ("coordinator", host.data), Role.MAIN)] if host.place.collects else []),
     ]
 
 
-def offer_scaling(
-    node: ros.Node, simulations: int, on_wanted: Callable[[int], None], *, most: int = MOST_SIMULATIONS
-) -> None:
-    """Declare the parameter by which any ROS 2 node may change the number of simulations.
-
-    Args:
-        node: Node of the launcher.
-        simulations: Value of the parameter.
-        on_wanted: Is called with each new value.
-        most: Largest value that can be set.
-    """
+def offer_scaling(node: ros.Node, simulations: int, on_wanted: Callable[[int], None], *, most: int) -> None:
+    """Declare the launcher's parameter by which any ROS 2 node may change the number of simulations, up to `most`."""
 
     def report(parameters: list[ros.Parameter]) -> None:
         for parameter in parameters:

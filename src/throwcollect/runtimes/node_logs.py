@@ -30,7 +30,8 @@ class NodeLogs:
 
     def skip_earlier(self) -> None:
         """Leave what is in the files by now out of `tail` and `said_ready`: nodes of an earlier run printed it."""
-        self._earlier_bytes = {name: path.stat().st_size for name, path in self.files().items() if path.is_file()}
+        for name in self.files():
+            self.skip(name)
 
     def skip(self, name: str) -> None:
         """Leave what a node has printed so far out as well: another one of the same name may come."""
@@ -70,36 +71,31 @@ class NodeLogs:
             return False
 
     def _open(self, name: str) -> TextIO:
-        """Open the log of a node behind what is left out.
-
-        Raises:
-            OSError: If it cannot be opened.
-        """
+        """Open the log of a node behind what is left out."""
         log = self.path(name).open(encoding="utf-8", errors="replace")
         log.seek(self._earlier_bytes.get(name, 0))
         return log
 
 
 class Tail:
-    """Reads a file that grows, and need not exist yet, line by line."""
+    """Reads a file that grows, and need not exist yet, line by line; it may move to another path meanwhile."""
 
     def __init__(self, path: Path) -> None:
-        self._path = path
+        self.path = path
         self._offset = 0
 
     def skip(self) -> None:
         """Skip everything that is in the file already."""
-        if self._path.exists():
-            self._offset = self._path.stat().st_size
+        if self.path.exists():
+            self._offset = self.path.stat().st_size
 
     def lines(self, *, torn: bool = False) -> Iterator[str]:
         """Read the lines that were added since the last call, without line ends.
 
-        Args:
-            torn: Whether to read a last line without a line end, too.
+        A last line without a line end is read only if `torn` is true.
         """
         try:
-            file = self._path.open("rb")
+            file = self.path.open("rb")
         except FileNotFoundError:
             return
         with file:

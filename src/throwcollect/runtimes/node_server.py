@@ -53,9 +53,7 @@ _LIBRARIES = (
 class ForkedNode:
     """A node that a `NodeServer` has forked, with the part of the interface of `subprocess.Popen` that hosts need.
 
-    Attributes:
-        pid: Process id.
-        returncode: As `subprocess.Popen.returncode`; None until `poll` or `wait` has seen the end.
+    `returncode` is None until `poll` or `wait` has seen the end.
     """
 
     def __init__(self, server: NodeServer, pid: int) -> None:
@@ -79,15 +77,14 @@ class ForkedNode:
         """Wait for the end of the node; None if it still runs after this time [s]."""
         deadline = time.monotonic() + timeout_s
         while self.poll() is None and (left := deadline - time.monotonic()) > 0:
-            self._server.await_news(left)
+            self.returncode = self._server.take_end(self.pid, patience_s=left)
         return self.returncode
 
 
 class NodeServer:
-    """Has nodes forked by a process of its own. If that process dies, its nodes die, and the next node has a new one.
+    """Has nodes forked by a process of its own, which has this environment, and so have all nodes.
 
-    Args:
-        environment: Environment variables for that process, and so for all nodes.
+    If that process dies, its nodes die, and the next node has a new one.
     """
 
     def __init__(self, environment: Mapping[str, str]) -> None:
@@ -102,9 +99,8 @@ class NodeServer:
     def begin(self, config: Config, *, fork: bool = False) -> None:
         """Start the process that forks, so that the first node waits less for imports.
 
-        Args:
-            config: Configuration of the nodes, from which the process computes once what all of them need.
-            fork: Whether the process is forked off this one, which spares it the imports that this one has done.
+        It computes once what all nodes of this configuration need. With `fork`, it is forked off this process, which
+        spares it the imports that this one has done.
         """
         with contextlib.suppress(OSError), open(os.devnull, "wb") as nowhere:
             connection = self._launch(self._fork) if fork else self._connect(nowhere)
@@ -115,13 +111,9 @@ class NodeServer:
     def start(
         self, arguments: Sequence[str], *, log: BinaryIO, core: int | None, environment: Mapping[str, str]
     ) -> ForkedNode:
-        """Start a node.
+        """Start a node, a `throwcollect` command with these arguments and these further environment variables.
 
-        Args:
-            arguments: Arguments of the `throwcollect` command.
-            log: File to which the node prints.
-            core: Processor core to which the node is bound; None for any.
-            environment: Further environment variables.
+        It prints to the log, and is bound to a processor core unless that is None.
 
         Raises:
             OSError: If the node cannot be started.
@@ -135,14 +127,13 @@ class NodeServer:
             self.close()
         return self._request(request, log)
 
-    def take_end(self, pid: int) -> int | None:
-        """How a node ended, as `subprocess.Popen.returncode` tells it, and forget the node; None while it runs."""
-        self._read(0.0)
-        return self._ends.pop(pid, None)
+    def take_end(self, pid: int, *, patience_s: float = 0.0) -> int | None:
+        """How a node ended, as `subprocess.Popen.returncode` tells it, and forget the node; None while it runs.
 
-    def await_news(self, timeout_s: float) -> None:
-        """Wait until a node ends, but no longer than this time [s]."""
-        self._read(timeout_s)
+        If no node has ended, this waits for the end of any, but no longer than `patience_s` [s].
+        """
+        self._read(patience_s)
+        return self._ends.pop(pid, None)
 
     def close(self) -> None:
         """End the process, and with it all nodes that still run, by force."""
@@ -155,11 +146,7 @@ class NodeServer:
             self._process = None
 
     def _request(self, request: bytes, log: BinaryIO) -> ForkedNode:
-        """Let the process fork a node.
-
-        Raises:
-            OSError: If it does not.
-        """
+        """Let the process fork a node."""
         socket.send_fds(self._connect(log), [request], [log.fileno()])
         pid = self._await_pid()
         self._running.add(pid)
@@ -172,13 +159,8 @@ class NodeServer:
         return self._launch(partial(self._start_program, log))
 
     def _launch(self, start: Callable[[socket.socket], subprocess.Popen[bytes] | ForkedProcess]) -> socket.socket:
-        """Start the process with one end of a new connection, and return the other end.
-
-        Raises:
-            OSError: If the process cannot be started.
-        """
-        # Sockets of this kind keep messages apart, as datagrams do, but also tell when the other side has closed its
-        # end.
+        """Start the process with one end of a new connection, and return the other end."""
+        # Sockets of this kind keep messages apart, as datagrams do, but also tell when the other end is closed.
         here, there = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         # A copy of the other end that stayed open here would hide that the process has ended.
         with there:
@@ -297,8 +279,7 @@ def serve(connection: socket.socket) -> list[str]:
 def _report_ends(connection: socket.socket) -> None:
     """Tell the launcher of all nodes that have ended."""
     with contextlib.suppress(ChildProcessError):
-        # One signal may stand for several ended processes, because the kernel keeps no second SIGCHLD while one is
-        # pending.
+        # One SIGCHLD may stand for several ended processes, because the kernel keeps no second one while it is pending.
         while (ended := os.waitpid(-1, os.WNOHANG))[0]:
             _send(connection, ended=ended[0], code=os.waitstatus_to_exitcode(ended[1]))
 

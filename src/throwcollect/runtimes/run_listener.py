@@ -60,11 +60,9 @@ class RunListener:
             self._node = None
 
     def spin(self, connection: Connection | None, seconds: float) -> None:
-        """Wait for a report, or for the router.
+        """Wait for a report, or for the router, so many seconds at most.
 
-        Args:
-            connection: The present way into the run; None while its router has no address.
-            seconds: Longest time [s].
+        The connection is the present way into the run; None while its router has no address.
 
         Raises:
             ConfigError: If the key of the run cannot be read.

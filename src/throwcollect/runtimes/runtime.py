@@ -33,7 +33,6 @@ class NodeState:
     """The state of one node.
 
     Attributes:
-        name: Name of the node.
         status: ``starting`` until a simulation is ready, ``running``, ``frozen``, ``restarting`` (the node ended and
             waits for its next start), or ``lost`` for good.
         restarts: Number of times that the node was started again.
@@ -53,7 +52,6 @@ class HeldNode:
     """A node of a run, as its runtime describes it.
 
     Attributes:
-        name: Name of the node.
         status: The runtime's word for the state, such as ``running``, ``paused`` or ``exited``.
         handle: Id of the node in the runtime.
     """
@@ -68,7 +66,6 @@ class HeldRun:
     """A run of which a runtime holds something; any user of the engine may have started it.
 
     Attributes:
-        run_id: Id of the run.
         source: Absolute path of the dataset's directory, or name of the volume that holds it.
         version: Version of throwcollect that started the run.
         nodes: Nodes of the run, sorted by name.
@@ -90,7 +87,6 @@ class Place:
         volume: Name of the volume that holds the dataset; None if a directory does.
         logs: Directory of the logs.
         simulations: Number of simulations at the start.
-        middleware: The middleware that carries the messages of the nodes.
         key: The key that the router asks for.
         collects: Whether the run collects a dataset; if not, its simulations serve clients until it is stopped.
     """
@@ -117,12 +113,9 @@ class Place:
 
 @dataclass(frozen=True)
 class Check:
-    """One finding of `doctor` about the machine.
+    """One finding of `doctor` about the machine, and what follows from it.
 
-    Attributes:
-        name: Name of the check.
-        status: `ok`, `note` (collections run, with a restriction), or `problem` (they do not).
-        finding: The finding, and what follows from it.
+    The status is `ok`, `note` (collections run, with a restriction), or `problem` (they do not).
     """
 
     name: str
@@ -223,13 +216,9 @@ class Runtime(ABC):
     def prepare(
         self, config: Config, middleware: Middleware, *, say: Callable[[str], None], warn: Callable[[str], None]
     ) -> Middleware:
-        """Make sure that this machine can do a run, even if that takes minutes.
+        """Make sure that this machine can do a run, even if that takes minutes; this process can join the middleware.
 
-        Args:
-            config: The configuration of the run.
-            middleware: The middleware that this process can join.
-            say: Is told in one line before anything that takes long.
-            warn: Is told in one line of what may be wrong.
+        `say` is told in one line before anything that takes long, and `warn` of what may be wrong.
 
         Returns:
             The middleware that will carry the messages of the nodes.
@@ -266,11 +255,7 @@ class Runtime(ABC):
         return False
 
     def remove(self, run: str, *, volumes: bool) -> list[str]:
-        """Remove whatever the runtime holds of a run.
-
-        Args:
-            run: Id of the run.
-            volumes: Whether a volume that holds the dataset is removed, too.
+        """Remove whatever the runtime holds of a run; a volume with its dataset only if `volumes` is true.
 
         Returns:
             Names of the containers, networks and volumes that were removed.

@@ -98,8 +98,7 @@ class Supervisor:
         """
         end = None
         news = self._end_frozen()
-        # Readiness is asked before ends are taken, because a simulation that was ready once may be started again more
-        # often.
+        # This comes before ends are taken, because a simulation that was ready once may be started again more often.
         self._ready |= {name for name in self._expendables if name not in self._ready and self.host.ready(name)}
         for node in self.host.exits():
             if node.name not in self._roster:
@@ -128,20 +127,13 @@ class Supervisor:
         return [self._state(name) for name in self._roster]
 
     def replace(self, hung: Iterable[str]) -> None:
-        """Kill nodes that do not answer any more, so that they are started again.
-
-        Args:
-            hung: Names of all nodes that hang now; a node that was named in the last call is not killed once more.
-        """
+        """Kill the nodes that hang now, so that they are started again, unless the last call has done that already."""
         known, self._hung = self._hung, frozenset(hung)
         for name in self._hung - known:
             self.host.signal(name, signal.SIGKILL)
 
     def drain(self, *, hurry: Callable[[], bool] = lambda: False) -> NodeExit | None:
-        """Let the main node finish the running trials and close its files.
-
-        Args:
-            hurry: Is asked again and again whether to end at once.
+        """Let the main node finish the running trials and close its files, unless `hurry` says that it has to end now.
 
         Returns:
             How the main node ended; None if it had to be ended by force, or was about to be started again.
@@ -214,10 +206,10 @@ class Supervisor:
         return True
 
     def _check_hope(self) -> None:
-        """Raise an error if the run cannot go on: see `poll`.
+        """See that the run can go on.
 
         Raises:
-            WorkerError: If so.
+            WorkerError: If it cannot: see `poll`.
         """
         hint = "throwcollect logs shows what the nodes said"
         names = self._expendables

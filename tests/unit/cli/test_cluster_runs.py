@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
 from throwcollect.cli import cluster_runs
+from throwcollect.cluster import slurm
 from throwcollect.cluster.following import Look
 from throwcollect.cluster.slurm import Task
+from throwcollect.errors import ConfigError
 
 RUN: Any = SimpleNamespace()
 
@@ -43,10 +46,28 @@ def test_events_are_documents_where_json_is_asked_for(capsys: pytest.CaptureFixt
 
 def test_a_run_of_which_only_the_joining_job_was_submitted_has_its_number(monkeypatch: pytest.MonkeyPatch) -> None:
     jobs = [SimpleNamespace(array="7", join="8"), SimpleNamespace(array="", join="9")]
-    run = SimpleNamespace(submission=SimpleNamespace(jobs=jobs, tasks=3), directory="data", look=look)
-    monkeypatch.setattr(cluster_runs, "find_queued", lambda: [run])
-    (document,) = cluster_runs.documents()
-    assert document["run"] == "9"
+    run: Any = SimpleNamespace(submission=SimpleNamespace(jobs=jobs, tasks=3), directory="data")
+    assert cluster_runs.make_document(run, look())["run"] == "9"
+
+
+def test_one_that_cannot_be_read_keeps_the_others_from_no_list(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for name, text in (("damaged", "{"), ("whole", '{"name": "a", "tasks": 2, "program": [], "image": null}')):
+        (tmp_path / name / "cluster").mkdir(parents=True)
+        (tmp_path / name / "cluster" / "submission.json").write_text(text)
+    directories = [str(tmp_path / name) for name in ("damaged", "whole")]
+    monkeypatch.setattr(slurm, "find_directories", lambda: directories)
+    monkeypatch.setattr(slurm, "find_tasks", dict)
+    assert list(cluster_runs.list_queued(lambda run, _: str(run.directory))) == directories[1:]
+    assert "damaged/cluster/submission.json: does not say what was submitted" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("named", ["2", "-1", "²", "sim_0"])
+def test_a_task_that_there_is_not_is_refused(named: str) -> None:
+    run: Any = SimpleNamespace(directory="data", logs={}, submission=SimpleNamespace(tasks=2))
+    with pytest.raises(ConfigError, match=f"data: has no task '{named}'"):
+        cluster_runs.print_logs(run, [named])
 
 
 def test_one_run_on_several_nodes_is_told_without_a_number(

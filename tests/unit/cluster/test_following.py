@@ -10,6 +10,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
+from throwcollect.cluster import following
 from throwcollect.cluster.following import Look, ProgressOfSlices
 
 
@@ -26,9 +27,12 @@ def run(tmp_path: Path) -> Any:
     )
 
 
-def test_the_speed_is_that_of_the_trials_which_ended_while_one_looked(run: Any) -> None:
+def test_the_speed_is_that_of_the_trials_which_ended_while_one_looked(
+    run: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
     seconds = iter([100.0, 110.0])
-    progress = ProgressOfSlices(run, clock=lambda: next(seconds))
+    monkeypatch.setattr(following, "time", SimpleNamespace(monotonic=lambda: next(seconds)))
+    progress = ProgressOfSlices(run)
     looks = [Look(frozenset(), (), None, complete) for complete in (False, True)]
     assert [progress.at(look).throws_per_s for look in looks] == [0.0, 3.0]
 

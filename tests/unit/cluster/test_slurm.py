@@ -25,7 +25,7 @@ def test_a_task_that_is_being_warned_of_its_time_limit_still_runs(
     (tmp_path / "squeue").write_text(f"#!/bin/sh\ncat <<END\n{QUEUE}END\n")
     (tmp_path / "squeue").chmod(0o755)
     monkeypatch.setenv("PATH", f"{tmp_path}:/usr/bin:/bin")
-    tasks = slurm.find_tasks("7")
+    tasks = slurm.find_tasks()["7"]
     assert [(task.index, task.lives, task.runs) for task in tasks] == [
         (0, True, True),
         (1, False, False),

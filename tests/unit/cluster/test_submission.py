@@ -61,13 +61,13 @@ def answer(monkeypatch: pytest.MonkeyPatch, directory: Path, **programs: str) ->
 def test_the_queue_is_read_task_by_task(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     rows = ["12|0|RUNNING|n1|None", "12|1|PENDING||Priority", "12|2|FAILED|n2|NonZeroExitCode", "99|0|RUNNING|n1|None"]
     answer(monkeypatch, tmp_path, squeue="\n".join([*rows, "13|N/A|PENDING||Dependency"]))
-    tasks = slurm.find_tasks("12")
-    assert [(task.index, task.state, task.lives) for task in tasks] == [
+    found = slurm.find_tasks()
+    assert [(task.index, task.state, task.lives) for task in found["12"]] == [
         (0, "RUNNING", True),
         (1, "PENDING", True),
         (2, "FAILED", False),
     ]
-    (joining,) = slurm.find_tasks("13")
+    (joining,) = found["13"]
     assert (joining.index, joining.reason) == (None, "Dependency")
 
 
@@ -95,5 +95,6 @@ def test_how_tasks_ended_comes_from_the_controller_and_rather_from_accounting(
 
 
 def test_directories_of_other_jobs_are_left_out(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    answer(monkeypatch, tmp_path, squeue="12|throwcollect:/data/with blank|x\n13|(null)\n14|somebody else's")
-    assert slurm.find_directories() == {"12": "/data/with blank|x"}
+    ours = "throwcollect:/data/with blank|x"
+    answer(monkeypatch, tmp_path, squeue=f"12|{ours}\n11|{ours}\n13|(null)\n14|somebody else's")
+    assert slurm.find_directories() == ["/data/with blank|x"]

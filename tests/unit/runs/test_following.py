@@ -1,14 +1,16 @@
 import os
 import subprocess
 import sys
+from collections.abc import Callable
 from datetime import datetime, timezone
 from pathlib import Path
 
 import pytest
 
 from throwcollect.runs.events import EventLog
+from throwcollect.runs.following import follow, read_events, read_logs
 from throwcollect.runs.record import Record
-from throwcollect.runs.records import Records
+from throwcollect.runs.records import Records, Run
 from throwcollect.runs.state_directory import STATE_VARIABLE
 
 
@@ -41,3 +43,48 @@ def test_what_follows_a_run_ends_with_its_reader_even_if_nothing_happens_any_mor
         process.wait()
         process.stderr.close()
         run.close()
+
+
+@pytest.fixture
+def planned(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[Run, Callable[[], bool]]:
+    """A run whose plan is being made in the background, and what first launches it, then ends it, and then agrees."""
+    monkeypatch.setenv(STATE_VARIABLE, str(tmp_path / "state"))
+    first, later = tmp_path / "first", tmp_path / "data" / "logs"
+    now = datetime.now(timezone.utc)
+    run = Records().new("small")
+    run.write(Record(run.run, "small", "", str(tmp_path / "data"), None, str(first), 0, now, os.getpid(), 1))
+    first.mkdir()
+    (first / "launcher.log").write_text("plan: 3 trials\n")
+    EventLog(later, "of-an-earlier-run").run_event("started", simulations=1)
+
+    def launch() -> None:
+        run.update(logs=str(later), runtime="local")
+        (first / "launcher.log").rename(later / "launcher.log")
+        (later / "sim_0.log").write_text("ready\n")
+        EventLog(later, run.run).run_event("started", simulations=1)
+
+    steps = iter([lambda: None, launch, lambda: run.update(ended=now, exit_code=0)])
+
+    def go_on() -> bool:
+        next(steps, lambda: None)()
+        return True
+
+    return Records().get(run.run), go_on
+
+
+def test_logs_are_followed_to_where_they_move(planned: tuple[Run, Callable[[], bool]]) -> None:
+    run, go_on = planned
+    lines = [(name, line) for name, line, _ in read_logs(run, (), follow=True, keep_on=go_on)]
+    assert lines == [("launcher", "plan: 3 trials"), ("sim_0", "ready")]
+
+
+def test_events_are_followed_to_where_they_are_written(planned: tuple[Run, Callable[[], bool]]) -> None:
+    run, go_on = planned
+    assert [event.run for event, _ in read_events(run, keep_on=go_on)] == [run.id]
+
+
+def test_who_waits_is_told_what_happens_in_this_run_from_where_it_is_written(
+    planned: tuple[Run, Callable[[], bool]],
+) -> None:
+    run, go_on = planned
+    assert [event.run for look in follow(run, keep_on=go_on) for event in look.events] == [run.id]

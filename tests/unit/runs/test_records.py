@@ -1,3 +1,4 @@
+import errno
 import fcntl
 import json
 import os
@@ -68,6 +69,17 @@ def test_what_is_written_is_read_by_others(state: Path) -> None:
     run.update(progress=replace(PROGRESS, ended=5), failure=Failure("ä"))
     assert Records().get(run.run).record == replace(written, progress=replace(PROGRESS, ended=5), failure=Failure("ä"))
     assert Records().ids() == [run.run]
+
+
+def test_a_file_system_without_locks_is_named(state: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(_descriptor: int, _how: int) -> None:
+        raise OSError(errno.ENOSYS, os.strerror(errno.ENOSYS))
+
+    records = Records()
+    monkeypatch.setattr(fcntl, "flock", refuse)
+    with pytest.raises(ConfigError, match="runs cannot be remembered there: Function not implemented"):
+        records.new("small")
+    assert list((state / "runs").iterdir()) == []
 
 
 def test_a_run_is_named_after_its_collection_and_never_like_another(
@@ -224,6 +236,19 @@ def test_runs_are_remembered_for_a_week_after_their_end(
     os.utime(state / "runs" / f"{name}.json", times=(written.timestamp(), written.timestamp()))
     records.new("small")
     assert (name in records.ids()) == remembered
+
+
+@pytest.mark.parametrize(("days", "remembered"), [(6, True), (8, False)])
+def test_the_key_of_a_run_that_was_killed_before_it_had_a_record_is_removed(
+    days: int, remembered: bool, state: Path
+) -> None:
+    records = Records()
+    run = records.new("small")
+    run.close()
+    then = (NOW - timedelta(days=days)).timestamp()
+    os.utime(state / "runs" / f"{run.run}.lock", times=(then, then))
+    records.new("small")
+    assert [run.key.exists, (state / "runs" / f"{run.run}.lock").exists()] == [remembered, remembered]
 
 
 def test_a_long_run_is_not_forgotten_while_it_lives(state: Path) -> None:

@@ -15,6 +15,8 @@ from throwcollect.ros.names import absolute_name, is_hidden
 
 param_app = typer.Typer(help="Parameters: list, get, set.", no_args_is_help=True)
 
+_WHOLE = range(-(2**63), 2**63)
+"""Whole numbers that a parameter can hold."""
 _SERVICE_S = 5.0
 """Longest wait for the parameter services of a node."""
 _FIELDS = {
@@ -78,7 +80,7 @@ def set_parameter(
     run: RunOption = None,
 ) -> None:
     """Set a parameter."""
-    parameter = _make_parameter(name, value).to_parameter_msg()
+    parameter = _make_parameter(name, value)
     with join_graph(run) as session:
         owner = _find_node(session, node)
         (result,) = _ask(session, owner, "SetParameters", parameters=[parameter]).results
@@ -87,15 +89,22 @@ def set_parameter(
         print("Set parameter successful" + (f": {result.reason}" if result.reason else ""))
 
 
-def _make_parameter(name: str, text: str) -> ros.Parameter:
-    """Make a parameter of the type that its value has in YAML; a value of another type becomes a text."""
+def _make_parameter(name: str, text: str) -> Any:
+    """Make the message of a parameter of the type that its value has in YAML; a value of another type becomes a text.
+
+    Raises:
+        ConfigError: If a whole number has more than 64 bits.
+    """
     from throwcollect.cli.ros.yaml_values import parse
 
     try:
         value = parse(text, "VALUE")
-        return ros.Parameter(name, value=text if value is None else value)
+        parameter = ros.Parameter(name, value=text if value is None else value)
     except (TypeError, ConfigError):
-        return ros.Parameter(name, value=text)
+        return ros.Parameter(name, value=text).to_parameter_msg()
+    if any(isinstance(each, int) and each not in _WHOLE for each in (value if isinstance(value, list) else [value])):
+        raise ConfigError(f"VALUE: should be int64, got {text:.80}")
+    return parameter.to_parameter_msg()
 
 
 def _find_node(session: Session, name: str) -> str:

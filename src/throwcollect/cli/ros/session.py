@@ -22,11 +22,7 @@ _MOST_NAMES = 8
 
 
 class Session:
-    """A hidden node, and the executor that it spins in.
-
-    Attributes:
-        node: The node.
-    """
+    """A hidden node, and the executor that it spins in."""
 
     def __init__(self) -> None:
         self.node = ros.Node(make_own_name(), enable_rosout=False, start_parameter_services=False)
@@ -56,12 +52,7 @@ class Session:
                 return
 
     def answer(self, future: ros.Future, *, alive: Callable[[], bool], who: str) -> Any:
-        """Wait for the answer to a request.
-
-        Args:
-            future: The future of the answer.
-            alive: Tells whether the node that should answer still exists.
-            who: Name of that node or service, for the message.
+        """Wait for the answer to a request to a node or service; `alive` tells whether that still exists.
 
         Raises:
             WorkerError: If the node has vanished.
@@ -123,13 +114,9 @@ def join_graph(run: str | None) -> Iterator[Session]:
 
 
 def require_name(what: str, name: str, names: Iterable[str], *, of: str = "") -> None:
-    """Refuse a name that does not exist, and propose those that are like it.
+    """Refuse the name of a thing, such as a ``topic``, that does not exist, and propose those that are like it.
 
-    Args:
-        what: Kind of thing that it names, such as ``topic``.
-        name: The name.
-        names: All names that exist.
-        of: Node that would have it; empty if the graph would.
+    `of` is the node that would have it; empty if the graph would.
 
     Raises:
         ConfigError: If it is none of them.

@@ -40,8 +40,9 @@ def show_topic(
 ) -> None:
     """Print the type of a topic and who publishes and subscribes to it."""
     with join_graph(run) as session:
-        name, kinds = _find_types(session, topic)
-        require_name("topic", name, _names(session))
+        name, topics = absolute_name(topic), dict(session.node.get_topic_names_and_types())
+        require_name("topic", name, topics)
+        kinds = topics[name]
         end = "\n\n" if verbose else "\n"
         print(f"Type: {kinds[0] if len(kinds) == 1 else kinds}", end=end)
         node = session.node
@@ -136,24 +137,16 @@ def _describe_rate(arrivals: deque[int]) -> str:
     )
 
 
-def _names(session: Session) -> list[str]:
-    return [name for name, _ in session.node.get_topic_names_and_types()]
-
-
-def _find_types(session: Session, topic: str) -> tuple[str, list[str]]:
-    name = absolute_name(topic)
-    return name, dict(session.node.get_topic_names_and_types()).get(name, [])
-
-
 def _find_message_type(session: Session, topic: str, kind: str | None) -> tuple[str, Any]:
     """Find the absolute name of a topic and the class of its messages.
 
     Raises:
         ConfigError: If the topic has several types and none is named, or does not have the one that is.
     """
-    name, kinds = _find_types(session, topic)
+    name, topics = absolute_name(topic), dict(session.node.get_topic_names_and_types())
+    kinds = topics.get(name, [])
     if kind is None:
-        require_name("topic", name, (each for each in _names(session) if not is_hidden(each) or each == name))
+        require_name("topic", name, (each for each in topics if not is_hidden(each) or each == name))
         if len(kinds) > 1:
             raise ConfigError(f"{name} has {len(kinds)} types", expected=f"one of {', '.join(kinds)}")
         (kind,) = kinds

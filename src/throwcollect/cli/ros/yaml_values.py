@@ -15,11 +15,7 @@ _SHORT = 128
 
 
 def parse(text: str, what: str) -> Any:
-    """Read a value from YAML.
-
-    Args:
-        text: The YAML.
-        what: Name of the argument that holds it, for the message.
+    """Read a value from YAML, which is the argument `what` of a command.
 
     Raises:
         ConfigError: If it is no YAML.

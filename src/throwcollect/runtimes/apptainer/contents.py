@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import tarfile
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -21,19 +20,6 @@ _MAGIC = b"SIF_MAGIC\0"
 _ENTRY_POINT = "throwcollect"
 
 
-@dataclass(frozen=True)
-class SifContents:
-    """The throwcollect in a SIF, according to the labels of the file.
-
-    Attributes:
-        version: Version; None if the file does not tell it.
-        sources: Digest of the sources, see `image_sources.digest_sources`; None if the file does not tell it.
-    """
-
-    version: str | None
-    sources: str | None
-
-
 def is_sif(path: Path) -> bool:
     """Whether a file is a SIF, judged by its first bytes.
 
@@ -44,8 +30,8 @@ def is_sif(path: Path) -> bool:
         return file.read(_MAGIC_AT + len(_MAGIC))[_MAGIC_AT:] == _MAGIC
 
 
-def read_contents(sif: Path) -> SifContents:
-    """Read the labels of a SIF.
+def read_labels(sif: Path) -> dict[str, str]:
+    """Read the labels of a SIF; those that were not set are left out.
 
     Raises:
         ConfigError: If there is no such file, or it is no SIF.
@@ -62,9 +48,7 @@ def read_contents(sif: Path) -> SifContents:
     except OSError as error:
         raise unreadable(sif, error) from error
     printed = call(f"{sif}: what it holds cannot be read", "inspect", "--json", str(sif))
-    labels = _labels_of(json.loads(printed))
-    known = {name: label for name, label in labels.items() if label != UNKNOWN}
-    return SifContents(known.get(VERSION_LABEL), known.get(SOURCES_LABEL))
+    return {name: label for name, label in _labels_of(json.loads(printed)).items() if label != UNKNOWN}
 
 
 def check_sif(sif: Path) -> None:
@@ -77,11 +61,11 @@ def check_sif(sif: Path) -> None:
         WorkerError: If neither Apptainer nor Singularity is installed, or it cannot read the file.
         DatasetError: If this user may not read the file.
     """
-    contents = read_contents(sif)
+    labels = read_labels(sif)
     hint = f"{command('image', 'sif', '-o', sif)} makes it anew"
-    if contents.version not in (None, __version__):
-        raise ConfigError(f"{sif}: holds throwcollect {contents.version}, and this is {__version__}", hint=hint)
-    if are_others(contents.sources):
+    if (version := labels.get(VERSION_LABEL, __version__)) != __version__:
+        raise ConfigError(f"{sif}: holds throwcollect {version}, and this is {__version__}", hint=hint)
+    if are_others(labels.get(SOURCES_LABEL)):
         raise ConfigError(f"{sif}: was made from other sources than these", hint=hint)
 
 

@@ -37,14 +37,10 @@ def find_program() -> str:
 
 
 def call(what: str, *arguments: str, cwd: Path | None = None, places: Mapping[str, Path] = _NO_PLACES) -> str:
-    """Run Apptainer, and return what it prints.
+    """Run Apptainer, and return what it prints; the message begins with `what` if it fails.
 
-    Args:
-        what: Beginning of the message if it fails.
-        arguments: Arguments of the program.
-        cwd: Working directory; None takes that of this process.
-        places: Directories for Apptainer by the end of the variable that names them, such as ``TMPDIR``; variables that
-            the user has set come first.
+    `places` has directories for Apptainer by the end of the variable that names them, such as ``TMPDIR``; variables
+    that the user has set come first.
 
     Raises:
         WorkerError: If Apptainer is not installed, or fails.

@@ -45,13 +45,9 @@ def make_sif(
 ) -> int:
     """Make a SIF, by default from the image of these sources, or without an engine from the clone itself.
 
-    Args:
-        output: The file. An existing SIF is replaced when the new one is complete.
-        image: Name of another image of the engine, which is pulled if the engine does not have it.
-        archive: An archive of an image, as `docker save` writes it, which is used instead.
-        base: Base image, if one is built.
-        wheelhouse: Directory of wheels, if an image is built; None takes them from the package index.
-        say: Is called with one line for each step.
+    An existing SIF is replaced when the new one is complete. `image` names another image of the engine, which is pulled
+    if the engine does not have it; `archive` is that of an image, as `docker save` writes it. `base` and `wheelhouse`
+    are as for `docker.image.build`.
 
     Returns:
         Size of the file [B].

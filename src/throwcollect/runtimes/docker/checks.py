@@ -89,12 +89,7 @@ def _problems(
 
 
 def _wrong_mount(source: Path, root: str) -> str | None:
-    """Why a directory or file, or the target of this link, must not be mounted; None if it may be.
-
-    Args:
-        source: Path in the configuration.
-        root: Directory in which the engine keeps all its files.
-    """
+    """Why a path, or the target of this link, must not be mounted; None if it may. `root` holds the engine's files."""
     if not source.exists():
         return f"{source} does not exist on this machine"
     real = source.resolve()

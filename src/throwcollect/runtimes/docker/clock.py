@@ -21,11 +21,8 @@ class EngineClock:
     Every answer to a client that was attended counts, and so does everything that arrives on a stream. A thread counts
     the time in small steps, so that time in which this process itself was stopped does not count as silence.
 
-    Attributes:
-        silent_s: Time since the engine last answered [s].
-
-    Args:
-        warn: Is told in one line when the engine has been silent for long, and when it answers again.
+    `silent_s` is the time since the engine last answered [s]. `warn` is told in one line when that is long, and when
+    the engine answers again.
     """
 
     def __init__(self, warn: Callable[[str], None]) -> None:

@@ -47,10 +47,9 @@ _OVER_S = 3.0
 
 @dataclass(frozen=True)
 class Way:
-    """The way for a container into the ROS graph of a run.
+    """The way for a container into the ROS graph of a run, whose id is `run`.
 
     Attributes:
-        run: Id of the run.
         environment: Environment variables with which the container joins.
         key: The run's key, as a mount.
         network: The engine's network in which the router is; None if the container needs the network of this machine.
@@ -102,7 +101,7 @@ class ComponentContainer:
     Args:
         place: The place of the run that consists of this container.
         way: The way into a run that the container joins; None if it joins none.
-        goes_on: Is asked again and again whether that run goes on.
+        goes_on: Is asked again and again whether the run of an id goes on.
         warn: Is told in one line when the engine is silent for long.
 
     Raises:
@@ -117,7 +116,7 @@ class ComponentContainer:
         spec: ContainerSpec,
         way: Way | None,
         *,
-        goes_on: Callable[[], bool],
+        goes_on: Callable[[str], bool],
         warn: Callable[[str], None],
     ) -> None:
         self.cleared = False
@@ -145,8 +144,7 @@ class ComponentContainer:
         try:
             self._watch = EngineWatch(self._client, self._place, self._clock)
             session.event("started")
-            # Up to version 1.43 of the engine's API, a container is made in one network, and joins others before it
-            # starts.
+            # Up to version 1.43 of the engine's API, a container is made in one network, and joins others afterwards.
             self._container.start(self._options(), networks=self._networks[1:])
             while not session.interruptions():
                 session.nodes([self._look()], endpoint=None, simulations=0)
@@ -187,6 +185,11 @@ class ComponentContainer:
         # The engine publishes ports only from a network with a way out, which the network of a run may not have.
         out = ["bridge"] if own and self._spec.section.ports and not self._spec.section.networks else []
         return [*out, *self._spec.section.networks, *own]
+
+    @property
+    def _is_left_behind(self) -> bool:
+        """Whether the run that the container has joined has ended."""
+        return self._way is not None and not self._goes_on(self._way.run)
 
     def _options(self) -> dict[str, Any]:
         way, spec = self._way, self._spec
@@ -238,15 +241,15 @@ class ComponentContainer:
             container.wait_log(LOG_S)
             # The end of the run may have made the container fail, but the record of the run tells its end a bit later.
             deadline = time.monotonic() + _OVER_S
-            while state.code != 0 and self._way is not None and self._goes_on() and time.monotonic() < deadline:
+            while state.code != 0 and self._way and not self._is_left_behind and time.monotonic() < deadline:
                 time.sleep(_POLL_S)
-            if state.code == 0 or (self._way is not None and not self._goes_on()):
+            if state.code == 0 or self._is_left_behind:
                 return True
             raise WorkerError(
                 f"the container of {self._spec.image} has ended: {end_in_words(state, self._spec.section.memory)}",
                 evidence=self._logs.tail(CONTAINER) or None,
             )
-        if self._way is not None and not self._goes_on():
+        if self._way is not None and self._is_left_behind:
             session.say(f"run {self._way.run} has ended, and so does the container that had joined it")
             return True
         return False

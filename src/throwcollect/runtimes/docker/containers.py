@@ -168,8 +168,7 @@ class DockerNodes(NodeHost):
                 name = container.labels[NODE_LABEL]
                 # `start` replaces a container that was created but never started.
                 if name not in self._nodes and container.status != "created":
-                    # The state has to be known before the next `exits`: a container that has ended sends no further
-                    # event.
+                    # The next `exits` has to know the state: a container that has ended sends no further event.
                     self._opened.look(container.id)
                     self._nodes[name] = self._node(name)
                     self._nodes[name].adopt(container)

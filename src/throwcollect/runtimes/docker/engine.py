@@ -26,14 +26,14 @@ PATIENCE_S = 30.0
 _TIMEOUTS = (Timeout, PoolTimeoutError, TimeoutError)
 
 
-def connect(*, timeout_s: float | None = None) -> DockerClient:
-    """Connect to the engine that ``DOCKER_HOST`` names; each request waits for `timeout_s` [s], or `PATIENCE_S`.
+def connect(*, timeout_s: float = PATIENCE_S) -> DockerClient:
+    """Connect to the engine that ``DOCKER_HOST`` names; each request waits for `timeout_s` [s] at most.
 
     Raises:
         WorkerError: If no engine answers.
     """
     try:
-        return DockerClient.from_env(timeout=timeout_s or PATIENCE_S)
+        return DockerClient.from_env(timeout=timeout_s)
     except ENGINE_ERRORS as error:
         raise no_answer(in_words(error)) from error
 

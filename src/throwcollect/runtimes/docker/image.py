@@ -58,14 +58,10 @@ def build(
     wheelhouse: Path | None = None,
     say: Callable[[str], None],
 ) -> int:
-    """Build the image from the clone that this package runs from.
+    """Build the image from the clone that this package runs from, and `say` each step in one line.
 
-    Args:
-        client: Client of the engine.
-        tag: Name of the image.
-        base: Base image, which is pulled if the engine does not have it.
-        wheelhouse: Directory of wheels, as `docker/wheelhouse.py --ros` fills it; None takes the package index.
-        say: Is called with one line for each step.
+    The base image is pulled if the engine does not have it. The wheelhouse is a directory of wheels, as
+    `docker/wheelhouse.py --ros` fills it; None takes them from the package index.
 
     Returns:
         Size of the image [B].
@@ -140,11 +136,6 @@ def rmw_of(client: DockerClient, tag: str) -> str | None:
 
 
 def _read_label(client: DockerClient, tag: str, name: str) -> str | None:
-    """Read a label of an image that the engine has.
-
-    Raises:
-        WorkerError: If the engine does not answer.
-    """
     with engine_errors(f"the engine does not say what the image {tag} holds"):
         label = client.images.get(tag).labels.get(name)
     return label if isinstance(label, str) else None
@@ -169,13 +160,8 @@ def save_image(
 ) -> None:
     """Write an image into an archive, as `docker save` does.
 
-    Args:
-        archive: The archive, which is made.
-        image: Name of the image, which is pulled if the engine does not have it. None takes the image of these sources,
-            which is built if the engine has none, or one of other sources.
-        base: Base image, if one is built.
-        wheelhouse: Directory of wheels, if an image is built; None takes them from the package index.
-        say: Is called with one line for each step.
+    The image is pulled if the engine does not have it. None takes the image of these sources, which is built, with
+    arguments as for `build`, if the engine has none, or one of other sources.
 
     Raises:
         ConfigError: If the image has to be built, but the package does not run from a clone.

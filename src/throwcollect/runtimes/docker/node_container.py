@@ -28,7 +28,6 @@ class NodeContainer:
     """A container, with a thread of its own that starts it and copies its output.
 
     Attributes:
-        name: Name of the node.
         handle: Id of the container; None until it runs.
         failure: Reason why the container could not be started; None if there is none.
 
@@ -60,11 +59,9 @@ class NodeContainer:
         return self._thread is not None and not self._thread.is_alive()
 
     def start(self, options: dict[str, Any], *, networks: Sequence[str]) -> None:
-        """Begin to start the container; an ended container of its name is removed.
+        """Begin to start the container, by keywords for `containers.create`; an ended container of its name is removed.
 
-        Args:
-            options: Keywords for `containers.create`.
-            networks: Further networks that the container joins.
+        It joins these networks besides that of the keywords.
         """
         self._run_in_thread(lambda: self._live(options, networks))
 

@@ -50,9 +50,7 @@ _LOG_SIZE = {"max-size": "10m", "max-file": "2"}
 class RunPlace:
     """The names of everything that an engine holds of a run.
 
-    Attributes:
-        run_id: Id of the run.
-        source: Place of the dataset: absolute path of a directory of this machine, or name of a volume.
+    `source` is the place of the dataset: absolute path of a directory of this machine, or name of a volume.
     """
 
     run_id: str

@@ -55,12 +55,12 @@ class DockerRuntime(Runtime):
         """Get the image, and find out the middleware of containers; see `Runtime.prepare`."""
         if is_installed("docker"):
             check_socket()
-        from throwcollect.runtimes.docker.engine import connect
+        from throwcollect.runtimes.docker.engine import PATIENCE_S, connect
         from throwcollect.runtimes.docker.image import ensure, is_outdated, rmw_of
         from throwcollect.runtimes.docker.options import image
 
         name = image(config)
-        with closing(connect(timeout_s=None if config.run.runtime == "docker" else _PROBE_S)) as client:
+        with closing(connect(timeout_s=PATIENCE_S if config.run.runtime == "docker" else _PROBE_S)) as client:
             ensure(client, name, say=say)
             if is_outdated(client, name):
                 _handle_outdated_image(client, name, config, warn)
@@ -68,18 +68,14 @@ class DockerRuntime(Runtime):
 
     def check(self) -> Check:
         """Whether an engine answers, and has the image of these sources."""
-        from docker.errors import ImageNotFound
-
         from throwcollect.runtimes.docker.engine import connect, engine_errors
-        from throwcollect.runtimes.docker.image import default_tag, is_outdated
+        from throwcollect.runtimes.docker.image import default_tag, is_outdated, is_there
 
         try:
             with closing(connect(timeout_s=_PROBE_S)) as client, engine_errors("the Docker engine fails"):
                 engine = client.version()["Version"]
                 found = f"Docker {engine} answers at {engine_address()}"
-                try:
-                    client.images.get(default_tag())
-                except ImageNotFound:
+                if not is_there(client, default_tag()):
                     lacking = f"the image {default_tag()} is not there yet; throwcollect image build makes it"
                     return Check("docker", "note", f"{found}; {lacking}")
                 if is_outdated(client, default_tag()):

@@ -277,6 +277,8 @@ def test_a_goal_that_is_not_reached_is_exit_code_1_and_a_rejected_one_2(say: Cal
         ("param get /robot/driver limits", "no parameter limits of /robot/driver\n  expected: limit"),
         ("param get /robot/drive limit", "no node /robot/drive"),
         ("param set /robot/driver limits 1", "parameter 'limits' is not declared"),
+        ("param set /robot/driver limit 9223372036854775808", "VALUE: should be int64, got 9223372036854775808"),
+        ("param set /robot/driver limit [1,9223372036854775808]", "VALUE: should be int64, got [1,92233720368547758"),
         ("param list /nobody", "no node /nobody"),
         ("topic list --run nobody-1234", "no run 'nobody-1234'"),
     ],

@@ -12,7 +12,7 @@ import pytest
 import throwcollect
 from throwcollect.errors import ConfigError, DatasetError, WorkerError
 from throwcollect.extras import MissingExtraError
-from throwcollect.runtimes.apptainer.contents import check_sif, read_contents
+from throwcollect.runtimes.apptainer.contents import check_sif, read_labels
 from throwcollect.runtimes.apptainer.sif import make_sif
 from throwcollect.runtimes.image_sources import SOURCES_LABEL, VERSION_LABEL, digest_sources, source_root
 
@@ -226,7 +226,7 @@ def test_a_sif_of_another_version_or_of_other_sources_is_told_from_ours(apptaine
     with pytest.raises(ConfigError, match="was made from other sources than these"):
         check_sif(sif)
     inspected(own)
-    assert read_contents(sif).version == throwcollect.__version__
+    assert read_labels(sif)[VERSION_LABEL] == throwcollect.__version__
 
 
 def test_what_is_no_sif_is_named(apptainer: Path, tmp_path: Path) -> None:
