@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from throwcollect.episode.channels import Channels
 from throwcollect.episode.layout import MessageLayout
 from throwcollect.episode.record import ControllerSamples, Samples
-from throwcollect.episode.topics import Recording, Topic
+from throwcollect.episode.topics import Recording
 from throwcollect.errors import DatasetError
 
 _COMPRESSION = b"zstd"
@@ -241,19 +241,6 @@ class ChunkEncoder:
         """Make the chunk of the records that `lay_out` has written for samples."""
         start, end = int(samples.stamps_ns[0]), int(samples.stamps_ns[-1])
         return Chunk.of(contents, self._compressor.compress(contents), start_ns=start, end_ns=end)
-
-
-def encode_message(topic: Topic, samples: Samples, index: int, controllers: Mapping[str, ControllerSamples]) -> bytes:
-    """Write the message of the sample at an index, byte for byte as `ChunkEncoder.lay_out` writes it.
-
-    Raises:
-        KeyError: If the set points of the topic's controller are missing.
-    """
-    message = bytearray(topic.layout.template)
-    one = slice(index, index + 1)
-    recording = Recording(samples[one], {name: target[one] for name, target in controllers.items()})
-    topic.fill(np.frombuffer(message, topic.layout.dtype), recording)
-    return bytes(message)
 
 
 def _row_type(layouts: Mapping[str, MessageLayout]) -> np.dtype[np.void]:

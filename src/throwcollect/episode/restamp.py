@@ -19,11 +19,11 @@ from throwcollect.episode.message import Episode
 from throwcollect.episode.message_table import MessageList, MessageTable
 from throwcollect.episode.record import EpisodeHeader
 from throwcollect.episode.recorded_chunk import RecordedChunk
+from throwcollect.episode.topics import put_stamps, read_stamps
 from throwcollect.errors import DatasetError
-from throwcollect.units import NS_PER_S
 
 _SECONDS = ("stamp.sec", "clock.sec")
-"""Ends of the paths of fields with the seconds of a stamp; durations, such as `time_from_start`, do not change."""
+"""Ends of the paths of fields with the seconds of a stamp; durations, such as `time_from_start`, stay as they are."""
 
 
 class _OfEachThread(threading.local):
@@ -39,7 +39,10 @@ class Restamper:
     def __init__(self, config: Config, channels: Channels) -> None:
         self._config = config
         self._topics = {
-            channel.id: (topic, [name for name in topic.layout.dtype.names or () if name.endswith(_SECONDS)])
+            channel.id: (
+                topic,
+                [name.removesuffix(".sec") for name in topic.layout.dtype.names or () if name.endswith(_SECONDS)],
+            )
             for channel, topic in channels.recorded.items()
         }
         self._of_this_thread = _OfEachThread(config.record.zstd_level)
@@ -78,7 +81,7 @@ class Restamper:
     def _move(self, table: MessageTable, by_ns: int) -> None:
         if list(table.columns) != list(self._topics):
             raise DatasetError(f"chunk: has the channels {list(table.columns)}", expected=f"{list(self._topics)}")
-        for channel, (topic, fields) in self._topics.items():
+        for channel, (topic, stamps) in self._topics.items():
             messages = table.messages(channel)
             if not topic.layout.describes_message(messages[0].tobytes()):
                 raise DatasetError(f"chunk: messages of {topic.name} are not laid out as {topic.type_name} is here")
@@ -87,10 +90,8 @@ class Restamper:
                 # Times are unsigned, and the way to an earlier slot is negative.
                 headers[time] = headers[time].astype(np.int64) + by_ns
             rows = messages.view(topic.layout.dtype)[:, 0]
-            for seconds in fields:
-                nanoseconds = seconds.removesuffix("sec") + "nanosec"
-                stamps = rows[seconds].astype(np.int64) * NS_PER_S + rows[nanoseconds] + by_ns
-                rows[seconds], rows[nanoseconds] = np.divmod(stamps, NS_PER_S)
+            for stamp in stamps:
+                put_stamps(rows, stamp, read_stamps(rows, stamp) + by_ns)
 
 
 def _move_header(header: EpisodeHeader, trial: int, by_ns: int) -> EpisodeHeader:
