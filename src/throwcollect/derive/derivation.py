@@ -57,33 +57,21 @@ class Derived:
         return asdict(self)
 
 
-def derive(sources: Sequence[Source], output: Path) -> Derived:
-    """Make the dataset that consists of the trials of some others, renumbered from 0, under the name of the first.
+def derive(sources: Sequence[Source], output: Path, *, name: str | None = None) -> Derived:
+    """Make the dataset that consists of the trials of some others, at least one, in their order, renumbered from 0.
 
-    Args:
-        sources: At least one; its trials come in the order of the sources.
-        output: Its directory, which must not exist or be empty; nothing is left there after an error.
+    Its directory must not exist or be empty, and nothing is left there after an error. Without a name of its own, it
+    has that of the first source.
 
     Raises:
         ConfigError: If there is no trial, the sources do not go together, or the directory cannot be used.
         DatasetError: If an episode of a source is damaged, or the dataset cannot be written.
     """
     with new_directory(output) as directory:
-        return write(sources, directory)
+        return _write(sources, directory, name)
 
 
-def write(sources: Sequence[Source], directory: Path, *, name: str | None = None) -> Derived:
-    """Write a derived dataset to a directory that the caller removes if this fails.
-
-    Args:
-        sources: As for `derive`.
-        directory: New or empty.
-        name: Name of the dataset; None for that of the first source.
-
-    Raises:
-        ConfigError: If there is no trial, or the sources do not go together.
-        DatasetError: If an episode of a source is damaged, or the dataset cannot be written.
-    """
+def _write(sources: Sequence[Source], directory: Path, name: str | None) -> Derived:
     began = time.monotonic()
     config, points = list_of_trials(sources)
     if not len(points.values):

@@ -23,7 +23,7 @@ from pydantic import TypeAdapter, ValidationError
 from throwcollect.config.kinds import Name
 from throwcollect.dataset.expression import Expression
 from throwcollect.dataset.reader import Dataset
-from throwcollect.derive.derivation import Derived, write
+from throwcollect.derive.derivation import Derived, derive
 from throwcollect.derive.source import Source, source
 from throwcollect.derive.trial_list import list_of_trials
 from throwcollect.errors import ConfigError, Problem
@@ -79,7 +79,7 @@ def split(
     """Split a dataset into parts, each a dataset of its own.
 
     Args:
-        directory: Directory of the dataset.
+        directory: The dataset.
         output: Directory that gets one directory a part; it must not exist or be empty.
         fractions: Names of the parts and their shares of the cells: ``train=0.8,test=0.2``.
         cells: Axes of the space that is cut into cells: an expression on columns of the table of throws (see
@@ -96,7 +96,7 @@ def split(
     parts = {}
     with new_directory(Path(output)) as beside:
         for name, places in members.items():
-            derived = write([source(dataset, places)], beside / name, name=_part_name(dataset.config.name, name))
+            derived = derive([source(dataset, places)], beside / name, name=_part_name(dataset.config.name, name))
             held = list(places.values())
             parts[name] = Part(derived, len({cell for cell in held if cell is not None}), held.count(None))
     return Split(parts, everything.without_episode)
