@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from throwcollect.dataset.creation import create
+from throwcollect.dataset.damage import locating_damage
 from throwcollect.dataset.directory import CARD, SOURCES
 from throwcollect.dataset.inspect import info
 from throwcollect.dataset.judging import judge_episode
@@ -29,7 +30,6 @@ from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.files import new_directory, write_file
 from throwcollect.robots.description import full_description
 from throwcollect.sweep.plan import Plan, make_trials
-from throwcollect.wording import command
 
 _ROWS_AT_ONCE = 256
 _MOST_THREADS = 4
@@ -134,13 +134,8 @@ def _rows(sources: Sequence[Source]) -> Iterator[tuple[Dataset, Row]]:
 
 
 def _restamp(restamper: Restamper, dataset: Dataset, row: Row, number: int) -> Episode:
-    trial = row["trial"]
-    episode = dataset.episode(trial)
-    try:
+    with locating_damage(dataset, row["trial"]):
+        episode = dataset.episode(row["trial"])
         if episode.digest != row["digest"]:
             raise DatasetError(f"digest {episode.digest}", expected=f"{row['digest']} as throws.parquet says")
         return restamper.restamp(episode, number)
-    except DatasetError as error:
-        raise DatasetError(
-            f"trial {trial}: {error}", path=dataset.directory, hint=command("dataset", "verify", dataset.directory)
-        ) from error

@@ -11,11 +11,11 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
+from throwcollect.dataset.damage import locating_damage
 from throwcollect.dataset.data_card import count_outcomes
 from throwcollect.dataset.moments import Moments
 from throwcollect.dataset.reader import Dataset
 from throwcollect.episode.record import Samples
-from throwcollect.errors import DatasetError
 from throwcollect.files import StrPath
 
 QUANTILES = (0.01, 0.05, 0.25, 0.5, 0.75, 0.95, 0.99)
@@ -105,11 +105,8 @@ def statistics(directory: StrPath) -> Statistics:
     dataset = Dataset.open(directory)
     moments, left_out = None, 0
     for episode in dataset.episodes():
-        try:
+        with locating_damage(dataset, episode.header.trial):
             rows = _stack_signals(episode.samples(dataset.joints))
-        except DatasetError as error:
-            # The episode knows neither its file nor its directory, without which nobody finds the damage.
-            raise error.locate(dataset.directory, f"trial {episode.header.trial}") from error
         finite = rows[np.isfinite(rows).all(axis=1)]
         left_out += len(rows) - len(finite)
         if len(finite):

@@ -11,6 +11,7 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from throwcollect.config.target import TargetColumn
+from throwcollect.dataset.damage import locating_damage
 from throwcollect.dataset.reader import Dataset
 from throwcollect.episode.record import Samples
 from throwcollect.errors import ConfigError, DatasetError
@@ -137,11 +138,9 @@ class Source:
         """
         dataset = self.dataset
         for entry in entries:
-            episode = dataset.episode(entry.trial)
-            try:
+            with locating_damage(dataset, entry.trial):
+                episode = dataset.episode(entry.trial)
                 recorded = episode.samples(dataset.joints)
-            except DatasetError as error:
-                raise DatasetError(f"{dataset.directory}: trial {entry.trial}: {error}") from error
             samples = resample(recorded, recorded_hz=dataset.config.record.rate_hz, rate_hz=self.rate_hz)
             planned = dataset.plan.trial(entry.trial)
             trajectory = trajectory_of(dataset.plan.config_of(planned))

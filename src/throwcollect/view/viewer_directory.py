@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from throwcollect.dataset.bag import bag_information, to_yaml
+from throwcollect.dataset.damage import locating_damage
 from throwcollect.dataset.directory import METADATA
 from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.throws_table import Row
@@ -107,4 +108,5 @@ def _schedule(dataset: Dataset, rows: Iterable[Row]) -> list[ShownThrow]:
 
 
 def _samples(dataset: Dataset, row: Row) -> Samples:
-    return dataset.episode(row["trial"]).samples(dataset.joints)
+    with locating_damage(dataset, row["trial"]):
+        return dataset.episode(row["trial"]).samples(dataset.joints)
