@@ -125,6 +125,7 @@ class MessageTable(RowLayout):
     Views of a bytearray are writable.
 
     Attributes:
+        contents: The records.
         log_times: Time of each row's first record [ns], shape ``(n_samples,)``, uint64.
 
     Raises:
@@ -133,6 +134,7 @@ class MessageTable(RowLayout):
 
     def __init__(self, contents: bytes | bytearray | memoryview, samples: int) -> None:
         super().__init__(contents, samples)
+        self.contents = contents
         self._table: NDArray[np.uint8] = np.frombuffer(contents, np.uint8).reshape(samples, -1)
         # Opcode, length and channel are the first bytes of a record: if they repeat in each row, so does the layout.
         for channel, column in self.columns.items():

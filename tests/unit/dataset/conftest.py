@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from throwcollect.config.schema import Config
 from throwcollect.dataset.writer import DatasetWriter
 from throwcollect.episode.channels import Channels
-from throwcollect.episode.chunk import ChunkEncoder
+from throwcollect.episode.encoder import ChunkEncoder
 from throwcollect.episode.message import Episode
 from throwcollect.episode.record import Contact, ControllerSamples, EpisodeHeader, GoalOutcome, Samples
 from throwcollect.robots.description import full_description, start_posture

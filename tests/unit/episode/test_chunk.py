@@ -15,7 +15,8 @@ from mcap.records import Message, MessageIndex
 
 from throwcollect.config.schema import Config
 from throwcollect.episode.channels import Channels
-from throwcollect.episode.chunk import Chunk, ChunkEncoder
+from throwcollect.episode.chunk import Chunk
+from throwcollect.episode.encoder import ChunkEncoder
 from throwcollect.episode.message import Episode
 from throwcollect.episode.message_table import MessageTable
 from throwcollect.episode.record import EpisodeHeader, Samples

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from rclzenoh.interfaces import deserialize, get_message
 from throwcollect.config.schema import Config
 from throwcollect.episode.channels import Channels
-from throwcollect.episode.chunk import ChunkEncoder
+from throwcollect.episode.encoder import ChunkEncoder
 from throwcollect.episode.message import (
     Delivery,
     Episode,

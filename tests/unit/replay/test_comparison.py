@@ -7,7 +7,7 @@ import pytest
 
 from throwcollect.config.schema import Config
 from throwcollect.episode.channels import Channels
-from throwcollect.episode.chunk import ChunkEncoder
+from throwcollect.episode.encoder import ChunkEncoder
 from throwcollect.episode.message import Episode
 from throwcollect.episode.record import Contact, EpisodeHeader, Samples
 from throwcollect.errors import DatasetError
