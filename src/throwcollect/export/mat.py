@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pyarrow as pa
 from numpy.typing import NDArray
 
 from throwcollect.config.schema import Config, DynamicMovementPrimitive
@@ -92,7 +91,8 @@ def write(source: Source, directory: Path) -> None:
             f"--to: mat has the structure of a throwing database, and the task {task.name} throws no ball",
             expected="another format",
         )
-    columns = {_name_field(field.name): _to_column(source.table[field.name]) for field in source.table.schema}
+    # An array of objects, as texts are, becomes a cell array; one of texts would become a matrix of characters.
+    columns = {_name_field(name): to_array(source.table[name])[:, np.newaxis] for name in source.table.column_names}
     units = {_name_field(field.name): read_metadata(field).get("unit", "") for field in source.table.schema}
     _save(directory / "throws.mat", {"throws": columns, "units": units, "digest_of_dataset": source.dataset.digest})
     (directory / "trajectories").mkdir()
@@ -101,11 +101,9 @@ def write(source: Source, directory: Path) -> None:
         for row in source.table.select(["trial", "landing_x_m", "landing_y_m", "hit_angle_rad"]).to_pylist()
     }
     for shard, entries in source.shards.items():
-        path = directory / "trajectories" / f"{shard}.mat"
-        _save(
-            path,
-            {"robot_throws": _gather_throws(source, entries, landings), "digest_of_dataset": source.dataset.digest},
-        )
+        throws = _gather_throws(source, entries, landings)
+        recording = {"robot_throws": throws, "digest_of_dataset": source.dataset.digest}
+        _save(directory / "trajectories" / f"{shard}.mat", recording)
 
 
 def _save(path: Path, variables: Mapping[str, Any]) -> None:
@@ -130,12 +128,6 @@ def _count_bytes(value: Any) -> int:
 
 def _name_field(column: str) -> str:
     return column.replace(".", "_")
-
-
-def _to_column(values: pa.ChunkedArray) -> NDArray[Any]:
-    array = to_array(values)
-    # An array of objects becomes a cell array; one of texts would become a matrix of characters.
-    return (array.astype(object) if array.dtype.kind == "U" else array)[:, np.newaxis]
 
 
 def _to_cell(values: Sequence[Any]) -> NDArray[np.object_]:
