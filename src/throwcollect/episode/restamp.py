@@ -6,7 +6,6 @@ Nothing in an episode but its stamps depends on its slot, so the result has the 
 from __future__ import annotations
 
 import hashlib
-import threading
 from dataclasses import replace
 
 import numpy as np
@@ -26,13 +25,6 @@ _SECONDS = ("stamp.sec", "clock.sec")
 """Ends of the paths of fields with the seconds of a stamp; durations, such as `time_from_start`, stay as they are."""
 
 
-class _OfEachThread(threading.local):
-    """A compressor for each thread, as threads must not share one."""
-
-    def __init__(self, level: int) -> None:
-        self.compressor = zstandard.ZstdCompressor(level=level)
-
-
 class Restamper:
     """Gives episodes of one configuration other numbers; threads may share a restamper."""
 
@@ -45,7 +37,6 @@ class Restamper:
             )
             for channel, topic in channels.recorded.items()
         }
-        self._of_this_thread = _OfEachThread(config.record.zstd_level)
 
     def restamp(self, episode: Episode, trial: int) -> Episode:
         """Make the episode that trial `trial` of the configuration would have yielded.
@@ -74,7 +65,7 @@ class Restamper:
 
     def _pack(self, contents: bytearray, like: Chunk, by_ns: int) -> RecordedChunk:
         """Make the chunk of records that are `by_ns` later than those of the chunk `like`."""
-        data = self._of_this_thread.compressor.compress(contents)
+        data = zstandard.compress(contents, self._config.record.zstd_level)
         chunk = Chunk.of(contents, data, start_ns=like.start_ns + by_ns, end_ns=like.end_ns + by_ns)
         return RecordedChunk(chunk, hashlib.sha256(contents).hexdigest())
 
