@@ -31,13 +31,11 @@ _BALL_GROUPS = {"ball_position_m": "ball_position", "ball_velocity_mps": "ball_l
 class ColumnStatistics:
     """Statistics of a column of the table of throws, over the rows that have a finite number.
 
+    Extrema, mean and standard deviation (that of the population) are None if there is no such row.
+
     Attributes:
         count: Number of rows that have a number.
         nulls: Number of rows that have none.
-        min: Smallest number; None without numbers, as are maximum, mean and deviation.
-        max: Largest number.
-        mean: Mean.
-        std: Standard deviation, of the population.
         quantiles: Quantiles at `QUANTILES`, linear between neighbours, by names such as ``q05``.
     """
 
@@ -54,11 +52,7 @@ class ColumnStatistics:
 class SignalStatistics:
     """Statistics of a recorded signal over all samples of all episodes.
 
-    Attributes:
-        min: Smallest value.
-        max: Largest value.
-        mean: Mean.
-        std: Standard deviation, of the population; 0 for a joint that is locked.
+    The standard deviation is that of the population, and 0 for a joint that is locked.
     """
 
     min: float

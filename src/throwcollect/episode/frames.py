@@ -22,8 +22,8 @@ class Frame:
     """A frame and its pose in its parent when its joint is at 0.
 
     Attributes:
-        parent: Name of the parent frame.
-        child: Name of the frame.
+        parent: Name of the parent.
+        child: Name of the frame itself.
         translation: Origin of the frame in its parent [m].
         rotation_xyzw: Unit quaternion, frame to parent.
     """
@@ -36,12 +36,7 @@ class Frame:
 
 @dataclass(frozen=True)
 class MovingFrame(Frame):
-    """A frame that a revolute joint turns in its parent.
-
-    Attributes:
-        joint: Name of the joint.
-        axis: Unit vector of the joint's axis, in the frame itself.
-    """
+    """A frame that a revolute joint turns in its parent; the axis is a unit vector in the frame itself."""
 
     joint: str
     axis: tuple[float, float, float]

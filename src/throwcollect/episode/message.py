@@ -91,10 +91,7 @@ class Episode:
         return MessageTable(self.state.contents, self.header.samples)
 
     def samples(self, joints: Sequence[str] | None = None) -> Samples:
-        """Read the samples, as views of the records where possible.
-
-        Args:
-            joints: The joints that must have been recorded, in this order; None accepts any.
+        """Read the samples, as views of the records where possible; `joints` must have been recorded, in this order.
 
         Raises:
             DatasetError: If the chunk is damaged, its messages have another layout than this version writes, or other
@@ -168,12 +165,9 @@ def _layout() -> MessageLayout:
 
 
 class Delivery(NamedTuple):
-    """An episode that a simulation hands over.
+    """An episode that a simulation hands over, with its conditions and the result of the trial, both in JSON.
 
-    Attributes:
-        episode: The episode.
-        result: Result of the trial in JSON; empty if the simulation has not judged it.
-        conditions: Conditions of the episode in JSON.
+    The result is empty if the simulation has not judged the episode.
     """
 
     episode: Episode
@@ -182,12 +176,7 @@ class Delivery(NamedTuple):
 
 
 class Refusal(NamedTuple):
-    """A refusal of a simulation to do a trial.
-
-    Attributes:
-        token: Token of the trial's lease.
-        reason: The reason.
-    """
+    """A refusal of a simulation to do a trial, with the token of its lease."""
 
     token: str
     reason: str

@@ -35,12 +35,7 @@ Rows = NDArray[np.void]
 
 @dataclass(frozen=True)
 class Recording:
-    """The values from which messages are made.
-
-    Attributes:
-        samples: The samples.
-        controllers: Set points of controllers, by name.
-    """
+    """The values from which messages are made: samples, and set points of controllers by name."""
 
     samples: Samples
     controllers: Mapping[str, ControllerSamples]
@@ -86,12 +81,9 @@ def read_stamps(rows: Rows, prefix: str) -> NDArray[np.int64]:
 
 
 def rotate(quaternion_xyzw: NDArray[np.float64], *vectors: NDArray[np.float64], inverse: bool) -> NDArray[np.float64]:
-    """Turn vectors by unit quaternions, element by element: a row's result does not depend on other rows.
+    """Turn vectors, each of shape ``(n, 3)``, by unit quaternions, shape ``(n, 4)``, or in the opposite direction.
 
-    Args:
-        quaternion_xyzw: Shape ``(n, 4)``.
-        vectors: Each of shape ``(n, 3)``.
-        inverse: Turn in the opposite direction.
+    It is done element by element, so a row's result does not depend on other rows.
 
     Returns:
         Shape ``(len(vectors), n, 3)``.

@@ -67,10 +67,7 @@ def _row_type(joints: tuple[str, ...], starts: tuple[int, ...], size: int) -> np
 def trajectory_rows(contents: bytes, samples: int, joints: tuple[str, ...]) -> NDArray[np.void]:
     """View the uncompressed records of a state chunk as a table, without a copy.
 
-    Args:
-        contents: Records with a valid CRC; so only the layout of the first message of each channel is checked.
-        samples: Number of samples.
-        joints: Joints that must have been recorded, in this order.
+    Their CRC has been compared, so only the layout of the first message of each channel is checked.
 
     Returns:
         Shape ``(samples,)``; the fields are the columns, as bytes.

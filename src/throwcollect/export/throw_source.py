@@ -30,13 +30,7 @@ Signals = Mapping[str, NDArray[np.float64]]
 
 @dataclass(frozen=True)
 class Entry:
-    """A throw that can be exported, before it is read.
-
-    Attributes:
-        trial: Number of its trial.
-        samples: Number of samples in the export.
-        succeeded: Whether it succeeded.
-    """
+    """A throw that can be exported, before it is read; its samples are as many as the export will have."""
 
     trial: int
     samples: int
@@ -95,11 +89,7 @@ class Source:
 
     @classmethod
     def open(cls, directory: Path, *, rate_hz: int | None = None) -> Source:
-        """Open a dataset to export it.
-
-        Args:
-            directory: Its directory.
-            rate_hz: Samples per second in the export; None for the recorded ones.
+        """Open a dataset to export it, with so many samples per second, or else as many as were recorded.
 
         Raises:
             DatasetError: If the directory holds no finished dataset, or one without episodes.

@@ -26,7 +26,6 @@ class Deviation:
     """How a throw by another engine differs from the stored one.
 
     Attributes:
-        trial: Number of the trial.
         stored: Its outcome in the dataset.
         again: Its outcome by the other engine.
         values: The other engine's value minus the stored one, in the unit of the column, for each column of the table
@@ -41,15 +40,9 @@ class Deviation:
 
 @dataclass(frozen=True)
 class Distribution:
-    """How much a column differs, in its unit.
+    """How much a column differs in the throws in which it could be compared, in its unit.
 
-    Attributes:
-        column: Its name.
-        throws: Number of throws in which it could be compared.
-        mean: Mean difference, with its sign.
-        rms: Root mean square.
-        median: Median of the absolute differences.
-        largest: Largest absolute difference.
+    The mean is that of differences with their signs; median and largest are those of absolute differences.
     """
 
     column: str

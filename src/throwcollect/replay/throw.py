@@ -35,10 +35,7 @@ class Replayer:
         return self.delivery(trial).episode
 
     def delivery(self, trial: Trial) -> Delivery:
-        """Simulate a trial: its episode, its result, and the conditions that it was simulated under.
-
-        Args:
-            trial: A trial of the collection, whether its plan has it or not.
+        """Simulate a trial of the collection, whether its plan has it or not: episode, result and conditions.
 
         Raises:
             ThrowcollectError: If a controller refuses its goal, or the samples are not finite, as in a collection.

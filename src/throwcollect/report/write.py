@@ -21,13 +21,10 @@ class Written:
 
 
 def write_report(directory: Path, page: Path, *, pictures: Path | None = None, model: Path | None = None) -> Written:
-    """Write a report on a dataset.
+    """Write a report on a dataset, and on a model that was learned from it, if its directory is given.
 
-    Args:
-        directory: The dataset.
-        page: HTML file to write, which must not exist.
-        pictures: Directory for pictures, which must not exist or be empty; None for a page alone.
-        model: Directory of a model that was learned from the dataset; None for none.
+    The page is an HTML file, which must not exist; the directory for pictures, if there shall be some, must not exist
+    or be empty.
 
     Raises:
         MissingExtraError: If a library that draws is not installed.

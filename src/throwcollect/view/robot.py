@@ -99,12 +99,7 @@ def draw_robot_of(config: Config) -> DrawnRobot:
 
 
 def read_drawn_robot(description: str, tool: str, share: Path) -> DrawnRobot:
-    """Read a URDF text as viewers draw it.
-
-    Args:
-        description: URDF text of the robot.
-        tool: Name of the tool's link, which has a colour of its own.
-        share: Directory that ``package://`` paths are relative to.
+    """Read a URDF text as viewers draw it; the link of the tool has a colour of its own.
 
     Raises:
         DatasetError: If the text is not a URDF that can be drawn.

@@ -52,8 +52,6 @@ class BallPath:
     """The ball of one throw.
 
     Attributes:
-        trial: Number of the trial.
-        outcome: Outcome of the trial.
         positions: Ball centre in world [m], shape ``(n_samples, 3)``.
         release: Index of the first sample after the release; None if it was not released.
     """
