@@ -185,7 +185,9 @@ def _read_pair(text: str, option: str, what: str) -> tuple[str, Fraction]:
     name, _, number = text.rpartition("=")
     try:
         value = Fraction(number) if _NUMBER.fullmatch(number) else None
-    except ZeroDivisionError:
+        # This is an error if the number is too large for a float, which all others can be made into.
+        float(value or 0)
+    except (ValueError, ArithmeticError):
         value = None
     if value is None or not name.strip():
         raise ConfigError([Problem(f"should be {what}, got {text!r}", option)])
@@ -193,4 +195,6 @@ def _read_pair(text: str, option: str, what: str) -> tuple[str, Fraction]:
 
 
 def _part_name(name: str, part: str) -> str:
-    return f"{name[: _LONGEST_NAME - len(part) - 1]}-{part}"
+    """Put the names of a dataset and of a part together; the first is cut, or left out, where there is no room."""
+    room = _LONGEST_NAME - len(part) - 1
+    return f"{name[:room]}-{part}" if room > 0 else part
