@@ -52,8 +52,8 @@ class Restamper:
         table = MessageTable(contents, episode.header.samples)
         self._move(table, by_ns)
         state = self._pack(contents, episode.state.chunk, by_ns)
-        sensors = [self._move_sensor(sensor, by_ns) for sensor in episode.sensors]
-        moved = Episode(_move_header(episode.header, trial, by_ns), state.chunk, state.said_sha256, sensors)
+        sensors = (self._move_sensor(sensor, by_ns) for sensor in episode.sensors)
+        moved = Episode(_move_header(episode.header, trial, by_ns), state, *sensors)
         # The table is at hand, so the new chunk need not be decompressed for it.
         moved.table = table
         return moved

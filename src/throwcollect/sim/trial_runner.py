@@ -13,6 +13,7 @@ from throwcollect.episode.channels import Channels
 from throwcollect.episode.encoder import ChunkEncoder
 from throwcollect.episode.message import Delivery, Episode
 from throwcollect.episode.record import EpisodeHeader, Samples, find_infinite_columns
+from throwcollect.episode.recorded_chunk import RecordedChunk
 from throwcollect.errors import ThrowcollectError
 from throwcollect.members import explain_failure
 from throwcollect.robots.description import full_description, robot_of, start_posture
@@ -96,7 +97,8 @@ class TrialRunner:
         table = self._encoder.lay_out(samples, states)
         # The records are judged, as by every reader of the dataset: they hold velocities in the ball's frame.
         result = self._judge(begun, table.samples, header) if begun else ""
-        episode = Episode(header, self._encoder.compress(table), hashlib.sha256(table.contents).hexdigest())
+        state = RecordedChunk(self._encoder.compress(table), hashlib.sha256(table.contents).hexdigest())
+        episode = Episode(header, state)
         return Delivery(episode, result, conditions.to_json())
 
     def _judge(self, begun: _Begun, samples: Samples, header: EpisodeHeader) -> str:

@@ -20,6 +20,7 @@ from throwcollect.episode.encoder import ChunkEncoder
 from throwcollect.episode.message import Episode
 from throwcollect.episode.message_table import MessageTable
 from throwcollect.episode.record import EpisodeHeader, Samples
+from throwcollect.episode.recorded_chunk import RecordedChunk
 from throwcollect.episode.topics import Recording
 from throwcollect.errors import DatasetError
 from throwcollect.robots.description import full_description
@@ -195,8 +196,8 @@ def test_samples_have_the_joints_that_the_recording_names(
     encoder: ChunkEncoder, header: EpisodeHeader, make_samples: Any
 ) -> None:
     contents = encoder.encode(make_samples(50)).decompress()
-    assert Episode(header, as_chunk(contents)).samples(TALOS.joints).position.shape == (50, 32)
-    renamed = Episode(header, as_chunk(contents.replace(b"head_1_joint", b"neck_1_joint")))
+    assert Episode(header, RecordedChunk(as_chunk(contents))).samples(TALOS.joints).position.shape == (50, 32)
+    renamed = Episode(header, RecordedChunk(as_chunk(contents.replace(b"head_1_joint", b"neck_1_joint"))))
     assert renamed.table.joints == tuple(joint.replace("head_1", "neck_1") for joint in TALOS.joints)
     assert renamed.samples().position.tolist() == make_samples(50).position.tolist()
     with pytest.raises(DatasetError, match=r"joint 29 of the joint states is neck_1_joint\n.*head_1_joint"):
