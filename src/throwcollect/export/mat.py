@@ -49,7 +49,7 @@ k = 1;
 path = robot_throws.qPath{{k}};
 dmp = robot_throws.DMP{{k}};
 target = robot_throws.targets(k, :);  % d, h, alpha""",
-        over_time=[*_FIELDS, "", *list_joints(source)],
+        over_time=[*_FIELDS, "", list_joints(source)],
         language="matlab",
     )
 
