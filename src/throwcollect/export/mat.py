@@ -30,6 +30,8 @@ scipy_io = lazily("scipy.io", extra="export")
 BASIS_FUNCTIONS = 25
 """Number of basis functions of each joint in a fitted DMP."""
 _FIT_POINTS = 501
+_LONGEST_NAME = 63
+"""Most characters of the name of a field in MATLAB."""
 _LARGEST = 2**31 - 1
 """Size that a variable may have in a file of version 5 [bytes]."""
 
@@ -83,13 +85,18 @@ def write(source: Source, directory: Path) -> None:
     """Write a dataset as MATLAB files of version 5; see `Exporter.write`.
 
     Raises:
-        ConfigError: If the dataset is not one of throws.
+        ConfigError: If the dataset is not one of throws, or a column has a name that MATLAB does not allow.
     """
     task = source.dataset.config.task
     if not task.throws:
         raise ConfigError(
             f"--to: mat has the structure of a throwing database, and the task {task.name} throws no ball",
             expected="another format",
+        )
+    if long := [name for name in source.table.column_names if len(name) > _LONGEST_NAME]:
+        raise ConfigError(
+            f"--to: mat has no room for the name of the column {long[0]}",
+            expected=f"at most {_LONGEST_NAME} characters, or another format",
         )
     # An array of objects, as texts are, becomes a cell array; one of texts would become a matrix of characters.
     columns = {_name_field(name): to_array(source.table[name])[:, np.newaxis] for name in source.table.column_names}
