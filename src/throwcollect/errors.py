@@ -89,8 +89,6 @@ class ConfigError(ThrowcollectError):
 
     Args:
         problems: All problems that were found, at least one; or a single sentence.
-        expected: What would have been right.
-        hint: One command or one edit that helps.
         more: Number of further problems, which are only counted.
     """
 
@@ -142,9 +140,6 @@ class DatasetError(ThrowcollectError):
         problem: One line that says what is wrong.
         path: The damaged file or directory; None if only the caller knows it.
         place: Place in that file, such as ``byte 17``; empty for the file as a whole.
-        expected: What would have been right.
-        evidence: What was observed.
-        hint: One command or one edit that helps.
     """
 
     exit_code = 4
@@ -173,9 +168,7 @@ class DatasetError(ThrowcollectError):
     def locate(self, path: Path | None = None, place: str = "") -> DatasetError:
         """Return the same error with file and place, for a caller that knows where the bytes came from.
 
-        Args:
-            path: The file of the bytes; None if the caller does not know it either.
-            place: Place of the bytes in the file, which comes before the place of the error in the bytes.
+        The place of the bytes in the file comes before that of the error in the bytes.
         """
         # The message is made with the error, so another place makes another error.
         whole = ": ".join(filter(None, (place, self.place)))
@@ -203,8 +196,6 @@ class RequestError(ThrowcollectError):
     Args:
         reason: Name of the result code in the interface definitions, such as ``NAME_INVALID``.
         message: One line that says what was asked for and what is wrong with it.
-        expected: What would have been right.
-        hint: One call or one edit that helps.
     """
 
     def __init__(self, reason: str, message: str, *, expected: str | None = None, hint: str | None = None) -> None:

@@ -54,12 +54,7 @@ _FIRST_WITH_MUJOCO = (3, 11)
 
 
 class MissingExtraError(ThrowcollectError, ImportError):
-    """A package that an extra brings is not installed; nothing has been started.
-
-    Attributes:
-        package: Name of the package in imports.
-        extra: The extra that brings it.
-    """
+    """A package, by its name in imports, that an extra brings is not installed; nothing has been started."""
 
     exit_code = ConfigError.exit_code
 
@@ -85,12 +80,7 @@ _SYSTEM_LIBRARY_OF = MappingProxyType({"pinocchio": ("libgomp.so.1", "libgomp1")
 
 
 class MissingLibraryError(ThrowcollectError, ImportError):
-    """A package is installed, but this system lacks a library that it loads; nothing has been started.
-
-    Attributes:
-        package: Name of the package in imports.
-        library: File name of the library.
-    """
+    """A package is installed, but this system lacks the file of a library that it loads; nothing has been started."""
 
     exit_code = ConfigError.exit_code
 
@@ -124,11 +114,9 @@ def is_installed(package: str) -> bool:
 
 
 def require(*packages: str, extra: str | None = None) -> None:
-    """Check that packages are installed, before anything begins.
+    """Check that packages, by their names in imports, are installed, before anything begins.
 
-    Args:
-        packages: Names of the packages in imports.
-        extra: The extra that the error names; None for that of `EXTRA_OF`.
+    The error names `extra`, or else that of `EXTRA_OF`.
 
     Raises:
         MissingExtraError: If one is not installed; it names the first.
@@ -140,10 +128,7 @@ def require(*packages: str, extra: str | None = None) -> None:
 
 @contextmanager
 def explain_missing(extra: str | None = None) -> Iterator[None]:
-    """Turn a failed import in the block into an error that names the extra.
-
-    Args:
-        extra: The extra that the error names; None for that of `EXTRA_OF`.
+    """Turn a failed import in the block into an error that names `extra`, or else that of `EXTRA_OF`.
 
     Raises:
         MissingExtraError: If a package that an extra brings is not installed.
@@ -158,14 +143,10 @@ def explain_missing(extra: str | None = None) -> Iterator[None]:
 
 
 def lazily(name: str, *, extra: str | None = None) -> Any:
-    """Make a stand-in for a module, which imports the module when an attribute of it is first used.
+    """Make a stand-in for a module of a package in `EXTRA_OF`, which imports it when an attribute of it is first used.
 
-    The use of an attribute raises `MissingExtraError` if the package is not installed, and `MissingLibraryError` if the
-    system lacks a library that the package loads.
-
-    Args:
-        name: Full name of a module of a package in `EXTRA_OF`.
-        extra: The extra that the error names; None for that of `EXTRA_OF`.
+    The use of an attribute raises `MissingExtraError` if the package is not installed, which names `extra`, or else
+    that of `EXTRA_OF`, and `MissingLibraryError` if the system lacks a library that the package loads.
     """
     return _LazyModule(name, extra)
 

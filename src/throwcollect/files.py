@@ -124,11 +124,7 @@ def beside(path: Path, *, mode: int = 0o666) -> Iterator[int]:
     """Open a new file that takes the place of `path` when the block ends well, and vanishes when it does not.
 
     While it is written, it is called ``<name>.new``. A file that already has that name was left by a process that was
-    killed, or put there by another program, and is removed.
-
-    Args:
-        path: The file.
-        mode: Its permissions, before the process's mask.
+    killed, or put there by another program, and is removed. The mode is before the process's mask.
 
     Yields:
         File descriptor to write to.
@@ -187,8 +183,7 @@ def replacing(path: Path) -> Iterator[int]:
 def new_directory(path: Path) -> Iterator[Path]:
     """Make a directory that gets its name when the block ends well, and vanishes when it does not.
 
-    Args:
-        path: The directory; must not exist, or be empty.
+    There must be none of that name, or an empty one.
 
     Yields:
         A hidden directory beside it, to write into meanwhile.

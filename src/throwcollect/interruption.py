@@ -39,8 +39,7 @@ def _leave(_number: int, _frame: FrameType | None) -> NoReturn:
 def die_with_parent(parent: int) -> None:
     """Ask the kernel to kill this process when its parent dies; to be called by a child right after the fork.
 
-    Args:
-        parent: Process id of the parent. If it has died before the call, no signal comes, so this process ends at once.
+    If the parent, whose process id is given, has died before the call, no signal comes, so this process ends at once.
     """
     _LIBC.prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
     if os.getppid() != parent:

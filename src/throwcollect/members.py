@@ -78,11 +78,9 @@ def names_of(family: str) -> tuple[str, ...]:
 
 @cache
 def load_member(family: str, name: str) -> Any:
-    """Import a member of a family; the cache is for callers that ask with every trial.
+    """Import a member of ``robots``, ``tools``, ``engines``, ``tasks``, ``runtimes`` or ``exporters`` by its name.
 
-    Args:
-        family: ``robots``, ``tools``, ``engines``, ``tasks``, ``runtimes`` or ``exporters``.
-        name: Name of the member.
+    The cache is for callers that ask with every trial.
 
     Returns:
         A `Robot` or an `Exporter`; the class of an engine or a runtime; for a tool or a task, the class of its section.
@@ -125,13 +123,8 @@ def load_object(path: str, kind: type | None = None) -> Any:
 def explain_failure(family: str, name: str, doing: str, *, passing: tuple[type[Exception], ...] = ()) -> Iterator[None]:
     """Report what a member of another package raises in the block as a fault of that package.
 
-    What our own members raise is let through, because it is a fault of throwcollect.
-
-    Args:
-        family: As `load_member` takes it.
-        name: Name of the member.
-        doing: What the member was asked to do, such as ``judge trial 3``.
-        passing: Exceptions that are let through, because the caller explains them.
+    What our own members raise is let through, because it is a fault of throwcollect, and so is what is `passing`,
+    because the caller explains it. `doing` says what the member was asked to do, such as ``judge trial 3``.
 
     Raises:
         MemberError: If the block raises anything else that is not raised on purpose.
@@ -155,11 +148,7 @@ def explain_failure(family: str, name: str, doing: str, *, passing: tuple[type[E
 
 
 def _import(path: str, what: str) -> Any:
-    """Import an object of another package, and report a mistake in there as one of that package.
-
-    Args:
-        path: The object, as ``module:name``.
-        what: What it is, as the beginning of a message.
+    """Import ``module:name`` of another package; the message about a mistake in there begins with `what` it is.
 
     Raises:
         ConfigError: If it cannot be imported.
@@ -171,10 +160,7 @@ def _import(path: str, what: str) -> Any:
     except ThrowcollectError:
         raise
     except Exception as error:
-        raise ConfigError(
-            f"{what} cannot be loaded: {type(error).__name__}: {error}",
-            hint=_WAY_OUT,
-        ) from error
+        raise ConfigError(f"{what} cannot be loaded: {type(error).__name__}: {error}", hint=_WAY_OUT) from error
 
 
 def _check_class(found: Any, kind: type, where: str) -> Any:

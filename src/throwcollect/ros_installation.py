@@ -100,11 +100,8 @@ def module_name(interface: str) -> str:
 
 def _has_wheels() -> bool:
     python = (sys.implementation.name, *sys.version_info[:2])
-    return python == ("cpython", 3, 11) and (platform.system(), platform.machine(), platform.libc_ver()[0]) == (
-        "Linux",
-        "x86_64",
-        "glibc",
-    )
+    system = (platform.system(), platform.machine(), platform.libc_ver()[0])
+    return python == ("cpython", 3, 11) and system == ("Linux", "x86_64", "glibc")
 
 
 def _directory(package: str) -> Path | None:

@@ -32,11 +32,7 @@ _PURPOSE = b"throwcollect signature 1\0"
 
 @dataclass(frozen=True)
 class RunKey:
-    """The key of a run.
-
-    Attributes:
-        directory: Directory of its two files.
-    """
+    """The key of a run, in the directory of its two files."""
 
     directory: Path
 
@@ -86,12 +82,9 @@ class RunKey:
         return key.private_numbers().private_value.to_bytes(_SECRET_BYTES, "big")
 
     def create(self, secret: bytes | None = None) -> None:
-        """Make a new key, or make the key of another machine again; the directory is created if it is missing.
+        """Make a new key, or from its secret the key of another machine again, in a directory that need not exist.
 
         The certificate of a key that is made again differs, but nodes trust it, because they check only who signed it.
-
-        Args:
-            secret: The secret of the key of another machine; None for a new key.
 
         Raises:
             ConfigError: If the files cannot be written, or no key has this secret.

@@ -66,7 +66,6 @@ class Simulator:
         self.config: Config = config
         self._check = feasibility_check(self.config)
         self._replayer = Replayer(self.config)
-        self._is_closed = False
 
     def __enter__(self) -> Simulator:
         return self
@@ -78,9 +77,7 @@ class Simulator:
 
     def close(self) -> None:
         """Free the physics engine; nothing can be simulated afterwards. To close it once more does nothing."""
-        if not self._is_closed:
-            self._is_closed = True
-            self._replayer.close()
+        self._replayer.close()
 
     def throw(self, values: Point | None = None, *, trial: int = 0, target: Point | None = None) -> Throw:
         """Simulate one throw.
@@ -121,10 +118,7 @@ class Simulator:
         return self._throw(planned)
 
     def find_refusal(self, values: Point) -> str | None:
-        """Say why the plan of a collection would refuse a throw; None if it would not.
-
-        Args:
-            values: What differs from the configuration.
+        """Say why the plan of a collection would refuse a throw with these values; None if it would not.
 
         Raises:
             ConfigError: If a key cannot vary, or a value is out of its range.
@@ -160,12 +154,9 @@ class Simulator:
             for trial, point in enumerate(points):
                 yield self.throw(point, trial=trial)
             return
+        pieces = tuple(enumerate(points))
         yield from work_side_by_side(
-            tuple(enumerate(points)),
-            _begin,
-            (self.config, self._source),
-            processes=processes,
-            doing="simulates",
+            pieces, _begin, (self.config, self._source), processes=processes, doing="simulates"
         )
 
     def _require_open(self) -> None:
@@ -174,7 +165,7 @@ class Simulator:
         Raises:
             ConflictError: If the simulator is closed.
         """
-        if self._is_closed:
+        if not self._replayer.close.alive:
             raise ConflictError("this simulator is closed", hint="make another Simulator")
 
     def _throw(self, trial: Trial) -> Throw:

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from throwcollect.dataset.creation import create
+from throwcollect.dataset.damage import locating_damage
 from throwcollect.dataset.directory import CARD, SOURCES
 from throwcollect.dataset.inspect import info
 from throwcollect.dataset.judging import judge_episode
@@ -29,7 +30,6 @@ from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.files import new_directory, write_file
 from throwcollect.robots.description import full_description
 from throwcollect.sweep.plan import Plan, make_trials
-from throwcollect.wording import command
 
 _ROWS_AT_ONCE = 256
 _MOST_THREADS = 4
@@ -57,33 +57,21 @@ class Derived:
         return asdict(self)
 
 
-def derive(sources: Sequence[Source], output: Path) -> Derived:
-    """Make the dataset that consists of the trials of some others, renumbered from 0, under the name of the first.
+def derive(sources: Sequence[Source], output: Path, *, name: str | None = None) -> Derived:
+    """Make the dataset that consists of the trials of some others, at least one, in their order, renumbered from 0.
 
-    Args:
-        sources: At least one; its trials come in the order of the sources.
-        output: Its directory, which must not exist or be empty; nothing is left there after an error.
+    Its directory must not exist or be empty, and nothing is left there after an error. Without a name of its own, it
+    has that of the first source.
 
     Raises:
         ConfigError: If there is no trial, the sources do not go together, or the directory cannot be used.
         DatasetError: If an episode of a source is damaged, or the dataset cannot be written.
     """
     with new_directory(output) as directory:
-        return write(sources, directory)
+        return _write(sources, directory, name)
 
 
-def write(sources: Sequence[Source], directory: Path, *, name: str | None = None) -> Derived:
-    """Write a derived dataset to a directory that the caller removes if this fails.
-
-    Args:
-        sources: As for `derive`.
-        directory: New or empty.
-        name: Name of the dataset; None for that of the first source.
-
-    Raises:
-        ConfigError: If there is no trial, or the sources do not go together.
-        DatasetError: If an episode of a source is damaged, or the dataset cannot be written.
-    """
+def _write(sources: Sequence[Source], directory: Path, name: str | None) -> Derived:
     began = time.monotonic()
     config, points = list_of_trials(sources)
     if not len(points.values):
@@ -146,13 +134,8 @@ def _rows(sources: Sequence[Source]) -> Iterator[tuple[Dataset, Row]]:
 
 
 def _restamp(restamper: Restamper, dataset: Dataset, row: Row, number: int) -> Episode:
-    trial = row["trial"]
-    episode = dataset.episode(trial)
-    try:
+    with locating_damage(dataset, row["trial"]):
+        episode = dataset.episode(row["trial"])
         if episode.digest != row["digest"]:
             raise DatasetError(f"digest {episode.digest}", expected=f"{row['digest']} as throws.parquet says")
         return restamper.restamp(episode, number)
-    except DatasetError as error:
-        raise DatasetError(
-            f"trial {trial}: {error}", path=dataset.directory, hint=command("dataset", "verify", dataset.directory)
-        ) from error

@@ -1,4 +1,7 @@
-"""Datasets made of some trials of one dataset, or of all trials of several."""
+"""Datasets made of some trials of one dataset, or of all trials of several.
+
+The directory of the new dataset must not exist, or be empty.
+"""
 
 from __future__ import annotations
 
@@ -16,11 +19,7 @@ from throwcollect.files import StrPath
 
 
 def merge(directories: Sequence[StrPath], output: StrPath) -> Derived:
-    """Put the trials of several datasets one after the other.
-
-    Args:
-        directories: Directories of the datasets, at least one, in this order.
-        output: Directory of the new dataset, which must not exist or be empty.
+    """Put the trials of several datasets, at least one, one after the other into a new one.
 
     Raises:
         ConfigError: If the datasets differ in keys that cannot be swept, or the directory cannot be used.
@@ -30,12 +29,7 @@ def merge(directories: Sequence[StrPath], output: StrPath) -> Derived:
 
 
 def filter_trials(directory: StrPath, output: StrPath, *, where: str) -> Derived:
-    """Take the trials that fulfil a condition.
-
-    Args:
-        directory: Directory of the dataset.
-        output: Directory of the new dataset, which must not exist or be empty.
-        where: Condition on columns of the table of throws; see `dataset.expression`.
+    """Take the trials that fulfil a condition on columns of the table of throws; see `dataset.expression`.
 
     Raises:
         ConfigError: If the condition cannot be evaluated or no trial fulfils it, or the directory cannot be used.
@@ -51,15 +45,9 @@ def filter_trials(directory: StrPath, output: StrPath, *, where: str) -> Derived
 
 
 def sample(directory: StrPath, output: StrPath, *, count: int, seed: int = 0) -> Derived:
-    """Take trials at random, all equally likely and none twice; they stay in their order.
+    """Take `count` trials at random, all equally likely and none twice; they stay in their order.
 
-    With the same seed, fewer trials are some of more.
-
-    Args:
-        directory: Directory of the dataset.
-        output: Directory of the new dataset, which must not exist or be empty.
-        count: Number of trials.
-        seed: Seed of the choice, not negative.
+    With the same seed, which is not negative, fewer trials are some of more.
 
     Raises:
         ConfigError: If the dataset has fewer episodes, or the directory cannot be used.

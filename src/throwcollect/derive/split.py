@@ -23,7 +23,7 @@ from pydantic import TypeAdapter, ValidationError
 from throwcollect.config.kinds import Name
 from throwcollect.dataset.expression import Expression
 from throwcollect.dataset.reader import Dataset
-from throwcollect.derive.derivation import Derived, write
+from throwcollect.derive.derivation import Derived, derive
 from throwcollect.derive.source import Source, source
 from throwcollect.derive.trial_list import list_of_trials
 from throwcollect.errors import ConfigError, Problem
@@ -79,7 +79,7 @@ def split(
     """Split a dataset into parts, each a dataset of its own.
 
     Args:
-        directory: Directory of the dataset.
+        directory: The dataset.
         output: Directory that gets one directory a part; it must not exist or be empty.
         fractions: Names of the parts and their shares of the cells: ``train=0.8,test=0.2``.
         cells: Axes of the space that is cut into cells: an expression on columns of the table of throws (see
@@ -96,7 +96,7 @@ def split(
     parts = {}
     with new_directory(Path(output)) as beside:
         for name, places in members.items():
-            derived = write([source(dataset, places)], beside / name, name=_part_name(dataset.config.name, name))
+            derived = derive([source(dataset, places)], beside / name, name=_part_name(dataset.config.name, name))
             held = list(places.values())
             parts[name] = Part(derived, len({cell for cell in held if cell is not None}), held.count(None))
     return Split(parts, everything.without_episode)
@@ -185,7 +185,9 @@ def _read_pair(text: str, option: str, what: str) -> tuple[str, Fraction]:
     name, _, number = text.rpartition("=")
     try:
         value = Fraction(number) if _NUMBER.fullmatch(number) else None
-    except ZeroDivisionError:
+        # This is an error if the number is too large for a float, which all others can be made into.
+        float(value or 0)
+    except (ValueError, ArithmeticError):
         value = None
     if value is None or not name.strip():
         raise ConfigError([Problem(f"should be {what}, got {text!r}", option)])
@@ -193,4 +195,6 @@ def _read_pair(text: str, option: str, what: str) -> tuple[str, Fraction]:
 
 
 def _part_name(name: str, part: str) -> str:
-    return f"{name[: _LONGEST_NAME - len(part) - 1]}-{part}"
+    """Put the names of a dataset and of a part together; the first is cut, or left out, where there is no room."""
+    room = _LONGEST_NAME - len(part) - 1
+    return f"{name[:room]}-{part}" if room > 0 else part

@@ -11,11 +11,11 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
+from throwcollect.dataset.damage import locating_damage
 from throwcollect.dataset.data_card import count_outcomes
 from throwcollect.dataset.moments import Moments
 from throwcollect.dataset.reader import Dataset
 from throwcollect.episode.record import Samples
-from throwcollect.errors import DatasetError
 from throwcollect.files import StrPath
 
 QUANTILES = (0.01, 0.05, 0.25, 0.5, 0.75, 0.95, 0.99)
@@ -31,13 +31,11 @@ _BALL_GROUPS = {"ball_position_m": "ball_position", "ball_velocity_mps": "ball_l
 class ColumnStatistics:
     """Statistics of a column of the table of throws, over the rows that have a finite number.
 
+    Extrema, mean and standard deviation (that of the population) are None if there is no such row.
+
     Attributes:
         count: Number of rows that have a number.
         nulls: Number of rows that have none.
-        min: Smallest number; None without numbers, as are maximum, mean and deviation.
-        max: Largest number.
-        mean: Mean.
-        std: Standard deviation, of the population.
         quantiles: Quantiles at `QUANTILES`, linear between neighbours, by names such as ``q05``.
     """
 
@@ -54,11 +52,7 @@ class ColumnStatistics:
 class SignalStatistics:
     """Statistics of a recorded signal over all samples of all episodes.
 
-    Attributes:
-        min: Smallest value.
-        max: Largest value.
-        mean: Mean.
-        std: Standard deviation, of the population; 0 for a joint that is locked.
+    The standard deviation is that of the population, and 0 for a joint that is locked.
     """
 
     min: float
@@ -105,11 +99,8 @@ def statistics(directory: StrPath) -> Statistics:
     dataset = Dataset.open(directory)
     moments, left_out = None, 0
     for episode in dataset.episodes():
-        try:
+        with locating_damage(dataset, episode.header.trial):
             rows = _stack_signals(episode.samples(dataset.joints))
-        except DatasetError as error:
-            # The episode knows neither its file nor its directory, without which nobody finds the damage.
-            raise error.locate(dataset.directory, f"trial {episode.header.trial}") from error
         finite = rows[np.isfinite(rows).all(axis=1)]
         left_out += len(rows) - len(finite)
         if len(finite):

@@ -35,11 +35,9 @@ _INFINITE_S, _INFINITE_NS = 9223372036, 854775807
 
 @dataclass(frozen=True)
 class Qos:
-    """Offered quality of service of a reliable publisher that keeps the last messages.
+    """Offered quality of service of a reliable publisher that keeps the last messages, `depth` of them.
 
-    Attributes:
-        durability: ``transient_local`` if late subscribers get the last messages.
-        depth: Number of messages that are kept.
+    With the durability ``transient_local``, late subscribers get them, too.
     """
 
     durability: Literal["volatile", "transient_local"]
@@ -81,14 +79,7 @@ _TRANSFORMS = Qos("volatile", 100)
 
 @dataclass(frozen=True)
 class Channel:
-    """One topic of a recording.
-
-    Attributes:
-        id: Number of the channel; the same in every dataset.
-        topic: Name of the topic.
-        type_name: Message type, ``package/msg/Type``.
-        qos: Offered quality of service.
-    """
+    """One topic of a recording, with its type ``package/msg/Type``, and a number that is the same in every dataset."""
 
     id: int
     topic: str

@@ -1,14 +1,13 @@
-"""MCAP chunks: encodes the samples of a trial into one, and packs, indexes and reads chunks.
+"""MCAP chunks: packs, indexes and reads them.
 
 The state chunk of an episode holds one Message record per channel and sample, samples in order of time and channels by
-number (MCAP specification, records Message, Chunk and Message Index); `message_table` reads it.
+number (MCAP specification, records Message, Chunk and Message Index); `encoder` writes it, `message_table` reads it.
 """
 
 from __future__ import annotations
 
 import struct
 import threading
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,10 +19,6 @@ from mcap.data_stream import RecordBuilder
 from mcap.opcode import Opcode
 from numpy.typing import NDArray
 
-from throwcollect.episode.channels import Channels
-from throwcollect.episode.layout import MessageLayout
-from throwcollect.episode.record import ControllerSamples, Samples
-from throwcollect.episode.topics import Recording, Topic
 from throwcollect.errors import DatasetError
 
 _COMPRESSION = b"zstd"
@@ -198,75 +193,3 @@ class Chunk:
         if crc32(contents) != self.crc:
             raise DatasetError("chunk: its CRC differs from its contents")
         return contents
-
-
-class ChunkEncoder:
-    """Encodes samples for one configuration, with a level of zstd."""
-
-    def __init__(self, channels: Channels, *, level: int) -> None:
-        self._topics = {topic.name: topic for topic in channels.recorded.values()}
-        self._compressor = zstandard.ZstdCompressor(level=level)
-        layouts = {channel.id: topic.layout for channel, topic in channels.recorded.items()}
-        self._template = np.frombuffer(
-            # The length of a record counts what is behind it: 22 bytes of channel, sequence and times, and the message.
-            b"".join(MESSAGE_HEADER.pack(Opcode.MESSAGE, 22 + len(layout.template), number, 0, 0, 0) + layout.template
-                     for number, layout in layouts.items()),
-            dtype=np.uint8,
-        )  # fmt: skip
-        self._dtype = _row_type({topic.name: topic.layout for topic in channels.recorded.values()})
-
-    def encode(self, samples: Samples, controllers: Mapping[str, ControllerSamples] | None = None) -> Chunk:
-        """Encode and compress an episode; see `lay_out`."""
-        return self.compress(self.lay_out(samples, controllers), samples)
-
-    def lay_out(self, samples: Samples, controllers: Mapping[str, ControllerSamples] | None = None) -> memoryview:
-        """Write the message records of an episode, with set points of each controller whose state is recorded, by name.
-
-        Raises:
-            KeyError: If the set points of a recorded controller are missing.
-        """
-        recording = Recording(samples, controllers or {})
-        table = np.empty((len(samples), len(self._template)), np.uint8)
-        table[:] = self._template
-        rows = table.view(self._dtype)[:, 0]
-        for name, topic in self._topics.items():
-            column = rows[name]
-            column["sequence"] = np.arange(len(samples))
-            column["log_time"] = column["publish_time"] = samples.stamps_ns
-            topic.fill(column["message"], recording)
-        # The hash and the compressor take a run of bytes, and this makes one without a copy.
-        return table.data.cast("B")
-
-    def compress(self, contents: memoryview, samples: Samples) -> Chunk:
-        """Make the chunk of the records that `lay_out` has written for samples."""
-        start, end = int(samples.stamps_ns[0]), int(samples.stamps_ns[-1])
-        return Chunk.of(contents, self._compressor.compress(contents), start_ns=start, end_ns=end)
-
-
-def encode_message(topic: Topic, samples: Samples, index: int, controllers: Mapping[str, ControllerSamples]) -> bytes:
-    """Write the message of the sample at an index, byte for byte as `ChunkEncoder.lay_out` writes it.
-
-    Raises:
-        KeyError: If the set points of the topic's controller are missing.
-    """
-    message = bytearray(topic.layout.template)
-    one = slice(index, index + 1)
-    recording = Recording(samples[one], {name: target[one] for name, target in controllers.items()})
-    topic.fill(np.frombuffer(message, topic.layout.dtype), recording)
-    return bytes(message)
-
-
-def _row_type(layouts: Mapping[str, MessageLayout]) -> np.dtype[np.void]:
-    formats = [
-        np.dtype(
-            {
-                "names": ["sequence", "log_time", "publish_time", "message"],
-                "formats": ["<u4", "<u8", "<u8", layout.dtype],
-                # The sequence follows opcode (1), length (8) and channel (2), the log time the sequence (4), and so on.
-                "offsets": [11, 15, 23, MESSAGE_HEADER.size],
-                "itemsize": MESSAGE_HEADER.size + len(layout.template),
-            }
-        )
-        for layout in layouts.values()
-    ]
-    return np.dtype({"names": list(layouts), "formats": formats})

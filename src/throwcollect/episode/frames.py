@@ -22,8 +22,8 @@ class Frame:
     """A frame and its pose in its parent when its joint is at 0.
 
     Attributes:
-        parent: Name of the parent frame.
-        child: Name of the frame.
+        parent: Name of the parent.
+        child: Name of the frame itself.
         translation: Origin of the frame in its parent [m].
         rotation_xyzw: Unit quaternion, frame to parent.
     """
@@ -36,12 +36,7 @@ class Frame:
 
 @dataclass(frozen=True)
 class MovingFrame(Frame):
-    """A frame that a revolute joint turns in its parent.
-
-    Attributes:
-        joint: Name of the joint.
-        axis: Unit vector of the joint's axis, in the frame itself.
-    """
+    """A frame that a revolute joint turns in its parent; the axis is a unit vector in the frame itself."""
 
     joint: str
     axis: tuple[float, float, float]
@@ -108,11 +103,10 @@ def _read_joint(joint: ElementTree.Element) -> Frame:
         raise ConfigError(f"robot description: joint {name} is {kind!r}", expected="fixed, revolute or continuous")
     try:
         parent, child = (joint.find(end).attrib["link"] for end in ("parent", "child"))  # type: ignore[union-attr]
-        translation = _vector(joint, "origin", "xyz", "0 0 0")
-        rotation = _quaternion(*_vector(joint, "origin", "rpy", "0 0 0"))
+        translation, rotation = read_origin(joint)
         if kind == "fixed":
             return Frame(parent, child, translation, rotation)
-        # The default is that of the URDF specification, and so are those of the origin.
+        # The default is that of the URDF specification.
         x, y, z = _vector(joint, "axis", "xyz", "1 0 0")
         length = math.hypot(x, y, z)
         return MovingFrame(parent, child, translation, rotation, name, (x / length, y / length, z / length))
@@ -120,8 +114,19 @@ def _read_joint(joint: ElementTree.Element) -> Frame:
         raise ConfigError(f"robot description: joint {name} is not readable: {error}") from error
 
 
-def _vector(joint: ElementTree.Element, tag: str, key: str, default: str) -> tuple[float, float, float]:
-    element = joint.find(tag)
+def read_origin(owner: ElementTree.Element) -> tuple[tuple[float, float, float], tuple[float, float, float, float]]:
+    """Read the origin of a joint or a shape in URDF: translation [m], and unit quaternion (x, y, z, w).
+
+    Raises:
+        ValueError: If it is not made of numbers.
+    """
+    # The defaults are those of the URDF specification.
+    roll, pitch, yaw = _vector(owner, "origin", "rpy", "0 0 0")
+    return _vector(owner, "origin", "xyz", "0 0 0"), _quaternion(roll, pitch, yaw)
+
+
+def _vector(owner: ElementTree.Element, tag: str, key: str, default: str) -> tuple[float, float, float]:
+    element = owner.find(tag)
     x, y, z = map(float, (default if element is None else element.get(key, default)).split())
     return x, y, z
 

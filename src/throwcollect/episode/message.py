@@ -49,32 +49,21 @@ class Episode:
 
     Attributes:
         header: The facts besides the samples.
+        chunks: All chunks in order, the state chunk first.
         state: The state chunk.
         sensors: Chunks of sensors, in the order of the channels that they hold.
-
-    The arguments `chunk` and `said_sha256` are those of `RecordedChunk`.
     """
 
-    def __init__(
-        self,
-        header: EpisodeHeader,
-        chunk: Chunk,
-        said_sha256: str | None = None,
-        sensors: Sequence[RecordedChunk] = (),
-    ) -> None:
+    def __init__(self, header: EpisodeHeader, state: RecordedChunk, *sensors: RecordedChunk) -> None:
         self.header = header
-        self.state = RecordedChunk(chunk, said_sha256)
-        self.sensors = tuple(sensors)
+        self.chunks = (state, *sensors)
+        self.state = state
+        self.sensors = sensors
 
     @property
     def chunk(self) -> Chunk:
         """The state chunk, compressed."""
         return self.state.chunk
-
-    @property
-    def chunks(self) -> tuple[RecordedChunk, ...]:
-        """All chunks in order, the state chunk first."""
-        return (self.state, *self.sensors)
 
     @cached_property
     def header_json(self) -> str:
@@ -91,10 +80,7 @@ class Episode:
         return MessageTable(self.state.contents, self.header.samples)
 
     def samples(self, joints: Sequence[str] | None = None) -> Samples:
-        """Read the samples, as views of the records where possible.
-
-        Args:
-            joints: The joints that must have been recorded, in this order; None accepts any.
+        """Read the samples, as views of the records where possible; `joints` must have been recorded, in this order.
 
         Raises:
             DatasetError: If the chunk is damaged, its messages have another layout than this version writes, or other
@@ -168,12 +154,9 @@ def _layout() -> MessageLayout:
 
 
 class Delivery(NamedTuple):
-    """An episode that a simulation hands over.
+    """An episode that a simulation hands over, with its conditions and the result of the trial, both in JSON.
 
-    Attributes:
-        episode: The episode.
-        result: Result of the trial in JSON; empty if the simulation has not judged it.
-        conditions: Conditions of the episode in JSON.
+    The result is empty if the simulation has not judged the episode.
     """
 
     episode: Episode
@@ -182,12 +165,7 @@ class Delivery(NamedTuple):
 
 
 class Refusal(NamedTuple):
-    """A refusal of a simulation to do a trial.
-
-    Attributes:
-        token: Token of the trial's lease.
-        reason: The reason.
-    """
+    """A refusal of a simulation to do a trial, with the token of its lease."""
 
     token: str
     reason: str
@@ -264,5 +242,4 @@ def make_episode(header: bytes | str, hashes: Sequence[str], chunks: Sequence[Ch
             raise DatasetError(f"episode: SHA-256 {said[:80]!r}", expected="64 hexadecimal digits")
     if len(hashes) != len(chunks) or not chunks:
         raise DatasetError(f"episode: {len(chunks)} chunks", expected=f"{len(hashes)}, as many as it has hashes of")
-    sensors = [RecordedChunk(chunk, said) for chunk, said in zip(chunks[1:], hashes[1:], strict=True)]
-    return Episode(header_from_json(header), chunks[0], hashes[0], sensors)
+    return Episode(header_from_json(header), *map(RecordedChunk, chunks, hashes))

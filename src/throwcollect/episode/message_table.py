@@ -7,6 +7,7 @@ size, and each of their channels may have a rate of its own.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import cached_property
 from typing import NamedTuple
 
@@ -17,9 +18,18 @@ from numpy.typing import NDArray
 from throwcollect.episode.channels import BALL_ODOMETRY_ID, JOINT_STATES_ID
 from throwcollect.episode.chunk import MESSAGE_HEADER, RECORD_PREFIX_BYTES, encode_message_index
 from throwcollect.episode.record import Samples
-from throwcollect.episode.topics import Rows, Topic, ball_odometry, joint_states, read_joint_names, read_samples
+from throwcollect.episode.topics import (
+    STAMP,
+    Rows,
+    Topic,
+    ball_odometry,
+    joint_states,
+    put_stamps,
+    read_joint_names,
+    read_samples,
+    read_stamps,
+)
 from throwcollect.errors import DatasetError
-from throwcollect.units import NS_PER_S
 
 _HEADERS = np.dtype(
     {
@@ -30,20 +40,39 @@ _HEADERS = np.dtype(
 """`MESSAGE_HEADER`, of many records at once."""
 _ALIKE_BYTES = 11
 """Size of opcode, length and channel, which are the same in all records of a channel."""
-_STAMP = np.dtype([("sec", "<i4"), ("nanosec", "<u4")])
 _STAMP_OFFSET = 4
 """Place of the stamp in a message that begins with its std_msgs/Header: behind the CDR encapsulation [bytes]."""
 
 
-class Column(NamedTuple):
-    """Place of the records of one channel in each row."""
+class Place(NamedTuple):
+    """Place of a record in a chunk; that in the first row is the place of the records of its channel in each row."""
 
     offset: int
     size: int
 
 
-class FirstRow:
-    """The first row of a state chunk, which has one message of each channel and shows the layout of all rows.
+def _find_records(
+    contents: bytes | bytearray | memoryview, *, shortest: int, wrong: str
+) -> Iterator[tuple[int, Place]]:
+    """Find the places of Message records that follow each other, with their channels; none is below `shortest` bytes.
+
+    Raises:
+        DatasetError: If the contents are anything else, with `wrong` for what they are.
+    """
+    offset = 0
+    while offset < len(contents):
+        if len(contents) - offset < MESSAGE_HEADER.size:
+            raise DatasetError(f"chunk: a record is cut off at byte {offset}")
+        opcode, length, channel, *_ = MESSAGE_HEADER.unpack_from(contents, offset)
+        size = RECORD_PREFIX_BYTES + length
+        if opcode != Opcode.MESSAGE or size < shortest or offset + size > len(contents):
+            raise DatasetError(f"chunk: {wrong} at byte {offset}")
+        yield channel, Place(offset, size)
+        offset += size
+
+
+class RowLayout:
+    """The layout of the rows of a state chunk, as the first one shows it: each has one message of each channel.
 
     Attributes:
         columns: Place of each channel's record in a row, by the channel's number.
@@ -56,57 +85,47 @@ class FirstRow:
         if samples < 1 or len(contents) % samples or not contents:
             raise DatasetError(f"chunk: {len(contents)} bytes are not the records of {samples} samples")
         self._row = bytes(contents[: len(contents) // samples])
-        self.columns: dict[int, Column] = {}
-        offset = 0
-        while offset < len(self._row):
-            if len(self._row) - offset < MESSAGE_HEADER.size:
-                raise DatasetError(f"chunk: a record is cut off at byte {offset}")
-            opcode, length, channel, *_ = MESSAGE_HEADER.unpack_from(self._row, offset)
-            column = Column(offset, RECORD_PREFIX_BYTES + length)
-            offset += column.size
-            if (
-                opcode != Opcode.MESSAGE
-                or length < MESSAGE_HEADER.size - RECORD_PREFIX_BYTES
-                or offset > len(self._row)
-                or channel in self.columns
-            ):
-                raise DatasetError(f"chunk: not one message per channel and sample at byte {column.offset}")
+        self.columns: dict[int, Place] = {}
+        wrong = "not one message per channel and sample"
+        for channel, column in _find_records(self._row, shortest=MESSAGE_HEADER.size, wrong=wrong):
+            if channel in self.columns:
+                raise DatasetError(f"chunk: {wrong} at byte {column.offset}")
             self.columns[channel] = column
 
     @cached_property
     def joints(self) -> tuple[str, ...]:
-        """Names of the joints in the joint state.
+        """Names of the joints, in the order of the columns of joints: those that the first joint state has.
 
         Raises:
             DatasetError: If there is no readable joint state.
         """
-        return read_joint_names(bytes(self._message(JOINT_STATES_ID, "/joint_states")))
+        return read_joint_names(bytes(self._first_message(JOINT_STATES_ID, "/joint_states")))
 
-    def check_layout(self, channel: int, topic: Topic) -> None:
+    def check_topic(self, channel: int, topic: Topic) -> None:
         """Check that the message of a channel has the layout of a topic.
 
         Raises:
             DatasetError: If there is no such channel, or its message has another layout.
         """
-        if not topic.layout.describes_message(self._message(channel, topic.name)):
+        if not topic.layout.describes_message(self._first_message(channel, topic.name)):
             raise DatasetError(
                 f"chunk: the messages of {topic.name} have another layout than {topic.type_name} written here"
             )
 
-    def _message(self, channel: int, topic: str) -> bytes | bytearray:
+    def _first_message(self, channel: int, topic: str) -> bytes | bytearray:
         if channel not in self.columns:
             raise DatasetError(f"chunk: no messages of {topic}")
         column = self.columns[channel]
         return self._row[column.offset + MESSAGE_HEADER.size : column.offset + column.size]
 
 
-class MessageTable:
+class MessageTable(RowLayout):
     """The records of a chunk seen as a table, without a copy; every row has the same channels at the same places.
 
     Views of a bytearray are writable.
 
     Attributes:
-        columns: Place of each channel's record in a row, by the channel's number.
+        contents: The records.
         log_times: Time of each row's first record [ns], shape ``(n_samples,)``, uint64.
 
     Raises:
@@ -114,8 +133,8 @@ class MessageTable:
     """
 
     def __init__(self, contents: bytes | bytearray | memoryview, samples: int) -> None:
-        self._first = FirstRow(contents, samples)
-        self.columns = self._first.columns
+        super().__init__(contents, samples)
+        self.contents = contents
         self._table: NDArray[np.uint8] = np.frombuffer(contents, np.uint8).reshape(samples, -1)
         # Opcode, length and channel are the first bytes of a record: if they repeat in each row, so does the layout.
         for channel, column in self.columns.items():
@@ -163,15 +182,6 @@ class MessageTable:
         offsets = np.arange(self.columns[channel].offset, self._table.size, self._table.shape[1])
         return encode_message_index(channel, self.headers(channel)["log_time"], offsets)
 
-    @property
-    def joints(self) -> tuple[str, ...]:
-        """Names of the joints, in the order of the columns of `samples`: those that the first joint state has.
-
-        Raises:
-            DatasetError: If there is no readable joint state.
-        """
-        return self._first.joints
-
     @cached_property
     def samples(self) -> Samples:
         """The samples; joint columns and the ball's pose are views of the records.
@@ -184,7 +194,7 @@ class MessageTable:
         return read_samples(*(self._read(channel, topic) for channel, topic in topics.items()))
 
     def _read(self, channel: int, topic: Topic) -> Rows:
-        self._first.check_layout(channel, topic)
+        self.check_topic(channel, topic)
         return self.messages(channel).view(topic.layout.dtype)[:, 0]
 
 
@@ -201,18 +211,10 @@ class MessageList:
     """
 
     def __init__(self, contents: bytes | bytearray | memoryview) -> None:
-        offsets, offset = [], 0
         # A message has to hold a stamp at least, as its place is read without another check.
-        shortest = MESSAGE_HEADER.size - RECORD_PREFIX_BYTES + _STAMP_OFFSET + _STAMP.itemsize
-        while offset < len(contents):
-            if len(contents) - offset < MESSAGE_HEADER.size:
-                raise DatasetError(f"chunk: a record is cut off at byte {offset}")
-            opcode, length, *_ = MESSAGE_HEADER.unpack_from(contents, offset)
-            end = offset + RECORD_PREFIX_BYTES + length
-            if opcode != Opcode.MESSAGE or length < shortest or end > len(contents):
-                raise DatasetError(f"chunk: not a message with a header at byte {offset}")
-            offsets.append(offset)
-            offset = end
+        shortest = MESSAGE_HEADER.size + _STAMP_OFFSET + STAMP.itemsize
+        records = _find_records(contents, shortest=shortest, wrong="not a message with a header")
+        offsets = [place.offset for _, place in records]
         if not offsets:
             raise DatasetError("chunk: holds no messages")
         self._bytes = np.frombuffer(contents, np.uint8)
@@ -230,9 +232,7 @@ class MessageList:
     @property
     def stamps_ns(self) -> NDArray[np.int64]:
         """Stamps in the messages' headers [ns], shape ``(n_messages,)``."""
-        stamps = self._gather(MESSAGE_HEADER.size + _STAMP_OFFSET, _STAMP)
-        times: NDArray[np.int64] = stamps["sec"].astype(np.int64) * NS_PER_S + stamps["nanosec"]
-        return times
+        return read_stamps(self._gather(MESSAGE_HEADER.size + _STAMP_OFFSET, STAMP), "stamp")
 
     def message_index(self, channel: int) -> bytes:
         """Encode the MCAP Message Index record of one channel."""
@@ -241,8 +241,8 @@ class MessageList:
 
     def move(self, by_ns: int) -> None:
         """Move all times and stamps by `by_ns` [ns], in the contents themselves, which must be a bytearray."""
-        stamps = self._gather(MESSAGE_HEADER.size + _STAMP_OFFSET, _STAMP)
-        stamps["sec"], stamps["nanosec"] = np.divmod(self.stamps_ns + by_ns, NS_PER_S)
+        stamps = np.empty(len(self), STAMP)
+        put_stamps(stamps, "stamp", self.stamps_ns + by_ns)
         for time in ("log_time", "publish_time"):
             # Times are unsigned, and the way may be negative.
             self.headers[time] = self.headers[time].astype(np.int64) + by_ns

@@ -65,9 +65,6 @@ class ControllerSamples:
     acceleration: NDArray[np.float64]
     output: NDArray[np.float64]
 
-    def __getitem__(self, rows: slice) -> ControllerSamples:
-        return ControllerSamples(**{name: column[rows] for name, column in vars(self).items()})
-
 
 @dataclass(frozen=True)
 class Contact:

@@ -6,7 +6,6 @@ Nothing in an episode but its stamps depends on its slot, so the result has the 
 from __future__ import annotations
 
 import hashlib
-import threading
 from dataclasses import replace
 
 import numpy as np
@@ -19,18 +18,11 @@ from throwcollect.episode.message import Episode
 from throwcollect.episode.message_table import MessageList, MessageTable
 from throwcollect.episode.record import EpisodeHeader
 from throwcollect.episode.recorded_chunk import RecordedChunk
+from throwcollect.episode.topics import put_stamps, read_stamps
 from throwcollect.errors import DatasetError
-from throwcollect.units import NS_PER_S
 
 _SECONDS = ("stamp.sec", "clock.sec")
-"""Ends of the paths of fields with the seconds of a stamp; durations, such as `time_from_start`, do not change."""
-
-
-class _OfEachThread(threading.local):
-    """A compressor for each thread, as threads must not share one."""
-
-    def __init__(self, level: int) -> None:
-        self.compressor = zstandard.ZstdCompressor(level=level)
+"""Ends of the paths of fields with the seconds of a stamp; durations, such as `time_from_start`, stay as they are."""
 
 
 class Restamper:
@@ -39,10 +31,12 @@ class Restamper:
     def __init__(self, config: Config, channels: Channels) -> None:
         self._config = config
         self._topics = {
-            channel.id: (topic, [name for name in topic.layout.dtype.names or () if name.endswith(_SECONDS)])
+            channel.id: (
+                topic,
+                [name.removesuffix(".sec") for name in topic.layout.dtype.names or () if name.endswith(_SECONDS)],
+            )
             for channel, topic in channels.recorded.items()
         }
-        self._of_this_thread = _OfEachThread(config.record.zstd_level)
 
     def restamp(self, episode: Episode, trial: int) -> Episode:
         """Make the episode that trial `trial` of the configuration would have yielded.
@@ -58,8 +52,8 @@ class Restamper:
         table = MessageTable(contents, episode.header.samples)
         self._move(table, by_ns)
         state = self._pack(contents, episode.state.chunk, by_ns)
-        sensors = [self._move_sensor(sensor, by_ns) for sensor in episode.sensors]
-        moved = Episode(_move_header(episode.header, trial, by_ns), state.chunk, state.said_sha256, sensors)
+        sensors = (self._move_sensor(sensor, by_ns) for sensor in episode.sensors)
+        moved = Episode(_move_header(episode.header, trial, by_ns), state, *sensors)
         # The table is at hand, so the new chunk need not be decompressed for it.
         moved.table = table
         return moved
@@ -71,14 +65,14 @@ class Restamper:
 
     def _pack(self, contents: bytearray, like: Chunk, by_ns: int) -> RecordedChunk:
         """Make the chunk of records that are `by_ns` later than those of the chunk `like`."""
-        data = self._of_this_thread.compressor.compress(contents)
+        data = zstandard.compress(contents, self._config.record.zstd_level)
         chunk = Chunk.of(contents, data, start_ns=like.start_ns + by_ns, end_ns=like.end_ns + by_ns)
         return RecordedChunk(chunk, hashlib.sha256(contents).hexdigest())
 
     def _move(self, table: MessageTable, by_ns: int) -> None:
         if list(table.columns) != list(self._topics):
             raise DatasetError(f"chunk: has the channels {list(table.columns)}", expected=f"{list(self._topics)}")
-        for channel, (topic, fields) in self._topics.items():
+        for channel, (topic, stamps) in self._topics.items():
             messages = table.messages(channel)
             if not topic.layout.describes_message(messages[0].tobytes()):
                 raise DatasetError(f"chunk: messages of {topic.name} are not laid out as {topic.type_name} is here")
@@ -87,10 +81,8 @@ class Restamper:
                 # Times are unsigned, and the way to an earlier slot is negative.
                 headers[time] = headers[time].astype(np.int64) + by_ns
             rows = messages.view(topic.layout.dtype)[:, 0]
-            for seconds in fields:
-                nanoseconds = seconds.removesuffix("sec") + "nanosec"
-                stamps = rows[seconds].astype(np.int64) * NS_PER_S + rows[nanoseconds] + by_ns
-                rows[seconds], rows[nanoseconds] = np.divmod(stamps, NS_PER_S)
+            for stamp in stamps:
+                put_stamps(rows, stamp, read_stamps(rows, stamp) + by_ns)
 
 
 def _move_header(header: EpisodeHeader, trial: int, by_ns: int) -> EpisodeHeader:

@@ -26,18 +26,16 @@ _STAMP = ("header.stamp.sec", "header.stamp.nanosec")
 _MOST_ROBOTS = 8
 """Most robots with cached layouts; there has to be a limit, as files may name any number of robots."""
 
+STAMP = np.dtype([("stamp.sec", "<i4"), ("stamp.nanosec", "<u4")])
+"""A builtin_interfaces/Time, as `read_stamps` and `put_stamps` take it."""
+
 Rows = NDArray[np.void]
 """Messages of one topic, one per sample: an array of the layout's structured type."""
 
 
 @dataclass(frozen=True)
 class Recording:
-    """The values from which messages are made.
-
-    Attributes:
-        samples: The samples.
-        controllers: Set points of controllers, by name.
-    """
+    """The values from which messages are made: samples, and set points of controllers by name."""
 
     samples: Samples
     controllers: Mapping[str, ControllerSamples]
@@ -59,18 +57,33 @@ class Topic:
     layout: MessageLayout
     fill: Callable[[Rows, Recording], None]
 
+    def encode(self, recording: Recording) -> NDArray[np.uint8]:
+        """Make the CDR messages of all samples, shape ``(n_samples, size)``.
 
-def _put_stamps(rows: Rows, prefix: str, stamps_ns: NDArray[np.int64]) -> None:
-    rows[f"{prefix}.sec"], rows[f"{prefix}.nanosec"] = np.divmod(stamps_ns, NS_PER_S)
+        Raises:
+            KeyError: If the set points of the topic's controller are missing.
+        """
+        template = np.frombuffer(self.layout.template, np.uint8)
+        messages = np.tile(template, (len(recording.samples), 1))
+        self.fill(messages.view(self.layout.dtype)[:, 0], recording)
+        return messages
+
+
+def put_stamps(rows: Rows, prefix: str, times_ns: NDArray[np.int64]) -> None:
+    """Write times [ns], shape ``(n,)``, into the fields of messages that hold seconds and nanoseconds."""
+    rows[f"{prefix}.sec"], rows[f"{prefix}.nanosec"] = np.divmod(times_ns, NS_PER_S)
+
+
+def read_stamps(rows: Rows, prefix: str) -> NDArray[np.int64]:
+    """Read the times [ns] that `put_stamps` writes, shape ``(n,)``."""
+    times: NDArray[np.int64] = rows[f"{prefix}.sec"].astype(np.int64) * NS_PER_S + rows[f"{prefix}.nanosec"]
+    return times
 
 
 def rotate(quaternion_xyzw: NDArray[np.float64], *vectors: NDArray[np.float64], inverse: bool) -> NDArray[np.float64]:
-    """Turn vectors by unit quaternions, element by element: a row's result does not depend on other rows.
+    """Turn vectors, each of shape ``(n, 3)``, by unit quaternions, shape ``(n, 4)``, or in the opposite direction.
 
-    Args:
-        quaternion_xyzw: Shape ``(n, 4)``.
-        vectors: Each of shape ``(n, 3)``.
-        inverse: Turn in the opposite direction.
+    It is done element by element, so a row's result does not depend on other rows.
 
     Returns:
         Shape ``(len(vectors), n, 3)``.
@@ -121,7 +134,7 @@ def read_joint_names(message: bytes) -> tuple[str, ...]:
 
 def _fill_joint_states(rows: Rows, recording: Recording) -> None:
     samples = recording.samples
-    _put_stamps(rows, "header.stamp", samples.stamps_ns)
+    put_stamps(rows, "header.stamp", samples.stamps_ns)
     rows["position"] = samples.position
     rows["velocity"] = samples.velocity
     rows["effort"] = samples.effort
@@ -131,18 +144,21 @@ def _fill_joint_states(rows: Rows, recording: Recording) -> None:
 def ball_odometry() -> Topic:
     """``/ball/odometry``: nav_msgs/Odometry; pose in world, twist in the ball's own frame, covariances 0 (unknown)."""
     kind = "nav_msgs/msg/Odometry"
-    message = get_message(kind)(header=_header(WORLD), child_frame_id=BALL)
+    message = get_message(kind)(header=make_header(WORLD), child_frame_id=BALL)
     variable = [*_STAMP, "pose.pose.position", "pose.pose.orientation", "twist.twist.linear", "twist.twist.angular"]
     return Topic("/ball/odometry", kind, MessageLayout(message, variable), _fill_ball_odometry)
 
 
-def _header(frame: str) -> Any:
-    return get_message("std_msgs/msg/Header")(frame_id=frame)
+def make_header(frame: str, stamp_ns: int = 0) -> Any:
+    """Make a std_msgs/Header."""
+    sec, nanosec = divmod(stamp_ns, NS_PER_S)
+    stamp = get_message("builtin_interfaces/msg/Time")(sec=sec, nanosec=nanosec)
+    return get_message("std_msgs/msg/Header")(stamp=stamp, frame_id=frame)
 
 
 def _fill_ball_odometry(rows: Rows, recording: Recording) -> None:
     samples = recording.samples
-    _put_stamps(rows, "header.stamp", samples.stamps_ns)
+    put_stamps(rows, "header.stamp", samples.stamps_ns)
     rows["pose.pose.position"] = samples.ball_position
     rows["pose.pose.orientation"] = orientation = samples.ball_orientation_xyzw
     rows["twist.twist.linear"], rows["twist.twist.angular"] = rotate(
@@ -160,7 +176,7 @@ def read_samples(joint_rows: Rows, ball_rows: Rows) -> Samples:
         orientation, ball_rows["twist.twist.linear"], ball_rows["twist.twist.angular"], inverse=False
     )
     return Samples(
-        stamps_ns=joint_rows["header.stamp.sec"].astype(np.int64) * NS_PER_S + joint_rows["header.stamp.nanosec"],
+        stamps_ns=read_stamps(joint_rows, "header.stamp"),
         position=joint_rows["position"],
         velocity=joint_rows["velocity"],
         effort=joint_rows["effort"],
@@ -179,7 +195,7 @@ def clock() -> Topic:
 
 
 def _fill_clock(rows: Rows, recording: Recording) -> None:
-    _put_stamps(rows, "clock", recording.samples.stamps_ns)
+    put_stamps(rows, "clock", recording.samples.stamps_ns)
 
 
 def transforms(frames: tuple[MovingFrame, ...], joints: Sequence[str]) -> Topic:
@@ -198,7 +214,7 @@ def transforms(frames: tuple[MovingFrame, ...], joints: Sequence[str]) -> Topic:
     def fill(rows: Rows, recording: Recording) -> None:
         samples = recording.samples
         for number in range(len(pairs)):
-            _put_stamps(rows, f"transforms.{number}.header.stamp", samples.stamps_ns)
+            put_stamps(rows, f"transforms.{number}.header.stamp", samples.stamps_ns)
         # Only the ball changes its place; the translations of frames that joints turn stand in the template.
         rows["transforms.0.transform.translation"] = samples.ball_position
         rows["transforms.0.transform.rotation"] = samples.ball_orientation_xyzw
@@ -216,16 +232,15 @@ def transform_message(
     stamp_ns: int,
 ) -> Any:
     """Make a geometry_msgs/TransformStamped of the child's pose in its parent: origin [m] and unit quaternion."""
-    sec, nanosec = divmod(stamp_ns, NS_PER_S)
-    header = _header(parent)
-    header.stamp = get_message("builtin_interfaces/msg/Time")(sec=sec, nanosec=nanosec)
     x, y, z = translation
     qx, qy, qz, qw = rotation_xyzw
     transform = get_message("geometry_msgs/msg/Transform")(
         translation=get_message("geometry_msgs/msg/Vector3")(x=x, y=y, z=z),
         rotation=get_message("geometry_msgs/msg/Quaternion")(x=qx, y=qy, z=qz, w=qw),
     )
-    return get_message("geometry_msgs/msg/TransformStamped")(header=header, child_frame_id=child, transform=transform)
+    return get_message("geometry_msgs/msg/TransformStamped")(
+        header=make_header(parent, stamp_ns), child_frame_id=child, transform=transform
+    )
 
 
 def controller_state(robot: Robot, controller: str) -> Topic:
@@ -256,9 +271,9 @@ def controller_state(robot: Robot, controller: str) -> Topic:
     def fill(rows: Rows, recording: Recording) -> None:
         samples, target = recording.samples, recording.controllers[controller]
         position, velocity = samples.position[:, columns], samples.velocity[:, columns]
-        _put_stamps(rows, "header.stamp", samples.stamps_ns)
+        put_stamps(rows, "header.stamp", samples.stamps_ns)
         for part in _TIMED:
-            _put_stamps(rows, f"{part}.time_from_start", target.elapsed_ns)
+            put_stamps(rows, f"{part}.time_from_start", target.elapsed_ns)
         rows["reference.positions"], rows["reference.velocities"] = target.position, target.velocity
         rows["reference.accelerations"] = target.acceleration
         rows["feedback.positions"], rows["feedback.velocities"] = position, velocity

@@ -14,9 +14,8 @@ from numpy.typing import NDArray
 
 from throwcollect.episode.channels import BALL_ODOMETRY_ID, JOINT_STATES_ID
 from throwcollect.episode.chunk import MESSAGE_HEADER
-from throwcollect.episode.message_table import FirstRow
-from throwcollect.episode.topics import ball_odometry, joint_states
-from throwcollect.units import NS_PER_S
+from throwcollect.episode.message_table import RowLayout
+from throwcollect.episode.topics import STAMP, ball_odometry, joint_states, read_stamps
 
 STAMPS = "stamps_ns"
 """A pair of 32-bit numbers until `to_nanoseconds` turns it into one number."""
@@ -38,7 +37,6 @@ _FIELDS = {
     },
 }
 """By channel: the columns, and the fields of its messages that hold them."""
-_STAMP_BYTES = 8
 
 
 def column_shapes(samples: int, joints: int) -> Mapping[str, tuple[int, ...]]:
@@ -61,7 +59,7 @@ def _row_type(joints: tuple[str, ...], starts: tuple[int, ...], size: int) -> np
             kind, offset = places[field][:2]
             names.append(name)
             # The nanoseconds lie right behind the seconds, so both are one run of bytes.
-            formats.append(f"V{_STAMP_BYTES if name == STAMPS else kind.itemsize}")
+            formats.append(f"V{STAMP.itemsize if name == STAMPS else kind.itemsize}")
             offsets.append(start + MESSAGE_HEADER.size + offset)
     return np.dtype({"names": names, "formats": formats, "offsets": offsets, "itemsize": size})
 
@@ -69,10 +67,7 @@ def _row_type(joints: tuple[str, ...], starts: tuple[int, ...], size: int) -> np
 def trajectory_rows(contents: bytes, samples: int, joints: tuple[str, ...]) -> NDArray[np.void]:
     """View the uncompressed records of a state chunk as a table, without a copy.
 
-    Args:
-        contents: Records with a valid CRC; so only the layout of the first message of each channel is checked.
-        samples: Number of samples.
-        joints: Joints that must have been recorded, in this order.
+    Their CRC has been compared, so only the layout of the first message of each channel is checked.
 
     Returns:
         Shape ``(samples,)``; the fields are the columns, as bytes.
@@ -80,9 +75,9 @@ def trajectory_rows(contents: bytes, samples: int, joints: tuple[str, ...]) -> N
     Raises:
         DatasetError: If they are not rows with joint states of these joints and odometry, as this version writes them.
     """
-    row = FirstRow(contents, samples)
+    row = RowLayout(contents, samples)
     for channel, topic in zip(_FIELDS, (joint_states(joints), ball_odometry()), strict=True):
-        row.check_layout(channel, topic)
+        row.check_topic(channel, topic)
     starts = tuple(row.columns[channel].offset for channel in _FIELDS)
     return np.frombuffer(contents, _row_type(joints, starts, len(contents) // samples))
 
@@ -96,6 +91,5 @@ def view_as_bytes(array: NDArray[np.float64] | NDArray[np.int64]) -> NDArray[np.
 
 def to_nanoseconds(stamps: NDArray[np.int64]) -> None:
     """Turn recorded stamps into numbers [ns], in place."""
-    pairs = stamps.view([("sec", "<i4"), ("nanosec", "<u4")])
     # Both sides are the same memory, which is written only when the right side is computed.
-    stamps[:] = pairs["sec"].astype(np.int64) * NS_PER_S + pairs["nanosec"]
+    stamps[:] = read_stamps(stamps.view(STAMP), "stamp")

@@ -18,17 +18,9 @@ from throwcollect.members import explain_failure, load_member, names_of
 
 @dataclass(frozen=True)
 class Exported:
-    """An export that was written.
+    """An export that was written, with the size of all its files and the digest of the dataset that it was made of.
 
-    Attributes:
-        directory: Its directory.
-        format: Its format.
-        trials: Number of trials, each with a row of the table.
-        episodes: Number of throws with time series.
-        samples: Number of their samples.
-        rate_hz: Samples per second.
-        size_bytes: Size of all files.
-        digest: Digest of the source.
+    Each trial has a row of the table, and each episode time series with samples.
     """
 
     directory: str
@@ -42,13 +34,10 @@ class Exported:
 
 
 def export(directory: StrPath, output: StrPath, *, to: str, rate_hz: int | None = None) -> Exported:
-    """Write a dataset in another format, with a data card and its configuration.
+    """Write a dataset in another format, with a data card and its configuration, at the recorded rate or a lower one.
 
-    Args:
-        directory: The dataset.
-        output: Directory to write; must be new or empty. Nothing is left there on failure.
-        to: Name of the format: ``parquet``, ``npz``, ``lerobot``, ``hdf5``, ``mat``, or one of another package.
-        rate_hz: Samples per second; the recorded ones when None.
+    The format is ``parquet``, ``npz``, ``lerobot``, ``hdf5``, ``mat``, or one of another package. The directory to
+    write must be new or empty, and nothing is left there on failure.
 
     Raises:
         ConfigError: If there is no such format, the rate is above the recorded one, or `output` exists.

@@ -132,10 +132,7 @@ def _add_throw(group: Any, throw: Throw, source: Source) -> None:
 def _add_table(group: Any, table: pa.Table, text: Any) -> None:
     for field in table.schema:
         values = to_array(table[field.name])
-        stored = group.create_dataset(
-            field.name, data=values.astype(object) if values.dtype.kind == "U" else values,
-            dtype=text if values.dtype.kind == "U" else None,
-        )  # fmt: skip
+        stored = group.create_dataset(field.name, data=values, dtype=text if values.dtype == object else None)
         stored.attrs.update(read_metadata(field))
 
 

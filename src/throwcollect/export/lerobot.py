@@ -107,7 +107,7 @@ dataset = LeRobotDataset("me/throws", root=".")
             f"| `next.success` | | true in the last frame of a throw that {success} |",
             "| `next.done` | | true in the last frame of a throw |",
             "",
-            *list_joints(source),
+            list_joints(source),
         ],
         hub={
             "tags": ["LeRobot"],

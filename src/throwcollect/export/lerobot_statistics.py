@@ -24,12 +24,9 @@ def summarise_episode(frames: Frames) -> Statistics:
 
 
 def summarise_all(moments: Moments, portions: Iterable[Frames]) -> Statistics:
-    """Compute the statistics of all frames.
+    """Compute the statistics of all frames from their moments and the frames themselves, in any portions.
 
-    Args:
-        moments: Their moments.
-        portions: The frames, in any portions. Quantiles come from histograms of 5000 bins over the range of each
-            component, so they are right to 1/5000 of it.
+    Quantiles come from histograms of 5000 bins over the range of each component, so they are right to 1/5000 of it.
     """
     low, span = moments.minimum, moments.maximum - moments.minimum
     histogram = np.zeros((len(span), _BINS), np.int64)

@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pyarrow as pa
 from numpy.typing import NDArray
 
 from throwcollect.config.schema import Config, DynamicMovementPrimitive
@@ -31,6 +30,8 @@ scipy_io = lazily("scipy.io", extra="export")
 BASIS_FUNCTIONS = 25
 """Number of basis functions of each joint in a fitted DMP."""
 _FIT_POINTS = 501
+_LONGEST_NAME = 63
+"""Most characters of the name of a field in MATLAB."""
 _LARGEST = 2**31 - 1
 """Size that a variable may have in a file of version 5 [bytes]."""
 
@@ -50,7 +51,7 @@ k = 1;
 path = robot_throws.qPath{{k}};
 dmp = robot_throws.DMP{{k}};
 target = robot_throws.targets(k, :);  % d, h, alpha""",
-        over_time=[*_FIELDS, "", *list_joints(source)],
+        over_time=[*_FIELDS, "", list_joints(source)],
         language="matlab",
     )
 
@@ -84,7 +85,7 @@ def write(source: Source, directory: Path) -> None:
     """Write a dataset as MATLAB files of version 5; see `Exporter.write`.
 
     Raises:
-        ConfigError: If the dataset is not one of throws.
+        ConfigError: If the dataset is not one of throws, or a column has a name that MATLAB does not allow.
     """
     task = source.dataset.config.task
     if not task.throws:
@@ -92,7 +93,13 @@ def write(source: Source, directory: Path) -> None:
             f"--to: mat has the structure of a throwing database, and the task {task.name} throws no ball",
             expected="another format",
         )
-    columns = {_name_field(field.name): _to_column(source.table[field.name]) for field in source.table.schema}
+    if long := [name for name in source.table.column_names if len(name) > _LONGEST_NAME]:
+        raise ConfigError(
+            f"--to: mat has no room for the name of the column {long[0]}",
+            expected=f"at most {_LONGEST_NAME} characters, or another format",
+        )
+    # An array of objects, as texts are, becomes a cell array; one of texts would become a matrix of characters.
+    columns = {_name_field(name): to_array(source.table[name])[:, np.newaxis] for name in source.table.column_names}
     units = {_name_field(field.name): read_metadata(field).get("unit", "") for field in source.table.schema}
     _save(directory / "throws.mat", {"throws": columns, "units": units, "digest_of_dataset": source.dataset.digest})
     (directory / "trajectories").mkdir()
@@ -101,11 +108,9 @@ def write(source: Source, directory: Path) -> None:
         for row in source.table.select(["trial", "landing_x_m", "landing_y_m", "hit_angle_rad"]).to_pylist()
     }
     for shard, entries in source.shards.items():
-        path = directory / "trajectories" / f"{shard}.mat"
-        _save(
-            path,
-            {"robot_throws": _gather_throws(source, entries, landings), "digest_of_dataset": source.dataset.digest},
-        )
+        throws = _gather_throws(source, entries, landings)
+        recording = {"robot_throws": throws, "digest_of_dataset": source.dataset.digest}
+        _save(directory / "trajectories" / f"{shard}.mat", recording)
 
 
 def _save(path: Path, variables: Mapping[str, Any]) -> None:
@@ -130,12 +135,6 @@ def _count_bytes(value: Any) -> int:
 
 def _name_field(column: str) -> str:
     return column.replace(".", "_")
-
-
-def _to_column(values: pa.ChunkedArray) -> NDArray[Any]:
-    array = to_array(values)
-    # An array of objects becomes a cell array; one of texts would become a matrix of characters.
-    return (array.astype(object) if array.dtype.kind == "U" else array)[:, np.newaxis]
 
 
 def _to_cell(values: Sequence[Any]) -> NDArray[np.object_]:

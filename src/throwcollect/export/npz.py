@@ -55,9 +55,9 @@ def write(source: Source, directory: Path) -> None:
 
 
 def to_array(column: pa.ChunkedArray) -> NDArray[Any]:
-    """Make an array of a column of the table of throws; a null becomes NaN, -1 or an empty string."""
+    """Make an array of a column of the table of throws, texts as objects; a null becomes NaN, -1 or an empty string."""
     if pa.types.is_string(column.type):
-        return np.array(column.fill_null("").to_pylist(), dtype=np.str_)
+        return np.array(column.fill_null("").to_pylist(), dtype=object)
     missing = -1 if pa.types.is_integer(column.type) else np.nan
     array: NDArray[Any] = column.fill_null(missing).to_numpy()
     return array
@@ -94,8 +94,10 @@ def _write_shard(source: Source, entries: tuple[Entry, ...], path: Path) -> None
 
 
 def _add(archive: zipfile.ZipFile, name: str, values: NDArray[Any]) -> None:
+    # Objects would be pickled, and every reader would have to allow that.
+    stored = values.astype(np.str_) if values.dtype == object else values
     with archive.open(_make_member(name), "w") as file:
-        np.lib.format.write_array(file, values, allow_pickle=False)
+        np.lib.format.write_array(file, stored, allow_pickle=False)
 
 
 def _make_member(name: str) -> zipfile.ZipInfo:

@@ -124,14 +124,14 @@ def tabulate_signals(source: Source, *, columns: bool = False) -> list[str]:
             for signal in source.signals
         ),
         "",
-        *list_joints(source, everything=True),
+        list_joints(source, everything=True),
     ]
 
 
-def list_joints(source: Source, *, everything: bool = False) -> list[str]:
+def list_joints(source: Source, *, everything: bool = False) -> str:
     """List the joints in the order of the data, in one line."""
     said = f"The joints that move are {_quote(source.dataset.moving_joints)}, in this order"
-    return [f"{said}; all joints are {_quote(source.dataset.joints)}." if everything else f"{said}."]
+    return f"{said}; all joints are {_quote(source.dataset.joints)}." if everything else f"{said}."
 
 
 def _quote(names: Sequence[str]) -> str:

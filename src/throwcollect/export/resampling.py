@@ -18,16 +18,11 @@ def count_resampled(samples: int, *, recorded_hz: int, rate_hz: int) -> int:
 
 
 def resample(samples: Samples, *, recorded_hz: int, rate_hz: int) -> Samples:
-    """Compute samples at a lower rate, from the first recorded one to the last instant within the record.
+    """Compute samples at a lower rate, or the same, from the first recorded one to the last instant within the record.
 
     If the rate divides the recorded one, these are every n-th recorded sample. Otherwise positions of joints and ball
     lie on the cubic through positions and velocities of both neighbours; all else is linear between them, and the
     ball's orientation is normalised. Nothing is filtered.
-
-    Args:
-        samples: As recorded, at least one.
-        recorded_hz: Their rate.
-        rate_hz: The lower rate, or the same.
     """
     if recorded_hz % rate_hz == 0:
         return samples[:: recorded_hz // rate_hz]

@@ -52,13 +52,7 @@ class Signal:
 
 
 def list_signals(joints: Sequence[str], moving: Sequence[str], targets: Sequence[TargetColumn]) -> tuple[Signal, ...]:
-    """Describe all signals of an exported throw.
-
-    Args:
-        joints: All joints of the robot.
-        moving: Joints that the task moves.
-        targets: Columns of targets, whose values are the same in all samples of a throw.
-    """
+    """Describe all signals of an exported throw; those of targets have the same value in all its samples."""
     every = f"{len(joints)} joints"
     return (
         Signal("time_s", "Time since the start of the trial.", pattern="time_s"),

@@ -11,6 +11,7 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from throwcollect.config.target import TargetColumn
+from throwcollect.dataset.damage import locating_damage
 from throwcollect.dataset.reader import Dataset
 from throwcollect.episode.record import Samples
 from throwcollect.errors import ConfigError, DatasetError
@@ -29,13 +30,7 @@ Signals = Mapping[str, NDArray[np.float64]]
 
 @dataclass(frozen=True)
 class Entry:
-    """A throw that can be exported, before it is read.
-
-    Attributes:
-        trial: Number of its trial.
-        samples: Number of samples in the export.
-        succeeded: Whether it succeeded.
-    """
+    """A throw that can be exported, before it is read; its samples are as many as the export will have."""
 
     trial: int
     samples: int
@@ -94,11 +89,7 @@ class Source:
 
     @classmethod
     def open(cls, directory: Path, *, rate_hz: int | None = None) -> Source:
-        """Open a dataset to export it.
-
-        Args:
-            directory: Its directory.
-            rate_hz: Samples per second in the export; None for the recorded ones.
+        """Open a dataset to export it, with so many samples per second, or else as many as were recorded.
 
         Raises:
             DatasetError: If the directory holds no finished dataset, or one without episodes.
@@ -137,11 +128,9 @@ class Source:
         """
         dataset = self.dataset
         for entry in entries:
-            episode = dataset.episode(entry.trial)
-            try:
+            with locating_damage(dataset, entry.trial):
+                episode = dataset.episode(entry.trial)
                 recorded = episode.samples(dataset.joints)
-            except DatasetError as error:
-                raise DatasetError(f"{dataset.directory}: trial {entry.trial}: {error}") from error
             samples = resample(recorded, recorded_hz=dataset.config.record.rate_hz, rate_hz=self.rate_hz)
             planned = dataset.plan.trial(entry.trial)
             trajectory = trajectory_of(dataset.plan.config_of(planned))

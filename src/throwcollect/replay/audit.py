@@ -1,10 +1,12 @@
-"""Replays many throws of a dataset in several processes."""
+"""Simulates many throws of a dataset again in several processes."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
+from typing import TypeVar
 
+from throwcollect.dataset.damage import locating_damage
 from throwcollect.dataset.reader import Dataset
 from throwcollect.engine_packages import require_engine
 from throwcollect.errors import DatasetError
@@ -13,6 +15,8 @@ from throwcollect.replay.comparison import Comparison, compare
 from throwcollect.side_by_side import THROWS_A_START, count_cores, work_side_by_side
 from throwcollect.trial.choice import choose_trials
 
+_Found = TypeVar("_Found")
+
 
 def select_trials(dataset: Dataset, *, sample: int | None) -> list[int]:
     """List the trials that have an episode, in order; or so many of them, always the same random choice.
@@ -20,29 +24,44 @@ def select_trials(dataset: Dataset, *, sample: int | None) -> list[int]:
     Raises:
         DatasetError: If no trial has an episode.
     """
-    trials = [row["trial"] for row in dataset.throws.select(["trial", "shard"]).to_pylist() if row["shard"]]
+    trials: list[int] = dataset.recorded.throws["trial"].to_pylist()
     if not trials:
         raise DatasetError(f"{dataset.directory}: no trial has an episode")
     return trials if sample is None else choose_trials(trials, count=sample, seed=dataset.config.seed)
 
 
 def replay_throws(directory: Path, trials: Sequence[int]) -> Iterator[Comparison]:
-    """Simulate stored throws again, many of them on all cores, and compare them, in the given order.
-
-    Args:
-        directory: Directory of the dataset.
-        trials: Trials that have an episode.
+    """Simulate stored throws of a dataset again, and compare them, in the given order.
 
     Raises:
-        DatasetError: If an episode is damaged.
+        DatasetError: If the dataset or an episode is damaged.
         MissingExtraError: If a library for simulating is not installed.
         WorkerError: If the physics engine does not start.
     """
-    require_engine(Dataset.open(directory).config.sim.engine)
+    return simulate_side_by_side(Dataset.open(directory).config.sim.engine, trials, _begin, (directory,))
+
+
+def simulate_side_by_side(
+    engine: str, trials: Sequence[int], begin: Callable[..., Callable[[int], _Found]], arguments: tuple[object, ...]
+) -> Iterator[_Found]:
+    """Simulate trials by an engine on all cores; `begin` and its arguments are those of `work_side_by_side`.
+
+    Raises:
+        MissingExtraError: If a library for simulating is not installed.
+        WorkerError: If the physics engine does not start.
+    """
+    require_simulating(engine)
+    return work_side_by_side(trials, begin, arguments, processes=count_cores(), doing="simulates", worth=THROWS_A_START)
+
+
+def require_simulating(engine: str) -> None:
+    """Check that the libraries for simulating by an engine are installed, before anything begins.
+
+    Raises:
+        MissingExtraError: If one is not installed.
+    """
+    require_engine(engine)
     require("pinocchio")
-    yield from work_side_by_side(
-        trials, _begin, (directory,), processes=count_cores(), doing="simulates", worth=THROWS_A_START
-    )
 
 
 def _begin(directory: Path) -> Callable[[int], Comparison]:
@@ -52,4 +71,11 @@ def _begin(directory: Path) -> Callable[[int], Comparison]:
 
     dataset = Dataset.open(directory)
     replayer = Replayer(dataset.config)
-    return lambda trial: compare(dataset.episode(trial), replayer.run(dataset.plan.trial(trial)))
+
+    def replay(number: int) -> Comparison:
+        """Simulate a trial, and compare it with the stored one."""
+        again = replayer.run(dataset.plan.trial(number))
+        with locating_damage(dataset, number):
+            return compare(dataset.episode(number), again)
+
+    return replay

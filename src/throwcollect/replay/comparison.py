@@ -13,13 +13,9 @@ from throwcollect.episode.record import EpisodeHeader, Samples
 
 @dataclass(frozen=True)
 class Comparison:
-    """How a stored throw differs from the same throw, simulated again.
+    """How a stored throw differs from the same throw, simulated again: a sentence for each difference.
 
-    Attributes:
-        trial: Number of the trial.
-        stored: Digest of the stored episode.
-        again: Digest of the new one.
-        differences: A sentence for each difference; empty if the episodes are the same bit for bit.
+    There are no differences if the episodes, whose digests are here, too, are the same bit for bit.
     """
 
     trial: int

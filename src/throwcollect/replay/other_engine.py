@@ -12,12 +12,10 @@ from throwcollect.config.values import with_values
 from throwcollect.dataset.judging import judge_episode
 from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.throws_table import ThrowsTable
-from throwcollect.engine_packages import require_engine
 from throwcollect.errors import ConfigError
-from throwcollect.extras import require
 from throwcollect.members import names_of
+from throwcollect.replay.audit import simulate_side_by_side
 from throwcollect.replay.throw import Replayer
-from throwcollect.side_by_side import THROWS_A_START, count_cores, work_side_by_side
 
 LANDING = ("landing_x_m", "landing_y_m")
 """Columns with the place where a throw landed."""
@@ -28,7 +26,6 @@ class Deviation:
     """How a throw by another engine differs from the stored one.
 
     Attributes:
-        trial: Number of the trial.
         stored: Its outcome in the dataset.
         again: Its outcome by the other engine.
         values: The other engine's value minus the stored one, in the unit of the column, for each column of the table
@@ -43,15 +40,9 @@ class Deviation:
 
 @dataclass(frozen=True)
 class Distribution:
-    """How much a column differs, in its unit.
+    """How much a column differs in the throws in which it could be compared, in its unit.
 
-    Attributes:
-        column: Its name.
-        throws: Number of throws in which it could be compared.
-        mean: Mean difference, with its sign.
-        rms: Root mean square.
-        median: Median of the absolute differences.
-        largest: Largest absolute difference.
+    The mean is that of differences with their signs; median and largest are those of absolute differences.
     """
 
     column: str
@@ -63,12 +54,7 @@ class Distribution:
 
 
 def simulate_with(directory: Path, engine: str, trials: Sequence[int]) -> Iterator[Deviation]:
-    """Simulate stored throws with another engine, many of them on all cores; deviations come in the given order.
-
-    Args:
-        directory: Directory of the dataset.
-        engine: Name of the engine.
-        trials: Trials that have an episode.
+    """Simulate stored throws of a dataset with another engine; deviations come in the given order.
 
     Raises:
         ConfigError: If there is no such engine, or the dataset was computed by it.
@@ -81,11 +67,7 @@ def simulate_with(directory: Path, engine: str, trials: Sequence[int]) -> Iterat
     if engine not in others:
         problem = f"the throws of {directory} are by {own} themselves" if engine == own else "there is no such engine"
         raise ConfigError(f"--engine {engine}: {problem}", expected=", ".join(others))
-    require_engine(engine)
-    require("pinocchio")
-    return work_side_by_side(
-        trials, _begin, (directory, engine), processes=count_cores(), doing="simulates", worth=THROWS_A_START
-    )
+    return simulate_side_by_side(engine, trials, _begin, (directory, engine))
 
 
 def distributions(deviations: Sequence[Deviation]) -> list[Distribution]:

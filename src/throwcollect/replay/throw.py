@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from weakref import finalize
+
 from throwcollect.config.schema import Config
 from throwcollect.episode.message import Delivery, Episode
 from throwcollect.sim.simulation import Simulation
@@ -10,10 +12,10 @@ from throwcollect.sweep.trials import Trial
 
 
 class Replayer:
-    """Runs trials of one collection, one after the other.
+    """Runs trials of one collection, one after the other, without its slow motion for onlookers.
 
-    Args:
-        config: Its configuration; slow motion for onlookers is left out.
+    Attributes:
+        close: Frees the world, as the end of this object does, too; no trial can be run afterwards.
 
     Raises:
         ConfigError: If it does not describe a world.
@@ -24,20 +26,16 @@ class Replayer:
         self._simulation = Simulation(config)
         self._simulation.real_time_factor = None
         self._runner = TrialRunner(self._simulation)
-
-    def close(self) -> None:
-        """Free the world; no trial can be run afterwards."""
-        self._simulation.world.close()
+        self.close = finalize(self, self._simulation.world.close)
+        # The end of the process frees all worlds, and engines may be gone by then.
+        self.close.atexit = False
 
     def run(self, trial: Trial) -> Episode:
         """Simulate a trial for its episode alone; see `delivery`."""
         return self.delivery(trial).episode
 
     def delivery(self, trial: Trial) -> Delivery:
-        """Simulate a trial: its episode, its result, and the conditions that it was simulated under.
-
-        Args:
-            trial: A trial of the collection, whether its plan has it or not.
+        """Simulate a trial of the collection, whether its plan has it or not: episode, result and conditions.
 
         Raises:
             ThrowcollectError: If a controller refuses its goal, or the samples are not finite, as in a collection.

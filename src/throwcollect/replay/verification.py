@@ -10,11 +10,9 @@ from throwcollect.coordinator.prepare import feasibility_check
 from throwcollect.dataset.findings import Finding
 from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.verify import verify
-from throwcollect.engine_packages import require_engine
 from throwcollect.errors import DatasetError
-from throwcollect.extras import require
 from throwcollect.files import StrPath
-from throwcollect.replay.audit import replay_throws, select_trials
+from throwcollect.replay.audit import replay_throws, require_simulating, select_trials
 
 
 def verify_dataset(
@@ -48,8 +46,7 @@ def verify_dataset(
     if replay is not None:
         # If the dataset cannot be opened, `verify` below reports why.
         with suppress(DatasetError):
-            require_engine(Dataset.open(Path(directory)).config.sim.engine)
-        require("pinocchio")
+            require_simulating(Dataset.open(directory).config.sim.engine)
     findings = verify(Path(directory), check_of=feasibility_check, processes=processes, say=say)
     if replay is not None:
         findings += _replay_findings(Path(directory), replay)
@@ -66,4 +63,6 @@ def _replay_findings(directory: Path, count: int) -> Iterator[Finding]:
                 problem = f"comes out otherwise: {'; '.join(comparison.differences)}"
                 yield Finding(shards[comparison.trial], f"trial {comparison.trial}", problem)
     except DatasetError as error:
+        # What it recommends is the command that has called this.
+        error.hint = None
         yield Finding("", "", f"cannot be replayed: {error}")

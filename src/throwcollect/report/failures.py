@@ -15,9 +15,7 @@ class Failure:
     """A group of trials with the same outcome and, but for numbers, the same reason.
 
     Attributes:
-        outcome: Their outcome.
         pattern: Their reason; if its numbers differ between the trials, with ``#`` in place of numbers.
-        count: Number of trials.
         examples: Numbers of the first of these trials.
     """
 

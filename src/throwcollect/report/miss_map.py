@@ -19,11 +19,7 @@ _MOST = 10_000
 def choose_scale(targets: NDArray[np.float64], places: NDArray[np.float64]) -> int:
     """Choose how many times as long misses are drawn, so that they are seen: the largest power of ten that fits.
 
-    It fits if the longest miss is drawn no longer than the targets are apart.
-
-    Args:
-        targets: Shape ``(n_targets, n_columns)``.
-        places: Where the trials at these targets ended, NaN for one without an end, in the same shape.
+    It fits if the longest miss is drawn no longer than the targets are apart; the arrays are those of `draw_miss_map`.
     """
     if not len(targets):
         return 1
@@ -48,13 +44,8 @@ def draw_miss_map(
 ) -> go.Figure:
     """Draw targets amid the ends of other trials, and a line for each miss, in the first two columns.
 
-    Args:
-        ends: Where trials ended, shape ``(n, n_columns)``.
-        targets: Shape ``(n_targets, n_columns)``.
-        places: Where the trials at these targets ended, NaN for one without an end, shape ``(n_targets, n_columns)``.
-        titles: Titles of the columns.
-        task: The task of the trials, which has a noun for them.
-        times: How many times as long misses are drawn.
+    Ends have the shape ``(n, n_columns)``; targets, and the places where the trials at these targets ended, NaN for one
+    without an end, have the shape ``(n_targets, n_columns)``. Misses are drawn `times` as long.
     """
     figure = go.Figure()
     ends, targets, places = map(_take_two, (ends, targets, places))

@@ -101,19 +101,13 @@ def _draw_errors(numbers: Sequence[int], misses: Sequence[Misses]) -> go.Figure:
     """Draw median and ninth decile of misses of one unit over a number of throws."""
     factor, unit = SHOWN_AS.get(misses[0].unit, (1.0, misses[0].unit))
     figure = go.Figure()
-    lines = (
-        ("median", "circle", [each.median for each in misses], {"color": BLUE, "width": 2}),
-        # The legend has room for a marker, but hardly for a dash: so the markers differ, too.
-        (
-            "9 of 10 below",
-            "circle-open",
-            [each.share90 for each in misses],
-            {"color": BLUE, "width": 1.5, "dash": "dash"},
-        ),
-    )
-    for name, symbol, values, line in lines:
+    # The legend has room for a marker, but hardly for a dash: so the markers differ, too.
+    for name, symbol, values, look in (
+        ("median", "circle", [each.median for each in misses], {"width": 2}),
+        ("9 of 10 below", "circle-open", [each.share90 for each in misses], {"width": 1.5, "dash": "dash"}),
+    ):
         scaled = [None if value is None else value * factor for value in values]
-        marker = {"color": BLUE, "size": 5, "symbol": symbol}
+        marker, line = {"color": BLUE, "size": 5, "symbol": symbol}, {"color": BLUE, **look}
         figure.add_scatter(x=list(numbers), y=scaled, mode="lines+markers", line=line, marker=marker, name=name)
     title = f"{_NOUNS.get(misses[0].unit, 'difference')} from the target [{unit.strip()}]"
     return figure.update_yaxes(title=title).update_layout(height=420, legend=LEGEND_ABOVE)
@@ -123,13 +117,9 @@ def _tabulate(score: Score) -> Table:
     rows = [(f"learned from {each.trained_on:,} throws", *_cells(each.errors)) for each in score.trained]
     if score.distilled is not None:
         rows.append(("model.onnx of these", *_cells(score.distilled)))
-    rows += [
-        (
-            f"in the other world after {format_count(each.real_throws, 'throw')} ({each.method.value})",
-            *_cells(each.errors),
-        )
-        for each in score.adapted
-    ]
+    for each in score.adapted:
+        after = f"after {format_count(each.real_throws, 'throw')} ({each.method.value})"
+        rows.append((f"in the other world {after}", *_cells(each.errors)))
     head = ("", "median", "9 of 10 below", "largest", "throws", "did not succeed")
     return Table(head=head, rows=tuple(rows), number_columns=(1, 2, 3, 4, 5))
 

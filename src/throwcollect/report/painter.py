@@ -6,7 +6,7 @@ traces and the settings of axes that the figures of a report have; a `KeyError` 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal
 
@@ -21,7 +21,7 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.ticker import AutoLocator, FuncFormatter, LogLocator, MaxNLocator, NullLocator
 
-from throwcollect.report.contents import Panel
+from throwcollect.report.contents import Panel, Section
 
 _COLUMN_IN, _BOTH_COLUMNS_IN = 3.5, 7.16
 """Widths of pictures [in]: one column of a paper in two columns, and both."""
@@ -78,6 +78,22 @@ _STYLE: dict[Any, Any] = {
     # Names may have dollar signs, which would begin a formula.
     "text.parse_math": False,
 }
+
+
+def write_pictures(sections: Iterable[Section], directory: Path) -> tuple[Path, ...]:
+    """Paint the panels that have the name of a picture, a PNG file in the directory for each name.
+
+    Raises:
+        OSError: If a file cannot be written.
+    """
+    pictures: dict[Path, list[Panel]] = {}
+    for section in sections:
+        for panel in section.panels:
+            if panel.picture:
+                pictures.setdefault(directory / f"{panel.picture}.png", []).append(panel)
+    for path, panels in pictures.items():
+        paint(panels, path)
+    return tuple(pictures)
 
 
 def paint(panels: Sequence[Panel], path: Path) -> None:

@@ -39,10 +39,8 @@ class Report:
     """A report on a dataset.
 
     Attributes:
-        name: Name of the dataset.
         lead: Sentence on its trials.
         tiles: Key numbers.
-        outcomes: Outcomes of all its trials.
         sections: In the order of the page; one that has nothing to show says so.
         noun: Word for a trial.
     """

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from contextlib import ExitStack
+from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -21,13 +21,10 @@ class Written:
 
 
 def write_report(directory: Path, page: Path, *, pictures: Path | None = None, model: Path | None = None) -> Written:
-    """Write a report on a dataset.
+    """Write a report on a dataset, and on a model that was learned from it, if its directory is given.
 
-    Args:
-        directory: Directory of the dataset.
-        page: HTML file to write, which must not exist.
-        pictures: Directory for pictures, which must not exist or be empty; None for a page alone.
-        model: Directory of a model that was learned from the dataset; None for none.
+    The page is an HTML file, which must not exist; the directory for pictures, if there shall be some, must not exist
+    or be empty.
 
     Raises:
         MissingExtraError: If a library that draws is not installed.
@@ -43,13 +40,14 @@ def write_report(directory: Path, page: Path, *, pictures: Path | None = None, m
             f"{page}: exists", expected="a file that is new", hint="choose another --output, or remove it"
         )
     written: tuple[Path, ...] = ()
-    with ExitStack() as stack:
-        # Entered before the dataset is read, so that a directory that cannot be used is reported at once.
-        unfinished = stack.enter_context(new_directory(pictures)) if pictures else None
+    # Entered before the dataset is read, so that a directory that cannot be used is reported at once.
+    with new_directory(pictures) if pictures else nullcontext() as unfinished:
         report = report_dataset(Dataset.open(directory), model=model)
+        text = render_page(report).encode()
         if pictures and unfinished:
-            from throwcollect.report.pictures import write_pictures
+            from throwcollect.report.painter import write_pictures
 
             written = tuple(pictures / path.name for path in write_pictures(report.sections, unfinished))
-        write_file(page, render_page(report).encode())
+    # The page may lie in the directory of the pictures, which is there only now.
+    write_file(page, text)
     return Written(page, written)

@@ -10,10 +10,9 @@ from throwcollect.config.key import Effect
 from throwcollect.config.schema import FASTEST, SLOWEST, Config
 from throwcollect.config.values import leaves, sweepable_keys, with_values
 from throwcollect.episode.channels import Channels
-from throwcollect.episode.chunk import encode_message
 from throwcollect.episode.message import pack
 from throwcollect.episode.record import Samples
-from throwcollect.episode.topics import Topic
+from throwcollect.episode.topics import Recording, Topic
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.robots.appearance import check_appearance
 from throwcollect.ros import (
@@ -177,9 +176,11 @@ class SimulationNode(Node):
             samples = self._simulation.last_sample()
         if len(samples):
             self._published_at = time.monotonic()
+        recording = Recording(samples, {})
+        columns = [(publisher, topic.encode(recording)) for topic, publisher in self._listened]
         for index in range(len(samples)):
-            for topic, publisher in self._listened:
-                publisher.publish(encode_message(topic, samples, index, {}))
+            for publisher, messages in columns:
+                publisher.publish(messages[index].tobytes())
         self._publish_steps(samples)
 
     def _repeats(self) -> bool:

@@ -10,10 +10,10 @@ from throwcollect.build import build_digest
 from throwcollect.config.schema import Config
 from throwcollect.config.values import with_values
 from throwcollect.episode.channels import Channels
-from throwcollect.episode.chunk import ChunkEncoder
+from throwcollect.episode.encoder import ChunkEncoder
 from throwcollect.episode.message import Delivery, Episode
-from throwcollect.episode.message_table import MessageTable
 from throwcollect.episode.record import EpisodeHeader, Samples, find_infinite_columns
+from throwcollect.episode.recorded_chunk import RecordedChunk
 from throwcollect.errors import ThrowcollectError
 from throwcollect.members import explain_failure
 from throwcollect.robots.description import full_description, robot_of, start_posture
@@ -94,10 +94,11 @@ class TrialRunner:
             trajectory=begun.trajectory.digest if begun else "",
             lease=begun.token if begun else "",
         )
-        records = self._encoder.lay_out(samples, states)
+        table = self._encoder.lay_out(samples, states)
         # The records are judged, as by every reader of the dataset: they hold velocities in the ball's frame.
-        result = self._judge(begun, MessageTable(records, header.samples).samples, header) if begun else ""
-        episode = Episode(header, self._encoder.compress(records, samples), hashlib.sha256(records).hexdigest())
+        result = self._judge(begun, table.samples, header) if begun else ""
+        state = RecordedChunk(self._encoder.compress(table), hashlib.sha256(table.contents).hexdigest())
+        episode = Episode(header, state)
         return Delivery(episode, result, conditions.to_json())
 
     def _judge(self, begun: _Begun, samples: Samples, header: EpisodeHeader) -> str:

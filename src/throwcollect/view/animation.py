@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from throwcollect.config.schema import Config
+from throwcollect.dataset.damage import locating_damage
 from throwcollect.dataset.reader import Dataset
 from throwcollect.engines.bullet.renderer import Renderer
 from throwcollect.episode.record import Samples
@@ -42,15 +43,7 @@ _HELD, _FLOWN, _LANDED = (150, 156, 164), (255, 115, 0), (200, 30, 30)
 
 @dataclass(frozen=True)
 class Animation:
-    """An animated picture that was written.
-
-    Attributes:
-        file: The file.
-        trial: Number of the trial.
-        pictures: Number of pictures.
-        duration_s: How long they take to watch [s], without the time for which the last one is shown.
-        size_bytes: Size of the file.
-    """
+    """An animated picture that was written; its duration [s] leaves out how long its last picture is shown."""
 
     file: Path
     trial: int
@@ -60,13 +53,9 @@ class Animation:
 
 
 def render(directory: Path, output: Path, *, trial: int | None = None, slow: float = 1.0) -> Animation:
-    """Draw a throw of a dataset.
+    """Draw a throw of a dataset, by default the first one that has an episode, `slow` times slower than it was.
 
-    Args:
-        directory: The dataset.
-        output: File to write, ``.webp`` or ``.gif``; one that is there is replaced.
-        trial: Number of the trial; None for the first one that has an episode.
-        slow: How many times slower than in simulation it is shown.
+    The file, ``.webp`` or ``.gif``, takes the place of one that is there.
 
     Raises:
         ConfigError: If there is no such format or trial, or the robot's files cannot be read.
@@ -83,7 +72,8 @@ def render(directory: Path, output: Path, *, trial: int | None = None, slow: flo
     dataset = Dataset.open(directory)
     row = choose_rows(dataset, None if trial is None else [trial])[0]
     config = dataset.plan.config_of(dataset.plan.trial(row["trial"]))
-    samples = dataset.episode(row["trial"]).samples(dataset.joints)
+    with locating_damage(dataset, row["trial"]):
+        samples = dataset.episode(row["trial"]).samples(dataset.joints)
     pictures = _draw_all(config, dataset.joints, samples, row, slow)
     if kind == "GIF":
         pictures = _reduce_colours(pictures)
@@ -160,9 +150,7 @@ def _place(renderer: Renderer, joints: tuple[str, ...], samples: Samples, number
 class _Ground:
     """The ground with lines every half metre, and everything that is drawn on it but robot and ball.
 
-    Args:
-        camera: The camera that sees it.
-        middle: Its middle in world [m], shape ``(2,)``.
+    Its middle in world [m] has the shape ``(2,)``.
     """
 
     def __init__(self, camera: Camera, middle: NDArray[np.float64]) -> None:

@@ -72,9 +72,7 @@ class Camera:
 def camera_on(points: NDArray[np.float64], aspect: float) -> Camera:
     """Place the camera so that it has all points in its picture and is as near as that allows.
 
-    Args:
-        points: In world [m], shape ``(n, 3)``.
-        aspect: Width over height of its picture.
+    The points are in world [m], shape ``(n, 3)``; the aspect is width over height of the picture.
     """
     back = _OUTWARD / np.linalg.norm(_OUTWARD)
     right = np.cross([0.0, 0.0, 1.0], back)

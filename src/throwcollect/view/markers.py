@@ -13,9 +13,8 @@ import numpy as np
 from rclzenoh.interfaces import get_message
 from throwcollect.dataset.throws_table import Row, ball_state
 from throwcollect.episode.frames import WORLD
-from throwcollect.episode.topics import BALL
+from throwcollect.episode.topics import BALL, make_header
 from throwcollect.errors import ConfigError
-from throwcollect.units import NS_PER_S
 from throwcollect.view.robot import BALL_RGBA, DrawnRobot, Rgba
 from throwcollect.view.shown_throws import ShownThrow
 
@@ -62,7 +61,7 @@ def throw_markers(throw: ShownThrow) -> Any:
     stamp = throw.start_ns
     ball = _marker("ball", marker.SPHERE, BALL_RGBA, (2 * throw.config.ball.radius_m,) * 3, stamp)
     ball.header.frame_id, ball.frame_locked = BALL, True
-    markers = [marker(header=_header(stamp), action=marker.DELETEALL), ball]
+    markers = [marker(header=make_header(WORLD, stamp), action=marker.DELETEALL), ball]
     markers.append(_path("path", throw, stamp, width=_LINE_M, alpha=1.0))
     for point in ("release", "apex", "landing"):
         markers += _point(point, throw.row, stamp)
@@ -89,7 +88,7 @@ def path_cloud(throw: ShownThrow) -> Any:
     data = throw.path.astype("<f4")
     fields = [field(name=name, offset=4 * axis, datatype=field.FLOAT32, count=1) for axis, name in enumerate("xyz")]
     return get_message("sensor_msgs/msg/PointCloud2")(
-        header=_header(throw.start_ns),
+        header=make_header(WORLD, throw.start_ns),
         height=1,
         width=len(data),
         fields=fields,
@@ -142,7 +141,7 @@ def _marker(namespace: str, kind: int, rgba: Rgba, scale: tuple[float, ...], sta
     r, g, b, a = rgba
     x, y, z = map(float, scale)
     return get_message("visualization_msgs/msg/Marker")(
-        header=_header(stamp_ns),
+        header=make_header(WORLD, stamp_ns),
         ns=namespace,
         id=number,
         type=kind,
@@ -153,16 +152,6 @@ def _marker(namespace: str, kind: int, rgba: Rgba, scale: tuple[float, ...], sta
 
 def _place(marker: Any, x: float, y: float, z: float) -> None:
     marker.pose.position = get_message("geometry_msgs/msg/Point")(x=float(x), y=float(y), z=float(z))
-
-
-def _header(stamp_ns: int) -> Any:
-    return get_message("std_msgs/msg/Header")(stamp=make_stamp(stamp_ns), frame_id=WORLD)
-
-
-def make_stamp(stamp_ns: int) -> Any:
-    """A builtin_interfaces/Time."""
-    sec, nanosec = divmod(stamp_ns, NS_PER_S)
-    return get_message("builtin_interfaces/msg/Time")(sec=sec, nanosec=nanosec)
 
 
 def _data_url(path: Path) -> str:

@@ -9,13 +9,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from throwcollect.config.schema import BallConfig, Config
+from throwcollect.episode.frames import read_origin
 from throwcollect.episode.topics import BALL
 from throwcollect.errors import DatasetError
-from throwcollect.extras import lazily
 from throwcollect.robots.description import full_description, robot_of
 from throwcollect.tools.tool import tool_of
-
-transform = lazily("scipy.spatial.transform")
 
 Rgba = tuple[float, float, float, float]
 
@@ -99,12 +97,7 @@ def draw_robot_of(config: Config) -> DrawnRobot:
 
 
 def read_drawn_robot(description: str, tool: str, share: Path) -> DrawnRobot:
-    """Read a URDF text as viewers draw it.
-
-    Args:
-        description: URDF text of the robot.
-        tool: Name of the tool's link, which has a colour of its own.
-        share: Directory that ``package://`` paths are relative to.
+    """Read a URDF text as viewers draw it; the link of the tool has a colour of its own.
 
     Raises:
         DatasetError: If the text is not a URDF that can be drawn.
@@ -155,8 +148,8 @@ def _color(material: ElementTree.Element) -> dict[str, Rgba]:
 
 
 def _shape(link: str, visual: ElementTree.Element, colors: dict[str, Rgba]) -> Shape:
-    origin, material = visual.find("origin"), visual.find("material")
-    xyz, rpy = (_numbers("0 0 0" if origin is None else origin.get(key, "0 0 0")) for key in ("xyz", "rpy"))
+    material = visual.find("material")
+    position, rotation = read_origin(visual)
     (geometry,) = visual.findall("geometry/*")
     mesh = ""
     if geometry.tag == "mesh":
@@ -171,12 +164,10 @@ def _shape(link: str, visual: ElementTree.Element, colors: dict[str, Rgba]) -> S
         size = (diameter, diameter, float(geometry.attrib["length"]))
     else:
         raise ValueError(f"link {link} has a {geometry.tag}")
-    # URDF turns about fixed axes, for which SciPy has small letters.
-    rotation = tuple(transform.Rotation.from_euler("xyz", rpy).as_quat().tolist())
     # Materials need no name, so the colour of the shape's own comes first.
     found = {} if material is None else colors | _color(material)
     rgba = _DEFAULT_RGBA if material is None else found.get(material.get("name", ""), _DEFAULT_RGBA)
-    return Shape(link, xyz, rotation, size, geometry.tag, mesh, rgba)
+    return Shape(link, position, rotation, size, geometry.tag, mesh, rgba)
 
 
 def _numbers(text: str) -> tuple[float, ...]:

@@ -16,11 +16,9 @@ from throwcollect.errors import ConfigError, DatasetError
 
 @dataclass(frozen=True)
 class ShownThrow:
-    """A throw and when it is shown.
+    """A throw, with its row of the table and the configuration of its trial, and when it is shown.
 
     Attributes:
-        row: Its row of the table of throws.
-        config: The configuration of its trial.
         start_ns: Stamp of its first sample in the file that viewers open [ns].
         path: Ball centre in world [m], shape ``(n_samples, 3)``.
     """

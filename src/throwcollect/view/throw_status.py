@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from rclzenoh.interfaces import get_message
-from throwcollect.view.markers import make_stamp
+from throwcollect.episode.topics import make_header
 from throwcollect.view.shown_throws import ShownThrow
 
 NAME = "throw"
@@ -27,7 +27,7 @@ def throw_facts(throw: ShownThrow) -> Any:
         message=": ".join(part for part in (f"trial {row['trial']} {row['outcome']}", row["reason"]) if part),
         values=[pair(key=key, value=_text(value)) for key, value in row.items() if value is not None],
     )
-    header = get_message("std_msgs/msg/Header")(stamp=make_stamp(throw.start_ns))
+    header = make_header("", throw.start_ns)
     return get_message("diagnostic_msgs/msg/DiagnosticArray")(header=header, status=[shown])
 
 

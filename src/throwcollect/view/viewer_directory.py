@@ -8,11 +8,12 @@ from pathlib import Path
 from typing import Any
 
 from throwcollect.dataset.bag import bag_information, to_yaml
+from throwcollect.dataset.damage import locating_damage
 from throwcollect.dataset.directory import METADATA
 from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.throws_table import Row
 from throwcollect.episode.record import Samples
-from throwcollect.files import new_directory, unwritable
+from throwcollect.files import new_directory
 from throwcollect.view.foxglove import layout
 from throwcollect.view.robot import draw_robot_of
 from throwcollect.view.shown_throws import ShownThrow, choose_rows
@@ -28,17 +29,7 @@ _PAUSE_NS = 1_000_000_000
 
 @dataclass(frozen=True)
 class View:
-    """A directory for viewers that was written.
-
-    Attributes:
-        recording: The MCAP file.
-        layout: The layout for Foxglove.
-        throws: Number of throws.
-        messages: Number of messages.
-        duration_s: How long they take to watch at real speed [s].
-        recording_bytes: Size of the MCAP file.
-        mesh_bytes: Size of the meshes.
-    """
+    """A directory for viewers that was written, and how long its throws take to watch at real speed [s]."""
 
     recording: Path
     layout: Path
@@ -54,12 +45,9 @@ class View:
 
 
 def view(directory: Path, output: Path, trials: Iterable[int] | None = None) -> View:
-    """Make throws of a dataset ready for viewers.
+    """Make throws of a dataset ready for viewers: trials in the given order, or else all that have an episode.
 
-    Args:
-        directory: The dataset.
-        output: Directory to write; must not exist, or be empty.
-        trials: Numbers of the trials to show, in this order; None for all that have an episode.
+    The directory to write must not exist, or be empty.
 
     Raises:
         ConfigError: If there is something at `output`, or the robot's files cannot be read.
@@ -71,19 +59,16 @@ def view(directory: Path, output: Path, trials: Iterable[int] | None = None) -> 
     robot = draw_robot_of(config)
     with new_directory(output) as beside:
         path = beside / RECORDING
-        try:
-            with path.open("wb") as stream:
-                recording = ViewRecording(stream, config)
-                recording.write(throws, lambda throw: _samples(dataset, throw.row), robot)
-                summary = recording.finish(RECORDING)
-            information = {"rosbag2_bagfile_information": bag_information([summary], recording.channels, {})}
-            (beside / METADATA).write_text(to_yaml(information), encoding="utf-8")
-            (beside / LAYOUT).write_bytes(layout(tuple(config.task.end)))
-            robot.copy_package(beside)
-            mesh_bytes = sum((beside / mesh).stat().st_size for mesh in robot.meshes)
-            recording_bytes = path.stat().st_size
-        except OSError as error:
-            raise unwritable(output, error) from error
+        with path.open("wb") as stream:
+            recording = ViewRecording(stream, config)
+            recording.write(throws, lambda throw: _samples(dataset, throw.row), robot)
+            summary = recording.finish(RECORDING)
+        information = {"rosbag2_bagfile_information": bag_information([summary], recording.channels, {})}
+        (beside / METADATA).write_text(to_yaml(information), encoding="utf-8")
+        (beside / LAYOUT).write_bytes(layout(tuple(config.task.end)))
+        robot.copy_package(beside)
+        mesh_bytes = sum((beside / mesh).stat().st_size for mesh in robot.meshes)
+        recording_bytes = path.stat().st_size
     return View(
         recording=output / RECORDING,
         layout=output / LAYOUT,
@@ -107,4 +92,5 @@ def _schedule(dataset: Dataset, rows: Iterable[Row]) -> list[ShownThrow]:
 
 
 def _samples(dataset: Dataset, row: Row) -> Samples:
-    return dataset.episode(row["trial"]).samples(dataset.joints)
+    with locating_damage(dataset, row["trial"]):
+        return dataset.episode(row["trial"]).samples(dataset.joints)

@@ -20,7 +20,7 @@ from throwcollect.episode.topics import Recording, ball_odometry, joint_states, 
 from throwcollect.robots.description import full_description, robot_of
 from throwcollect.view.markers import all_markers, path_cloud, robot_markers, throw_markers
 from throwcollect.view.robot import DrawnRobot, ball_urdf
-from throwcollect.view.sampled import ball_speed, encode_samples, range_shares
+from throwcollect.view.sampled import ball_speed, range_shares
 from throwcollect.view.shown_throws import ShownThrow
 from throwcollect.view.throw_status import throw_facts
 
@@ -117,7 +117,7 @@ class ViewRecording:
         # Throws follow one another here, whatever stamps they have in the dataset.
         stamps = samples.stamps_ns - samples.stamps_ns[0] + start_ns
         recording = Recording(replace(samples, stamps_ns=stamps), {})
-        columns = [(self._numbers[topic.name], encode_samples(topic, recording)) for topic in self._topics]
+        columns = [(self._numbers[topic.name], topic.encode(recording)) for topic in self._topics]
         for number, stamp in enumerate(stamps.tolist()):
             for channel, messages in columns:
                 self._put_data(channel, stamp, messages[number].tobytes())

@@ -15,9 +15,10 @@ from numpy.typing import NDArray
 from throwcollect.config.schema import Config
 from throwcollect.dataset.writer import DatasetWriter
 from throwcollect.episode.channels import Channels
-from throwcollect.episode.chunk import ChunkEncoder
+from throwcollect.episode.encoder import ChunkEncoder
 from throwcollect.episode.message import Episode
 from throwcollect.episode.record import Contact, ControllerSamples, EpisodeHeader, GoalOutcome, Samples
+from throwcollect.episode.recorded_chunk import RecordedChunk
 from throwcollect.robots.description import full_description, start_posture
 from throwcollect.robots.quintic_curve import sample_quintic
 from throwcollect.robots.talos import TALOS
@@ -115,7 +116,7 @@ class Collection:
             )
             for name in ("arm_right_controller", "torso_controller")
         }
-        return Episode(header, self.encoder.encode(samples, targets))
+        return Episode(header, RecordedChunk(self.encoder.encode(samples, targets)))
 
     def result(self, episode: Episode) -> ThrowResult:
         config = self.plan.config_of(self.plan.trials[episode.header.trial])

@@ -17,6 +17,7 @@ from throwcollect.config.loader import load
 from throwcollect.dataset.mcap_file import McapFile, episode_run
 from throwcollect.episode.channels import Channels
 from throwcollect.episode.message import Episode
+from throwcollect.episode.recorded_chunk import RecordedChunk
 from throwcollect.episode.topics import joint_states
 from throwcollect.robots.description import full_description
 from throwcollect.robots.talos import TALOS
@@ -168,7 +169,10 @@ def altered_with_all_hashes_made_to_fit(directory: Path) -> None:
     contents[31 + joint_states(TALOS.joints).layout.dtype.fields["position"][1] + 6] ^= 1
     data = zstandard.ZstdCompressor(level=1).compress(bytes(contents))
     chunk = replace(second.chunk, data=data, crc=zlib.crc32(contents))
-    written(directory / SHARD, [first, Episode(second.header, chunk, hashlib.sha256(contents).hexdigest()), third])
+    written(
+        directory / SHARD,
+        [first, Episode(second.header, RecordedChunk(chunk, hashlib.sha256(contents).hexdigest())), third],
+    )
 
 
 def schema_text(directory: Path) -> None:

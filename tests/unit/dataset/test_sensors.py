@@ -71,7 +71,7 @@ def filmed(episode: Episode, change: Callable[[list[records.Message]], None] = l
     contents = encode_records(*messages)
     data = zstandard.ZstdCompressor(level=1).compress(contents)
     chunk = Chunk.of(contents, data, start_ns=start, end_ns=messages[-1].log_time)
-    return Episode(episode.header, episode.chunk, sensors=[RecordedChunk(chunk)])
+    return Episode(episode.header, RecordedChunk(episode.chunk), RecordedChunk(chunk))
 
 
 class Filmed(Collection):

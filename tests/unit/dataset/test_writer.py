@@ -16,6 +16,7 @@ from throwcollect.dataset.creation import create
 from throwcollect.dataset.verify import verify
 from throwcollect.dataset.writer import DatasetWriter
 from throwcollect.episode.message import Episode
+from throwcollect.episode.recorded_chunk import RecordedChunk
 from throwcollect.errors import ConfigError, DatasetError
 
 MAY_DIFFER = {"README.md", "provenance.json"}
@@ -214,7 +215,7 @@ def test_an_episode_is_taken_once_and_only_if_it_is_waited_for(collection: Any, 
         with pytest.raises(DatasetError, match=f"no episode of trial {trial} is waited for"):
             writer.append_lost(trial, "gone")
     stranger = collection.episode(1)
-    stranger = Episode(replace(stranger.header, trial=99), stranger.chunk, stranger.state.records_sha256)
+    stranger = Episode(replace(stranger.header, trial=99), stranger.state)
     with pytest.raises(DatasetError, match="no episode of trial 99 is waited for"):
         writer.append(stranger, collection.result(collection.episode(1)))
     writer.close()
@@ -223,7 +224,8 @@ def test_an_episode_is_taken_once_and_only_if_it_is_waited_for(collection: Any, 
 def test_a_damaged_episode_is_not_written(collection: Any, tmp_path: Path) -> None:
     writer = DatasetWriter.create(tmp_path / "dataset", collection.plan)
     whole = collection.episode(0)
-    damaged = Episode(whole.header, replace(whole.chunk, crc=whole.chunk.crc ^ 1), whole.state.records_sha256)
+    chunk = whole.chunk
+    damaged = Episode(whole.header, RecordedChunk(replace(chunk, crc=chunk.crc ^ 1), whole.state.records_sha256))
     with pytest.raises(DatasetError, match="CRC differs"):
         writer.append(damaged, collection.result(whole))
     assert not list((tmp_path / "dataset").glob("*.part"))

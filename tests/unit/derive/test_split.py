@@ -65,6 +65,13 @@ def test_parts_are_datasets_that_share_no_cell(some: Path, tmp_path: Path) -> No
     assert sorted(trials) == list(range(12))
 
 
+def test_the_name_of_a_part_is_whole_however_long(some: Path, tmp_path: Path) -> None:
+    first, second, third = "a" * 62, "b" * 63, "c" * 64
+    split(some, tmp_path / "parts", fractions=f"{first}=1/3,{second}=1/3,{third}=1/3", cells=["trial=1"])
+    names = [Dataset.open(tmp_path / "parts" / part).config.name for part in (first, second, third)]
+    assert names == [f"q-{first}", second, third]
+
+
 def test_more_trials_move_nothing_from_one_part_to_another(some: Path, collected: Path, tmp_path: Path) -> None:
     merge([collected, some], tmp_path / "more")
     shift = len(Dataset.open(collected))
@@ -122,6 +129,8 @@ def test_wrong_fractions_are_explained(some: Path, tmp_path: Path, fractions: st
         ("landing_x_m", "should be an expression and the width of cells, such as landing_x_m=0.05, got 'landing_x_m'"),
         ("landing_x_m=0", "the width of cells should be above 0"),
         (f"landing_x_m=0.{'0' * 400}1", "the width of cells should be above 0"),
+        (f"landing_x_m={'1' * 400}", "should be an expression and the width of cells, such as landing_x_m=0.05"),
+        (f"landing_x_m={'1' * 5000}", "should be an expression and the width of cells, such as landing_x_m=0.05"),
         ("landing_x=0.1", "no column 'landing_x'; did you mean 'landing_x_m'"),
         ("outcome=1", "should be a number, is text"),
     ],

@@ -33,9 +33,7 @@ def wild(shape: tuple[int, ...], *, seed: int) -> np.ndarray[Any, np.dtype[np.fl
 
 
 def messages_of(topic: Topic, samples: Samples, targets: dict[str, ControllerSamples] | None = None) -> list[bytes]:
-    rows = np.tile(np.frombuffer(topic.layout.template, np.uint8), (len(samples), 1))
-    topic.fill(rows.view(topic.layout.dtype)[:, 0], Recording(samples, targets or {}))
-    return [row.tobytes() for row in rows]
+    return [row.tobytes() for row in topic.encode(Recording(samples, targets or {}))]
 
 
 def by_rosbags(type_name: str, **fields: object) -> bytes:

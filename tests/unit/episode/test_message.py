@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from rclzenoh.interfaces import deserialize, get_message
 from throwcollect.config.schema import Config
 from throwcollect.episode.channels import Channels
-from throwcollect.episode.chunk import ChunkEncoder
+from throwcollect.episode.encoder import ChunkEncoder
 from throwcollect.episode.message import (
     Delivery,
     Episode,
@@ -23,6 +23,7 @@ from throwcollect.episode.message import (
     unpack,
 )
 from throwcollect.episode.record import EpisodeHeader
+from throwcollect.episode.recorded_chunk import RecordedChunk
 from throwcollect.errors import DatasetError
 from throwcollect.robots.description import full_description
 from throwcollect.run_key import Signer
@@ -39,7 +40,7 @@ def encoder() -> ChunkEncoder:
 
 @pytest.fixture
 def sent(encoder: ChunkEncoder, header: EpisodeHeader, make_samples: Any) -> Episode:
-    return Episode(header, encoder.encode(make_samples(50)))
+    return Episode(header, RecordedChunk(encoder.encode(make_samples(50))))
 
 
 def test_an_episode_arrives_as_it_was_sent(sent: Episode, make_samples: Any) -> None:
@@ -72,14 +73,14 @@ def test_the_digest_covers_header_and_messages_but_not_their_packing(
     records = hashlib.sha256(sent.chunk.decompress()).digest()
     assert sent.digest == hashlib.sha256(header_to_json(header).encode() + b"\0" + records).hexdigest()
     packer = ChunkEncoder(Channels(Config(), full_description(Config())), level=9)
-    packed_more = Episode(header, packer.encode(make_samples(50)))
+    packed_more = Episode(header, RecordedChunk(packer.encode(make_samples(50))))
     assert packed_more.chunk.data != sent.chunk.data
     assert packed_more.digest == sent.digest
     others = [
-        Episode(replace(header, end_reason="rest"), sent.chunk, sent.state.records_sha256),
-        Episode(replace(header, contacts=header.contacts[:1]), sent.chunk, sent.state.records_sha256),
-        Episode(replace(header, goals=()), sent.chunk, sent.state.records_sha256),
-        Episode(header, encoder.encode(make_samples(50, seed=1))),
+        Episode(replace(header, end_reason="rest"), sent.state),
+        Episode(replace(header, contacts=header.contacts[:1]), sent.state),
+        Episode(replace(header, goals=()), sent.state),
+        Episode(header, RecordedChunk(encoder.encode(make_samples(50, seed=1)))),
     ]
     assert len({sent.digest, *(other.digest for other in others)}) == 5
 
@@ -87,7 +88,7 @@ def test_the_digest_covers_header_and_messages_but_not_their_packing(
 def test_a_hash_that_is_not_that_of_the_records_is_found(sent: Episode) -> None:
     sent.check_records()
     with pytest.raises(DatasetError, match="SHA-256 of its records is"):
-        Episode(sent.header, sent.chunk, "0" * 64).check_records()
+        Episode(sent.header, RecordedChunk(sent.chunk, "0" * 64)).check_records()
 
 
 @pytest.mark.parametrize("sha256", ["", "0" * 63, "0" * 65, "G" * 64, "\xff" * 64, "A" * 64])
@@ -126,7 +127,7 @@ def test_a_wrong_header_is_refused(header: EpisodeHeader, old: str, new: str) ->
 
 
 def test_more_samples_than_there_are_is_an_error(sent: Episode) -> None:
-    claim = Episode(replace(sent.header, samples=51), sent.chunk, sent.state.records_sha256)
+    claim = Episode(replace(sent.header, samples=51), sent.state)
     with pytest.raises(DatasetError, match="are not the records of 51 samples"):
         unpack(pack(Delivery(claim, "", ""), SIGNER), SIGNER).episode.samples()
 
@@ -150,7 +151,7 @@ def test_a_message_of_another_layout_is_refused(sent: Episode) -> None:
 
 @pytest.fixture(scope="module")
 def whole(encoder: ChunkEncoder, header: EpisodeHeader, make_samples: Any) -> bytes:
-    episode = Episode(replace(header, samples=3), encoder.encode(make_samples(3)))
+    episode = Episode(replace(header, samples=3), RecordedChunk(encoder.encode(make_samples(3))))
     return pack(Delivery(episode, RESULT, CONDITIONS), SIGNER)
 
 
@@ -182,7 +183,7 @@ def test_a_refusal_arrives_as_it_was_sent() -> None:
 
 def test_each_chunk_comes_with_a_hash(sent: Episode) -> None:
     message = pack(Delivery(sent, "", ""), SIGNER)
-    without = Episode(sent.header, sent.chunk, "")
+    without = Episode(sent.header, RecordedChunk(sent.chunk, ""))
     without.state.__dict__["records_sha256"] = ""
     with pytest.raises(DatasetError, match="episode: 1 chunks"):
         unpack(pack(Delivery(without, "", ""), SIGNER), SIGNER)

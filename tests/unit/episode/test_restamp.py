@@ -7,6 +7,7 @@ from tests.unit.dataset.conftest import Collection, throw
 from throwcollect.episode.channels import Channels
 from throwcollect.episode.message import Episode
 from throwcollect.episode.record import Contact, ControllerSamples
+from throwcollect.episode.recorded_chunk import RecordedChunk
 from throwcollect.episode.restamp import Restamper
 from throwcollect.errors import DatasetError
 from throwcollect.robots.description import full_description
@@ -32,7 +33,7 @@ def recorded(collection: Collection, *, as_trial: int) -> Episode:
     }
     header = replace(header, trial=as_trial, start_ns=header.start_ns + by_ns, contacts=contacts)
     samples = replace(samples, stamps_ns=samples.stamps_ns + by_ns)
-    return Episode(header, collection.encoder.encode(samples, targets))
+    return Episode(header, RecordedChunk(collection.encoder.encode(samples, targets)))
 
 
 @pytest.fixture(scope="module")
@@ -71,7 +72,7 @@ def test_an_episode_whose_records_are_not_what_was_hashed_is_refused(
     collection: Collection, restamper: Restamper
 ) -> None:
     episode = recorded(collection, as_trial=4)
-    forged = Episode(episode.header, episode.chunk, "0" * 64)
+    forged = Episode(episode.header, RecordedChunk(episode.chunk, "0" * 64))
     with pytest.raises(DatasetError, match="SHA-256 of its records"):
         restamper.restamp(forged, 0)
 

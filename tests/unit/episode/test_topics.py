@@ -12,9 +12,7 @@ from throwcollect.robots.talos import TALOS
 
 
 def rows_of(topic: Topic, samples: Samples) -> Any:
-    rows = np.tile(np.frombuffer(topic.layout.template, np.uint8), (len(samples), 1))
-    topic.fill(rows.view(topic.layout.dtype)[:, 0], Recording(samples, {}))
-    return rows.view(topic.layout.dtype)[:, 0]
+    return topic.encode(Recording(samples, {})).view(topic.layout.dtype)[:, 0]
 
 
 def test_the_twist_is_in_the_frame_of_the_ball(make_samples: Any) -> None:

@@ -7,9 +7,10 @@ import pytest
 
 from throwcollect.config.schema import Config
 from throwcollect.episode.channels import Channels
-from throwcollect.episode.chunk import ChunkEncoder
+from throwcollect.episode.encoder import ChunkEncoder
 from throwcollect.episode.message import Episode
 from throwcollect.episode.record import Contact, EpisodeHeader, Samples
+from throwcollect.episode.recorded_chunk import RecordedChunk
 from throwcollect.errors import DatasetError
 from throwcollect.replay.comparison import compare
 from throwcollect.robots.description import full_description
@@ -31,7 +32,7 @@ HEADER = EpisodeHeader(0, 16_000_000_000, "landed", (Contact("spoon", 16_000_000
 
 
 def episode(samples: Samples = SAMPLES, header: EpisodeHeader = HEADER) -> Episode:
-    return Episode(header, ENCODER.encode(samples))
+    return Episode(header, RecordedChunk(ENCODER.encode(samples)))
 
 
 def test_the_same_throw_has_no_differences() -> None:
@@ -54,6 +55,6 @@ def test_other_contacts_and_a_shorter_throw_are_told() -> None:
 
 def test_a_damaged_throw_is_not_compared() -> None:
     whole = episode()
-    damaged = Episode(HEADER, whole.chunk, "0" * 64)
+    damaged = Episode(HEADER, RecordedChunk(whole.chunk, "0" * 64))
     with pytest.raises(DatasetError, match="SHA-256 of its records is"):
         compare(damaged, whole)

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from throwcollect.dataset.reader import Dataset
-from throwcollect.errors import ConfigError
+from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.replay.other_engine import Deviation, Distribution, distributions, simulate_with
 from throwcollect.report.throw.deviations import write_deviations
 
@@ -40,6 +40,13 @@ def test_the_engine_is_another_one_that_is_there(monkeypatch: pytest.MonkeyPatch
     with pytest.raises(ConfigError, match="--engine physx: there is no such engine") as refused:
         simulate_with(tmp_path, "physx", [0])
     assert "expected: mujoco, ballistic" in str(refused.value)
+
+
+def test_a_picture_that_cannot_be_written_is_no_defect_of_ours(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match=r"apart\.txt: no picture ends like this"):
+        write_deviations([[0.001, -0.002], [0.0, 0.003]], tmp_path / "apart.txt")
+    with pytest.raises(DatasetError, match=r"apart\.png: cannot be written: No such file or directory"):
+        write_deviations([[0.001, -0.002], [0.0, 0.003]], tmp_path / "missing" / "apart.png")
 
 
 def test_a_picture_of_landings_is_written(tmp_path: Path) -> None:

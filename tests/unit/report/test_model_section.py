@@ -10,7 +10,7 @@ from throwcollect.dataset.reader import Dataset
 from throwcollect.learning.model_directory import write_score
 from throwcollect.learning.score import Adapted, Errors, Misses, Score, ThrowAtTarget, Trained
 from throwcollect.report.model_section import show_model
-from throwcollect.report.pictures import write_pictures
+from throwcollect.report.painter import write_pictures
 
 
 @pytest.fixture(scope="module")

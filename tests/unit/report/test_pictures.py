@@ -6,7 +6,7 @@ import matplotlib.image as image
 import pytest
 
 from throwcollect.dataset.reader import Dataset
-from throwcollect.report.pictures import write_pictures
+from throwcollect.report.painter import write_pictures
 from throwcollect.report.sections import report_dataset
 
 

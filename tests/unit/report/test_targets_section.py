@@ -16,7 +16,7 @@ from throwcollect.config.until import UntilConfig, Wanted
 from throwcollect.dataset.reader import Dataset
 from throwcollect.episode.record import EpisodeHeader, Samples
 from throwcollect.report.miss_map import choose_scale, draw_miss_map, title_column, title_misses
-from throwcollect.report.pictures import write_pictures
+from throwcollect.report.painter import write_pictures
 from throwcollect.report.sections import report_dataset
 from throwcollect.report.targets_section import show_targets
 

@@ -81,6 +81,14 @@ def test_what_is_there_is_never_overwritten(collected: Path, tmp_path: Path) -> 
     assert not (tmp_path / "other.html").exists()
 
 
+def test_the_page_may_lie_among_the_pictures(collected: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("throwcollect.report.painter.DPI", 50)
+    together = tmp_path / "together"
+    together.mkdir()
+    written = write_report(collected, together / "page.html", pictures=together)
+    assert set(together.iterdir()) == {written.page, *written.pictures}
+
+
 def test_without_plotly_the_message_says_how_to_get_it(
     collected: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

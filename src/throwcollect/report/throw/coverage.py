@@ -23,12 +23,7 @@ _LABELS = {
 
 @dataclass(frozen=True)
 class Axis:
-    """One dimension of the cells.
-
-    Attributes:
-        label: Its title, with the unit.
-        edges: Edges of its bins, shape ``(n_bins + 1,)``.
-    """
+    """One dimension of the cells: its title, with the unit, and the edges of its bins, shape ``(n_bins + 1,)``."""
 
     label: str
     edges: NDArray[np.float64]
@@ -68,12 +63,7 @@ class Coverage:
 def count_throws(landings: Landings, throws: pa.Table, *, target: TargetConfig | None) -> Coverage | None:
     """Count throws that landed in the cells of the configuration's targets; None if none landed.
 
-    Without targets, the cells span the values of the throws.
-
-    Args:
-        landings: Throws that landed.
-        throws: Table of all throws.
-        target: Targets of the configuration; None if it has none.
+    Without targets, the cells span the values of the throws. The table is that of all throws.
     """
     if not len(landings):
         return None

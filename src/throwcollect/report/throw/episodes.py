@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from throwcollect.config.schema import Config
+from throwcollect.dataset.damage import locating_damage
 from throwcollect.dataset.reader import Dataset
-from throwcollect.episode.record import EpisodeHeader
+from throwcollect.episode.record import EpisodeHeader, Samples
 from throwcollect.report.outcomes import LANDED, Outcomes
 from throwcollect.report.throw.landings import Landings
 from throwcollect.robots.quintic_curve import sample_positions
@@ -51,8 +52,6 @@ class BallPath:
     """The ball of one throw.
 
     Attributes:
-        trial: Number of the trial.
-        outcome: Outcome of the trial.
         positions: Ball centre in world [m], shape ``(n_samples, 3)``.
         release: Index of the first sample after the release; None if it was not released.
     """
@@ -103,9 +102,9 @@ def measure_residuals(dataset: Dataset) -> Residuals:
     chosen = np.sort(np.random.default_rng(0).permutation(trials)[:MOST_RESIDUALS])
     distances = []
     for trial in chosen.tolist():
-        episode = dataset.episode(trial)
+        header, samples = _read(dataset, trial)
         config = dataset.plan.config_of(dataset.plan.trial(trial))
-        distance = flight_residual(episode.samples(), episode.header, config=config)
+        distance = flight_residual(samples, header, config=config)
         if distance is not None:
             distances.append(distance)
     return Residuals(len(trials), len(chosen), np.array(distances))
@@ -133,9 +132,8 @@ def read_paths(dataset: Dataset, trials: Sequence[int]) -> Iterator[BallPath]:
     """
     outcomes = dataset.throws["outcome"]
     for trial in trials:
-        episode = dataset.episode(trial)
-        samples = episode.samples()
-        release_ns = _find_release(episode.header, dataset.config)
+        header, samples = _read(dataset, trial)
+        release_ns = _find_release(header, dataset.config)
         release = None if release_ns is None else int(np.searchsorted(samples.stamps_ns, release_ns))
         yield BallPath(trial, outcomes[trial].as_py(), samples.ball_position, release)
 
@@ -146,21 +144,26 @@ def read_motion(dataset: Dataset, trial: int) -> JointMotion:
     Raises:
         DatasetError: If the episode is not where the table says, or is damaged.
     """
-    episode = dataset.episode(trial)
-    samples = episode.samples(dataset.joints)
+    header, samples = _read(dataset, trial)
     config = dataset.plan.config_of(dataset.plan.trial(trial))
     trajectory = trajectory_of(config)
-    times = (samples.stamps_ns - episode.header.start_ns) / NS_PER_S
+    times = (samples.stamps_ns - header.start_ns) / NS_PER_S
     columns = [dataset.joints.index(joint) for joint in trajectory.joints]
-    release_ns = _find_release(episode.header, config)
+    release_ns = _find_release(header, config)
     return JointMotion(
         trial=trial,
         joints=trajectory.joints,
         times_s=times,
         commanded=sample_positions(trajectory, times),
         measured=samples.position[:, columns],
-        release_s=None if release_ns is None else (release_ns - episode.header.start_ns) / NS_PER_S,
+        release_s=None if release_ns is None else (release_ns - header.start_ns) / NS_PER_S,
     )
+
+
+def _read(dataset: Dataset, trial: int) -> tuple[EpisodeHeader, Samples]:
+    with locating_damage(dataset, trial):
+        episode = dataset.episode(trial)
+        return episode.header, episode.samples(dataset.joints)
 
 
 def _find_release(header: EpisodeHeader, config: Config) -> int | None:

@@ -22,10 +22,12 @@ def chosen(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     """Trials that are replayed; trial 5 comes out otherwise, trial 3 has no episode."""
     trials: list[int] = []
     shards = ["a.mcap" if trial != 3 else None for trial in range(20)]
+    throws = pa.table({"trial": range(20), "shard": shards})
     dataset = SimpleNamespace(
         directory=Path("data"),
         config=SimpleNamespace(seed=1),
-        throws=pa.table({"trial": range(20), "shard": shards}),
+        throws=throws,
+        recorded=SimpleNamespace(throws=throws.filter(throws["shard"].is_valid())),
         episode=lambda _: None,
     )
 

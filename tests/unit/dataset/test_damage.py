@@ -1,0 +1,37 @@
+"""Whatever reads a damaged episode says in which dataset and trial the damage is, and how to find the rest."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from tests.unit.dataset.shard_defects import chunk_contents
+
+from throwcollect.dataset.reader import Dataset
+from throwcollect.derive.selection import merge
+from throwcollect.derive.statistics import statistics
+from throwcollect.errors import DatasetError
+from throwcollect.export.export import export
+from throwcollect.replay.audit import replay_throws
+from throwcollect.report.sections import report_dataset
+from throwcollect.view.animation import render
+from throwcollect.view.viewer_directory import view
+
+READERS: dict[str, Callable[[Path], object]] = {
+    "statistics": statistics,
+    "merge": lambda dataset: merge([dataset], dataset / "merged"),
+    "export": lambda dataset: export(dataset, dataset / "npz", to="npz"),
+    "view": lambda dataset: view(dataset, dataset / "view"),
+    "render": lambda dataset: render(dataset, dataset / "throw.webp", trial=4),
+    "report": lambda dataset: report_dataset(Dataset.open(dataset)),
+    "replay": lambda dataset: list(replay_throws(dataset, [4])),
+}
+
+
+@pytest.mark.parametrize("reader", READERS)
+def test_damage_is_located(reader: str, dataset: Path) -> None:
+    chunk_contents(dataset)
+    with pytest.raises(DatasetError, match=rf"^{dataset}: trial 4: chunk: ") as found:
+        READERS[reader](dataset)
+    assert found.value.hint == f"throwcollect dataset verify {dataset}"
