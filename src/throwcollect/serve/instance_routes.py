@@ -15,7 +15,7 @@ from fastapi.responses import PlainTextResponse
 from pydantic import BaseModel, ConfigDict, Field, JsonValue, field_validator
 
 from throwcollect.files import open_log
-from throwcollect.runs.events import EVENTS
+from throwcollect.runs.events import EVENTS, parse
 from throwcollect.runs.record import Origin
 from throwcollect.runtimes.node_logs import NodeLogs
 from throwcollect.serve.catalogue import LONGEST_NAME
@@ -153,11 +153,15 @@ def make_log_routes(instances: Instances) -> APIRouter:
     @router.get("/{instance}/events", response_class=Response, responses=describe_bytes("application/x-ndjson"))
     def events(instance: str) -> Response:
         """What has happened in a run, one event in JSON a line."""
-        path = Path(instances.get(instance).record.logs) / EVENTS
-        text = b""
+        record = instances.get(instance).record
+        told: list[str] = []
         # The file does not exist before the first event.
-        with suppress(OSError), open(open_log(path, os.O_RDONLY), "rb") as file:
-            text = file.read()
-        return Response(text, media_type="application/x-ndjson")
+        with (
+            suppress(OSError),
+            open(open_log(Path(record.logs) / EVENTS, os.O_RDONLY), encoding="utf-8", errors="replace") as file,
+        ):
+            # Where a dataset is resumed, the file has the events of earlier runs, too.
+            told += (line for line in file if (event := parse(line)) and event.run == record.run)
+        return Response("".join(told), media_type="application/x-ndjson")
 
     return router

@@ -9,7 +9,7 @@ import pytest
 from throwcollect.dataset.reader import Dataset
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.replay.other_engine import Deviation, Distribution, distributions, simulate_with
-from throwcollect.report.throw.deviations import write_deviations
+from throwcollect.report.throw.deviations import check_picture, write_deviations
 
 
 def test_a_distribution_has_what_both_throws_have() -> None:
@@ -44,7 +44,13 @@ def test_the_engine_is_another_one_that_is_there(monkeypatch: pytest.MonkeyPatch
 
 def test_a_picture_that_cannot_be_written_is_no_defect_of_ours(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match=r"apart\.txt: no picture ends like this"):
-        write_deviations([[0.001, -0.002], [0.0, 0.003]], tmp_path / "apart.txt")
+        check_picture(tmp_path / "apart.txt")
+    with pytest.raises(ConfigError, match=r"apart\.png: its directory does not exist"):
+        check_picture(tmp_path / "missing" / "apart.png")
+    check_picture(tmp_path / "apart.png")
+    (tmp_path / "apart.png").touch()
+    with pytest.raises(ConfigError, match=r"apart\.png: exists"):
+        check_picture(tmp_path / "apart.png")
     with pytest.raises(DatasetError, match=r"apart\.png: cannot be written: No such file or directory"):
         write_deviations([[0.001, -0.002], [0.0, 0.003]], tmp_path / "missing" / "apart.png")
 

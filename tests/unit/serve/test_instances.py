@@ -448,13 +448,13 @@ def test_logs_and_events_are_read_where_they_lie(client: TestClient, remember: R
     logs = tmp_path / "datasets" / "a" / "logs"
     logs.mkdir(parents=True)
     (logs / "sim_0.log").write_bytes(b"".join(b"line %d\xff\n" % number for number in range(500)))
-    (logs / "events.jsonl").write_text('{"event": "started"}\n')
-    secret = tmp_path / "secret.log"
-    secret.write_text("secret")
-    (logs / "leak.log").symlink_to(secret)
+    event = '{"time": "", "run": "a", "event": "started"}\n'
+    (logs / "events.jsonl").write_text(event.replace('"a"', '"earlier"') + event)
+    (tmp_path / "secret.log").write_text("secret")
+    (logs / "leak.log").symlink_to(tmp_path / "secret.log")
     assert client.get(f"{URL}/a/log/sim_0?tail=2").text == "line 498\ufffd\nline 499\ufffd\n"
     assert len(client.get(f"{URL}/a/log/sim_0").text.splitlines()) == 200
-    assert client.get(f"{URL}/a/events").text == '{"event": "started"}\n'
+    assert client.get(f"{URL}/a/events").text == event
     for node in ("leak", "..%2f..%2f..%2fsecret", "../secret", "sim_1", "%00", 300 * "a"):
         answer = client.get(f"{URL}/a/log/{node}")
         assert answer.status_code == 404, node

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -14,6 +14,9 @@ from throwcollect.cli.printing import print_json
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.extras import require
 from throwcollect.wording import format_count
+
+if TYPE_CHECKING:
+    from throwcollect.replay.other_engine import Deviation
 
 
 def replay_dataset(
@@ -76,15 +79,16 @@ def _compare_engines(directory: Path, engine: str, trials: Sequence[int], plot: 
     Raises:
         ConfigError: If there is no such engine, the dataset was computed by it, or nothing can be drawn.
     """
-    from throwcollect.replay.other_engine import LANDING, distributions, simulate_with
+    from throwcollect.replay.other_engine import LANDING, simulate_with
 
     if plot is not None:
         require("plotly", "matplotlib")
-        if plot.exists():
-            raise ConfigError(f"{plot}: exists", expected="a file that is new")
+        from throwcollect.report.throw.deviations import check_picture
+
+        check_picture(plot)
     deviations = list(simulate_with(directory, engine, trials))
-    found = distributions(deviations)
-    differ = sum(each.stored != each.again for each in deviations)
+    # The numbers come first: a picture that cannot be drawn after all does not cost them.
+    _print_deviations(directory, engine, deviations, json=json)
     if plot is not None:
         from throwcollect.report.throw.deviations import write_deviations
 
@@ -92,6 +96,13 @@ def _compare_engines(directory: Path, engine: str, trials: Sequence[int], plot: 
         if not landed:
             raise ConfigError("--plot: no throw landed with both engines")
         write_deviations([[each[column] for each in landed] for column in LANDING], plot)
+
+
+def _print_deviations(directory: Path, engine: str, deviations: Sequence[Deviation], *, json: bool) -> None:
+    from throwcollect.replay.other_engine import distributions
+
+    found = distributions(deviations)
+    differ = sum(each.stored != each.again for each in deviations)
     if json:
         print_json({"throws": [asdict(each) for each in deviations], "columns": [asdict(each) for each in found]})
         return
