@@ -24,6 +24,8 @@ Plain = bool | float | str | list[float] | None
 
 _TAG = "tag:yaml.org,2002:"
 _MOST_BYTES = 5_000_000
+_MOST_BITS = 1023
+"""Most binary digits of a whole number; every such number can be a float."""
 _SWEPT = ("sweep", "parameters")
 _SWEPT_FIELDS = ("min", "max", "scale", "count", "values")
 
@@ -131,7 +133,8 @@ class Document:
         self._count += 1
         if self._count > MOST_VALUES:
             # Aliases of aliases can make a short text arbitrarily large.
-            raise ConfigError([Problem(f"holds more than {MOST_VALUES} values", path=self._path)])
+            path = self._path if self._in_file else None
+            raise ConfigError([Problem(f"holds more than {MOST_VALUES} values", join_key(location[:1]), path)])
         if node in inside:
             self._note(node, location, "an alias cannot be inside its own anchor")
             return None
@@ -222,7 +225,14 @@ def _scalar(node: Node) -> Any:
     tag = str(node.tag).removeprefix(_TAG)
     if not isinstance(node, ScalarNode) or tag not in readers:
         raise ValueError(f"the tag {tag} means nothing here")
-    return readers[tag](node)
+    try:
+        value = readers[tag](node)
+    except (LookupError, ValueError) as error:
+        # Of a text that does not fit, ruamel looks for letters and words that are not there.
+        raise ValueError(f"{quote(node.value)} is not of the kind {tag}") from error
+    if isinstance(value, int) and value.bit_length() > _MOST_BITS:
+        raise ValueError("the number is too large")
+    return value
 
 
 def _parts(key: str) -> tuple[str, ...]:
@@ -231,7 +241,8 @@ def _parts(key: str) -> tuple[str, ...]:
     if parts[:2] != _SWEPT or len(parts) < 3:
         return parts
     rest = parts[2:]
-    within = 1 if rest[-1] in _SWEPT_FIELDS else 2 if rest[-2:-1] == ("values",) else 0
+    # What stands first is the swept key, or its beginning, also if it is called as a field is.
+    within = 1 if rest[-1] in _SWEPT_FIELDS and rest[1:] else 2 if rest[1:-1][-1:] == ("values",) else 0
     swept, field = rest[: len(rest) - within], rest[len(rest) - within :]
     return (*_SWEPT, ".".join(swept), *field)
 

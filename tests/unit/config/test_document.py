@@ -78,6 +78,38 @@ def test_numbers_of_absurd_length_are_problems(read):
     assert [(key, line) for key, line, _ in facts(read(f"a: 1\nb: {'9' * 5000}\n"))] == [("b", 2)]
 
 
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        ("!!bool maybe", "'maybe' is not of the kind bool"),
+        ('!!int ""', "'' is not of the kind int"),
+        ('!!float ""', "'' is not of the kind float"),
+        ("0x" + "f" * 5000, "the number is too large"),
+        ("-1" + "0" * 400, "the number is too large"),
+    ],
+)
+def test_what_does_not_fit_its_tag_or_any_number_is_a_problem(read, text, sentence):
+    assert facts(read(f"a: 1\nb: {text}\n")) == [("b", 2, sentence)]
+
+
+@pytest.mark.parametrize("escaped", [r"\UFFFFFFFF", r"\U00110000", r"\ud800"])
+def test_characters_that_unicode_does_not_have_are_no_yaml(read, escaped):
+    with pytest.raises(ConfigError, match=r"run\.yaml:2: not valid YAML: an escaped character is none of Unicode"):
+        read(f'a: 1\n"{escaped}": 2\n')
+
+
+def test_an_override_that_is_too_large_does_not_name_the_file(read):
+    document = read("a: 1\n")
+    with pytest.raises(ConfigError, match=r"^b: holds more than 30000 values$"):
+        document.override(f"b=[{30_000 * '1,'}]")
+
+
+def test_a_swept_key_that_is_called_as_a_field_keeps_its_name(read):
+    document = read("a: 1\n")
+    document.override("sweep.parameters.min=1")
+    assert document.values["sweep"] == {"parameters": {"min": 1}}
+
+
 def test_a_byte_order_mark_is_no_part_of_the_first_key(read):
     assert read("\ufeffa: 1\n").values == {"a": 1}
 
