@@ -158,6 +158,8 @@ def test_files_that_are_no_table(tmp_path):
     (tmp_path / "directory.csv").mkdir()
     assert problems(tmp_path / "directory.csv") == ["sweep.file: should be a file, got the directory directory.csv"]
     assert problems(tmp_path / "list.json") == ["sweep.file: should end in .csv or .parquet, got 'list.json'"]
+    (long,) = problems(tmp_path / f"{300 * 'x'}.csv")
+    assert long.endswith("xx.csv: sweep.file: cannot be read: File name too long")
     broken = tmp_path / "broken.parquet"
     broken.write_bytes(b"PAR1 but not much more")
     assert problems(broken)[0].startswith("broken.parquet: sweep.file: cannot be read as Parquet: ")
