@@ -200,6 +200,9 @@ def _text_of(path: Path) -> str:
         line = error.object.count(b"\n", 0, error.start) + 1
         sentence = f"should be UTF-8 text, got the byte 0x{error.object[error.start]:02x}"
         raise ConfigError([Problem(sentence, path=path, line=line)]) from error
+    except ValueError as error:
+        # A zero byte, for one, is refused by Python, which does not ask the system then.
+        raise ConfigError([Problem("no file can have this name", path=path)]) from error
 
 
 @cache

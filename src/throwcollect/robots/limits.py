@@ -67,6 +67,6 @@ def shares_of(values: NDArray[np.float64], limits: NDArray[np.float64]) -> NDArr
     A limit may be 0, as a URDF may have it for joints that never move: what is 0 is within it, all else is infinitely
     far beyond.
     """
-    with np.errstate(divide="ignore"):
+    with np.errstate(divide="ignore", over="ignore"):
         shares: NDArray[np.float64] = np.divide(np.abs(values), limits, out=np.zeros_like(values), where=values != 0)
     return shares

@@ -44,7 +44,7 @@ def measure_joints(
     middle = (limits.lower[moving] + limits.upper[moving]) / 2
     # One row per joint, so that arithmetic runs along memory.
     measured = samples.position.T[moving]
-    positions = np.abs(measured - middle[:, np.newaxis]).max(axis=1) / (limits.upper[moving] - middle)
+    positions = shares_of(np.abs(measured - middle[:, np.newaxis]).max(axis=1), limits.upper[moving] - middle)
     desired = sample_positions(trajectory, (samples.stamps_ns - start_ns) / NS_PER_S).T
     errors = np.abs(measured - desired).max(axis=1)
     saturated = 0.0

@@ -1,4 +1,5 @@
 import os
+from pathlib import Path
 
 import pytest
 
@@ -200,6 +201,11 @@ def test_an_override_that_is_nested_too_deeply_is_a_problem(read):
 def test_a_file_whose_tag_is_not_that_of_keys_and_values_is_a_problem(text, message, read):
     with pytest.raises(ConfigError, match=f"run.yaml:1: {message} means nothing here"):
         read(text)
+
+
+def test_a_name_that_no_file_can_have_is_refused():
+    with pytest.raises(ConfigError, match="no file can have this name"):
+        Document(Path("a\0b"))
 
 
 def test_a_pipe_is_not_waited_for(tmp_path):
