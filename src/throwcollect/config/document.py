@@ -39,11 +39,13 @@ class Document:
     Attributes:
         values: Plain dictionaries, lists, text, numbers, truth values and None.
         problems: Problems of the YAML and of overrides, which are known before the values are validated.
+        left_out: Locations of values that are None because a problem tells what is wrong with them.
     """
 
     def __init__(self, path: Path) -> None:
         self.values: dict[str, Any] = {}
         self.problems: list[Problem] = []
+        self.left_out: set[Location] = set()
         self._path = path
         self._count = 0
         self._in_file = True
@@ -136,11 +138,9 @@ class Document:
             path = self._path if self._in_file else None
             raise ConfigError([Problem(f"holds more than {MOST_VALUES} values", join_key(location[:1]), path)])
         if node in inside:
-            self._note(node, location, "an alias cannot be inside its own anchor")
-            return None
+            return self._leave_out(node, location, "an alias cannot be inside its own anchor")
         if len(inside) >= MOST_LEVELS:
-            self._note(node, location, "values are nested too deeply")
-            return None
+            return self._leave_out(node, location, "values are nested too deeply")
         inside = (*inside, node)
         if isinstance(node, MappingNode) and node.tag == _TAG + "map":
             return self._mapping(node, location, inside)
@@ -153,8 +153,7 @@ class Document:
         try:
             return _scalar(node)
         except ValueError as error:
-            self._note(node, location, str(error))
-            return None
+            return self._leave_out(node, location, str(error))
 
     def _mapping(self, node: MappingNode, location: Location, inside: tuple[Node, ...]) -> dict[str, Any]:
         values: dict[str, Any] = {}
@@ -169,6 +168,10 @@ class Document:
                 self._lines[(*location, name)] = self._line(key_node)
                 values[name] = self._plain(value_node, (*location, name), inside)
         return values
+
+    def _leave_out(self, node: Node, location: Location, sentence: str) -> None:
+        self._note(node, location, sentence)
+        self.left_out.add(location)
 
     def _note(self, node: Node, location: Location, sentence: str) -> None:
         path = self._path if self._in_file else None

@@ -67,8 +67,8 @@ def dmp_trajectory(
     with np.errstate(all="ignore"):
         motion = roll_out(times, start=origin, goal=goal, weights=weights, tau=duration_s, family=family)
     positions, velocities, accelerations = motion
-    finite = np.isfinite(motion).all(axis=(0, 1)).tolist()
-    if wrong := [joint for joint, is_finite in zip(end, finite, strict=True) if not is_finite]:
+    finite = np.isfinite(motion)
+    if wrong := [joint for number, joint in enumerate(end) if not finite[:, :, number].all()]:
         raise ConfigError(
             f"the DMP of {join_names(wrong)} leads to numbers that are not finite",
             hint="set smaller weights, or a task.trajectory.alpha_x nearer to 2",
