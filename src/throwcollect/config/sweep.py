@@ -116,8 +116,9 @@ class SweepConfig(Section):
 
     A relative path starts at the directory of the configuration file."""
     feasibility: Annotated[Literal["actual", "nominal"], Key(later=True)] = "actual"
-    """Robot that the plan is checked for: the `actual` one that throws, or the `nominal` one, for which the keys of
-    `robot`, `tool` and `ball` have their defaults: a user who plans motions for a robot knows only this one."""
+    """Robot that the plan is checked for: the `actual` one that throws, or the `nominal` one, for which all keys of
+    `tool` and `ball`, and those of `robot` but `posture`, `locked` and `base_height_m`, have their defaults: a user who
+    plans motions for a robot knows only this one."""
     target: Annotated[TargetConfig | None, Key(later=True)] = None
     """Spreads throws over landing targets: trials are added to the plan where throws are few."""
 

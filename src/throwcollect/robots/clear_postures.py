@@ -77,8 +77,7 @@ class ClearPostures:
         """
         unknown: NDArray[np.bool_] = np.ones(len(postures), bool)
         if not self._tries:
-            # No further posture is kept, but the distances of few pairs decide about this one at less cost than the
-            # tree.
+            # No further posture is kept, but for few pairs, their distances cost less than the tree would.
             unknown[0] = len(self._pairs) > _FEW_PAIRS or self._compute_distances(postures[0]).min() <= self._needed
             return unknown
         self._tries -= 1

@@ -92,8 +92,9 @@ def _read_csv(path: Path, config: Config) -> _Rows:
         # Spreadsheets write a byte order mark, and `csv` wants line ends as they are.
         with path.open(encoding="utf-8-sig", newline="") as file:
             reader = csv.reader(file)
-            names = tuple(name.strip() for name in next(reader, []))
-            _check_columns(names, path, config, line=1)
+            # Lines without any cell count nowhere, before the header as well as below.
+            names = tuple(name.strip() for name in next(filter(None, reader), []))
+            _check_columns(names, path, config, line=reader.line_num)
             for cells in reader:
                 if not cells:
                     continue

@@ -67,6 +67,7 @@ def test_what_pandas_numbers_rows_by_is_no_key(tmp_path):
         (HEADER, ["list.csv: sweep.file: the file has no rows"]),
         (b"ball.mass_kg\n\xff\n", ["list.csv: sweep.file: should be UTF-8 text"]),
         ("ball.mas_kg\n1\n", ["list.csv:1: ball.mas_kg: unknown key; did you mean 'ball.mass_kg'?"]),
+        ("\n\r\nball.mas_kg\n1\n", ["list.csv:3: ball.mas_kg: unknown key; did you mean 'ball.mass_kg'?"]),
         (
             "seed,ball.mass_kg,ball.mass_kg\n",
             [
