@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import PurePosixPath
 from typing import Annotated
 
-from pydantic import AfterValidator, ConfigDict, Field, PositiveFloat, PositiveInt
+from pydantic import AfterValidator, ConfigDict, Field, PositiveInt
 from typing_extensions import TypedDict
 
 from throwcollect.config.host_paths import DEVICES, is_allowed_device, normal_path, refusal
@@ -209,7 +209,7 @@ class ContainerOptions(TypedDict, total=False):
 class NodeContainerConfig(Section):
     """Further properties of the containers of one kind of node."""
 
-    cpus: PositiveFloat | None = None
+    cpus: Annotated[float, Field(ge=0.01, le=10_000)] | None = None
     """Upper bound of processor time, in cores."""
     memory: Size | None = None
     """Upper bound of memory; nothing is swapped out beyond it."""
@@ -225,6 +225,11 @@ class NodeContainerConfig(Section):
     """Ports of the container (`80`, `53/udp`) and those of 127.0.0.1 at which they are published."""
     options: ContainerOptions = {}
     """Further options."""
+
+    def _find_contradictions(self) -> Iterator[tuple[str, str]]:
+        for port in self.ports:
+            if port.endswith("/tcp") and (same := port.removesuffix("/tcp")) in self.ports:
+                yield f"ports.{port}", f"should be left out, as {same} is the same port"
 
 
 @dataclass(frozen=True)

@@ -24,6 +24,8 @@ Plain = bool | float | str | list[float] | None
 
 _TAG = "tag:yaml.org,2002:"
 _MOST_BYTES = 5_000_000
+_MOST_BITS = 1023
+"""Most binary digits of a whole number; every such number can be a float."""
 _SWEPT = ("sweep", "parameters")
 _SWEPT_FIELDS = ("min", "max", "scale", "count", "values")
 
@@ -37,11 +39,13 @@ class Document:
     Attributes:
         values: Plain dictionaries, lists, text, numbers, truth values and None.
         problems: Problems of the YAML and of overrides, which are known before the values are validated.
+        left_out: Locations of values that are None because a problem tells what is wrong with them.
     """
 
     def __init__(self, path: Path) -> None:
         self.values: dict[str, Any] = {}
         self.problems: list[Problem] = []
+        self.left_out: set[Location] = set()
         self._path = path
         self._count = 0
         self._in_file = True
@@ -131,13 +135,12 @@ class Document:
         self._count += 1
         if self._count > MOST_VALUES:
             # Aliases of aliases can make a short text arbitrarily large.
-            raise ConfigError([Problem(f"holds more than {MOST_VALUES} values", path=self._path)])
+            path = self._path if self._in_file else None
+            raise ConfigError([Problem(f"holds more than {MOST_VALUES} values", join_key(location[:1]), path)])
         if node in inside:
-            self._note(node, location, "an alias cannot be inside its own anchor")
-            return None
+            return self._leave_out(node, location, "an alias cannot be inside its own anchor")
         if len(inside) >= MOST_LEVELS:
-            self._note(node, location, "values are nested too deeply")
-            return None
+            return self._leave_out(node, location, "values are nested too deeply")
         inside = (*inside, node)
         if isinstance(node, MappingNode) and node.tag == _TAG + "map":
             return self._mapping(node, location, inside)
@@ -150,8 +153,7 @@ class Document:
         try:
             return _scalar(node)
         except ValueError as error:
-            self._note(node, location, str(error))
-            return None
+            return self._leave_out(node, location, str(error))
 
     def _mapping(self, node: MappingNode, location: Location, inside: tuple[Node, ...]) -> dict[str, Any]:
         values: dict[str, Any] = {}
@@ -166,6 +168,10 @@ class Document:
                 self._lines[(*location, name)] = self._line(key_node)
                 values[name] = self._plain(value_node, (*location, name), inside)
         return values
+
+    def _leave_out(self, node: Node, location: Location, sentence: str) -> None:
+        self._note(node, location, sentence)
+        self.left_out.add(location)
 
     def _note(self, node: Node, location: Location, sentence: str) -> None:
         path = self._path if self._in_file else None
@@ -197,6 +203,9 @@ def _text_of(path: Path) -> str:
         line = error.object.count(b"\n", 0, error.start) + 1
         sentence = f"should be UTF-8 text, got the byte 0x{error.object[error.start]:02x}"
         raise ConfigError([Problem(sentence, path=path, line=line)]) from error
+    except ValueError as error:
+        # A zero byte, for one, is refused by Python, which does not ask the system then.
+        raise ConfigError([Problem("no file can have this name", path=path)]) from error
 
 
 @cache
@@ -222,7 +231,14 @@ def _scalar(node: Node) -> Any:
     tag = str(node.tag).removeprefix(_TAG)
     if not isinstance(node, ScalarNode) or tag not in readers:
         raise ValueError(f"the tag {tag} means nothing here")
-    return readers[tag](node)
+    try:
+        value = readers[tag](node)
+    except (LookupError, ValueError) as error:
+        # Of a text that does not fit, ruamel looks for letters and words that are not there.
+        raise ValueError(f"{quote(node.value)} is not of the kind {tag}") from error
+    if isinstance(value, int) and value.bit_length() > _MOST_BITS:
+        raise ValueError("the number is too large")
+    return value
 
 
 def _parts(key: str) -> tuple[str, ...]:
@@ -231,7 +247,8 @@ def _parts(key: str) -> tuple[str, ...]:
     if parts[:2] != _SWEPT or len(parts) < 3:
         return parts
     rest = parts[2:]
-    within = 1 if rest[-1] in _SWEPT_FIELDS else 2 if rest[-2:-1] == ("values",) else 0
+    # What stands first is the swept key, or its beginning, also if it is called as a field is.
+    within = 1 if rest[-1] in _SWEPT_FIELDS and rest[1:] else 2 if rest[1:-1][-1:] == ("values",) else 0
     swept, field = rest[: len(rest) - within], rest[len(rest) - within :]
     return (*_SWEPT, ".".join(swept), *field)
 

@@ -78,7 +78,7 @@ def match(pattern: str, expected: str) -> AfterValidator:
     """
 
     def check(text: str) -> str:
-        if not re.fullmatch(pattern, text):
+        if not re.fullmatch(pattern, text, re.ASCII):
             raise ValueError(f"should be {expected}, got '{text}'")
         return text
 

@@ -58,6 +58,7 @@ def load_locating_errors(path: Path, overrides: Sequence[str] = ()) -> Iterator[
     for override in overrides:
         document.override(override, find_default=partial(_find_default, document.values))
     config, found, more = _check(document.values)
+    found = [each for each in found if each.location not in document.left_out]
     problems = [document.problem(each.location, each.sentence) for each in found]
     unknown = sum(each.unknown for each in found)
     rest = sorted([*document.problems, *problems[unknown:]], key=lambda problem: problem.line or 0)

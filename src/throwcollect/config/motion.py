@@ -30,7 +30,7 @@ class DynamicMovementPrimitive(Section):
     """Number of Gaussian basis functions of each joint."""
     weights: dict[Joint, list[Annotated[float, Field(json_schema_extra={"unit": "rad"})]]] = {}
     """Weights of the forcing term of each moving joint; a joint that is absent has zero weights [rad]."""
-    alpha_z: PositiveFloat = 48.0
+    alpha_z: Annotated[float, Field(gt=0, le=1000)] = 48.0
     """Stiffness constant of the transformation system [-]; beta_z is alpha_z / 4 (critically damped)."""
     alpha_x: PositiveFloat = 2.0
     """Decay constant of the phase [-]."""

@@ -165,7 +165,9 @@ def _locate(details: ErrorDetails, values: Any, above: Location, expected: Shape
             section, shape = shape, shape.child(part)
             here = here[part] if inside else None
         else:
-            shape = next((each for each in shape.alternatives if each.node.get("title") == part), shape)
+            # The branch of a union is named by module and class; a title is the class alone.
+            title = str(part).rpartition(".")[2]
+            shape = next((each for each in shape.alternatives if each.node.get("title") == title), shape)
     return tuple(location), shape, section
 
 

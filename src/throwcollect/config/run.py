@@ -20,7 +20,7 @@ else:
 
 
 def _listen_address(text: str) -> str:
-    found = re.fullmatch(r"tcp/(\[[0-9a-fA-F:.]+\]|[A-Za-z0-9.-]+):([1-9]\d{0,4})", text)
+    found = re.fullmatch(r"tcp/(\[[0-9a-fA-F:.]+\]|[A-Za-z0-9.-]+):([1-9][0-9]{0,4})", text)
     if found is None or int(found[2]) > 65535:
         raise ValueError(f"should be tcp/ADDRESS:PORT, such as tcp/0.0.0.0:7447, got '{text}'")
     return text

@@ -66,11 +66,16 @@ def any_of(sections: Mapping[str, type[Section]], choose: Callable[[Any], Any]) 
     def find_tag(value: Any) -> str | None:
         # Defaults, and sections that are validated again as a part of another, are objects already.
         if isinstance(value, Section):
-            return type(value).__name__
+            return _tag_of(type(value))
         name = choose(value)
-        return sections[name].__name__ if isinstance(name, str) and name in sections else None
+        return _tag_of(sections[name]) if isinstance(name, str) and name in sections else None
 
-    return Annotated[reduce(or_, [Annotated[kind, Tag(kind.__name__)] for kind in kinds]), Discriminator(find_tag)]
+    return Annotated[reduce(or_, [Annotated[kind, Tag(_tag_of(kind))] for kind in kinds]), Discriminator(find_tag)]
+
+
+def _tag_of(section: type[Section]) -> str:
+    """Name a class by its module, too, as classes of two packages may have one name."""
+    return f"{section.__module__}.{section.__name__}"
 
 
 def _read_docstrings(section: type[Section]) -> dict[str, str]:

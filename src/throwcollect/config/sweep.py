@@ -32,6 +32,8 @@ class Range(Section):
     def _find_contradictions(self) -> Iterator[tuple[str, str]]:
         if self.min > self.max:
             yield "min", f"should be at most max, {self.max}, got {self.min}"
+        elif not math.isfinite(self.max - self.min):
+            yield "max", f"should be nearer to min, {self.min}, got {self.max}"
         elif self.scale == "log" and self.min <= 0:
             yield "min", f"should be above 0 on a logarithmic scale, got {self.min}"
         if self.count == 1 and self.min < self.max:
@@ -67,6 +69,8 @@ class Bins(Section):
     def _find_contradictions(self) -> Iterator[tuple[str, str]]:
         if self.min >= self.max:
             yield "min", f"should be below max, {self.max}, got {self.min}"
+        elif not math.isfinite(self.max - self.min):
+            yield "max", f"should be nearer to min, {self.min}, got {self.max}"
 
 
 class TargetConfig(Section):
@@ -112,8 +116,9 @@ class SweepConfig(Section):
 
     A relative path starts at the directory of the configuration file."""
     feasibility: Annotated[Literal["actual", "nominal"], Key(later=True)] = "actual"
-    """Robot that the plan is checked for: the `actual` one that throws, or the `nominal` one, for which the keys of
-    `robot`, `tool` and `ball` have their defaults: a user who plans motions for a robot knows only this one."""
+    """Robot that the plan is checked for: the `actual` one that throws, or the `nominal` one, for which all keys of
+    `tool` and `ball`, and those of `robot` but `posture`, `locked` and `base_height_m`, have their defaults: a user who
+    plans motions for a robot knows only this one."""
     target: Annotated[TargetConfig | None, Key(later=True)] = None
     """Spreads throws over landing targets: trials are added to the plan where throws are few."""
 

@@ -29,6 +29,15 @@ class _Scanner(Scanner):
             self._refuse("values are nested too deeply")
         return super().fetch_more_tokens()
 
+    def scan_flow_scalar_non_spaces(self, double: Any, start_mark: Any) -> Any:
+        # The digits after \U may be any, and those after \u half of a character, which no file can hold.
+        try:
+            parts = super().scan_flow_scalar_non_spaces(double, start_mark)
+            "".join(parts).encode()
+        except (ValueError, OverflowError):
+            self._refuse("an escaped character is none of Unicode")
+        return parts
+
     def _refuse(self, reason: str) -> None:
         raise ScannerError(None, None, reason, self.reader.get_mark())
 

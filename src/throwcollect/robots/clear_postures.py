@@ -77,8 +77,7 @@ class ClearPostures:
         """
         unknown: NDArray[np.bool_] = np.ones(len(postures), bool)
         if not self._tries:
-            # No further posture is kept, but the distances of few pairs decide about this one at less cost than the
-            # tree.
+            # No further posture is kept, but for few pairs, their distances cost less than the tree would.
             unknown[0] = len(self._pairs) > _FEW_PAIRS or self._compute_distances(postures[0]).min() <= self._needed
             return unknown
         self._tries -= 1
@@ -133,7 +132,9 @@ def find_reaches(model: pinocchio.Model, geometry: pinocchio.GeometryModel) -> N
         Shape ``(n_pairs, n_joints)``, in the order of the model; 0 for joints that are not between the two.
     """
     shapes = np.array([_find_reach(model, shape) for shape in geometry.geometryObjects])
-    one, other = np.array([(pair.first, pair.second) for pair in geometry.collisionPairs]).T
+    pairs = [(pair.first, pair.second) for pair in geometry.collisionPairs]
+    # Without the reshape, a robot that has no shapes, and so no pairs, would have no columns.
+    one, other = np.array(pairs, np.intp).reshape(-1, 2).T
     # A joint that carries both links, or neither, does not move them against each other.
     between = (shapes[one] > 0) != (shapes[other] > 0)
     reaches: NDArray[np.float64] = between * (shapes[one] + shapes[other])

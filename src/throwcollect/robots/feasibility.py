@@ -13,7 +13,7 @@ from throwcollect.pinocchio_library import pinocchio
 from throwcollect.robots.clearance import MARGIN_M, Clearance
 from throwcollect.robots.description import find_locked_joints, joint_model, joint_offsets, robot_of, start_posture
 from throwcollect.robots.dynamics import Dynamics, Motion
-from throwcollect.robots.limits import joint_limits
+from throwcollect.robots.limits import joint_limits, shares_of
 from throwcollect.robots.quintic_curve import sample_quintic
 from throwcollect.robots.robot import Robot
 from throwcollect.robots.trajectory import JointTrajectory
@@ -120,12 +120,12 @@ class Feasibility:
                 f"{joints[joint]} moves at {abs(velocities[worst]):.4g} rad/s at {times[row]:.3f} s; "
                 f"its limit is {limits.velocity[joint]:.4g} rad/s"
             )
-        limit = limits.effort * np.where([joint in locked for joint in joints], np.inf, config.robot.effort_scale)
+        limit = np.where([joint in locked for joint in joints], np.inf, limits.effort * config.robot.effort_scale)
         # The model without locked joints is faster and decides most trials. A trial near a limit is computed again
         # with all joints, so that its numbers do not depend on which joints are locked.
         tool = self._tool_of(config)
         efforts = self._dynamics_of_free_joints(locked).efforts(config, tool, motion)
-        if (np.abs(efforts) / limit <= _SURELY).all():
+        if (shares_of(efforts, limit) <= _SURELY).all():
             return None
         efforts = self._dynamics.efforts(config, tool, motion)
         if worst := _worst(efforts, limit):
@@ -197,7 +197,7 @@ def _spread(positions: NDArray[np.float64]) -> NDArray[np.intp]:
 
 def _worst(values: NDArray[np.float64], limits: NDArray[np.float64]) -> tuple[int, int] | None:
     """Find row and column of the largest magnitude over its limit; None if no limit is exceeded."""
-    shares = np.abs(values) / limits
+    shares = shares_of(values, limits)
     row, column = np.unravel_index(int(np.argmax(shares)), shares.shape)
     return (int(row), int(column)) if shares[row, column] > 1 else None
 

@@ -59,3 +59,14 @@ def joint_limits(robot: Robot) -> JointLimits:
     # The result is cached, so all who ask for it have the same arrays.
     table.flags.writeable = False
     return JointLimits(*table.T)
+
+
+def shares_of(values: NDArray[np.float64], limits: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Compute magnitudes over their limits [-], of the shape of the values, ``(..., n_joints)``.
+
+    A limit may be 0, as a URDF may have it for joints that never move: what is 0 is within it, all else is infinitely
+    far beyond.
+    """
+    with np.errstate(divide="ignore", over="ignore"):
+        shares: NDArray[np.float64] = np.divide(np.abs(values), limits, out=np.zeros_like(values), where=values != 0)
+    return shares

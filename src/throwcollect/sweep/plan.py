@@ -165,7 +165,10 @@ class Plan:
             trials = _read_trials(file, keys, targets, path)
         stored = metadata.get(_SLICE_KEY)
         if stored is not None:
-            return cls(config, trials, Slice.parse(stored.decode()))
+            try:
+                return cls(config, trials, Slice.parse(stored.decode(errors="replace")))
+            except ConfigError as error:
+                raise DatasetError(f"is damaged: {error.message}", path=path) from error
         # Only a slice begins later than with trial 0.
         if trials.first:
             raise DatasetError(_MISNUMBERED, path=path)

@@ -48,9 +48,12 @@ def read_points(path: Path, config: Config) -> Points:
     readers = {".csv": _read_csv, ".parquet": _read_parquet}
     if path.suffix not in readers:
         raise ConfigError([Problem(f"should end in .csv or .parquet, got '{path.name}'", "sweep.file")])
-    if not path.is_file():
-        problem = f"should be a file, got the directory {path}" if path.is_dir() else f"there is no file {path}"
-        raise ConfigError([Problem(problem, "sweep.file")])
+    try:
+        if not path.is_file():
+            problem = f"should be a file, got the directory {path}" if path.is_dir() else f"there is no file {path}"
+            raise ConfigError([Problem(problem, "sweep.file")])
+    except OSError as error:
+        raise ConfigError([Problem(f"cannot be read: {error.strerror}", "sweep.file", path)]) from error
     rows = readers[path.suffix](path, config)
     problems = [*rows.problems, *_find_value_problems(rows, path, config), *_find_target_problems(rows, path, config)]
     if problems:
@@ -89,8 +92,9 @@ def _read_csv(path: Path, config: Config) -> _Rows:
         # Spreadsheets write a byte order mark, and `csv` wants line ends as they are.
         with path.open(encoding="utf-8-sig", newline="") as file:
             reader = csv.reader(file)
-            names = tuple(name.strip() for name in next(reader, []))
-            _check_columns(names, path, config, line=1)
+            # Lines without any cell count nowhere, before the header as well as below.
+            names = tuple(name.strip() for name in next(filter(None, reader), []))
+            _check_columns(names, path, config, line=reader.line_num)
             for cells in reader:
                 if not cells:
                     continue

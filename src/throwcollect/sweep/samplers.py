@@ -89,9 +89,11 @@ UNIT_SAMPLERS = MappingProxyType[str, UnitSampler](
 
 
 def spread(parameter: Parameter, unit: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Map places from 0 to 1, 1 excluded, to values of a parameter; each of a set of values gets an equal share."""
+    """Map places from 0 to 1 to values of a parameter; each of a set of values gets an equal share."""
     if isinstance(parameter, Values):
-        return np.array(parameter.values)[(unit * len(parameter.values)).astype(np.int64)]
+        count = len(parameter.values)
+        # A place in the last strip of a Latin hypercube can be rounded to 1.
+        return np.array(parameter.values)[np.minimum((unit * count).astype(np.int64), count - 1)]
     if parameter.scale == "log":
         low, high = math.log(parameter.min), math.log(parameter.max)
         # Rounding may lead beyond the upper bound, and the exponential of that may be too large for a float.

@@ -26,6 +26,7 @@ from throwcollect.config.motion import DynamicMovementPrimitive
 from throwcollect.errors import ConfigError
 from throwcollect.reproducible_math import exp, matmul
 from throwcollect.robots.trajectory import JointTrajectory
+from throwcollect.wording import join_names
 
 _SETTLED_RAD = 1e-3
 _SETTLED_RADPS = 5e-3
@@ -55,15 +56,23 @@ def dmp_trajectory(
         points_hz: Points per second.
 
     Raises:
-        ConfigError: If the motion has not settled after 5 tau.
+        ConfigError: If the motion has not settled after 5 tau, or leads to numbers that are not finite.
     """
     zero = [0.0] * family.basis_functions
     weights = np.array([family.weights.get(joint, zero) for joint in end])
     origin = np.array([start[joint] for joint in end])
     goal = np.array(list(end.values()))
     times = np.arange(2 + math.ceil(_HORIZON_TAU * duration_s * points_hz)) / points_hz
-    motion = roll_out(times, start=origin, goal=goal, weights=weights, tau=duration_s, family=family)
+    # What overflows is refused below.
+    with np.errstate(all="ignore"):
+        motion = roll_out(times, start=origin, goal=goal, weights=weights, tau=duration_s, family=family)
     positions, velocities, accelerations = motion
+    finite = np.isfinite(motion)
+    if wrong := [joint for number, joint in enumerate(end) if not finite[:, :, number].all()]:
+        raise ConfigError(
+            f"the DMP of {join_names(wrong)} leads to numbers that are not finite",
+            hint="set smaller weights, or a task.trajectory.alpha_x nearer to 2",
+        )
     moving = (np.abs(positions - goal) > _SETTLED_RAD) | (np.abs(velocities) > _SETTLED_RADPS)
     if moving[-1].any():
         joint = int(np.argmax(np.abs(velocities[-1]) / _SETTLED_RADPS + np.abs(positions[-1] - goal) / _SETTLED_RAD))

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from throwcollect.config.schema import Config
 from throwcollect.episode.record import EpisodeHeader, Samples
 from throwcollect.robots.description import robot_of
-from throwcollect.robots.limits import joint_limits
+from throwcollect.robots.limits import joint_limits, shares_of
 from throwcollect.robots.quintic_curve import sample_positions
 from throwcollect.robots.trajectory import JointTrajectory
 from throwcollect.tasks.measures import Peak
@@ -35,8 +35,8 @@ def measure_joints(
     robot = robot_of(config)
     limits = joint_limits(robot)
     effort_limits = limits.effort * config.robot.effort_scale
-    velocity_peak = _peak(np.abs(samples.velocity).max(axis=0) / limits.velocity, robot.joints)
-    effort_peak = _peak(np.abs(samples.effort).max(axis=0) / effort_limits, robot.joints)
+    velocity_peak = _peak(shares_of(np.abs(samples.velocity).max(axis=0), limits.velocity), robot.joints)
+    effort_peak = _peak(shares_of(np.abs(samples.effort).max(axis=0), effort_limits), robot.joints)
     # A sum is not finite if any of its terms is not.
     if not math.isfinite(velocity_peak.share + effort_peak.share + samples.position.sum()):
         return None
@@ -44,13 +44,13 @@ def measure_joints(
     middle = (limits.lower[moving] + limits.upper[moving]) / 2
     # One row per joint, so that arithmetic runs along memory.
     measured = samples.position.T[moving]
-    positions = np.abs(measured - middle[:, np.newaxis]).max(axis=1) / (limits.upper[moving] - middle)
+    positions = shares_of(np.abs(measured - middle[:, np.newaxis]).max(axis=1), limits.upper[moving] - middle)
     desired = sample_positions(trajectory, (samples.stamps_ns - start_ns) / NS_PER_S).T
     errors = np.abs(measured - desired).max(axis=1)
     saturated = 0.0
     # In most trials no torque gets to its limit, and the samples need not be searched.
     if effort_peak.share >= _AT_LIMIT:
-        saturated = float((np.abs(samples.effort) / effort_limits >= _AT_LIMIT).any(axis=1).mean())
+        saturated = float((shares_of(samples.effort, effort_limits) >= _AT_LIMIT).any(axis=1).mean())
     return replace(
         result,
         position_peak=_peak(positions, trajectory.joints),

@@ -74,7 +74,9 @@ def test_a_single_core_needs_no_quotes(tmp_path: Path) -> None:
     [
         ("imgae: x", "imgae: unknown key; did you mean 'image'?"),
         ("volume: a b", "volume: should be a volume's name: letters, digits, _, . and -, got 'a b'"),
-        ("sim: {cpus: 0}", "sim.cpus: should be a number above 0 or null, got 0"),
+        ("sim: {cpus: 0}", "sim.cpus: should be a number from 0.01 to 10000 or null, got 0"),
+        ("sim: {cpus: 1e-12}", "sim.cpus: should be a number from 0.01 to 10000 or null, got 1e-12"),
+        ("sim: {ports: {80: 81, 80/tcp: 82}}", "sim.ports.80/tcp: should be left out, as 80 is the same port"),
         ("sim: {memory: 5m}", "sim.memory: should be a size of 6m or more, such as 512m or 2g, got '5m'"),
         ("sim: {memory: 512MB}", "sim.memory: should be a size of 6m or more, such as 512m or 2g, got '512MB'"),
         ("sim: {memory: 512}", "sim.memory: should be a size such as 512m or 2g or null, got 512"),

@@ -1,4 +1,5 @@
 import os
+from pathlib import Path
 
 import pytest
 
@@ -76,6 +77,38 @@ def test_tags_that_mean_nothing_are_problems(read):
 
 def test_numbers_of_absurd_length_are_problems(read):
     assert [(key, line) for key, line, _ in facts(read(f"a: 1\nb: {'9' * 5000}\n"))] == [("b", 2)]
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        ("!!bool maybe", "'maybe' is not of the kind bool"),
+        ('!!int ""', "'' is not of the kind int"),
+        ('!!float ""', "'' is not of the kind float"),
+        ("0x" + "f" * 5000, "the number is too large"),
+        ("-1" + "0" * 400, "the number is too large"),
+    ],
+)
+def test_what_does_not_fit_its_tag_or_any_number_is_a_problem(read, text, sentence):
+    assert facts(read(f"a: 1\nb: {text}\n")) == [("b", 2, sentence)]
+
+
+@pytest.mark.parametrize("escaped", [r"\UFFFFFFFF", r"\U00110000", r"\ud800"])
+def test_characters_that_unicode_does_not_have_are_no_yaml(read, escaped):
+    with pytest.raises(ConfigError, match=r"run\.yaml:2: not valid YAML: an escaped character is none of Unicode"):
+        read(f'a: 1\n"{escaped}": 2\n')
+
+
+def test_an_override_that_is_too_large_does_not_name_the_file(read):
+    document = read("a: 1\n")
+    with pytest.raises(ConfigError, match=r"^b: holds more than 30000 values$"):
+        document.override(f"b=[{30_000 * '1,'}]")
+
+
+def test_a_swept_key_that_is_called_as_a_field_keeps_its_name(read):
+    document = read("a: 1\n")
+    document.override("sweep.parameters.min=1")
+    assert document.values["sweep"] == {"parameters": {"min": 1}}
 
 
 def test_a_byte_order_mark_is_no_part_of_the_first_key(read):
@@ -168,6 +201,11 @@ def test_an_override_that_is_nested_too_deeply_is_a_problem(read):
 def test_a_file_whose_tag_is_not_that_of_keys_and_values_is_a_problem(text, message, read):
     with pytest.raises(ConfigError, match=f"run.yaml:1: {message} means nothing here"):
         read(text)
+
+
+def test_a_name_that_no_file_can_have_is_refused():
+    with pytest.raises(ConfigError, match="no file can have this name"):
+        Document(Path("a\0b"))
 
 
 def test_a_pipe_is_not_waited_for(tmp_path):

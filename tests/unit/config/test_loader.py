@@ -157,7 +157,7 @@ configs = st.builds(
                 family=st.just("dmp"),
                 basis_functions=st.just(3),
                 weights=st.fixed_dictionaries({"arm_right_4_joint": weights}),
-                alpha_z=st.floats(0, exclude_min=True, allow_infinity=False),
+                alpha_z=st.floats(0, 1000, exclude_min=True),
             ),
         ),
     ),

@@ -272,3 +272,10 @@ def test_suggestions_are_not_looked_for_where_nobody_would_read_them(tmp_path, m
     with pytest.raises(ConfigError, match=r"task\.end\.joint_0: Talos has no joint 'joint_0'\n"):
         load(path)
     assert len(asked) <= 200
+
+
+def test_a_value_that_cannot_be_read_is_told_once(problems_of):
+    assert problems_of("seed: !!int x\nball: {mass_kg: !!bool maybe}") == [
+        "run.yaml:1: seed: 'x' is not of the kind int",
+        "run.yaml:2: ball.mass_kg: 'maybe' is not of the kind bool",
+    ]

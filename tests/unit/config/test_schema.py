@@ -1,8 +1,15 @@
-import pytest
-from pydantic import ValidationError
+from typing import ClassVar, Literal
 
+import pytest
+from pydantic import TypeAdapter, ValidationError
+
+from throwcollect.config import schema
+from throwcollect.config.run import RunConfig
 from throwcollect.config.schema import Config, Range, SweepConfig, Values
-from throwcollect.tasks.throw.config import ThrowConfig
+from throwcollect.config.section import any_of
+from throwcollect.config.sweep import Bins
+from throwcollect.config.until import UntilConfig, Wanted
+from throwcollect.tasks.throw.config import ThrowConfig, UntilLanded
 
 
 def test_every_key_has_a_default_so_that_an_empty_configuration_is_one():
@@ -31,3 +38,52 @@ def test_slots_of_trials_do_not_overlap_and_none_starts_at_zero():
     starts = [config.trial_start_ns(number) for number in range(3)]
     assert starts[0] > 0
     assert starts[1] - starts[0] == starts[2] - starts[1] > config.sim.max_trial_s * 10**9
+
+
+class UntilLandedToo(UntilConfig):
+    """The section `until` of somebody else's task."""
+
+    landed: Wanted
+
+
+class LobConfig(ThrowConfig):
+    """A task whose success has the name that the one of `throw` has."""
+
+    until: ClassVar[type[UntilConfig]] = UntilLandedToo
+    name: Literal["lob"] = "lob"
+
+
+def test_tasks_may_have_successes_of_one_name(monkeypatch):
+    tasks = {"throw": ThrowConfig, "lob": LobConfig}
+    monkeypatch.setattr(schema, "names_of", lambda _: tuple(tasks))
+    monkeypatch.setattr(schema, "load_member", lambda _, name: tasks[name])
+    until = TypeAdapter(schema._untils()).validate_python({"landed": 3})
+    assert type(until) is UntilLanded
+    monkeypatch.undo()
+    for task in (ThrowConfig(), LobConfig()):
+        assert list(Config().model_copy(update={"until": until, "task": task})._find_contradictions()) == []
+
+
+def test_classes_of_two_packages_may_have_one_name():
+    namesake = type("ThrowConfig", (LobConfig,), {"__module__": "somebody.elses"})
+    kind = TypeAdapter(any_of({"throw": ThrowConfig, "lob": namesake}, lambda value: value["name"]))
+    assert [type(kind.validate_python({"name": name})) for name in ("throw", "lob")] == [ThrowConfig, namesake]
+
+
+@pytest.mark.parametrize("wide", [Range, lambda **ends: Bins(bins=2, **ends)])
+def test_ends_whose_distance_is_no_number_are_refused(wide):
+    with pytest.raises(ValidationError, match=r"max: should be nearer to min, -1e\+308, got 1e\+308"):
+        wide(min=-1e308, max=1e308)
+
+
+@pytest.mark.parametrize(
+    ("section", "key", "value"),
+    [
+        (schema.ClusterConfig, "time", "\N{ARABIC-INDIC DIGIT FOUR}:00:00"),
+        (schema.ClusterConfig, "memory", "1\N{ARABIC-INDIC DIGIT FOUR}G"),
+        (RunConfig, "listen", "tcp/0.0.0.0:744\N{ARABIC-INDIC DIGIT FOUR}"),
+    ],
+)
+def test_digits_are_those_of_ascii(section, key, value):
+    with pytest.raises(ValidationError, match=f"should be .*, got '{value}'"):
+        section(**{key: value})

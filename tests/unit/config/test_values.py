@@ -20,7 +20,7 @@ BOUNDS = {
     "task.duration_s": (0.1, 10),
     "task.end.arm_right_4_joint": (-6.3, 6.3),
     "task.start.torso_1_joint": (-6.3, 6.3),
-    "task.trajectory.alpha_z": (1e-9, 1e9),
+    "task.trajectory.alpha_z": (1e-9, 1e3),
     "task.trajectory.weights.arm_right_4_joint.2": (-1e9, 1e9),
     "ball.mass_kg": (1e-9, 2),
     "robot.effort_scale": (1e-9, 10),

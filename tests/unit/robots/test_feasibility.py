@@ -355,3 +355,20 @@ def test_a_description_that_lacks_something_is_named(talos, file, text, instead,
         path.write_text(whole.replace(text, instead))
     with pytest.raises(ConfigError, match=f"^{re.escape(str(path))}: {message}"):
         Feasibility(Config())
+
+
+def test_a_limit_of_0_hides_no_violation_of_another_one(talos):
+    text = talos.urdf_path.read_text()
+    joint = re.search(r'<joint name="gripper_left_joint".*?</joint>', text, flags=re.DOTALL)[0]
+    still = re.sub(r'(effort|velocity)="[^"]*"', r'\1="0.0"', joint)
+    assert still != joint
+    talos.urdf_path.write_text(text.replace(joint, still))
+    feasibility = Feasibility(Config())
+    assert (feasibility._limits.velocity == 0).sum() == (feasibility._limits.effort == 0).sum() == 1
+
+    def reason(config):
+        return feasibility.check(config, task_of(config).trajectory())
+
+    assert reason(Config()) is None
+    assert reason(throw(duration_s=0.5)).startswith("arm_right_7_joint moves at 2.413 rad/s")
+    assert reason(LONG).startswith("arm_right_2_joint needs 23.9")

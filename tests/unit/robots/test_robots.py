@@ -1,15 +1,20 @@
 """What holds for every robot of the table, and for one of another package."""
 
+import re
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from throwcollect.config.schema import Config
 from throwcollect.members import load_member, names_of
+from throwcollect.robots.clearance import Clearance
 from throwcollect.robots.description import joint_model
 from throwcollect.robots.limits import joint_limits
 from throwcollect.robots.robot import Robot
+from throwcollect.tools.tool import tool_of
 
 sys.path.append(str(Path(__file__).parents[2] / "plugins"))
 
@@ -51,3 +56,11 @@ def test_the_description_has_the_joints_and_the_hand(robot: Robot) -> None:
     model = joint_model(robot)
     assert set(model.names[1:]) == set(robot.joints)
     assert model.existBodyName(robot.hand)
+
+
+def test_a_robot_without_collision_shapes_meets_nothing(tmp_path: Path) -> None:
+    text = re.sub("<collision>.*?</collision>", "", PLANAR_ARM.urdf_path.read_text(), flags=re.DOTALL)
+    (tmp_path / "arm.urdf").write_text(text)
+    arm = replace(PLANAR_ARM, share=lambda: tmp_path, urdf="arm.urdf", srdf=str(PLANAR_ARM.srdf_path))
+    clearance = Clearance(arm, joint_model(arm), tool_of(Config().tool))
+    assert clearance.first_approach(np.zeros((3, 2))) is None

@@ -210,3 +210,13 @@ def test_foreign_tables_are_no_plans(tmp_path):
 def test_values_to_choose_from_are_planned_as_well():
     config = Config(trials=4, sweep=SweepConfig(parameters={"ball.friction": Values(values=[0.1, 0.2])}))
     assert sorted(trial.values["ball.friction"] for trial in make_plan(config).trials) == [0.1, 0.1, 0.2, 0.2]
+
+
+@pytest.mark.parametrize("text", [b"9", b"\xff", b"2/2"])
+def test_a_plan_that_is_no_slice_of_any_is_damaged(tmp_path, text):
+    path = tmp_path / "plan.parquet"
+    make_plan(swept()).write(path)
+    table = pq.read_table(path)
+    pq.write_table(table.replace_schema_metadata(table.schema.metadata | {b"throwcollect.slice": text}), path)
+    with pytest.raises(DatasetError, match=r"plan\.parquet: is damaged: .*slice"):
+        Plan.read(path, swept())

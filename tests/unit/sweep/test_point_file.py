@@ -67,6 +67,7 @@ def test_what_pandas_numbers_rows_by_is_no_key(tmp_path):
         (HEADER, ["list.csv: sweep.file: the file has no rows"]),
         (b"ball.mass_kg\n\xff\n", ["list.csv: sweep.file: should be UTF-8 text"]),
         ("ball.mas_kg\n1\n", ["list.csv:1: ball.mas_kg: unknown key; did you mean 'ball.mass_kg'?"]),
+        ("\n\r\nball.mas_kg\n1\n", ["list.csv:3: ball.mas_kg: unknown key; did you mean 'ball.mass_kg'?"]),
         (
             "seed,ball.mass_kg,ball.mass_kg\n",
             [
@@ -158,6 +159,8 @@ def test_files_that_are_no_table(tmp_path):
     (tmp_path / "directory.csv").mkdir()
     assert problems(tmp_path / "directory.csv") == ["sweep.file: should be a file, got the directory directory.csv"]
     assert problems(tmp_path / "list.json") == ["sweep.file: should end in .csv or .parquet, got 'list.json'"]
+    (long,) = problems(tmp_path / f"{300 * 'x'}.csv")
+    assert long.endswith("xx.csv: sweep.file: cannot be read: File name too long")
     broken = tmp_path / "broken.parquet"
     broken.write_bytes(b"PAR1 but not much more")
     assert problems(broken)[0].startswith("broken.parquet: sweep.file: cannot be read as Parquet: ")

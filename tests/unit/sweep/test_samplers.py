@@ -185,3 +185,7 @@ def test_until_draws_ten_times_as_many_points_as_should_land_unless_trials_says_
     sweep = SweepConfig(parameters=SPREAD)
     assert len(draw_points(Config(until={"landed": 30}, sweep=sweep), directory=HERE).values) == 300
     assert len(draw_points(Config(trials=40, until={"landed": 30}, sweep=sweep), directory=HERE).values) == 40
+
+
+def test_a_place_that_is_rounded_to_1_has_the_last_of_the_values():
+    assert spread(Values(values=[2.0, 5.0]), np.array([0.0, 0.75, 1.0])).tolist() == [2.0, 5.0, 5.0]

@@ -41,8 +41,7 @@ class Flight:
         before, after = self.times[knot : knot + 2].tolist()
         span = after - before
         u = (time_s - before) / span
-        # This is the cubic Hermite polynomial: `smooth` leads from place to place, `bump` adds what the velocities ask
-        # for.
+        # The cubic Hermite polynomial: `smooth` leads from place to place, and `bump` gives it the velocities.
         smooth, bump = u * u * (3 - 2 * u), span * u * (1 - u)
         # For three numbers, plain Python is faster than an array.
         axes = list(

@@ -57,8 +57,7 @@ class Spoon(Tool):
         middle = np.array([config.cup_depth_m / 2, (config.cup_rim_radius_m + config.cup_floor_radius_m) / 2, 0.0])
         inner_face = pinocchio.SE3(pinocchio.rpy.rpyToMatrix(0.0, 0.0, lean), middle)
         wall = inner_face * pinocchio.SE3(np.eye(3), np.array([0.0, config.wall_thickness_m / 2, 0.0]))
-        # As wide as the rim: narrower walls would leave gaps there, and below the rim they only overlap outside the
-        # cup.
+        # As wide as the rim, as narrower walls would leave gaps there; further down they overlap outside the cup alone.
         width = 2 * config.cup_rim_radius_m * math.tan(math.pi / config.cup_walls)
         turns = (
             pinocchio.SE3(pinocchio.rpy.rpyToMatrix(2 * math.pi * number / config.cup_walls, 0.0, 0.0), np.zeros(3))

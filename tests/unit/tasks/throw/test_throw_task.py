@@ -52,6 +52,14 @@ def test_landed_throw_has_all_its_numbers():
     assert result.velocity_peak.share == pytest.approx(0.686, abs=2e-3)
 
 
+def test_a_joint_with_limits_of_0_that_rests_spoils_no_result(monkeypatch):
+    limits = joint_limits(TALOS)
+    zero = {name: np.where(np.arange(32) == GRIPPER, 0.0, getattr(limits, name)) for name in ("velocity", "effort")}
+    expected = judged(*episode())
+    monkeypatch.setattr("throwcollect.tasks.joint_measures.joint_limits", lambda _: replace(limits, **zero))
+    assert judged(*episode()) == expected
+
+
 def test_spin_is_that_of_the_first_sample_after_the_release():
     samples, header = episode()
     spins = np.arange(3.0 * len(samples)).reshape(-1, 3)
