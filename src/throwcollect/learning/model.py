@@ -15,7 +15,7 @@ from throwcollect.config.loader import dump_yaml
 from throwcollect.errors import ConfigError
 from throwcollect.extras import require
 from throwcollect.files import StrPath
-from throwcollect.learning.adapting import Method, adapt, refuse_far_parameters
+from throwcollect.learning.adapting import Method, adapt, refuse_far_inputs
 from throwcollect.learning.aiming import Choice, aim
 from throwcollect.learning.arrays import Array
 from throwcollect.learning.distilling import distil
@@ -31,7 +31,8 @@ if TYPE_CHECKING:
     from throwcollect.dataset.reader import Dataset
 
 _LARGEST = 1e6
-"""Largest number of a target [m, rad, ...]: no robot reaches that far, and powers of it do not overflow."""
+"""Largest number of a target, and of a scatter [m, rad, ...]: no robot reaches that far, and powers of it do not
+overflow."""
 
 _Word = TypeVar("_Word", bound=Enum)
 
@@ -201,7 +202,7 @@ class Model:
 
         Raises:
             ConfigError: If there are no throws, or not as many places; a key is missing or unknown, a value not finite,
-                there is no such method, or a parameter is far outside of the range of the dataset.
+                there is no such method, or a parameter or context is far outside of the range of the dataset.
         """
         parameters, context = self._inputs(points)
         measured = np.array([self._check_target(place, self.targets) for place in places], np.float64)
@@ -217,7 +218,8 @@ class Model:
                 expected="a dataset whose sweep varies the world",
                 hint="try bias",
             )
-        refuse_far_parameters(self.learned, parameters)
+        refuse_far_inputs(self.learned, Role.PARAMETER, parameters)
+        refuse_far_inputs(self.learned, Role.CONTEXT, context)
         # A measured place differs from its prediction by the scatter of the throw, and by the error of the model.
         deviation = float(np.hypot(scatter, self.file.trained_on.error))
         adapted = adapt(
@@ -394,7 +396,7 @@ def _check_scatter(scatter: float) -> None:
     """Refuse a number that is no standard deviation.
 
     Raises:
-        ConfigError: If it is negative, or not finite.
+        ConfigError: If it is negative, no number, or as large as no target is.
     """
-    if not 0.0 <= scatter < np.inf:
-        raise ConfigError(f"scatter: got {scatter}", expected="0 or more, in the unit of the targets")
+    if not 0.0 <= scatter <= _LARGEST:
+        raise ConfigError(f"scatter: got {scatter}", expected=f"0 to {_LARGEST:g}, in the unit of the targets")
