@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from throwcollect.config.loader import load
 from throwcollect.config.schema import Config
+from throwcollect.config.sweep import MOST_TRIALS
 from throwcollect.config.values import reason_not_sweepable, with_values
 from throwcollect.coordinator.prepare import feasibility_check
 from throwcollect.dataset.judging import judge_episode
@@ -99,8 +100,8 @@ class Simulator:
             PlanError: If the plan of a collection would refuse it, for the reason that it would have.
         """
         self._require_open()
-        if trial < 0:
-            raise ConfigError(f"trial {trial}: there is no such trial", expected="a number from 0")
+        if not 0 <= trial < MOST_TRIALS:
+            raise ConfigError(f"trial {trial}: there is no such trial", expected=f"0 to {MOST_TRIALS - 1}")
         point = dict(values or {})
         wrong = self.config.task.find_wrong_targets(target or {})
         wrong |= {

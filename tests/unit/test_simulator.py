@@ -117,9 +117,11 @@ def test_wrong_values_are_named(simulator: Simulator, values: dict[str, float], 
         simulator.throw(values)
 
 
-def test_there_are_no_negative_numbers(simulator: Simulator) -> None:
+def test_there_are_no_numbers_but_those_of_trials(simulator: Simulator) -> None:
     with pytest.raises(ConfigError, match="trial -1: there is no such trial"):
         simulator.throw(trial=-1)
+    with pytest.raises(ConfigError, match="trial 10000000: there is no such trial"):
+        simulator.throw(trial=10_000_000)
     with pytest.raises(ConfigError, match="processes: got 0"):
         next(simulator.throw_many([{}], processes=0))
 
