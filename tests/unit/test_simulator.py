@@ -73,7 +73,11 @@ def test_a_throw_at_a_target_is_the_same_and_says_by_how_much_it_missed(simulato
     ("target", "sentence"),
     [
         ({"target_x_m": 1.4}, "target_y_m: is missing beside target_x_m"),
-        ({"target_x_m": 1.4, "target_y_m": float("nan")}, "target_y_m: should be a number, got nan"),
+        ({"target_x_m": 1.4, "target_y_m": float("nan")}, "target_y_m: should be a number from .* got nan"),
+        (
+            {"target_x_m": 1e308, "target_y_m": 0.0},
+            r"target_x_m: should be a number from -1e\+06 to 1e\+06, got 1e\+308",
+        ),
         ({"x": 1.4}, "x: the task throw has no such target"),
     ],
 )

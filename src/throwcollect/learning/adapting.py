@@ -209,13 +209,23 @@ def _ends(learned: LearnedMap, method: Method, count: int) -> tuple[Array, Array
 
 
 def _step_inside(normal: Array, right: Array, found: Array, low: Array, high: Array) -> Array:
-    """Solve the normal equations; a number that would leave its bounds is held there, and the others adjust."""
+    """Solve the normal equations; a number that would leave its bounds is held there, and the others adjust.
+
+    Raises:
+        ConfigError: If the numbers are beyond all floats.
+    """
     held = np.full(len(found), np.nan)
     while True:
         free = np.isnan(held)
         reduced = np.where(free[:, np.newaxis] & free, normal, np.eye(len(found)))
         pull = right - matmul(normal, np.where(free, 0.0, held)[:, np.newaxis])[:, 0]
         unbounded = found + np.where(free, solve(reduced, np.where(free, pull, 0.0)[:, np.newaxis])[:, 0], held)
+        if not np.isfinite(unbounded).all():
+            raise ConfigError(
+                "the throws ended too far from where the model has them",
+                expected="places in the unit of the targets",
+                hint="--method offset takes any place",
+            )
         bounded = np.clip(unbounded, low, high)
         leaving = free & (bounded != unbounded)
         if not leaving.any():

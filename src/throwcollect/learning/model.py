@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from throwcollect.config.loader import dump_yaml
+from throwcollect.config.target import LARGEST_TARGET
 from throwcollect.errors import ConfigError
 from throwcollect.extras import require
 from throwcollect.files import StrPath
@@ -29,10 +30,6 @@ from throwcollect.version import __version__
 
 if TYPE_CHECKING:
     from throwcollect.dataset.reader import Dataset
-
-_LARGEST = 1e6
-"""Largest number of a target, and of a scatter [m, rad, ...]: no robot reaches that far, and powers of it do not
-overflow."""
 
 _Word = TypeVar("_Word", bound=Enum)
 
@@ -241,12 +238,7 @@ class Model:
             found=list_found(learned, adapted.method, adapted.deviations),
         )
         file = self.file.model_copy(
-            update={
-                "correction": adapted.correction,
-                "adaptation": entry,
-                "version": __version__,
-                "distilled": None,
-            }
+            update={"correction": adapted.correction, "adaptation": entry, "version": __version__, "distilled": None}
         )
         world = replace(self, file=file, learned=learned)
         return world if self.file.distilled is None else world.distil()
@@ -301,8 +293,8 @@ class Model:
             ConfigError: If there are not as many as names, or one is not finite, or so large that powers of it are not.
         """
         row = [float(value) for value in values]
-        if len(row) != len(names) or not (np.abs(row) <= _LARGEST).all():
-            wanted = f"finite numbers of at most {_LARGEST:g}: {', '.join(names)}"
+        if len(row) != len(names) or not (np.abs(row) <= LARGEST_TARGET).all():
+            wanted = f"finite numbers of at most {LARGEST_TARGET:g}: {', '.join(names)}"
             raise ConfigError(f"got {', '.join(map(str, row))}", expected=wanted)
         return row
 
@@ -398,5 +390,5 @@ def _check_scatter(scatter: float) -> None:
     Raises:
         ConfigError: If it is negative, no number, or as large as no target is.
     """
-    if not 0.0 <= scatter <= _LARGEST:
-        raise ConfigError(f"scatter: got {scatter}", expected=f"0 to {_LARGEST:g}, in the unit of the targets")
+    if not 0.0 <= scatter <= LARGEST_TARGET:
+        raise ConfigError(f"scatter: got {scatter}", expected=f"0 to {LARGEST_TARGET:g}, in the unit of the targets")

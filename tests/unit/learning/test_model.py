@@ -236,6 +236,17 @@ def test_a_damaged_model_is_told_in_words(model: Model, tmp_path: Path, file: st
     assert caught.value.path == path
 
 
+@pytest.mark.parametrize("targets", [["landing_x_m", "effort_peak_share"], ["landing_x_m"] * 2, [KEYS[0]]])
+def test_a_target_that_has_a_column_already_is_read_as_it_was_saved(
+    dataset: Dataset, tmp_path: Path, targets: list[str]
+) -> None:
+    model = fit(dataset, targets=targets)
+    model.save(tmp_path / "model")
+    again = load_model(tmp_path / "model")
+    assert again.targets == tuple(targets)
+    assert np.array_equal(again.learned.outputs, model.learned.outputs)
+
+
 def test_another_directory_is_no_model(tmp_path: Path) -> None:
     with pytest.raises(DatasetError, match=r"model\.json"):
         load_model(tmp_path)
