@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from math import isfinite
 from pathlib import Path
 from types import TracebackType
 
@@ -14,6 +13,8 @@ from numpy.typing import NDArray
 
 from throwcollect.config.loader import load
 from throwcollect.config.schema import Config
+from throwcollect.config.sweep import MOST_TRIALS
+from throwcollect.config.target import LARGEST_TARGET
 from throwcollect.config.values import reason_not_sweepable, with_values
 from throwcollect.coordinator.prepare import feasibility_check
 from throwcollect.dataset.judging import judge_episode
@@ -99,12 +100,14 @@ class Simulator:
             PlanError: If the plan of a collection would refuse it, for the reason that it would have.
         """
         self._require_open()
-        if trial < 0:
-            raise ConfigError(f"trial {trial}: there is no such trial", expected="a number from 0")
+        if not 0 <= trial < MOST_TRIALS:
+            raise ConfigError(f"trial {trial}: there is no such trial", expected=f"0 to {MOST_TRIALS - 1}")
         point = dict(values or {})
         wrong = self.config.task.find_wrong_targets(target or {})
         wrong |= {
-            name: f"should be a number, got {value}" for name, value in (target or {}).items() if not isfinite(value)
+            name: f"should be a number from {-LARGEST_TARGET:g} to {LARGEST_TARGET:g}, got {value}"
+            for name, value in (target or {}).items()
+            if not abs(value) <= LARGEST_TARGET
         }
         if wrong:
             raise ConfigError([Problem(reason, key=name) for name, reason in wrong.items()])

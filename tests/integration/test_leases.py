@@ -98,11 +98,25 @@ def test_leases_are_set_alone(robot: Robot) -> None:
 
 
 def test_what_a_lease_does_not_say_is_as_configured(robot: Robot) -> None:
-    assert robot.set({"ball.friction": 0.1, "scene.gravity_mps2": 1.6}).successful
+    by_hand = {"trial.number": 7, "trial.controllers": [ARM], "ball.friction": 0.1, "scene.gravity_mps2": 1.6}
+    assert robot.set(by_hand).successful
+    assert robot.set({"constraints.goal_time": 0.1, "cmd_timeout": 0.2}, node=ARM).successful
     (delivery,) = handed_over(robot, lease(robot, {"ball.mass_kg": 0.05}))
     assert json.loads(delivery.conditions)["values"] == {"ball.mass_kg": 0.05}
-    values = robot.parameters("get_parameters", names=["ball.friction", "scene.gravity_mps2"]).values
-    assert [value.double_value for value in values] == [CONFIG.ball.friction, CONFIG.scene.gravity_mps2]
+    number, controllers, *physics = robot.parameters("get_parameters", names=list(by_hand)).values
+    assert (number.integer_value, list(controllers.string_array_value)) == (-1, [""])
+    assert [value.double_value for value in physics] == [CONFIG.ball.friction, CONFIG.scene.gravity_mps2]
+    limits = robot.parameters("get_parameters", node=ARM, names=["constraints.goal_time", "cmd_timeout"]).values
+    assert [value.double_value for value in limits] == [0.6, 0.0]
+
+
+def test_after_a_lease_a_reset_begins_what_the_parameters_say(robot: Robot) -> None:
+    handed_over(robot, lease(robot, {"ball.mass_kg": 0.05}))
+    robot.reset()
+    assert robot.now_ns() == 0
+    assert robot.set({"trial.number": 4, "trial.controllers": [ARM, TORSO]}).successful
+    robot.reset()
+    assert json.loads(by_hand(robot).conditions)["values"] == {}
 
 
 @pytest.mark.parametrize(("factor", "accepted"), [(0.0, True), (1.0, True), (5.0, True), (0.99, False), (0.001, False)])

@@ -73,7 +73,11 @@ def test_a_throw_at_a_target_is_the_same_and_says_by_how_much_it_missed(simulato
     ("target", "sentence"),
     [
         ({"target_x_m": 1.4}, "target_y_m: is missing beside target_x_m"),
-        ({"target_x_m": 1.4, "target_y_m": float("nan")}, "target_y_m: should be a number, got nan"),
+        ({"target_x_m": 1.4, "target_y_m": float("nan")}, "target_y_m: should be a number from .* got nan"),
+        (
+            {"target_x_m": 1e308, "target_y_m": 0.0},
+            r"target_x_m: should be a number from -1e\+06 to 1e\+06, got 1e\+308",
+        ),
         ({"x": 1.4}, "x: the task throw has no such target"),
     ],
 )
@@ -117,9 +121,11 @@ def test_wrong_values_are_named(simulator: Simulator, values: dict[str, float], 
         simulator.throw(values)
 
 
-def test_there_are_no_negative_numbers(simulator: Simulator) -> None:
+def test_there_are_no_numbers_but_those_of_trials(simulator: Simulator) -> None:
     with pytest.raises(ConfigError, match="trial -1: there is no such trial"):
         simulator.throw(trial=-1)
+    with pytest.raises(ConfigError, match="trial 10000000: there is no such trial"):
+        simulator.throw(trial=10_000_000)
     with pytest.raises(ConfigError, match="processes: got 0"):
         next(simulator.throw_many([{}], processes=0))
 

@@ -20,7 +20,7 @@ from throwcollect.config.kinds import Angle, Joint, Name
 from throwcollect.config.motion import DynamicMovementPrimitive, MinimumJerk
 from throwcollect.config.run import RunConfig
 from throwcollect.config.section import Section, any_of
-from throwcollect.config.sweep import Parameter, Range, SweepConfig, Values
+from throwcollect.config.sweep import MOST_TRIALS, Parameter, Range, SweepConfig, Values
 from throwcollect.config.task import TaskConfig
 from throwcollect.config.tool import ToolConfig
 from throwcollect.config.until import UntilConfig
@@ -189,7 +189,7 @@ class Config(Section):
     """Name of the collection and of its files."""
     seed: Annotated[int, Field(ge=0, lt=2**32), Key(Effect.PLAN)] = 0
     """Root of all randomness."""
-    trials: Annotated[Annotated[int, Field(ge=1, le=10_000_000)] | None, Key(Effect.PLAN)] = None
+    trials: Annotated[Annotated[int, Field(ge=1, le=MOST_TRIALS)] | None, Key(Effect.PLAN)] = None
     """Number of trials, with `until` the largest one; none means all points for `grid` and `list`, ten for each throw
     that should land with `until`."""
     until: Annotated[AnyUntil | None, Key(Effect.PLAN, later=True)] = None

@@ -14,6 +14,9 @@ from throwcollect.config.section import Section, any_of
 LANDING_HEIGHT = "scene.landing_height_m"
 """Key that must be swept where heights are a target."""
 
+MOST_TRIALS = 10_000_000
+"""Most trials of a plan; even the last one starts at a time that fits into a stamp of ROS."""
+
 _MOST_CELLS = 10_000
 
 
@@ -26,7 +29,7 @@ class Range(Section):
     """Upper bound, in the unit of the key."""
     scale: Literal["linear", "log"] = "linear"
     """Whether the value or its logarithm is spread evenly."""
-    count: Annotated[int, Field(ge=1, le=10_000_000)] | None = None
+    count: Annotated[int, Field(ge=1, le=MOST_TRIALS)] | None = None
     """Number of grid points, both ends included; for the sampler `grid` only."""
 
     def _find_contradictions(self) -> Iterator[tuple[str, str]]:

@@ -7,6 +7,9 @@ from dataclasses import dataclass
 TARGET_PREFIX = "target_"
 """Prefix of the columns of targets, and of no others: keys have dots, and results have other names."""
 
+LARGEST_TARGET = 1e6
+"""Largest number of a target [m, rad, ...]: no robot reaches that far, and powers of it do not overflow."""
+
 
 @dataclass(frozen=True)
 class TargetColumn:

@@ -98,7 +98,7 @@ class JointTrajectoryController:
     def parameters(self, parameters: ControllerParameters) -> None:
         self._parameters = parameters
         self._defaults = default_tolerances(parameters.constraints, parameters.joints)
-        if parameters.cmd_timeout and not parameters.timeout:
+        if parameters.cmd_timeout and not parameters.timeout_ns:
             values = f"({parameters.cmd_timeout:g} vs. {parameters.constraints.goal_time:g})"
             problem = f"Command timeout must be higher than goal_time tolerance {values}; it is off."
             self.logger.warning("%s: %s", self.name, problem, extra={REPEATED: "timeout"})
@@ -324,7 +324,7 @@ class JointTrajectoryController:
             self.goal_id = None
 
     def _judge_with(self, tolerances: Tolerances) -> Judge:
-        return Judge(tolerances, round(self._parameters.timeout * 1e9), self._parameters.joints)
+        return Judge(tolerances, self._parameters.timeout_ns, self._parameters.joints)
 
     def _refusal(self, trajectory: Trajectory, now_ns: int) -> Refusal | None:
         if reason := refusal(trajectory, self._parameters, now_ns):

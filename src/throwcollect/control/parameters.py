@@ -8,6 +8,9 @@ from dataclasses import dataclass, field
 
 from throwcollect.errors import ConfigError, Problem
 
+_LONGEST_S = 1e10
+"""Longest time that counts: no stamp of ROS is so late, and parameters may be as large as floats are."""
+
 
 @dataclass(frozen=True)
 class JointConstraints:
@@ -90,6 +93,11 @@ class ControllerParameters:
         return self.constraints.decelerate_on_cancel
 
     @property
-    def timeout(self) -> float:
-        """How long after the end of a trajectory the joints are stopped [s]; 0 never."""
-        return self.cmd_timeout if self.cmd_timeout > self.constraints.goal_time else 0.0
+    def timeout_ns(self) -> int:
+        """How long after the end of a trajectory the joints are stopped [ns]; 0 never."""
+        return to_nanoseconds(self.cmd_timeout) if self.cmd_timeout > self.constraints.goal_time else 0
+
+
+def to_nanoseconds(seconds: float) -> int:
+    """A time that a parameter says, in nanoseconds."""
+    return round(min(seconds, _LONGEST_S) * 1e9)

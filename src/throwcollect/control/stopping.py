@@ -9,6 +9,9 @@ from numpy.typing import NDArray
 
 from throwcollect.control.waypoints import QUINTIC, Waypoints
 
+_LONGEST_S = 60.0
+"""Longest time for which a joint brakes: one that is faster than any robot's would take more points than fit."""
+
 
 def brake(
     positions: NDArray[np.float64],
@@ -16,7 +19,7 @@ def brake(
     deceleration: NDArray[np.float64],
     period_ns: int,
 ) -> Waypoints:
-    """Trajectory on which each joint brakes from its speed to rest, at a deceleration of its own.
+    """Trajectory on which each joint brakes from its speed to rest, at a deceleration of its own, within a minute.
 
     Args:
         positions: Where the joints are [rad], shape ``(n_joints,)``.
@@ -27,12 +30,13 @@ def brake(
     Returns:
         One point a period from now to the first at which all joints rest.
     """
-    stopping_s = np.abs(velocities) / deceleration
+    # `fmin` leaves out speeds that are no numbers, which a physics engine may have for goals far beyond all robots.
+    stopping_s = np.fmin(np.abs(velocities) / deceleration, _LONGEST_S)
     count = math.ceil(stopping_s.max() * 1e9 / period_ns) + 1
     times_ns = np.arange(count, dtype=np.int64) * period_ns
     seconds = (times_ns / 1e9)[:, np.newaxis]
     braking = np.minimum(seconds, stopping_s)
-    towards = -np.sign(velocities) * deceleration
+    towards = np.where(stopping_s < _LONGEST_S, -np.sign(velocities) * deceleration, -velocities / _LONGEST_S)
     moves = seconds < stopping_s
     return Waypoints(
         times_ns,

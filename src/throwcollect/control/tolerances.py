@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from throwcollect.control.goal import JointTolerance, TrajectoryGoal
-from throwcollect.control.parameters import Constraints
+from throwcollect.control.parameters import Constraints, to_nanoseconds
 
 _ERASE = -1.0
 """A goal switches a tolerance off with this number (control_msgs); upstream compares with the width below."""
@@ -45,7 +45,7 @@ def default_tolerances(constraints: Constraints, joints: Sequence[str]) -> Toler
     return Tolerances(
         path=np.array([limit.trajectory for limit in limits]),
         goal=np.array([limit.goal for limit in limits]),
-        goal_time_ns=round(constraints.goal_time * 1e9),
+        goal_time_ns=to_nanoseconds(constraints.goal_time),
     )
 
 

@@ -29,7 +29,7 @@ _SMALL_STEP = 1e-5
 """The search ends after a step that is smaller [scaled, or m or rad]: nobody could measure the difference."""
 _THROWS_FOR_BIAS = 3
 _FAR = 2.0
-"""Parameters that are farther from the middle of their range [scaled: it ends at 1] are refused."""
+"""Parameters and context that are farther from the middle of their range [scaled: it ends at 1] are refused."""
 _CLEARLY = 3.0
 """Adapting helps if the sum of squared misses falls by more than the square of so many standard deviations."""
 
@@ -111,15 +111,20 @@ def adapt(
     return Adaptation(chosen, _shift(learned.correction, chosen, found), deviations, before, after)
 
 
-def refuse_far_parameters(learned: LearnedMap, parameters: Array) -> None:
-    """Refuse throws by scaled parameters where the polynomials say nothing: mostly slips, such as degrees for radians.
+def refuse_far_inputs(learned: LearnedMap, role: Role, inputs: Array) -> None:
+    """Refuse throws where the polynomials say nothing: mostly slips, such as degrees for radians.
+
+    Args:
+        learned: The map.
+        role: Parameters or context.
+        inputs: Their scaled values, shape ``(n_throws, n_axes of the role)``.
 
     Raises:
-        ConfigError: If a parameter is outside of the range of the dataset by more than half of that range.
+        ConfigError: If a value is outside of the range of the dataset by more than half of that range.
     """
-    for number, column in np.argwhere(np.abs(parameters) > _FAR).tolist():
-        axis = learned.axes_of(Role.PARAMETER)[column]
-        value = learned.unscale(Role.PARAMETER, parameters)[number, column]
+    for number, column in np.argwhere(np.abs(inputs) > _FAR).tolist():
+        axis = learned.axes_of(role)[column]
+        value = learned.unscale(role, inputs)[number, column]
         raise ConfigError(
             f"throw {number}: {axis.key} is {value:g}",
             expected=f"about {axis.minimum:g} to {axis.maximum:g}, the range that the model was learned from",
@@ -204,13 +209,23 @@ def _ends(learned: LearnedMap, method: Method, count: int) -> tuple[Array, Array
 
 
 def _step_inside(normal: Array, right: Array, found: Array, low: Array, high: Array) -> Array:
-    """Solve the normal equations; a number that would leave its bounds is held there, and the others adjust."""
+    """Solve the normal equations; a number that would leave its bounds is held there, and the others adjust.
+
+    Raises:
+        ConfigError: If the numbers are beyond all floats.
+    """
     held = np.full(len(found), np.nan)
     while True:
         free = np.isnan(held)
         reduced = np.where(free[:, np.newaxis] & free, normal, np.eye(len(found)))
         pull = right - matmul(normal, np.where(free, 0.0, held)[:, np.newaxis])[:, 0]
         unbounded = found + np.where(free, solve(reduced, np.where(free, pull, 0.0)[:, np.newaxis])[:, 0], held)
+        if not np.isfinite(unbounded).all():
+            raise ConfigError(
+                "the throws ended too far from where the model has them",
+                expected="places in the unit of the targets",
+                hint="--method offset takes any place",
+            )
         bounded = np.clip(unbounded, low, high)
         leaving = free & (bounded != unbounded)
         if not leaving.any():

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from throwcollect.errors import ConfigError
 from throwcollect.learning.arrays import Array, Vector
 from throwcollect.learning.learned_map import LearnedMap, Role
 from throwcollect.learning.polynomial import SAMPLES_PER_TERM, Polynomial, fit_polynomial, list_exponents, list_terms
@@ -60,7 +61,13 @@ def distil(learned: LearnedMap) -> DistilledMap:
 
     The polynomial is not fitted to the parameters of the throws: different parameters lead to one target, and their
     mean to none. Instead, Gauss-Newton steps for all coefficients together make the misses small that the map predicts.
+
+    Raises:
+        ConfigError: If a target is the same in all throws, so that it has no range to be scaled by.
     """
+    for name, ends in zip(learned.targets, learned.outputs.T, strict=True):
+        if ends.min() == ends.max():
+            raise ConfigError(f"{name} has the value {ends[0]:g} in all throws", expected="targets that vary")
     parameters, context = (
         learned.inputs[:_MOST_THROWS, learned.columns_of(role)] for role in (Role.PARAMETER, Role.CONTEXT)
     )

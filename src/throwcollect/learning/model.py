@@ -12,10 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from throwcollect.config.loader import dump_yaml
+from throwcollect.config.target import LARGEST_TARGET
 from throwcollect.errors import ConfigError
 from throwcollect.extras import require
 from throwcollect.files import StrPath
-from throwcollect.learning.adapting import Method, adapt, refuse_far_parameters
+from throwcollect.learning.adapting import Method, adapt, refuse_far_inputs
 from throwcollect.learning.aiming import Choice, aim
 from throwcollect.learning.arrays import Array
 from throwcollect.learning.distilling import distil
@@ -29,9 +30,6 @@ from throwcollect.version import __version__
 
 if TYPE_CHECKING:
     from throwcollect.dataset.reader import Dataset
-
-_LARGEST = 1e6
-"""Largest number of a target [m, rad, ...]: no robot reaches that far, and powers of it do not overflow."""
 
 _Word = TypeVar("_Word", bound=Enum)
 
@@ -201,7 +199,7 @@ class Model:
 
         Raises:
             ConfigError: If there are no throws, or not as many places; a key is missing or unknown, a value not finite,
-                there is no such method, or a parameter is far outside of the range of the dataset.
+                there is no such method, or a parameter or context is far outside of the range of the dataset.
         """
         parameters, context = self._inputs(points)
         measured = np.array([self._check_target(place, self.targets) for place in places], np.float64)
@@ -217,7 +215,8 @@ class Model:
                 expected="a dataset whose sweep varies the world",
                 hint="try bias",
             )
-        refuse_far_parameters(self.learned, parameters)
+        refuse_far_inputs(self.learned, Role.PARAMETER, parameters)
+        refuse_far_inputs(self.learned, Role.CONTEXT, context)
         # A measured place differs from its prediction by the scatter of the throw, and by the error of the model.
         deviation = float(np.hypot(scatter, self.file.trained_on.error))
         adapted = adapt(
@@ -239,12 +238,7 @@ class Model:
             found=list_found(learned, adapted.method, adapted.deviations),
         )
         file = self.file.model_copy(
-            update={
-                "correction": adapted.correction,
-                "adaptation": entry,
-                "version": __version__,
-                "distilled": None,
-            }
+            update={"correction": adapted.correction, "adaptation": entry, "version": __version__, "distilled": None}
         )
         world = replace(self, file=file, learned=learned)
         return world if self.file.distilled is None else world.distil()
@@ -299,8 +293,8 @@ class Model:
             ConfigError: If there are not as many as names, or one is not finite, or so large that powers of it are not.
         """
         row = [float(value) for value in values]
-        if len(row) != len(names) or not (np.abs(row) <= _LARGEST).all():
-            wanted = f"finite numbers of at most {_LARGEST:g}: {', '.join(names)}"
+        if len(row) != len(names) or not (np.abs(row) <= LARGEST_TARGET).all():
+            wanted = f"finite numbers of at most {LARGEST_TARGET:g}: {', '.join(names)}"
             raise ConfigError(f"got {', '.join(map(str, row))}", expected=wanted)
         return row
 
@@ -394,7 +388,7 @@ def _check_scatter(scatter: float) -> None:
     """Refuse a number that is no standard deviation.
 
     Raises:
-        ConfigError: If it is negative, or not finite.
+        ConfigError: If it is negative, no number, or as large as no target is.
     """
-    if not 0.0 <= scatter < np.inf:
-        raise ConfigError(f"scatter: got {scatter}", expected="0 or more, in the unit of the targets")
+    if not 0.0 <= scatter <= LARGEST_TARGET:
+        raise ConfigError(f"scatter: got {scatter}", expected=f"0 to {LARGEST_TARGET:g}, in the unit of the targets")

@@ -62,7 +62,8 @@ def read_model(directory: Path) -> tuple[ModelFile, LearnedMap, NDArray[np.int64
     file = read_model_file(directory)
     path = directory / POINTS
     table = read_parquet(path)
-    names = ["trial", *(axis.key for axis in file.axes), *file.targets, EFFORT]
+    # A target may be a key, or the effort, and has one column all the same.
+    names = list(dict.fromkeys(["trial", *(axis.key for axis in file.axes), *file.targets, EFFORT]))
     if table.column_names != names or not all(
         pa.types.is_floating(field.type) or (field.name == "trial" and pa.types.is_integer(field.type))
         for field in table.schema

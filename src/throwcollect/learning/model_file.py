@@ -79,7 +79,7 @@ class TrainedOn(Entry):
     throws: int
     ignored: int
     selection: str | None
-    folds_error: dict[int, FiniteFloat]
+    folds_error: dict[int, FiniteFloat] = Field(min_length=1)
     without_latents: FiniteFloat | None
     latents_count: bool
 

@@ -8,6 +8,8 @@ from throwcollect.ros.msg import Duration, JointTrajectory, JointTrajectoryContr
 from throwcollect.ros.msg import JointTolerance as JointToleranceMessage
 
 _NS = 10**9
+_LONGEST_NS = 2**31 * _NS - 1
+"""Largest time that a message can hold [ns]: its seconds have 32 bits, one of them for the sign."""
 
 
 def nanoseconds(time: Time | Duration) -> int:
@@ -84,5 +86,7 @@ def _point_message(point: TrajectoryPoint) -> JointTrajectoryPoint:
         accelerations=point.accelerations,
         effort=point.effort,
     )
-    message.time_from_start.sec, message.time_from_start.nanosec = divmod(point.time_from_start_ns, _NS)
+    # A trajectory that was stamped decades ago can go on for longer than that.
+    passed_ns = min(point.time_from_start_ns, _LONGEST_NS)
+    message.time_from_start.sec, message.time_from_start.nanosec = divmod(passed_ns, _NS)
     return message

@@ -26,6 +26,7 @@ class ControllerNode(Node):
 
     Attributes:
         controller: That name.
+        face: Its parameters.
         action: The action by which it is given goals.
     """
 
@@ -38,7 +39,7 @@ class ControllerNode(Node):
         self._limb = limb
         self._log = _LogHandler(self)
         limb.controller.logger.addHandler(self._log)
-        ParameterFace(self, limb, simulation.trial)
+        self.face = ParameterFace(self, limb, simulation.trial)
         self.action = ControllerAction(
             self, simulation, controller, aborts_refused=simulation.config.controllers.refused_goals == "abort"
         )

@@ -34,8 +34,10 @@ class ParameterFace:
     """
 
     def __init__(self, node: Node, limb: LimbController, trial: PresentTrial) -> None:
+        self._node = node
         self._limb = limb
         self._trial = trial
+        self._configured: dict[str, Any] = {}
         for name, value, description, read_only in _list_declared(limb.controller.parameters):
             descriptor = ParameterDescriptor(description=description, read_only=read_only)
             if isinstance(value, float):
@@ -43,8 +45,19 @@ class ParameterFace:
                     floating_range(_LEAST_RATE_HZ if name == "action_monitor_rate" else 0.0, None)
                 ]
             node.declare_parameter(name, value, descriptor)
+            if not read_only:
+                self._configured[name] = value
         node.add_on_set_parameters_callback(self._check)
         node.add_post_set_parameters_callback(self._apply)
+
+    def restore(self) -> None:
+        """Set back what clients have changed, for a trial that is simulated with the configured parameters."""
+        stray = {name: value for name, value in self._configured.items() if self._get_value(name) != value}
+        if stray:
+            self._node.set_parameters_atomically([Parameter(name, value=value) for name, value in stray.items()])
+
+    def _get_value(self, name: str) -> Any:
+        return self._node.get_parameter(name).value
 
     def _check(self, parameters: list[Parameter]) -> SetParametersResult:
         if self._trial.leased:

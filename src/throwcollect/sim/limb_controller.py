@@ -19,6 +19,7 @@ from throwcollect.control import (
     JointTrajectoryController,
     Refusal,
     Trajectory,
+    TrajectoryPoint,
 )
 from throwcollect.episode.record import ControllerSamples
 from throwcollect.robots.robot import Robot
@@ -113,10 +114,8 @@ class LimbController:
                 continue
             held = self._posture[self._joints.index(joint)]
             for point in trajectory.points:
-                # A point of the wrong size is left to the controller, which refuses it in the next check.
-                target = point.positions[column] if column < len(point.positions) else held
-                if not abs(target - held) <= _LOCKED_TOLERANCE_RAD:
-                    text = f"{joint} is locked at {held:.6g} rad (robot.locked) and cannot go to {target:.6g} rad"
+                if wish := _tell_motion(point, column, held):
+                    text = f"{joint} is locked at {held:.6g} rad (robot.locked) and cannot {wish}"
                     return self._controller.refuse(Refusal(ErrorCode.INVALID_GOAL, text))
         return None
 
@@ -172,6 +171,17 @@ class LimbController:
         still = np.zeros(len(self._joints)) if self._configured.measures_velocity else None
         self._controller.reset(start_ns, JointState(self._posture, still))
         self._controller.scale_speed(self._speed)
+
+
+def _tell_motion(point: TrajectoryPoint, column: int, held: float) -> str:
+    """How a point would move a joint away from the angle [rad] at which it is held; nothing if it would not."""
+    # A field of the wrong size is left to the controller, which refuses it in the next check.
+    if column < len(point.positions):
+        target = point.positions[column]
+        return "" if abs(target - held) <= _LOCKED_TOLERANCE_RAD else f"go to {target:.6g} rad"
+    # A point without positions is reached by its velocities and accelerations.
+    rates = () if len(point.positions) else (point.velocities, point.accelerations)
+    return "move" if any(values[column] != 0 for values in rates if column < len(values)) else ""
 
 
 def _configure(robot: Robot, joints: tuple[str, ...], config: ControllersConfig) -> ControllerParameters:

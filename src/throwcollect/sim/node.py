@@ -8,6 +8,7 @@ from typing import Any
 
 from throwcollect.config.key import Effect
 from throwcollect.config.schema import FASTEST, SLOWEST, Config
+from throwcollect.config.sweep import MOST_TRIALS
 from throwcollect.config.values import leaves, sweepable_keys, with_values
 from throwcollect.episode.channels import Channels
 from throwcollect.episode.message import pack
@@ -34,7 +35,7 @@ from throwcollect.sim import descriptors
 from throwcollect.sim.controller_manager import ControllerManager
 from throwcollect.sim.controller_node import ControllerNode
 from throwcollect.sim.lease_queue import LeaseQueue
-from throwcollect.sim.present_trial import TrialSetup
+from throwcollect.sim.present_trial import NO_TRIAL, TrialSetup
 from throwcollect.sim.simulation import Simulation, State
 from throwcollect.sim.simulation_control import SimulationControl
 from throwcollect.sim.stepping import Stepping
@@ -47,6 +48,8 @@ Clock: Any = get_message(_CLOCK)
 _EPISODE = "episode"
 NUMBER, CONTROLLERS = "trial.number", "trial.controllers"
 """Parameters that set up a trial by hand."""
+_NO_CONTROLLERS = [""]
+"""An empty list, whose type nobody could tell, is written like this."""
 _LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 _SAMPLED = QoSProfile(depth=100)
 _WHOLE = QoSProfile(history=HistoryPolicy.KEEP_ALL)
@@ -69,9 +72,6 @@ _NO_LIMIT = 0.0
 _FACTORS = f"a number from {SLOWEST} to {FASTEST}, or 0 for no limit"
 _HIDDEN = (Effect.PLAN, Effect.RUN)
 """Effects of keys that the node does not show as parameters, because they do not concern a simulation."""
-
-_MOST_TRIALS = 10_000_000
-"""Largest number of trials that a configuration may ask for; even the last starts at a time that fits into a stamp."""
 
 
 class SimulationNode(Node):
@@ -191,7 +191,7 @@ class SimulationNode(Node):
     def _rests(self) -> bool:
         """Whether time stands still for lack of work; not in a collection, which publishes each sample once."""
         simulation = self._simulation
-        return simulation.state == State.PLAYING and not simulation.running and simulation.trial.setup.number < 0
+        return simulation.state == State.PLAYING and not simulation.running and simulation.trial.begun.number < 0
 
     def _publish_steps(self, samples: Samples) -> None:
         """Publish the time after steps of a paused simulation, which may end between two samples."""
@@ -240,14 +240,11 @@ class SimulationNode(Node):
         physics = set(sweepable_keys(config, Effect.PHYSICS))
         shown = {leaf.name: leaf.value for leaf in leaves(config) if leaf.key.effect not in _HIDDEN}
         self._physics = {key: float(value) for key, value in shown.items() if key in physics}
-        setup = self._simulation.trial.setup
-        numbers = [descriptors.integer_range(-1, _MOST_TRIALS - 1)]
+        numbers = [descriptors.integer_range(NO_TRIAL, MOST_TRIALS - 1)]
         about_number = "Number of the trial that the next reset begins, from 0; -1 for none, which also ends a lease."
-        self.declare_parameter(
-            NUMBER, setup.number, ParameterDescriptor(description=about_number, integer_range=numbers)
-        )
+        self.declare_parameter(NUMBER, NO_TRIAL, ParameterDescriptor(description=about_number, integer_range=numbers))
         about_controllers = "Controllers that must have a goal before the clock of a trial runs; with none, any goal."
-        self.declare_parameter(CONTROLLERS, [""], ParameterDescriptor(description=about_controllers))
+        self.declare_parameter(CONTROLLERS, _NO_CONTROLLERS, ParameterDescriptor(description=about_controllers))
         about_leases = "Trials that a coordinator wants, in JSON with its signatures, instead of those before."
         self.declare_parameter(LEASES, "", ParameterDescriptor(description=about_leases))
         factor = config.sim.real_time_factor or _NO_LIMIT
@@ -331,8 +328,8 @@ class SimulationNode(Node):
         setup = self._simulation.trial.setup
         number = int(values.get(NUMBER, setup.number))
         controllers = tuple(filter(None, values.get(CONTROLLERS, setup.controllers)))
-        if number >= _MOST_TRIALS:
-            raise ConfigError(f"{NUMBER}: should be below {_MOST_TRIALS}, got {number}")
+        if number >= MOST_TRIALS:
+            raise ConfigError(f"{NUMBER}: should be below {MOST_TRIALS}, got {number}")
         if unknown := [name for name in controllers if name not in self._simulation.limbs]:
             raise ConfigError(f"no controller {unknown[0]!r}")
         return number, controllers
@@ -351,8 +348,11 @@ class SimulationNode(Node):
         return _NO_LIMIT < factor < self._simulation.config.sim.slowest_factor
 
     def _restore_parameters(self) -> None:
-        """Go back to the configuration's physics, and from slow motion, in case a client has set something else."""
-        stray = {key: value for key, value in self._physics.items() if self._get_value(key) != value}
+        """Go back to what is configured, and from slow motion, in case a client has set something else."""
+        for controller in self._controllers.values():
+            controller.face.restore()
+        configured = {NUMBER: NO_TRIAL, CONTROLLERS: _NO_CONTROLLERS, **self._physics}
+        stray = {key: value for key, value in configured.items() if self._get_value(key) != value}
         if self._hangs(self._get_value(_FACTOR)):
             stray[_FACTOR] = self._simulation.config.sim.real_time_factor or _NO_LIMIT
         if stray:

@@ -10,7 +10,8 @@ from throwcollect.control import ErrorCode, GoalResult, Refusal
 from throwcollect.episode.record import GoalOutcome
 from throwcollect.errors import RequestError
 
-_NO_TRIAL = -1
+NO_TRIAL = -1
+"""Number of the trial while none is set up."""
 _EXECUTING = 2
 """action_msgs/msg/GoalStatus.STATUS_EXECUTING."""
 
@@ -35,29 +36,31 @@ class PresentTrial:
 
     Attributes:
         setup: The trial that the next reset prepares.
+        begun: The one that the last reset has prepared.
         leased: Whether the trial belongs to a coordinator, until its episode is handed over; meanwhile no other client
             may change anything.
     """
 
     def __init__(self, config: Config) -> None:
-        self.setup = TrialSetup(_NO_TRIAL, (), config)
+        self.setup = self.begun = TrialSetup(NO_TRIAL, (), config)
         self.leased = False
         self._config = config
         self._goals: dict[str, GoalOutcome] = {}
 
     def set_up_nothing(self) -> None:
-        """End the lease, after which the coordinator does not accept the episode; go back to the configuration."""
+        """End the lease, and have the next reset go back to the configuration."""
         self.leased = False
-        self.setup = TrialSetup(_NO_TRIAL, (), self._config)
+        self.setup = TrialSetup(NO_TRIAL, (), self._config)
 
     def begin(self) -> None:
-        """Forget the goals of the trial before."""
+        """Take up the trial that is set up, and forget the goals of the one before."""
+        self.begun = self.setup
         self._goals = {}
 
     @property
     def has_all_goals(self) -> bool:
         """Whether every controller that must have a goal before the clock runs has had one."""
-        return all(name in self._goals for name in self.setup.controllers)
+        return all(name in self._goals for name in self.begun.controllers)
 
     def require_free(self) -> None:
         """Refuse what would change a leased trial.

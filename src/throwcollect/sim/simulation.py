@@ -96,6 +96,8 @@ class Simulation:
         self._pace = Pace()
         self.real_time_factor = config.sim.real_time_factor
         self._results: list[tuple[str, GoalResult]] = []
+        self._has_start = False
+        """Whether the world went on from a start state: the last reset of its state has not failed."""
         self.reset()
 
     @property
@@ -106,7 +108,7 @@ class Simulation:
     @property
     def running(self) -> bool:
         """Whether there is something to `advance`: the clock runs, or steps are left to be taken."""
-        return self._steps is not None or (self._running and self.state == State.PLAYING)
+        return self._steps is not None or (self._running and self._has_start and self.state == State.PLAYING)
 
     def lease(self, number: int, config: Config, goals: Mapping[str, TrajectoryGoal]) -> None:
         """Begin a trial for a coordinator, with controllers as they are configured, which no other client may touch.
@@ -124,7 +126,8 @@ class Simulation:
         self.trial.setup = TrialSetup(number, tuple(goals), config)
         self.reset()
         for controller, goal in goals.items():
-            if (refusal := self.submit(controller, number, goal)) is not None:
+            # Clients' goals are numbers, so no result of a lease's goal is taken for that of one of theirs.
+            if (refusal := self.submit(controller, ("trial", number), goal)) is not None:
                 raise ThrowcollectError(f"trial {number}: {controller} refuses its goal: {refusal}")
         self.trial.leased = True
 
@@ -167,7 +170,7 @@ class Simulation:
         if not (of_time or of_state):
             return
         self._interrupt_steps("the simulation was reset")
-        self._running = False
+        self._running = self._in_trial = False
         self.trial.begin()
         setup = self.trial.setup
         start_ns = self.now_ns
@@ -175,8 +178,10 @@ class Simulation:
             # Each trial has a slot of time of its own, so that stamps in a dataset never overlap.
             start_ns = 0 if setup.number < 0 else setup.config.trial_start_ns(setup.number)
         if of_state:
+            self._has_start = False
             self.world.reset(setup.config, start_ns=start_ns)
             posture = start_posture(setup.config)
+            self._has_start = True
         else:
             self.world.restart_clock(start_ns)
             posture = self.world.posture()
@@ -262,11 +267,13 @@ class Simulation:
 
         Raises:
             RequestError: ``RESULT_OPERATION_FAILED`` if the simulation is not paused, ``RESULT_INCORRECT_STATE`` if the
-                steps of another request are still being taken.
+                steps of another request are still being taken, or the last reset has failed.
         """
         if self.state != State.PAUSED:
             message = f"steps are taken while the simulation is paused only; it is {self.state.name}"
             raise RequestError("RESULT_OPERATION_FAILED", message)
+        if not self._has_start:
+            raise RequestError("RESULT_INCORRECT_STATE", "there is no start state until a reset succeeds")
         if self._steps is not None:
             message = f"{self._steps.taken} of {self._steps.wanted} steps of another request have been taken"
             raise RequestError("RESULT_INCORRECT_STATE", message, hint="wait for its end")
@@ -313,7 +320,7 @@ class Simulation:
         self._in_trial = self.trial.leased = False
         samples = self.world.samples()
         header = EpisodeHeader(
-            trial=self.trial.setup.number,
+            trial=self.trial.begun.number,
             start_ns=int(samples.stamps_ns[0]),
             end_reason=self.world.end_reason,
             contacts=self.world.contacts(),

@@ -28,7 +28,6 @@ from throwcollect.trial.goals import trial_goals
 class _Begun:
     """A trial that was begun for a coordinator."""
 
-    config: Config
     trajectory: JointTrajectory
     token: str
 
@@ -63,7 +62,7 @@ class TrialRunner:
         config = with_values(self._simulation.config, values)
         trajectory = trajectory_of(config)
         self._simulation.lease(trial, config, trial_goals(robot_of(config), trajectory, start_posture(config)))
-        self._begun = _Begun(config, trajectory, token)
+        self._begun = _Begun(trajectory, token)
 
     def disown(self) -> None:
         """Take its lease from the trial that runs: its episode is not judged, and names no lease."""
@@ -86,7 +85,11 @@ class TrialRunner:
             return None
         header, samples, states = ended
         begun, self._begun = self._begun, None
-        config = begun.config if begun else self._simulation.trial.setup.config
+        trial = self._simulation.trial
+        config = trial.begun.config
+        if begun is not None:
+            # What clients set up by hand later begins with the configuration, and not with the values of this trial.
+            trial.set_up_nothing()
         conditions = Conditions(
             build=build_digest(config.sim.engine),
             settings=self._settings.digest,
@@ -96,12 +99,12 @@ class TrialRunner:
         )
         table = self._encoder.lay_out(samples, states)
         # The records are judged, as by every reader of the dataset: they hold velocities in the ball's frame.
-        result = self._judge(begun, table.samples, header) if begun else ""
+        result = self._judge(config, begun.trajectory, table.samples, header) if begun else ""
         state = RecordedChunk(self._encoder.compress(table), hashlib.sha256(table.contents).hexdigest())
         episode = Episode(header, state)
         return Delivery(episode, result, conditions.to_json())
 
-    def _judge(self, begun: _Begun, samples: Samples, header: EpisodeHeader) -> str:
+    def _judge(self, config: Config, trajectory: JointTrajectory, samples: Samples, header: EpisodeHeader) -> str:
         """The result of a trial in JSON.
 
         Raises:
@@ -110,7 +113,6 @@ class TrialRunner:
         """
         if (infinite := next(find_infinite_columns(samples), None)) is not None:
             raise ThrowcollectError(f"trial {header.trial}: {infinite}")
-        task = begun.config.task
         # A result of a wrong kind is a fault of the task as well; it is found where the result is written.
-        with explain_failure("tasks", task.name, f"judge trial {header.trial}"):
-            return self._columns.to_json(task_of(begun.config).judge(samples, header, begun.trajectory))
+        with explain_failure("tasks", config.task.name, f"judge trial {header.trial}"):
+            return self._columns.to_json(task_of(config).judge(samples, header, trajectory))

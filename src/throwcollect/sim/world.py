@@ -82,7 +82,11 @@ class World(Observer):
         self._joints = robot_of(config).joints
         self._described: tuple[object, Description] | None = None
         self._start_key: object = None
-        self.reset(config)
+        try:
+            self.reset(config)
+        except BaseException:
+            self.close()
+            raise
 
     def close(self) -> None:
         """Free the world; it cannot be used afterwards."""

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from throwcollect.config.schema import Config
-from throwcollect.config.target import is_target
+from throwcollect.config.target import LARGEST_TARGET, is_target
 from throwcollect.config.values import reason_not_sweepable, with_values
 from throwcollect.errors import ConfigError, Problem
 from throwcollect.sweep.parquet_file import encode_table
@@ -196,9 +196,14 @@ def _check_columns(names: tuple[str, ...], path: Path, config: Config, *, line: 
 
 
 def _find_target_problems(rows: _Rows, path: Path, config: Config) -> Iterator[Problem]:
-    """Find rows with incomplete targets."""
+    """Find rows with incomplete targets, and with targets that no robot reaches."""
     if (targets := rows.points.targets) is None or not len(rows.numbers):
         return
+    far = np.argwhere(np.abs(targets.values) > LARGEST_TARGET)
+    for row, column in far[:_MOST_PROBLEMS].tolist():
+        sentence = f"should be a number from {-LARGEST_TARGET:g} to {LARGEST_TARGET:g}"
+        value = targets.values[row, column]
+        yield _of_row(f"{sentence}, got {value}", targets.names[column], path, int(rows.numbers[row]))
     there = ~np.isnan(targets.values)
     # Rows differ in few ways, so each way is checked once, however many rows there are.
     for pattern in np.unique(there, axis=0):

@@ -11,13 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from throwcollect.config.schema import Config, Parameter, Range, Values
+from throwcollect.config.sweep import MOST_TRIALS
 from throwcollect.errors import PlanError, Problem
 from throwcollect.reproducible_math import exp, log
 from throwcollect.sweep.point_file import read_points
 from throwcollect.sweep.points import Points
 from throwcollect.sweep.sobol import MOST_DIMENSIONS, draw_sobol
 
-_MOST_TRIALS = 10_000_000
 _TRIALS_PER_SUCCESS = 10
 """Most trials per wanted success, for configurations with `until` and without `trials`."""
 
@@ -119,9 +119,9 @@ def places(parameter: Parameter, values: NDArray[np.float64]) -> NDArray[np.floa
 
 def _grid(parameters: dict[str, Parameter], trials: int | None) -> Points:
     size = math.prod(len(key.values) if isinstance(key, Values) else _count(key) for key in parameters.values())
-    if trials is None and size > _MOST_TRIALS:
+    if trials is None and size > MOST_TRIALS:
         raise PlanError(
-            [Problem(f"the grid has {size} points", key="sweep.parameters")], expected=f"at most {_MOST_TRIALS}"
+            [Problem(f"the grid has {size} points", key="sweep.parameters")], expected=f"at most {MOST_TRIALS}"
         )
     places = np.arange(_check_count(trials, size))
     columns = []

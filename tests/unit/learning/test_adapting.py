@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from tests.unit.learning.worlds import KEYS, draw, land, learn, learn_with_drag
 
+from throwcollect.errors import ConfigError
 from throwcollect.learning.adapting import Adaptation, Method, adapt
 from throwcollect.learning.learned_map import LearnedMap, Role
 
@@ -110,3 +111,19 @@ def test_what_is_wanted_is_done_even_if_it_does_not_help() -> None:
 def test_scatter_is_not_taken_for_a_difference(count: int) -> None:
     found = [elsewhere(learn(), count, land, noise_m=0.02, seed=seed).method for seed in range(12)]
     assert found.count(Method.NONE) >= 11
+
+
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+def test_places_beyond_all_that_a_bias_explains_are_named() -> None:
+    learned = learn()
+    values = learned.scale(Role.PARAMETER, draw(1, 8))
+    with pytest.raises(ConfigError, match="the throws ended too far from where the model has them"):
+        adapt(
+            learned,
+            values,
+            np.zeros((1, 0)),
+            np.array([[1e5, -2e4]]),
+            method=Method.BIAS,
+            scatter=0.002,
+            latents_count=False,
+        )

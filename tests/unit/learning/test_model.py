@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import subprocess
 import sys
 from dataclasses import replace
@@ -197,13 +198,19 @@ def test_adapting_wants_a_place_for_each_throw(model: Model) -> None:
         model.adapt([point], [(1.0, 0.0)], method="magic")
     with pytest.raises(ConfigError, match="scatter"):
         model.adapt([point], [(1.0, 0.0)], scatter=-1.0)
+    with pytest.raises(ConfigError, match="scatter: got 1e\\+200"):
+        model.adapt([point], [(1.0, 0.0)], scatter=1e200)
 
 
-def test_adapting_refuses_throws_of_which_the_model_knows_nothing(model: Model) -> None:
+def test_adapting_refuses_throws_of_which_the_model_knows_nothing(model: Model, dataset: Dataset) -> None:
     points = [dict(zip(KEYS, row, strict=True)) for row in draw(2, 8).tolist()]
     points[1][KEYS[1]] = 45.0
     with pytest.raises(ConfigError, match=f"throw 1: {KEYS[1]} is 45\\n  expected: about .* to .*, the range"):
         model.adapt(points, land(draw(2, 8), 0.0).tolist())
+    given = fit(dataset, given=[KEYS[1]])
+    points[1][KEYS[1]] = 1e200
+    with pytest.raises(ConfigError, match=f"throw 1: {KEYS[1]} is 1e\\+200"):
+        given.adapt(points, land(draw(2, 8), 0.0).tolist())
 
 
 @pytest.mark.parametrize(
@@ -212,6 +219,7 @@ def test_adapting_refuses_throws_of_which_the_model_knows_nothing(model: Model) 
         ("model.json", lambda text: text[:100], "Invalid JSON"),
         ("model.json", lambda text: text.replace('"bias": [', '"bias": [1.0,'), "do not belong together"),
         ("model.json", lambda text: text.replace('"format": "1"', '"format": "2"'), "format"),
+        ("model.json", lambda text: re.sub(r'"folds_error": {[^}]*}', '"folds_error": {}', text), "folds_error"),
         ("points.parquet", lambda _: "PAR1", "is damaged"),
         ("points.parquet", None, "is missing"),
     ],
@@ -226,6 +234,17 @@ def test_a_damaged_model_is_told_in_words(model: Model, tmp_path: Path, file: st
     with pytest.raises(DatasetError, match=message) as caught:
         load_model(tmp_path / "model")
     assert caught.value.path == path
+
+
+@pytest.mark.parametrize("targets", [["landing_x_m", "effort_peak_share"], ["landing_x_m"] * 2, [KEYS[0]]])
+def test_a_target_that_has_a_column_already_is_read_as_it_was_saved(
+    dataset: Dataset, tmp_path: Path, targets: list[str]
+) -> None:
+    model = fit(dataset, targets=targets)
+    model.save(tmp_path / "model")
+    again = load_model(tmp_path / "model")
+    assert again.targets == tuple(targets)
+    assert np.array_equal(again.learned.outputs, model.learned.outputs)
 
 
 def test_another_directory_is_no_model(tmp_path: Path) -> None:

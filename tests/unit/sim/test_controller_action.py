@@ -6,10 +6,12 @@ from typing import Any
 import pytest
 from tests.integration.robot import ARM, goal, stamp_ns
 
+from rclzenoh.interfaces import deserialize, serialize
 from throwcollect.config.schema import Config
 from throwcollect.ros import GoalResponse
 from throwcollect.sim import controller_action
 from throwcollect.sim.controller_action import ControllerAction
+from throwcollect.sim.controller_messages import feedback_message, read_goal, read_trajectory
 from throwcollect.sim.simulation import Simulation
 
 
@@ -84,3 +86,28 @@ def test_a_goal_that_ended_before_its_handle_came_hears_of_its_own_time_alone(
     advance(simulation, action)
     # The first goal ends with the update after the second came, and a slice of time with a goal.
     assert (first.told, second.told) == ([50], [52, 102])
+
+
+def test_the_result_of_a_leased_goal_is_not_that_of_a_client(simulation: Simulation, action: ControllerAction) -> None:
+    server: Any = action._server
+    server.consider(goal(ARM, 1.0, arm_right_4_joint=-1.7))
+    simulation.lease(1, simulation.config, {ARM: read_goal(goal(ARM, 0.2, arm_right_4_joint=-1.7))})
+    for _ in range(10):
+        for _, result in simulation.pop_results():
+            action.finish(result)
+        simulation.advance(watched=True)
+    simulation.end_lease()
+    assert action._goals[1].result.result().error_string == "simulation was reset"
+
+
+def test_a_trajectory_that_was_stamped_decades_ago_is_told_of(simulation: Simulation) -> None:
+    message = goal(ARM, 1.0).trajectory
+    message.header.stamp.sec = -(2**31) + 1
+    message.points = message.points[-1:]
+    message.points[0].time_from_start.sec = 2**31 - 1
+    message.points[0].time_from_start.nanosec = 2 * 10**9
+    assert simulation.follow(ARM, read_trajectory(message)) is None
+    simulation.step(700)
+    feedback = feedback_message(simulation.observe(ARM).state(simulation.now_ns))
+    assert feedback.actual.time_from_start.sec == feedback.desired.time_from_start.sec == 2**31 - 1
+    assert deserialize(serialize(feedback), type(feedback)) == feedback

@@ -148,3 +148,25 @@ def test_joints_can_brake_when_a_goal_is_cancelled() -> None:
     state = world.observe(ARM).state(world.now_ns)
     assert state.output.positions[ELBOW] == pytest.approx(position + speed**2 / 2 / 5.0, abs=1e-6)
     assert state.actual.positions[ELBOW] == pytest.approx(state.output.positions[ELBOW], abs=0.005)
+
+
+def test_velocities_alone_that_would_move_a_locked_joint_are_refused_by_name() -> None:
+    limb = simulation().limbs[HEAD]
+    joints = TALOS.controllers[HEAD]
+    still, turning = ([TrajectoryPoint(10**9, velocities=[0.0, speed])] for speed in (0.0, 0.1))
+    assert limb.refuse_locked(Trajectory(joints, still)) is None
+    refusal = limb.refuse_locked(Trajectory(joints, turning))
+    assert refusal is not None
+    assert refusal.text == f"{HEAD}: head_2_joint is locked at 0 rad (robot.locked) and cannot move"
+
+
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+@pytest.mark.parametrize("far", [1e6, 1.7e308])
+def test_joints_that_are_faster_than_any_robot_brake_too(far: float) -> None:
+    options = {"hold": "decelerate", "max_deceleration_radps2": 5.0}
+    world = Simulation(Config.model_validate({"controllers": options, "sim": {"engine": "ballistic"}}))
+    world.submit(ARM, 1, goal(1.0, elbow=far))
+    world.step(150)
+    assert world.cancel(ARM, 1)
+    world.step(10)
+    assert [result.status for _, result in world.pop_results()] == [GoalStatus.CANCELED]

@@ -5,8 +5,9 @@ import numpy as np
 import pytest
 
 from throwcollect.config.schema import Config
+from throwcollect.config.values import with_values
 from throwcollect.control import GoalStatus, Trajectory, TrajectoryGoal, TrajectoryPoint
-from throwcollect.errors import RequestError
+from throwcollect.errors import ConfigError, RequestError
 from throwcollect.robots.description import start_posture
 from throwcollect.robots.talos import TALOS
 from throwcollect.sim.present_trial import TrialSetup
@@ -348,3 +349,28 @@ def test_samples_are_told_one_by_one_also_after_steps_that_ended_between_them(si
     simulation.real_time_factor = None
     assert simulation.now_ns == 4 * 10**9 // CONFIG.sim.physics_hz
     assert len(simulation.fresh_samples()) == 1
+
+
+def test_after_a_reset_that_fails_the_clock_stands_still_until_another_one_succeeds() -> None:
+    config = Config.model_validate({"sim": {"engine": "ballistic"}, "tool": {"cup_floor_radius_m": 0.006}})
+    simulation = Simulation(config)
+    simulation.trial.setup = TrialSetup(0, (), config)
+    simulation.reset()
+    simulation.submit(ARM, 1, swing())
+    simulation.advance(watched=True)
+    simulation.trial.setup = TrialSetup(0, (), with_values(config, {"ball.radius_m": 0.005}))
+    with pytest.raises(ConfigError, match=r"tool\.cup_floor_radius_m"):
+        simulation.reset()
+    assert simulation.submit(ARM, 2, swing()) is None
+    assert not simulation.running
+    simulation.state = State.PAUSED
+    with pytest.raises(RequestError, match="there is no start state until a reset succeeds"):
+        simulation.request_steps(1)
+    simulation.state = State.PLAYING
+    simulation.trial.setup = TrialSetup(0, (), config)
+    simulation.reset()
+    simulation.submit(ARM, 3, swing())
+    run(simulation)
+    episode = simulation.episode()
+    assert episode is not None
+    assert [each.status for each in episode[0].goals] == [4]

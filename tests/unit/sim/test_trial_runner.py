@@ -12,7 +12,8 @@ from throwcollect.dataset.judging import judge_episode
 from throwcollect.episode.message import Delivery
 from throwcollect.errors import ConfigError, ThrowcollectError
 from throwcollect.sim.limb_controller import LimbController
-from throwcollect.sim.simulation import Simulation
+from throwcollect.sim.present_trial import TrialSetup
+from throwcollect.sim.simulation import Simulation, State
 from throwcollect.sim.trial_runner import TrialRunner
 from throwcollect.tasks.task import task_of
 from throwcollect.trial.conditions import conditions_from_json
@@ -91,3 +92,25 @@ def test_a_trial_that_is_dropped_yields_nothing(simulation: Simulation) -> None:
     assert not simulation.trial.leased
     assert runner.hand_over() is None
     assert simulation.now_ns == 0
+
+
+def test_what_is_set_up_meanwhile_is_of_the_next_trial_alone(simulation: Simulation) -> None:
+    runner = TrialRunner(simulation)
+    simulation.trial.setup = TrialSetup(3, (), with_values(CONFIG, {"ball.mass_kg": 0.05}))
+    simulation.reset()
+    simulation.state = State.PAUSED
+    simulation.step(100)
+    simulation.trial.setup = TrialSetup(4, (), with_values(CONFIG, {"ball.mass_kg": 0.06}))
+    simulation.step(100_000)
+    simulation.state = State.PLAYING
+    delivery = runner.hand_over()
+    assert delivery is not None
+    assert delivery.episode.header.trial == 3
+    assert conditions_from_json(delivery.conditions).values == {"ball.mass_kg": 0.05}
+
+
+def test_what_is_set_up_after_a_leased_trial_begins_with_the_configuration(simulation: Simulation) -> None:
+    runner = TrialRunner(simulation)
+    runner.begin(3, VALUES)
+    finish(runner, simulation)
+    assert simulation.trial.setup == TrialSetup(-1, (), CONFIG)

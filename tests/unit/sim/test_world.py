@@ -6,6 +6,7 @@ import pytest
 from throwcollect.config.schema import Config
 from throwcollect.engines.engine import BodyState
 from throwcollect.errors import ConfigError
+from throwcollect.members import load_member
 from throwcollect.robots.description import start_posture
 from throwcollect.robots.talos import TALOS
 from throwcollect.sim.world import World
@@ -243,3 +244,12 @@ def test_a_ball_that_the_spoon_cannot_hold_is_refused(world):
     with pytest.raises(ConfigError, match="falls through the floor of the cup"):
         world.reset(config(tool={"cup_floor_radius_m": 0.03}))
     assert throw(world).ball_position[-1, 0] == pytest.approx(1.69, abs=0.02)
+
+
+@pytest.mark.parametrize("engine", ["bullet", "mujoco", "ballistic"])
+def test_an_engine_without_a_start_state_is_freed(engine, monkeypatch):
+    kind, freed = load_member("engines", engine), []
+    monkeypatch.setattr(kind, "close", lambda self, close=kind.close: freed.append(close(self)))
+    with pytest.raises(ConfigError, match=r"tool\.cup_floor_radius_m"):
+        World(config(sim={"engine": engine}, tool={"cup_floor_radius_m": 0.006}, ball={"radius_m": 0.005}))
+    assert freed == [None]

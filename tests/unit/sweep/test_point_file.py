@@ -221,6 +221,10 @@ def test_parquet_holds_the_same_targets(csv, tmp_path):
                 "list.csv:6: target_y_m: is missing beside target_x_m",
             ],
         ),
+        (
+            TARGETED + "1,-0.2,1.4\n1,1e308,1.4\n",
+            ["list.csv:3: target_y_m: should be a number from -1e+06 to 1e+06, got 1e+308"],
+        ),
     ],
 )
 def test_wrong_targets_are_named_with_their_lines(csv, content, messages):

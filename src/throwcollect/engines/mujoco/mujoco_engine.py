@@ -65,8 +65,9 @@ class MujocoEngine(Engine):
 
     def close(self) -> None:
         """Free the world."""
-        self._is_loaded = False
-        del self._model, self._data
+        if self._is_loaded:
+            self._is_loaded = False
+            del self._model, self._data
 
     @property
     def is_as_loaded(self) -> bool:
