@@ -1,4 +1,4 @@
-"""The tables of docs/cli.md have the commands that there are, each with the options that it has."""
+"""The tables of docs/cli.md have the commands that there are, each with its options, and `--help` is well formed."""
 
 import re
 from collections.abc import Iterator
@@ -52,3 +52,10 @@ def test_the_page_has_the_commands_and_the_options_that_there_are() -> None:
         wrong += [f"{' '.join(path)}: has no {name}" for name in sorted(told[path] - known)]
         wrong += [f"{' '.join(path)}: {names[0]} is missing" for names in options if not named & set(names)]
     assert wrong == []
+
+
+def test_help_shows_arguments_that_may_be_left_out_in_one_pair_of_brackets() -> None:
+    for path, found in list_commands(command):
+        context = found.make_context(path[-1], [], resilient_parsing=True)
+        usage = " ".join(found.collect_usage_pieces(context))
+        assert not re.search(r"\[\[|\.\.\.[\]}]", usage), f"{' '.join(path)}: {usage}"
