@@ -13,13 +13,7 @@ import throwcollect
 
 
 def main(data: str, nominal: str, real: str) -> None:
-    """Learn, aim, throw, and adapt.
-
-    Args:
-        data: Directory of a dataset.
-        nominal: Its configuration.
-        real: The configuration that plays the real robot.
-    """
+    """Learn from the dataset `data` of the configuration `nominal`, aim, throw, and adapt to the robot of `real`."""
     dataset = throwcollect.load(data)
     print(dataset)
 

@@ -46,11 +46,7 @@ def write(picture: Path, name: str) -> None:
 
 
 def main(kept: Path) -> None:
-    """Write all pictures.
-
-    Args:
-        kept: Where the datasets are made, or are.
-    """
+    """Write all pictures, of datasets that are made in the directory `kept`, unless they are there."""
     sys.path.insert(0, str(ROOT))
     from tests.e2e.chromium import browse
 

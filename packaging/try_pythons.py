@@ -1,4 +1,4 @@
-"""Tries throwcollect with every Python that is here: `try_pythons.py [VERSION ...]` prints a table.
+"""Tries throwcollect with every Python that is here: `python packaging/try_pythons.py [VERSION ...]` prints a table.
 
 For each version, `packaging/environment.sh` makes an environment, the extra `collect` is installed, and five throws
 are collected with the engine that this Python has. Another environment with nothing but the light core reads them.

@@ -56,3 +56,14 @@ def test_the_citation_names_this_version() -> None:
     citation = YAML(typ="safe").load(ROOT / "CITATION.cff")
     assert citation["version"] == __version__
     assert {"cff-version", "message", "title", "authors"} <= citation.keys()
+
+
+def test_the_distribution_and_the_images_that_are_named_have_this_version() -> None:
+    assert f'\nversion = "{__version__}"\n' in (ROOT / "pyproject.toml").read_text(encoding="utf-8")
+    named = {
+        f"{path.name}: {version}"
+        for path in [*(ROOT / "compose").iterdir(), *(ROOT / "docs").glob("*.md")]
+        for version in re.findall(r"\bthrowcollect:(\d[\w.]*)", path.read_text(encoding="utf-8"))
+        if version != __version__
+    }
+    assert named == set()

@@ -35,6 +35,8 @@ case "$*" in
     *" up "*) echo "up $CONFIGS $CONFIG" >> {path}; exit "${{UP:-0}}" ;;
     run*) echo "run $*" >> {path}; exit "${{RUN:-0}}" ;;
     *" down "*) echo "$*" >> {path} ;;
+    "image inspect "*) exit "${{INSPECT:-0}}" ;;
+    "pull "*) echo "pull $2: access denied" >&2; exit 1 ;;
 esac
 """
     )
@@ -45,8 +47,10 @@ esac
     return path
 
 
-def collect(directory: Path, output: str, **variables: str) -> subprocess.CompletedProcess[str]:
-    words = [shutil.which("dash") or "sh", str(SCRIPT), "configs/throws.yaml", "2", output]
+def collect(
+    directory: Path, output: str, *, config: str = "configs/throws.yaml", **variables: str
+) -> subprocess.CompletedProcess[str]:
+    words = [shutil.which("dash") or "sh", str(SCRIPT), config, "2", output]
     environment = {**os.environ, **variables}
     return subprocess.run(words, cwd=directory, env=environment, capture_output=True, text=True, check=False)
 
@@ -77,6 +81,41 @@ def test_directories_are_found_whatever_the_shell_of_the_user_searches(tmp_path:
     up, run, _ = calls.read_text().splitlines()
     assert up == f"up {tmp_path}/configs throws.yaml"
     assert f" -v {tmp_path}/data:/out " in run
+
+
+def test_an_image_that_cannot_be_had_is_named_before_anything_is_made(tmp_path: Path, calls: Path) -> None:
+    done = collect(tmp_path, "data", INSPECT="1", THROWCOLLECT_IMAGE="nobody/has:1")
+    assert (done.returncode, calls.read_text()) == (2, "")
+    assert "pull nobody/has:1: access denied" in done.stderr
+    assert "nobody/has:1: cannot be had; `throwcollect image build` makes it" in done.stderr
+    assert not (tmp_path / "data").exists()
+
+
+def test_a_machine_without_compose_says_so(tmp_path: Path, calls: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    commands = calls.parent / "bin"
+    for name in ("sh", "dirname", "basename", "id", "uname", "mkdir", "rmdir"):
+        (commands / name).symlink_to(shutil.which(name) or name)
+    (commands / "docker").unlink()
+    done = collect(tmp_path, "data", PATH=str(commands))
+    assert (done.returncode, done.stderr) == (2, f"{SCRIPT}: neither `docker compose` nor docker-compose is here\n")
+    assert not (tmp_path / "data").exists()
+
+
+@pytest.mark.parametrize("place", ["configs", "output"])
+def test_a_colon_in_a_path_is_refused_before_anything_is_collected(tmp_path: Path, calls: Path, place: str) -> None:
+    (tmp_path / "a:b").mkdir()
+    (tmp_path / "a:b" / "throws.yaml").touch()
+    paths = {"configs": {"config": "a:b/throws.yaml", "output": "data"}, "output": {"output": "a:b/data"}}[place]
+    done = collect(tmp_path, **paths)
+    assert (done.returncode, calls.read_text()) == (2, "")
+    assert "should have no colon" in done.stderr
+    assert not (tmp_path / paths["output"]).exists()
+
+
+def test_files_may_begin_with_a_dash(tmp_path: Path, calls: Path) -> None:
+    (tmp_path / "-v.yaml").touch()
+    assert collect(tmp_path, "-data", config="-v.yaml").returncode == 0
+    assert calls.read_text().splitlines()[0] == f"up {tmp_path} -v.yaml"
 
 
 @pytest.mark.parametrize(

@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 
 import throwcollect
+from throwcollect.runs import prepare, resume
 
 ROOT = Path(__file__).parents[2]
 DOCUMENTS = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
@@ -17,6 +18,23 @@ def test_the_list_and_what_is_shown_and_described_agree() -> None:
     described = re.findall(r"^\| `(\w+)[`(]", (ROOT / "docs" / "python.md").read_text(encoding="utf-8"), re.MULTILINE)
     assert dir(throwcollect) == throwcollect.__all__ == sorted(throwcollect.__all__)
     assert sorted(described) == throwcollect.__all__
+
+
+def read_signatures(page: str) -> dict[str, list[str]]:
+    """Names of the parameters of each function that a table of a page describes."""
+    text = (ROOT / "docs" / page).read_text(encoding="utf-8")
+    cells = re.findall(r"^\| (.*?) \| ", text, re.MULTILINE)
+    calls = [call for cell in cells for call in re.findall(r"`([\w.]+)\(([^`]*)\)`", cell)]
+    return {name: re.findall(r"(\w+)(?:=|,|$)", re.sub(r"\(\)|=[^,]*", "", each)) for name, each in calls}
+
+
+def test_functions_have_the_parameters_that_are_described() -> None:
+    described = read_signatures("python.md")
+    assert described == {name: list(inspect.signature(getattr(throwcollect, name)).parameters) for name in described}
+    described = read_signatures("runs.md")
+    assert described["runs.prepare"] == list(inspect.signature(prepare).parameters)
+    # The last one is for the launcher.
+    assert described["runs.resume"] == list(inspect.signature(resume).parameters)[:-1]
 
 
 def test_type_checkers_read_what_is_imported() -> None:

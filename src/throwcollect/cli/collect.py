@@ -125,15 +125,27 @@ def resume(
 
     changes = overrides(settings, trials=trials, run__simulations=simulations, run__runtime=runtime)
     if is_submitted(directory):
-        from throwcollect.cluster.submit import submit_missing
-
-        if submit_missing(directory, overrides=changes, say=tell) is None:
-            tell(f"{directory}: nothing is left to submit")
+        for name, value in {"-n": simulations, "--runtime": runtime, "--check": check}.items():
+            if value:
+                raise ConfigError(f"{name}: should be left out, as tasks of a cluster collect {directory}")
+        _resume_tasks(directory, changes, json=json)
         return
     from throwcollect.runs.preparation import resume as go_on
 
     prepare_run = partial(go_on, directory, overrides=changes, check=check)
     _collect(prepare_run, directory=directory, detach=detach, json=json)
+
+
+def _resume_tasks(directory: Path, changes: list[str], *, json: bool) -> None:
+    from throwcollect.cluster.submit import submit_missing
+
+    submitted = submit_missing(directory, overrides=changes, say=tell)
+    job = submitted.job if submitted is not None else None
+    if json:
+        numbers = {"array": job.array, "join": job.join} if job is not None else {"array": "", "join": ""}
+        print_json({"directory": str(directory.absolute()), **numbers})
+    elif job is None:
+        tell(f"{directory}: nothing is left to submit")
 
 
 def launch(run: str, lock: LockOption) -> None:

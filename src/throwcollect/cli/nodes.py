@@ -42,7 +42,8 @@ def sim(
         str | None, typer.Option("--name", help="Name of the node, and of its namespace; sim_<host name> by default.")
     ] = None,
     namespace: Annotated[
-        str | None, typer.Option("--namespace", help="Namespace: / where nodes look that know of no other; /<name>.")
+        str | None,
+        typer.Option("--namespace", help="Namespace; /<name> by default. / is where nodes of the real robot look."),
     ] = None,
 ) -> None:
     """Run one simulation."""

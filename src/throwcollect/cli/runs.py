@@ -96,7 +96,7 @@ def wait(run: RunOption = None, json: JsonOption = False) -> None:
 
 
 def logs(
-    nodes: Annotated[list[str] | None, typer.Argument(metavar="[NODE]...", help="Names of nodes; all if none.")] = None,
+    nodes: Annotated[list[str] | None, typer.Argument(metavar="NODE", help="Names of nodes; all if none.")] = None,
     follow: Annotated[bool, typer.Option("-f", "--follow", help="Go on until the run ends.")] = False,
     run: RunOption = None,
 ) -> None:

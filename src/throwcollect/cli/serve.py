@@ -26,7 +26,7 @@ def serve(
     catalogue: Annotated[
         Path | None,
         typer.Argument(
-            metavar="[CATALOG]",
+            metavar="CATALOG",
             help="YAML file with components, or a configuration; throwcollect.yaml by default.",
             readable=False,
         ),

@@ -86,7 +86,7 @@ def _check_robot() -> Check:
 def _check_extras() -> Check:
     """List the extras that are installed, and those of which at least one package is missing."""
     missing = sorted({extra for package, extra in EXTRA_OF.items() if has_wheel(package) and not is_installed(package)})
-    complete = join_names(sorted(set(EXTRA_OF.values()) - set(missing)))
+    complete = ", ".join(sorted(set(EXTRA_OF.values()) - set(missing)))
     if not missing:
         return Check("extras", "ok", complete)
     without = f"without {join_names(missing)} (try: {install_command(','.join(missing))})"

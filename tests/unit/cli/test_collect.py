@@ -1,13 +1,14 @@
-"""Options of `up` that do not go together."""
+"""Options of `up` and `resume` that do not go together, or with the dataset."""
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from throwcollect.cli.collect import up
+from throwcollect.cli.collect import resume, up
 from throwcollect.errors import ConfigError
 
 
@@ -26,3 +27,26 @@ def test_what_a_slice_has_no_use_for_is_refused_and_not_forgotten(
 ) -> None:
     with pytest.raises(ConfigError, match=f"^{option}: should be left out with --slice"):
         up(slice="0/2", output=tmp_path / "data", **given)
+
+
+@pytest.fixture
+def submitted(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every dataset was submitted to a cluster, and nothing is left to submit."""
+    monkeypatch.setattr("throwcollect.cluster.submission.is_submitted", lambda _: True)
+    monkeypatch.setattr("throwcollect.cluster.submit.submit_missing", lambda *_, **__: None)
+
+
+@pytest.mark.usefixtures("submitted")
+@pytest.mark.parametrize(
+    ("options", "name"),
+    [({"check": True}, "--check"), ({"simulations": "4"}, "-n"), ({"runtime": "docker"}, "--runtime")],
+)
+def test_what_tasks_of_a_cluster_would_not_heed_is_refused(options: dict[str, Any], name: str, tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match=f"^{name}: should be left out"):
+        resume(tmp_path, **options)
+
+
+@pytest.mark.usefixtures("submitted")
+def test_what_is_submitted_is_told_as_json(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    resume(tmp_path, json=True)
+    assert json.loads(capsys.readouterr().out) == {"directory": str(tmp_path), "array": "", "join": ""}

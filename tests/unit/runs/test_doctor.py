@@ -32,6 +32,14 @@ def test_a_machine_that_runs_the_tests_has_no_problem(tmp_path: Path) -> None:
     assert str(tmp_path) in checks["disk"].finding
 
 
+def test_all_extras_that_are_there_are_listed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("throwcollect.runs.doctor.is_installed", lambda package: package != "onnx")
+    monkeypatch.setattr("throwcollect.runs.doctor.has_wheel", lambda _: True)
+    (finding,) = (check.finding for check in examine(tmp_path) if check.name == "extras")
+    there = "collect, docker, export, mujoco, pandas, report, serve"
+    assert finding == f"{there}, without onnx (try: pip install 'throwcollect[onnx]')"
+
+
 def backends(directory: Path) -> dict[str, tuple[str, str]]:
     _choose_installed.cache_clear()
     found = {check.name: (check.status, check.finding) for check in examine(directory)}

@@ -23,7 +23,7 @@ _MOMENTS = ("min", "max", "mean", "std")
 
 
 def merge_datasets(
-    directories: Annotated[list[Path], typer.Argument(metavar="DIR...", help="Directories of the datasets.")],
+    directories: Annotated[list[Path], typer.Argument(metavar="DIR", help="Directories of the datasets.")],
     output: OutputArgument,
     json: JsonOption = False,
 ) -> None:

@@ -35,7 +35,7 @@ _FIELDS = {
 
 @param_app.command("list")
 def list_parameters(
-    node: Annotated[str | None, typer.Argument(metavar="[NODE]", help="Name of the node; all nodes if none.")] = None,
+    node: Annotated[str | None, typer.Argument(metavar="NODE", help="Name of the node; all nodes if none.")] = None,
     run: RunOption = None,
 ) -> None:
     """List the parameters of a node, or of all nodes."""

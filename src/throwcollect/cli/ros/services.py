@@ -27,7 +27,7 @@ def list_services(types: TypesOption = False, hidden: HiddenOption = False, run:
 def call_service(
     service: Annotated[str, typer.Argument(metavar="SERVICE", help="Name of the service.")],
     kind: Annotated[str, typer.Argument(metavar="TYPE", help="Type, such as std_srvs/srv/Trigger.")],
-    values: Annotated[str, typer.Argument(metavar="[VALUES]", help="Fields of the request in YAML.")] = "{}",
+    values: Annotated[str, typer.Argument(metavar="VALUES", help="Fields of the request in YAML.")] = "{}",
     run: RunOption = None,
 ) -> None:
     """Call a service and print its response."""

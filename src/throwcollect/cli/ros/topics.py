@@ -61,7 +61,7 @@ def echo(
     topic: TopicArgument,
     kind: Annotated[
         str | None,
-        typer.Argument(metavar="[TYPE]", help="Type, such as std_msgs/msg/String; needed if nobody publishes."),
+        typer.Argument(metavar="TYPE", help="Type, such as std_msgs/msg/String; needed if nobody publishes."),
     ] = None,
     once: Annotated[bool, typer.Option("--once", help="End after the first message.")] = False,
     field: Annotated[

@@ -1,0 +1,61 @@
+"""The tables of docs/cli.md have the commands that there are, each with its options, and `--help` is well formed."""
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from throwcollect.cli.main import command
+
+PAGE = (Path(__file__).parents[3] / "docs" / "cli.md").read_text(encoding="utf-8")
+
+
+def find_commands(words: list[str], found: Any, path: tuple[str, ...] = ()) -> Iterator[tuple[str, ...]]:
+    """Paths of the commands that a line such as `dataset filter|sample DIR` means."""
+    if not hasattr(found, "commands") or not words or words[0] == "...":
+        yield path
+        return
+    for name in words[0].split("|"):
+        assert name in found.commands, f"{' '.join([*path, name])}: there is no such command"
+        yield from find_commands(words[1:], found.commands[name], (*path, name))
+
+
+def list_commands(found: Any, path: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], Any]]:
+    """All commands that are not hidden."""
+    if hasattr(found, "commands"):
+        for name, below in found.commands.items():
+            yield from list_commands(below, (*path, name))
+    elif not found.hidden:
+        yield path, found
+
+
+def read_options() -> dict[tuple[str, ...], set[str]]:
+    """The options that the page has of each command."""
+    told: dict[tuple[str, ...], set[str]] = {}
+    for cell in re.findall(r"^\| (`.*?`) \| ", PAGE, flags=re.MULTILINE):
+        for line in re.findall(r"`([^`]*)`", cell.replace("\\|", "|")):
+            for path in find_commands(line.split(), command):
+                told.setdefault(path, set()).update(re.findall(r"(?<![\w-])--?[a-z][a-z-]*", line))
+    return told
+
+
+def test_the_page_has_the_commands_and_the_options_that_there_are() -> None:
+    told, wrong = read_options(), []
+    for path, found in list_commands(command):
+        if path not in told:
+            wrong.append(f"{' '.join(path)}: is missing")
+            continue
+        # What a line has for a group, such as `ros topic|node ... [--run RUN]`, is that of all commands in it.
+        named = set().union(*(told.get(path[:length], ()) for length in range(1, len(path) + 1)))
+        options = [each.opts for each in found.params if each.param_type_name == "option" and each.name != "help"]
+        known = {name for names in options for name in names}
+        wrong += [f"{' '.join(path)}: has no {name}" for name in sorted(told[path] - known)]
+        wrong += [f"{' '.join(path)}: {names[0]} is missing" for names in options if not named & set(names)]
+    assert wrong == []
+
+
+def test_help_shows_arguments_that_may_be_left_out_in_one_pair_of_brackets() -> None:
+    for path, found in list_commands(command):
+        context = found.make_context(path[-1], [], resilient_parsing=True)
+        usage = " ".join(found.collect_usage_pieces(context))
+        assert not re.search(r"\[\[|\.\.\.[\]}]", usage), f"{' '.join(path)}: {usage}"
