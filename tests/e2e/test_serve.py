@@ -76,7 +76,10 @@ class Server:
         return dict(found)
 
     def wait_until(self, name: str, status: str) -> dict[str, Any]:
-        return dict(wait_for(lambda: found if (found := self.instance(name))["status"] == status else None))
+        try:
+            return dict(wait_for(lambda: found if (found := self.instance(name))["status"] == status else None))
+        except AssertionError as error:
+            raise AssertionError(f"not {status}: {self.instance(name)}") from error
 
     def kill(self) -> None:
         with suppress(psutil.NoSuchProcess):
