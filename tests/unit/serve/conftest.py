@@ -13,8 +13,9 @@ from starlette.testclient import TestClient, WebSocketTestSession
 from tests.e2e.collection import FAST, collect_here, write_config
 
 from throwcollect.runs.record import Record
-from throwcollect.runs.records import OpenRun, Records
+from throwcollect.runs.records import OpenRun, Records, Run
 from throwcollect.runs.state_directory import STATE_VARIABLE
+from throwcollect.serve import instances as instances_module
 from throwcollect.serve.access import Access, Keys
 from throwcollect.serve.app import make_app
 from throwcollect.serve.catalogue import Catalogue
@@ -113,6 +114,21 @@ def remember(tmp_path: Path) -> Iterator[Remember]:
     yield make
     for run in opened:
         run.close()
+
+
+@pytest.fixture
+def begun(monkeypatch: pytest.MonkeyPatch, remember: Remember) -> list[dict[str, Any]]:
+    """What runs are begun from; they live at once, and do nothing."""
+    asked: list[dict[str, Any]] = []
+
+    def begin(config: Path, **options: Any) -> Run:
+        asked.append({"config": config, **options})
+        name = options.get("run") or f"resumed-{len(asked)}"
+        remember(name, origin=options["origin"], kind=options.get("kind", "collection"))
+        return Records().get(name)
+
+    monkeypatch.setattr(instances_module, "begin_run", begin)
+    return asked
 
 
 def ended(**fields: Any) -> dict[str, Any]:

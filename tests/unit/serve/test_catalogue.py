@@ -1,6 +1,5 @@
 """Catalogues, and what their messages say."""
 
-import re
 from pathlib import Path
 
 import pytest
@@ -8,8 +7,7 @@ from tests.unit.serve.conftest import CONFIG
 
 from throwcollect.config.containers import ContainerSpec, NodeContainerConfig
 from throwcollect.errors import ConfigError, NotFoundError
-from throwcollect.serve.catalogue import NAME, Catalogue
-from throwcollect.serve.instance_routes import make_id
+from throwcollect.serve.catalogue import Catalogue
 
 
 @pytest.fixture
@@ -124,9 +122,3 @@ def test_mistakes_in_a_configuration_are_told_with_its_own_line(directory: Path)
         f"{path}:3: components.a.session: names a file with errors",
         f"{directory / 'small.yaml'}:2: trails: unknown key; did you mean 'trials'?",
     ]
-
-
-def test_an_id_that_is_chosen_fits_however_long_the_name_of_the_component_is() -> None:
-    for name in ("c", "c" * 63):
-        assert re.fullmatch(NAME, make_id(name))
-        assert make_id(name).startswith(name[:51])

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
-import re
 import shutil
 import threading
 from pathlib import Path
@@ -14,7 +12,6 @@ import pytest
 from starlette.testclient import TestClient
 from tests.unit.serve.conftest import Remember, Served, ended
 
-from throwcollect.robots.talos import TALOS
 from throwcollect.runs.component_container import ContainerOrder
 from throwcollect.runs.record import Failure, Origin, Planning
 from throwcollect.runs.records import Records, Run
@@ -22,22 +19,8 @@ from throwcollect.runtimes.runtime import NodeState
 from throwcollect.serve import instances as instances_module
 from throwcollect.serve.catalogue import Catalogue
 
+pytestmark = pytest.mark.usefixtures("begun")
 URL = "/api/v1/instances"
-
-
-@pytest.fixture(autouse=True)
-def begun(monkeypatch: pytest.MonkeyPatch, remember: Remember) -> list[dict[str, Any]]:
-    """What runs are begun from; they live at once, and do nothing."""
-    asked: list[dict[str, Any]] = []
-
-    def begin(config: Path, **options: Any) -> Run:
-        asked.append({"config": config, **options})
-        name = options.get("run") or f"resumed-{len(asked)}"
-        remember(name, origin=options["origin"], kind=options.get("kind", "collection"))
-        return Records().get(name)
-
-    monkeypatch.setattr(instances_module, "begin_run", begin)
-    return asked
 
 
 def put(client: TestClient, name: str, **wish: Any) -> Any:
@@ -228,117 +211,6 @@ def test_some_keys_are_the_operators_alone(
     assert not begun
 
 
-@pytest.mark.parametrize(
-    "wish",
-    [
-        {},
-        {"component": 7},
-        {"component": "throws", "image": "ubuntu"},
-        {"component": "throws", "simulations": 0},
-        {"component": "throws", "simulations": 257},
-        {"component": "throws", "set": {"trials": {"image": "ubuntu"}}, "mounts": ["/:/host"]},
-        {"component": "throws", "set": []},
-        [],
-        None,
-        "throws",
-    ],
-)
-def test_a_request_of_another_form_is_refused(client: TestClient, begun: list[dict[str, Any]], wish: Any) -> None:
-    answer = client.put(f"{URL}/a", json=wish)
-    assert answer.status_code == 422
-    assert answer.json()["problems"]
-    assert not begun
-
-
-@pytest.mark.parametrize(
-    ("wish", "key", "message"),
-    [
-        ({}, "component", "missing; should be text"),
-        ({"component": 7}, "component", "should be text, got 7"),
-        (
-            {"component": "throws", "simulations": 300},
-            "simulations",
-            "should be a whole number from 1 to 256 or null, got 300",
-        ),
-        (
-            {"component": "throws", "simulations": "many"},
-            "simulations",
-            "should be a whole number from 1 to 256 or null, got 'many'",
-        ),
-        ({"component": "throws", "simulation": 3}, "simulation", "unknown key; did you mean 'simulations'?"),
-        ({"component": "throws", "set": []}, "set", "should be keys, each with anything, got an empty list"),
-        (
-            {"component": "throws", "set": {"trials": "\ud800"}},
-            "set",
-            "should be text that UTF-8 can hold, got half a character ('\\ud800')",
-        ),
-        ([], "", "the body should be {component: …}, got an empty list"),
-    ],
-)
-def test_what_is_wrong_with_a_body_is_told_as_with_a_configuration(
-    client: TestClient, wish: Any, key: str, message: str
-) -> None:
-    answer = client.put(f"{URL}/a", content=json.dumps(wish).encode(), headers={"Content-Type": "application/json"})
-    assert answer.headers["content-type"] == "application/problem+json"
-    assert (answer.status_code, answer.json()) == (
-        422,
-        {
-            "title": f"{key}: {message}" if key else message,
-            "status": 422,
-            "problems": [{"message": message, "key": key, "line": None}],
-        },
-    )
-
-
-def test_each_key_of_a_body_is_told(client: TestClient) -> None:
-    answer = client.put(f"{URL}/a", json={"simulations": 0, "image": "ubuntu"})
-    assert [each["key"] for each in answer.json()["problems"]] == ["image", "component", "simulations"]
-    scaled = client.patch(f"{URL}/a", json={"simulations": "x"}).json()
-    assert scaled["title"] == "simulations: should be a whole number from 0 to 256, got 'x'"
-    assert client.post("/api/v1/exchange", json={"code": 3}).json()["title"] == "code: should be text, got 3"
-
-
-def test_a_body_that_is_no_json_is_told_in_one_sentence(client: TestClient) -> None:
-    torn = client.put(f"{URL}/a", content=b"{", headers={"Content-Type": "application/json"}).json()
-    assert torn["title"].startswith("the body is not valid JSON: ")
-    untold = client.put(f"{URL}/a", content=b"{}").json()
-    assert untold["title"] == "the body should be JSON, and the header Content-Type should be application/json"
-
-
-def test_what_is_no_json_is_refused(client: TestClient) -> None:
-    for content in (
-        b"{",
-        b"\xff",
-        b'{"component": "throws", "set": {"trials": "\\ud800"}}',
-        b'{"component": "throws", "set": {"\\ud800": 1}}',
-        b"[" * 5000,
-    ):
-        answer = client.put(f"{URL}/a", content=content, headers={"Content-Type": "application/json"})
-        assert answer.status_code in (400, 422), (content[:60], answer.text)
-
-
-@pytest.mark.parametrize("name", ["-rf", "A", "a.b", "a b", "ä", 64 * "a", "a%0A", "%00", "..%2fa", ".."])
-def test_ids_of_strange_form_begin_nothing(client: TestClient, begun: list[dict[str, Any]], name: str) -> None:
-    assert put(client, name).status_code in (404, 405, 422)
-    assert not begun
-    assert client.get(f"{URL}/{name}").status_code == 404 or name == ".."
-    assert client.get(f"{URL}/{name}/events").status_code == 404
-
-
-def test_a_component_that_is_none_is_not_found(client: TestClient) -> None:
-    answer = client.put(f"{URL}/a", json={"component": "nothing"})
-    assert (answer.status_code, answer.json()["expected"]) == (404, "one of throws, talos")
-    assert client.get("/api/v1/components/nothing").status_code == 404
-    assert client.get("/api/v1/components/talos").json()["kind"] == "session"
-
-
-def test_an_id_is_chosen_for_who_has_none(client: TestClient) -> None:
-    answer = client.post(URL, json={"component": "throws"})
-    assert answer.status_code == 202
-    assert answer.headers["location"] == f"{URL}/{answer.json()['id']}"
-    assert client.get(answer.headers["location"]).status_code == 200
-
-
 def test_what_has_ended_cannot_be_stopped_or_scaled(client: TestClient, remember: Remember) -> None:
     remember("over", **ended())
     remember("dead", lives=False)
@@ -376,23 +248,6 @@ def test_all_that_clients_have_begun_are_stopped_and_nothing_else(
     remember("of-a-command")
     answer = client.delete(URL)
     assert (answer.status_code, answer.json(), told) == (202, ["begun"], ["begun"])
-
-
-def test_viewers_are_told_of_the_scene(client: TestClient, remember: Remember, tmp_path: Path) -> None:
-    directory = tmp_path / "datasets" / "a"
-    remember("a")
-    assert client.get(f"{URL}/a/scene").status_code == 404
-    directory.mkdir(parents=True)
-    text = "name: a\ntrials: 3\nrobot: {base_height_m: 1.1}\nscene: {landing_height_m: 0.4}\n"
-    (directory / "config.yaml").write_text(text)
-    known = {"base_height_m": 1.1, "landing_height_m": 0.4, "target_distance_m": None}
-    assert client.get(f"{URL}/a/scene").json() == known
-    (directory / "config.yaml").write_text(f"""{text}sweep:
-  parameters: {{scene.landing_height_m: {{min: 0.1, max: 0.5}}, task.duration_s: {{min: 0.9, max: 1.2}}}}
-  target: {{distance_m: {{min: 0.5, max: 2.5, bins: 4}}}}
-""")
-    aimed = {"base_height_m": 1.1, "landing_height_m": None, "target_distance_m": [0.5, 2.5]}
-    assert client.get(f"{URL}/a/scene").json() == aimed
 
 
 def test_records_that_cannot_be_read_are_told_of(client: TestClient, state: Path, remember: Remember) -> None:
@@ -439,62 +294,3 @@ def test_the_state_tells_how_far_a_plan_is(client: TestClient, remember: Remembe
     assert found == {"large": ("planning", {"checked": 1200, "trials": 30000}), "killed": ("died", None)}
     # It counts as one that lives.
     assert client.get("/api/v1/state").json()["instances"][0]["id"] == "large"
-
-
-def test_logs_and_events_are_read_where_they_lie(client: TestClient, remember: Remember, tmp_path: Path) -> None:
-    remember("a")
-    assert client.get(f"{URL}/a/log/sim_0").status_code == 404
-    assert client.get(f"{URL}/a/events").content == b""
-    logs = tmp_path / "datasets" / "a" / "logs"
-    logs.mkdir(parents=True)
-    (logs / "sim_0.log").write_bytes(b"".join(b"line %d\xff\n" % number for number in range(500)))
-    event = '{"time": "", "run": "a", "event": "started"}\n'
-    (logs / "events.jsonl").write_text(event.replace('"a"', '"earlier"') + event)
-    (tmp_path / "secret.log").write_text("secret")
-    (logs / "leak.log").symlink_to(tmp_path / "secret.log")
-    assert client.get(f"{URL}/a/log/sim_0?tail=2").text == "line 498\ufffd\nline 499\ufffd\n"
-    assert len(client.get(f"{URL}/a/log/sim_0").text.splitlines()) == 200
-    assert client.get(f"{URL}/a/events").text == event
-    for node in ("leak", "..%2f..%2f..%2fsecret", "../secret", "sim_1", "%00", 300 * "a"):
-        answer = client.get(f"{URL}/a/log/{node}")
-        assert answer.status_code == 404, node
-        assert "secret\n" not in answer.text
-    for tail in ("0", "10001", "x"):
-        assert client.get(f"{URL}/a/log/sim_0?tail={tail}").status_code == 422
-
-
-def test_meshes_are_had_by_their_content_which_never_changes(
-    client: TestClient, remember: Remember, tmp_path: Path
-) -> None:
-    directory = tmp_path / "datasets" / "a"
-    directory.mkdir(parents=True)
-    (directory / "config.yaml").write_text("name: small\n")
-    remember("a")
-    meshes = client.get(f"{URL}/a/meshes").json()
-    named = set(re.findall(r'package://[^"]+', client.get(f"{URL}/a/urdf").text))
-    assert {each["url"] for each in meshes} == named
-    for each in (meshes[0], meshes[-1]):
-        found = client.get(f"/api/v1/meshes/{each['sha256']}")
-        assert (hashlib.sha256(found.content).hexdigest(), len(found.content)) == (each["sha256"], each["bytes"])
-        assert "immutable" in found.headers["cache-control"]
-        assert found.content == client.get(f"/api/v1/meshes/{each['url'].removeprefix('package://')}").content
-    assert client.get(f"/api/v1/meshes/{64 * '0'}").status_code == 404
-    assert client.get(f"{URL}/nobody/meshes").status_code == 404
-
-
-def test_meshes_come_from_packages_of_robots_alone(served: Served) -> None:
-    client = served.client()
-    base = "/api/v1/meshes"
-    mesh = "example-robot-data/robots/talos_data/meshes/head/head_1.stl"
-    assert client.get(f"{base}/{mesh}").content == (TALOS.share() / mesh).read_bytes()
-    for path in (
-        "../x",
-        "..%2f..%2fsetup.py",
-        "%2e%2e/x",
-        "nothing/x",
-        "%00/x",
-        "a/%00",
-        f"a/{300 * 'a'}",
-        "%2fetc/passwd",
-    ):
-        assert client.get(f"{base}/{path}").status_code == 404, path

@@ -1,0 +1,157 @@
+"""What clients may say to the routes of instances, in which form, and what they are answered."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+from starlette.testclient import TestClient
+from tests.unit.serve.conftest import Remember
+
+from throwcollect.serve.catalogue import NAME
+from throwcollect.serve.instance_routes import make_id
+
+pytestmark = pytest.mark.usefixtures("begun")
+URL = "/api/v1/instances"
+
+
+@pytest.mark.parametrize(
+    "wish",
+    [
+        {},
+        {"component": 7},
+        {"component": "throws", "image": "ubuntu"},
+        {"component": "throws", "simulations": 0},
+        {"component": "throws", "simulations": 257},
+        {"component": "throws", "set": {"trials": {"image": "ubuntu"}}, "mounts": ["/:/host"]},
+        {"component": "throws", "set": []},
+        [],
+        None,
+        "throws",
+    ],
+)
+def test_a_request_of_another_form_is_refused(client: TestClient, begun: list[dict[str, Any]], wish: Any) -> None:
+    answer = client.put(f"{URL}/a", json=wish)
+    assert answer.status_code == 422
+    assert answer.json()["problems"]
+    assert not begun
+
+
+@pytest.mark.parametrize(
+    ("wish", "key", "message"),
+    [
+        ({}, "component", "missing; should be text"),
+        ({"component": 7}, "component", "should be text, got 7"),
+        (
+            {"component": "throws", "simulations": 300},
+            "simulations",
+            "should be a whole number from 1 to 256 or null, got 300",
+        ),
+        (
+            {"component": "throws", "simulations": "many"},
+            "simulations",
+            "should be a whole number from 1 to 256 or null, got 'many'",
+        ),
+        ({"component": "throws", "simulation": 3}, "simulation", "unknown key; did you mean 'simulations'?"),
+        ({"component": "throws", "set": []}, "set", "should be keys, each with anything, got an empty list"),
+        (
+            {"component": "throws", "set": {"trials": "\ud800"}},
+            "set",
+            "should be text that UTF-8 can hold, got half a character ('\\ud800')",
+        ),
+        ([], "", "the body should be {component: …}, got an empty list"),
+    ],
+)
+def test_what_is_wrong_with_a_body_is_told_as_with_a_configuration(
+    client: TestClient, wish: Any, key: str, message: str
+) -> None:
+    answer = client.put(f"{URL}/a", content=json.dumps(wish).encode(), headers={"Content-Type": "application/json"})
+    assert answer.headers["content-type"] == "application/problem+json"
+    assert (answer.status_code, answer.json()) == (
+        422,
+        {
+            "title": f"{key}: {message}" if key else message,
+            "status": 422,
+            "problems": [{"message": message, "key": key, "line": None}],
+        },
+    )
+
+
+def test_each_key_of_a_body_is_told(client: TestClient) -> None:
+    answer = client.put(f"{URL}/a", json={"simulations": 0, "image": "ubuntu"})
+    assert [each["key"] for each in answer.json()["problems"]] == ["image", "component", "simulations"]
+    scaled = client.patch(f"{URL}/a", json={"simulations": "x"}).json()
+    assert scaled["title"] == "simulations: should be a whole number from 0 to 256, got 'x'"
+    assert client.post("/api/v1/exchange", json={"code": 3}).json()["title"] == "code: should be text, got 3"
+
+
+def test_a_body_that_is_no_json_is_told_in_one_sentence(client: TestClient) -> None:
+    torn = client.put(f"{URL}/a", content=b"{", headers={"Content-Type": "application/json"}).json()
+    assert torn["title"].startswith("the body is not valid JSON: ")
+    untold = client.put(f"{URL}/a", content=b"{}").json()
+    assert untold["title"] == "the body should be JSON, and the header Content-Type should be application/json"
+
+
+def test_what_is_no_json_is_refused(client: TestClient) -> None:
+    for content in (
+        b"{",
+        b"\xff",
+        b'{"component": "throws", "set": {"trials": "\\ud800"}}',
+        b'{"component": "throws", "set": {"\\ud800": 1}}',
+        b"[" * 5000,
+    ):
+        answer = client.put(f"{URL}/a", content=content, headers={"Content-Type": "application/json"})
+        assert answer.status_code in (400, 422), (content[:60], answer.text)
+
+
+@pytest.mark.parametrize("name", ["-rf", "A", "a.b", "a b", "ä", 64 * "a", "a%0A", "%00", "..%2fa", ".."])
+def test_ids_of_strange_form_begin_nothing(client: TestClient, begun: list[dict[str, Any]], name: str) -> None:
+    assert client.put(f"{URL}/{name}", json={"component": "throws"}).status_code in (404, 405, 422)
+    assert not begun
+    assert client.get(f"{URL}/{name}").status_code == 404 or name == ".."
+    assert client.get(f"{URL}/{name}/events").status_code == 404
+
+
+def test_a_component_that_is_none_is_not_found(client: TestClient) -> None:
+    answer = client.put(f"{URL}/a", json={"component": "nothing"})
+    assert (answer.status_code, answer.json()["expected"]) == (404, "one of throws, talos")
+    assert client.get("/api/v1/components/nothing").status_code == 404
+    assert client.get("/api/v1/components/talos").json()["kind"] == "session"
+
+
+def test_an_id_is_chosen_for_who_has_none(client: TestClient) -> None:
+    answer = client.post(URL, json={"component": "throws"})
+    assert answer.status_code == 202
+    assert answer.headers["location"] == f"{URL}/{answer.json()['id']}"
+    assert client.get(answer.headers["location"]).status_code == 200
+
+
+def test_an_id_that_is_chosen_fits_however_long_the_name_of_the_component_is() -> None:
+    for name in ("c", "c" * 63):
+        assert re.fullmatch(NAME, make_id(name))
+        assert make_id(name).startswith(name[:51])
+
+
+def test_logs_and_events_are_read_where_they_lie(client: TestClient, remember: Remember, tmp_path: Path) -> None:
+    remember("a")
+    assert client.get(f"{URL}/a/log/sim_0").status_code == 404
+    assert client.get(f"{URL}/a/events").content == b""
+    logs = tmp_path / "datasets" / "a" / "logs"
+    logs.mkdir(parents=True)
+    (logs / "sim_0.log").write_bytes(b"".join(b"line %d\xff\n" % number for number in range(500)))
+    event = '{"time": "", "run": "a", "event": "started"}\n'
+    (logs / "events.jsonl").write_text(event.replace('"a"', '"earlier"') + event)
+    (tmp_path / "secret.log").write_text("secret")
+    (logs / "leak.log").symlink_to(tmp_path / "secret.log")
+    assert client.get(f"{URL}/a/log/sim_0?tail=2").text == "line 498\ufffd\nline 499\ufffd\n"
+    assert len(client.get(f"{URL}/a/log/sim_0").text.splitlines()) == 200
+    assert client.get(f"{URL}/a/events").text == event
+    for node in ("leak", "..%2f..%2f..%2fsecret", "../secret", "sim_1", "%00", 300 * "a"):
+        answer = client.get(f"{URL}/a/log/{node}")
+        assert answer.status_code == 404, node
+        assert "secret\n" not in answer.text
+    for tail in ("0", "10001", "x"):
+        assert client.get(f"{URL}/a/log/sim_0?tail={tail}").status_code == 422
