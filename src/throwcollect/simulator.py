@@ -42,7 +42,8 @@ class Simulator:
     """Simulates throws of one configuration, one after the other, as a collection of it would.
 
     A throw has the samples, the events and the digest that a dataset of the same configuration has for the same values
-    under the same number. It takes less than a tenth of a second; the first takes one, as the robot is loaded.
+    under the same number. The first throw takes about a second, as the robot is loaded, and each further one less than
+    a tenth of that.
 
     Use it as a context manager, or `close` it: a process can have a few physics engines at a time.
 
