@@ -24,6 +24,7 @@ import pyarrow as pa
 from throwcollect.cluster.submit import submit
 from throwcollect.config.loader import load
 from throwcollect.config.schema import Config
+from throwcollect.coordinator.onlooker import SILENT
 from throwcollect.dataset.creation import create
 from throwcollect.dataset.directory import MANIFEST, PLAN, THROWS, shard_name
 from throwcollect.dataset.join import join
@@ -83,9 +84,8 @@ def _measure(trials: int, one: Path, scratch: Path) -> None:
     tasks = trials // PER_SHARD
     planned, plan = _timed(lambda: make_plan(config))
     frozen, _ = _timed(lambda: create(scratch / "data", plan))
-    submitted, _ = _timed(
-        lambda: submit(CONFIG, scratch / "dry", tasks, overrides=[*_SETTINGS, f"trials={trials}"], dry=True, say=print)
-    )
+    changes = [*_SETTINGS, f"trials={trials}"]
+    submitted, _ = _timed(lambda: submit(CONFIG, scratch / "dry", tasks, overrides=changes, dry=True, onlooker=SILENT))
     _make_slices(scratch / "data", plan, one)
     before_mb = _peak_mb()
     joined, _ = _timed(lambda: join(scratch / "data"))

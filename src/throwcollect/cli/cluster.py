@@ -10,6 +10,7 @@ import typer
 
 from throwcollect.cli.options import ConfigArgument, JsonOption, SetOption, TrialsOption, overrides
 from throwcollect.cli.printing import print_json, tell
+from throwcollect.cli.terminal import display
 from throwcollect.wording import command
 
 
@@ -39,7 +40,8 @@ def submit(
     from throwcollect.cluster.submit import submit as submit_dataset
 
     changes = overrides(settings, trials=trials)
-    done = submit_dataset(config, output, tasks, overrides=changes, live=mode == "live", dry=dry_run, say=tell)
+    shown = display(quiet=json, bar=False)
+    done = submit_dataset(config, output, tasks, overrides=changes, live=mode == "live", dry=dry_run, onlooker=shown)
     if done.job is None:
         typer.echo(done.script, nl=False)
         if mode == "array":

@@ -139,7 +139,7 @@ def resume(
 def _resume_tasks(directory: Path, changes: list[str], *, json: bool) -> None:
     from throwcollect.cluster.submit import submit_missing
 
-    submitted = submit_missing(directory, overrides=changes, say=tell)
+    submitted = submit_missing(directory, overrides=changes, onlooker=display(quiet=json, bar=False))
     job = submitted.job if submitted is not None else None
     if json:
         numbers = {"array": job.array, "join": job.join} if job is not None else {"array": "", "join": ""}

@@ -10,6 +10,7 @@ import typer
 from throwcollect.cli.options import ConfigArgument, JsonOption, SetOption, TrialsOption, overrides
 from throwcollect.cli.printing import format_number, print_json, print_result, tell
 from throwcollect.cli.streams import end_with_reader
+from throwcollect.cli.terminal import display
 from throwcollect.config.default_path import DEFAULT_CONFIG
 from throwcollect.errors import ConfigError
 from throwcollect.side_by_side import count_cores
@@ -71,10 +72,11 @@ def plan(
 
     end_with_reader()
     with load_locating_errors(path, overrides(settings, trials=trials)) as config:
+        shown = display(quiet=json, bar=False)
         if output is None:
-            found = draw_plan(config, directory=path.parent, processes=count_cores(), say=tell)
+            found = draw_plan(config, directory=path.parent, processes=count_cores(), onlooker=shown)
         else:
-            found = prepare(config, output, sweep_directory=path.parent, processes=count_cores(), say=tell)
+            found = prepare(config, output, sweep_directory=path.parent, processes=count_cores(), onlooker=shown)
     if json:
         rows = [
             {
@@ -90,10 +92,10 @@ def plan(
         print_json(rows)
         return
     names = (*found.keys, *found.trials.target_names)
-    shown = found.trials if output is None else ()
-    if shown:
+    listed = found.trials if output is None else ()
+    if listed:
         typer.echo("  ".join(["trial", *names]))
-    for trial in shown:
+    for trial in listed:
         values = {**trial.values, **trial.target}
         numbers = [format_number(values.get(name)).rjust(len(name)) for name in names]
         note = f"  refused: {trial.refused}" if trial.refused else ""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass, replace
 from datetime import datetime, timezone
@@ -25,6 +25,7 @@ from throwcollect.cluster.submission import (
 )
 from throwcollect.config.loader import load_locating_errors
 from throwcollect.config.schema import Config
+from throwcollect.coordinator.onlooker import Onlooker
 from throwcollect.coordinator.prepare import prepare
 from throwcollect.coordinator.resume import refuse_changes
 from throwcollect.dataset.directory import CONFIG, PLAN, TRIALS
@@ -39,7 +40,6 @@ from throwcollect.sweep.slice import Slice
 from throwcollect.wording import command, format_count
 
 _COLLECT, _JOIN, _LOGS = "collect.sh", "join.sh", "logs"
-Say = Callable[[str], object]
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,7 @@ def submit(
     overrides: Sequence[str] = (),
     live: bool = False,
     dry: bool = False,
-    say: Say,
+    onlooker: Onlooker,
 ) -> Submitted:
     """Plan a dataset and submit it as an array of tasks, or as one run on several nodes.
 
@@ -75,7 +75,7 @@ def submit(
         overrides: Overrides of keys of the configuration, as ``--set`` takes them.
         live: Whether it is one run on several nodes, as a plan needs that grows with its results.
         dry: Whether to make only the script, and write nothing.
-        say: Receives messages on the progress.
+        onlooker: Is told what is planned and submitted.
 
     Raises:
         ConfigError: If the configuration cannot be collected so, something is missing that tasks need, or Slurm would
@@ -105,19 +105,19 @@ def submit(
         if not live:
             _check_size(tasks)
         made, planned = not directory.exists(), not (directory / PLAN).exists()
-        _freeze(complete, directory, config.parent, say)
+        _freeze(complete, directory, config.parent, onlooker)
         # Only from here on, because a directory that was refused holds the files of somebody else.
         undo.callback(_remove, directory, made=made, planned=planned)
         if not live:
             Plan.read(directory / PLAN, read_frozen_config(directory), slice=Slice(0, tasks))
         image = str(scripts.image) if scripts.image else None
         submission = Submission(complete.name, tasks, tuple(scripts.program), image, live=live)
-        submitted = _submit(scripts, submission, slices, say)
+        submitted = _submit(scripts, submission, slices, onlooker)
         undo.pop_all()
         return submitted
 
 
-def submit_missing(directory: Path, *, overrides: Sequence[str] = (), say: Say) -> Submitted | None:
+def submit_missing(directory: Path, *, overrides: Sequence[str] = (), onlooker: Onlooker) -> Submitted | None:
     """Submit the slices of a dataset that are neither finished nor on their way; of one run, what is left of it.
 
     Overrides may change only keys that do not change the dataset.
@@ -146,10 +146,10 @@ def submit_missing(directory: Path, *, overrides: Sequence[str] = (), say: Say) 
         program=submission.program,
         image=None if submission.image is None else Path(submission.image),
     )
-    return _submit(scripts, submission, missing, say)
+    return _submit(scripts, submission, missing, onlooker)
 
 
-def _submit(scripts: BatchScripts, submission: Submission, slices: tuple[int, ...], say: Say) -> Submitted:
+def _submit(scripts: BatchScripts, submission: Submission, slices: tuple[int, ...], onlooker: Onlooker) -> Submitted:
     """Write the scripts and submit them; without slices, submit only the job that joins what is finished.
 
     Raises:
@@ -181,7 +181,7 @@ def _submit(scripts: BatchScripts, submission: Submission, slices: tuple[int, ..
             message = f"submitted job {joining}, which joins the slices; all of them are finished"
     job = Job(array, joining, slices, datetime.now(timezone.utc))
     write_submission(directory, replace(submission, jobs=(*submission.jobs, job)))
-    say(message)
+    onlooker.say(message)
     return Submitted(directory, text, job)
 
 
@@ -219,16 +219,16 @@ def _check_size(tasks: int) -> None:
         raise ConfigError(f"--tasks {tasks}: is more than Slurm takes here", expected=f"at most {largest}")
 
 
-def _freeze(config: Config, directory: Path, sweep_directory: Path, say: Say) -> None:
+def _freeze(config: Config, directory: Path, sweep_directory: Path, onlooker: Onlooker) -> None:
     """Make the plan of the configuration in the directory, or check that the plan there is the same."""
     if (directory / PLAN).exists():
         refuse_changes(directory, read_changed_config(directory), config)
-        say(f"takes the plan in {directory}")
+        onlooker.say(f"takes the plan in {directory}")
         return
-    plan = prepare(config, directory, sweep_directory=sweep_directory, processes=count_cores(), say=say)
+    plan = prepare(config, directory, sweep_directory=sweep_directory, processes=count_cores(), onlooker=onlooker)
     refused = len(plan.trials.refused)
     note = f", {refused} refused by calculation" if refused else ""
-    say(f"plan: {format_count(len(plan.trials), 'trial')}{note}; dataset: {directory}")
+    onlooker.say(f"plan: {format_count(len(plan.trials), 'trial')}{note}; dataset: {directory}")
 
 
 def _remove(directory: Path, *, made: bool, planned: bool) -> None:

@@ -11,6 +11,7 @@ from pathlib import Path
 
 from throwcollect.config.schema import Config, RobotConfig
 from throwcollect.config.values import with_values
+from throwcollect.coordinator.onlooker import SILENT, Onlooker
 from throwcollect.dataset.creation import create, refuse_taken
 from throwcollect.dataset.directory import TRIALS
 from throwcollect.dataset.throws_table import ThrowsTable
@@ -38,12 +39,8 @@ _SUNKEN_M = 0.01
 _LEAST_BYTES = 40
 """Bytes that each trial takes in the file of a plan: its digest and its seed, which nothing compresses."""
 
-Say = Callable[[str], object]
-UpdatePlan = Callable[[int, int], object]
-"""Is called with how many trials of how many have been checked; an error that it raises gives the plan up."""
 
-
-def draw_plan(config: Config, *, directory: Path, processes: int = 1, say: Say = lambda _: None) -> Plan:
+def draw_plan(config: Config, *, directory: Path, processes: int = 1, onlooker: Onlooker = SILENT) -> Plan:
     """Draw all trials that are known before anything runs, and refuse those that the robot cannot do.
 
     Args:
@@ -51,19 +48,19 @@ def draw_plan(config: Config, *, directory: Path, processes: int = 1, say: Say =
         directory: Where a relative `sweep.file` is looked for: the directory of the configuration's file.
         processes: How many processes may check the trials of a large plan; more than one import the program that calls
             this, as those of `multiprocessing` do.
-        say: Called now and then with how many trials of a large plan have been checked.
+        onlooker: Is told how many trials of a large plan have been checked, and warned of a robot that is misplaced.
 
     Raises:
         ConfigError: If the sweep cannot be drawn, or no trial is left.
         WorkerError: If a process that checks trials is killed.
     """
-    points = _draw_points(config, directory, say)
-    return _check_trials(config, points, processes=processes, say=say, update_plan=lambda *_: None)
+    points = _draw_points(config, directory, onlooker)
+    return _check_trials(config, points, processes=processes, onlooker=onlooker)
 
 
-def _draw_points(config: Config, directory: Path, say: Say) -> Points:
+def _draw_points(config: Config, directory: Path, onlooker: Onlooker) -> Points:
     if (count := _count_before(config)) >= _TOLD_TRIALS:
-        say(f"plan: draws {count} trials")
+        onlooker.say(f"plan: draws {count} trials")
     return draw_first_points(config, directory=directory)
 
 
@@ -72,33 +69,33 @@ def _count_before(config: Config) -> int:
     return 0 if config.grows else config.trials or 0
 
 
-def _check_trials(config: Config, points: Points, *, processes: int, say: Say, update_plan: UpdatePlan) -> Plan:
+def _check_trials(config: Config, points: Points, *, processes: int, onlooker: Onlooker) -> Plan:
     """Make the plan of points, and refuse the trials that the robot cannot do (see `draw_plan`)."""
     if sentence := find_sunken_robot(config):
-        say(sentence)
+        onlooker.warn(sentence)
     # The table checks the task, which may be of another package and broken: without this, each trial would be refused.
     ThrowsTable((), config)
     count = len(points.values)
     size = max(_TRIALS_A_PIECE, count // _MOST_PIECES)
     if count >= _TOLD_TRIALS:
-        say(f"plan: checks {count} trials")
+        onlooker.say(f"plan: checks {count} trials")
     # The first pieces are small, so that progress can be reported soon.
     firsts = [*range(0, min(size, count), _TRIALS_A_PIECE), *range(size, count, size)]
     pieces = [(first, points[first:stop]) for first, stop in pairwise([*firsts, count])]
     processes = processes if count >= _MANY_TRIALS else 1
     say_at = time.monotonic() + _TELL_FIRST_S
-    update_plan(0, count)
+    onlooker.update_plan(0, count)
     with working_side_by_side(
         pieces, _make_checked_trials, (config,), processes=processes, doing="checks trials"
     ) as checked:
         trials = next(checked)
-        update_plan(len(trials), count)
+        onlooker.update_plan(len(trials), count)
         for piece in checked:
             trials.extend(piece)
-            update_plan(len(trials), count)
+            onlooker.update_plan(len(trials), count)
             if time.monotonic() >= say_at:
                 say_at = time.monotonic() + _TELL_EVERY_S
-                say(f"plan: {len(trials)} of {count} trials checked")
+                onlooker.say(f"plan: {len(trials)} of {count} trials checked")
     check_some_left(trials)
     return Plan(config, trials)
 
@@ -209,13 +206,12 @@ def prepare(
     *,
     sweep_directory: Path,
     processes: int = 1,
-    say: Say = lambda _: None,
-    update_plan: UpdatePlan = lambda *_: None,
+    onlooker: Onlooker = SILENT,
 ) -> Plan:
     """Freeze the plan: write a dataset directory that holds the resolved configuration and all trials.
 
-    The directory has to be new or empty. A relative `sweep.file` is looked for in `sweep_directory`. `update_plan` is
-    called often with how many trials have been checked (see `UpdatePlan`); the rest is as for `draw_plan`.
+    The directory has to be new or empty. A relative `sweep.file` is looked for in `sweep_directory`. The rest is as for
+    `draw_plan`.
 
     Raises:
         ConfigError: If the sweep or the directory cannot be used; nothing stays on the disk then.
@@ -224,10 +220,10 @@ def prepare(
     # To check many trials takes minutes, so what needs no plan is looked at before.
     refuse_taken(directory)
     _check_room(directory, _count_before(config))
-    update_plan(0, _count_before(config))
-    points = _draw_points(config, sweep_directory, say)
+    onlooker.update_plan(0, _count_before(config))
+    points = _draw_points(config, sweep_directory, onlooker)
     _check_room(directory, len(points.values))
-    plan = _check_trials(config, points, processes=processes, say=say, update_plan=update_plan)
+    plan = _check_trials(config, points, processes=processes, onlooker=onlooker)
     # This comes after the plan is drawn, because the configuration as it was given names the place of its list.
     plan = replace(plan, config=make_self_contained(config))
     try:

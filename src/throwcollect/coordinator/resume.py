@@ -12,7 +12,8 @@ from throwcollect.config.loader import dump_yaml, load, load_locating_errors
 from throwcollect.config.problems import quote
 from throwcollect.config.schema import Config
 from throwcollect.config.values import differences
-from throwcollect.coordinator.prepare import Say, draw_plan, make_self_contained, prepare, read_listed_points
+from throwcollect.coordinator.onlooker import SILENT, Onlooker
+from throwcollect.coordinator.prepare import draw_plan, make_self_contained, prepare, read_listed_points
 from throwcollect.dataset.configuration import read_config
 from throwcollect.dataset.directory import CONFIG, METADATA, PLAN, SHARD_SUFFIX, SOURCES, TRIALS, config_path
 from throwcollect.dataset.lock import hold_lock
@@ -39,7 +40,7 @@ def begun(directory: Path) -> bool:
 
 
 def resume(
-    config: Config, directory: Path, *, sweep_directory: Path, check: bool = False, say: Say = lambda _: None
+    config: Config, directory: Path, *, sweep_directory: Path, check: bool = False, onlooker: Onlooker = SILENT
 ) -> Plan:
     """Write a configuration and its plan into a dataset's directory; some of its trials may have run already.
 
@@ -50,7 +51,8 @@ def resume(
         directory: Directory of the dataset.
         sweep_directory: Where a relative `sweep.file` is looked for, should the plan be made anew.
         check: Whether the files of a finished dataset are compared byte for byte, and not only by their sizes.
-        say: Called with what of a finished dataset is missing or damaged, and with how much there is to look through.
+        onlooker: Is warned of what is missing or damaged in a finished dataset, and told how much there is to look
+            through.
 
     Raises:
         ConfigError: If the configuration is another one, or has fewer trials, or other ones.
@@ -62,7 +64,7 @@ def resume(
         if stored is not None:
             refuse_changes(directory, stored, make_self_contained(config))
         old = _read_stored_plan(directory, stored, make_self_contained(config))
-        damaged = _find_damaged(directory, old, check=check, say=say)
+        damaged = _find_damaged(directory, old, check=check, onlooker=onlooker)
         # The list may be read and written below, and a link in its place could lead to any file of the user.
         check_regular(directory / TRIALS)
         # A configuration from another directory names a list of its own, from which the damaged one is made again.
@@ -75,8 +77,8 @@ def resume(
             # The plan is drawn again. One that grew with the results cannot be, and stays if its trials are intact.
             old = None
         remove_unfinished(directory)
-        plan = _write(config, directory, sweep_directory, stored, old, damaged, say)
-        _announce_search(directory, say)
+        plan = _write(config, directory, sweep_directory, stored, old, damaged, onlooker)
+        _announce_search(directory, onlooker)
         return plan
 
 
@@ -99,11 +101,11 @@ def _write(
     stored: Config | None,
     old: Plan | None,
     damaged: Collection[str],
-    say: Say,
+    onlooker: Onlooker,
 ) -> Plan:
     config = make_self_contained(given)
     if old is None or TRIALS in damaged or old.config.without_run() != config.without_run():
-        drawn = replace(draw_plan(given, directory=sweep_directory, say=say), config=config)
+        drawn = replace(draw_plan(given, directory=sweep_directory, onlooker=onlooker), config=config)
         plan = _extend(directory, old, drawn)
         if (listed := read_listed_points(given, directory=sweep_directory)) is not None:
             write_file(directory / TRIALS, encode_points(listed))
@@ -127,16 +129,16 @@ def _write(
     return plan
 
 
-def _announce_search(directory: Path, say: Say) -> None:
+def _announce_search(directory: Path, onlooker: Onlooker) -> None:
     """Report the size of what an earlier collection has left, if looking through it takes long."""
     if is_there(directory / METADATA):
         return
     size = sum(path.lstat().st_size for path in directory.glob(f"*{SHARD_SUFFIX}*"))
     if size >= _MUCH_BYTES:
-        say(f"{directory}: looks through {size / 1e6:.0f} MB of recordings first; whole episodes stay")
+        onlooker.say(f"{directory}: looks through {size / 1e6:.0f} MB of recordings first; whole episodes stay")
 
 
-def _find_damaged(directory: Path, plan: Plan | None, *, check: bool, say: Say) -> frozenset[str]:
+def _find_damaged(directory: Path, plan: Plan | None, *, check: bool, onlooker: Onlooker) -> frozenset[str]:
     """Names of the files of a finished dataset that are missing or damaged; none if it is not finished.
 
     Raises:
@@ -146,7 +148,7 @@ def _find_damaged(directory: Path, plan: Plan | None, *, check: bool, say: Say) 
         return frozenset()
     findings = find_damage(directory, plan, in_full=check)
     for finding in findings:
-        say(f"{directory}: {finding}")
+        onlooker.warn(f"{directory}: {finding}")
     if any(finding.file == SOURCES for finding in findings):
         raise DatasetError(
             f"{directory / SOURCES}: is missing or damaged, and nothing else says where the trials come from",

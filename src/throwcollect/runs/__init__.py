@@ -6,13 +6,13 @@ A name is imported when it is used for the first time; see ``docs/runs.md``.
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from throwcollect.coordinator.onlooker import Onlooker as Onlooker
     from throwcollect.runs.control import down as down
     from throwcollect.runs.control import scale as scale
     from throwcollect.runs.control import stop as stop
     from throwcollect.runs.following import Look as Look
     from throwcollect.runs.following import follow as follow
     from throwcollect.runs.following import wait as wait
-    from throwcollect.runs.onlooker import Onlooker as Onlooker
     from throwcollect.runs.preparation import prepare as prepare
     from throwcollect.runs.preparation import resume as resume
     from throwcollect.runs.prepared_run import PreparedRun as PreparedRun
@@ -21,19 +21,19 @@ if TYPE_CHECKING:
     from throwcollect.runs.selection import find as find
 else:
     _PLACES = {
-        "Look": "following",
-        "Onlooker": "onlooker",
-        "PreparedRun": "prepared_run",
-        "Run": "records",
-        "Summary": "record",
-        "down": "control",
-        "find": "selection",
-        "follow": "following",
-        "prepare": "preparation",
-        "resume": "preparation",
-        "scale": "control",
-        "stop": "control",
-        "wait": "following",
+        "Look": "runs.following",
+        "Onlooker": "coordinator.onlooker",
+        "PreparedRun": "runs.prepared_run",
+        "Run": "runs.records",
+        "Summary": "runs.record",
+        "down": "runs.control",
+        "find": "runs.selection",
+        "follow": "runs.following",
+        "prepare": "runs.preparation",
+        "resume": "runs.preparation",
+        "scale": "runs.control",
+        "stop": "runs.control",
+        "wait": "runs.following",
     }
     __all__ = list(_PLACES)
 
@@ -42,7 +42,7 @@ else:
 
         if name not in _PLACES:
             raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-        return getattr(import_module(f"{__name__}.{_PLACES[name]}"), name)
+        return getattr(import_module(f"throwcollect.{_PLACES[name]}"), name)
 
     def __dir__() -> list[str]:
         return sorted({*globals(), *__all__})

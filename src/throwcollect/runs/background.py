@@ -21,6 +21,7 @@ from pydantic import TypeAdapter
 
 from throwcollect.config.loader import dump_yaml, load, load_locating_errors
 from throwcollect.config.schema import Config
+from throwcollect.coordinator.onlooker import Onlooker
 from throwcollect.coordinator.progress import Progress
 from throwcollect.dataset.directory import config_path
 from throwcollect.errors import ConfigError, Interrupted, Problem, ThrowcollectError, WorkerError
@@ -34,7 +35,6 @@ from throwcollect.runs.component_container import (
     check_order,
     launch_container,
 )
-from throwcollect.runs.onlooker import Onlooker
 from throwcollect.runs.preparation import MANY_TRIALS, Request, prepare_run, resume
 from throwcollect.runs.prepared_run import PreparedRun
 from throwcollect.runs.record import Failure, Kind, Origin, Planning, Record

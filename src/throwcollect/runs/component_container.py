@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING
 from pydantic import TypeAdapter
 
 from throwcollect.config.containers import ContainerSpec
+from throwcollect.coordinator.onlooker import Onlooker
 from throwcollect.errors import ConfigError, ConflictError, Interrupted
 from throwcollect.extras import explain_missing
-from throwcollect.runs.onlooker import Onlooker
 from throwcollect.runs.records import OpenRun, Records, Run
 from throwcollect.runs.selection import require_living
 from throwcollect.runtimes.runtime import Host, Place

@@ -9,6 +9,7 @@ from collections.abc import Callable
 
 from throwcollect.config.loader import load
 from throwcollect.config.schema import Config
+from throwcollect.coordinator.onlooker import SILENT, Onlooker
 from throwcollect.coordinator.progress import Progress
 from throwcollect.errors import WorkerError
 from throwcollect.files import write_file
@@ -17,7 +18,6 @@ from throwcollect.ros.endpoint import answers
 from throwcollect.ros.middleware import Middleware
 from throwcollect.run_key import RunKey
 from throwcollect.runs.control import join_for_a_moment
-from throwcollect.runs.onlooker import SILENT, Onlooker
 from throwcollect.runs.own_directory import make_own_directory
 from throwcollect.runs.token import JoinToken
 from throwcollect.runtimes.local import LocalNodes

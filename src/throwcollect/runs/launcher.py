@@ -12,13 +12,13 @@ from typing import Any
 
 from throwcollect.config.loader import load
 from throwcollect.config.schema import Config
+from throwcollect.coordinator.onlooker import Onlooker
 from throwcollect.coordinator.progress import Progress
 from throwcollect.dataset.directory import config_path
 from throwcollect.dataset.lock import hold_lock
 from throwcollect.dataset.summary import explain_loss
 from throwcollect.errors import ConfigError, Interrupted, LossError, ThrowcollectError, WorkerError
 from throwcollect.runs.events import EventLog
-from throwcollect.runs.onlooker import Onlooker
 from throwcollect.runs.record import Failure, Summary
 from throwcollect.runs.records import OpenRun, Records, Run
 from throwcollect.runtimes.node_logs import NodeLogs

@@ -12,13 +12,13 @@ from typing import TYPE_CHECKING
 
 from throwcollect.config.loader import load_locating_errors
 from throwcollect.config.schema import Config
+from throwcollect.coordinator.onlooker import SILENT, Onlooker
 from throwcollect.dataset.configuration import read_config, refuse_damaged_config, refuse_lost_config
 from throwcollect.dataset.directory import CONFIG, PLAN, TRIALS, config_path
 from throwcollect.dataset.lock import hold_lock
 from throwcollect.errors import ConfigError, Problem
 from throwcollect.ros.middleware import Middleware
 from throwcollect.runs.choice import Choice, begin, choose
-from throwcollect.runs.onlooker import SILENT, Onlooker
 from throwcollect.runs.prepared_run import PreparedRun
 from throwcollect.runs.record import Origin, Record
 from throwcollect.runs.records import OpenRun, Records
@@ -155,7 +155,7 @@ def resume(
         if (left := _take_over(records, directory, read, onlooker, own=own)) is not None:
             return left
         sweep_directory = directory if config is None else Path(config).parent
-        plan = resume_plan(read, directory, sweep_directory=sweep_directory, check=check, say=onlooker.say)
+        plan = resume_plan(read, directory, sweep_directory=sweep_directory, check=check, onlooker=onlooker)
         if finished(directory, plan):
             onlooker.say(f"{directory}: every trial has ended, nothing is left to do")
             return None
@@ -260,8 +260,7 @@ def _make_plan(request: Request, directory: Path, onlooker: Onlooker) -> Plan:
         directory,
         sweep_directory=request.sweep_directory,
         processes=request.processes,
-        say=onlooker.say,
-        update_plan=onlooker.update_plan,
+        onlooker=onlooker,
     )
 
 

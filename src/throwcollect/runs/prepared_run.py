@@ -9,9 +9,9 @@ from types import TracebackType
 from typing import cast
 
 from throwcollect.config.schema import Config
+from throwcollect.coordinator.onlooker import Onlooker
 from throwcollect.errors import ConfigError
 from throwcollect.ros.endpoint import split_address
-from throwcollect.runs.onlooker import Onlooker
 from throwcollect.runs.record import Record, Summary
 from throwcollect.runs.records import OpenRun, Records, Run
 from throwcollect.runs.token import JoinToken

@@ -11,6 +11,7 @@ from pathlib import Path
 
 from throwcollect.config.loader import load_locating_errors
 from throwcollect.config.schema import Config
+from throwcollect.coordinator.onlooker import SILENT, Onlooker
 from throwcollect.coordinator.resume import refuse_changes
 from throwcollect.dataset.configuration import read_config
 from throwcollect.dataset.creation import create
@@ -26,7 +27,6 @@ from throwcollect.dataset.slice_directory import (
 )
 from throwcollect.dataset.summary import explain_loss
 from throwcollect.errors import ConfigError, Interrupted, Problem
-from throwcollect.runs.onlooker import SILENT, Onlooker
 from throwcollect.runs.preparation import Request, prepare_run
 from throwcollect.runs.records import Records
 from throwcollect.sweep.plan import Plan

@@ -9,6 +9,7 @@ from tests.e2e.collection import CONFIG, FAST, write_config
 
 from throwcollect.cluster import slurm
 from throwcollect.cluster.submit import submit
+from throwcollect.coordinator.onlooker import SILENT
 from throwcollect.errors import ConfigError, WorkerError
 
 
@@ -27,7 +28,7 @@ def test_an_array_whose_joining_job_is_refused_is_cancelled(tmp_path: Path, monk
     monkeypatch.setattr(slurm, "find_largest_array", lambda: None)
     monkeypatch.setattr(slurm, "cancel", cancelled.extend)
     with pytest.raises(WorkerError, match="too many jobs"):
-        submit(config, tmp_path / "data", 2, say=lambda _: None)
+        submit(config, tmp_path / "data", 2, onlooker=SILENT)
     assert cancelled == ["12"]
     assert not (tmp_path / "data").exists()
 
@@ -45,7 +46,7 @@ def test_an_array_may_be_as_large_as_slurm_says(
     monkeypatch.setattr(slurm, "check", lambda _: None)
     monkeypatch.setattr(slurm, "find_largest_array", lambda: 2)
     with pytest.raises(error, match=said):
-        submit(config, tmp_path / "data", tasks, say=lambda _: None)
+        submit(config, tmp_path / "data", tasks, onlooker=SILENT)
 
 
 def test_a_directory_that_is_refused_keeps_its_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -56,5 +57,5 @@ def test_a_directory_that_is_refused_keeps_its_files(tmp_path: Path, monkeypatch
     monkeypatch.setattr(slurm, "find_largest_array", lambda: None)
     before = sorted((tmp_path / "mine").rglob("*"))
     with pytest.raises(ConfigError, match="a directory that is new or empty"):
-        submit(config, tmp_path / "mine", 2, say=lambda _: None)
+        submit(config, tmp_path / "mine", 2, onlooker=SILENT)
     assert sorted((tmp_path / "mine").rglob("*")) == before

@@ -6,9 +6,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from tests.unit.coordinator.listener import Listener
 
 from throwcollect.config.schema import Config
 from throwcollect.coordinator import prepare
+from throwcollect.coordinator.onlooker import Onlooker
 from throwcollect.errors import ConfigError, Interrupted, PlanError
 
 CONFIG: dict[str, Any] = {
@@ -49,37 +51,40 @@ def test_of_a_large_plan_it_is_told_at_once_what_goes_on(monkeypatch: pytest.Mon
     monkeypatch.setattr(prepare, "_MOST_PIECES", 1)
     monkeypatch.setattr(prepare, "_TELL_FIRST_S", 0.0)
     monkeypatch.setattr(prepare, "feasibility_check", lambda _: lambda _: None)
-    said: list[str] = []
+    told = Listener()
     config = Config.model_validate({**CONFIG, "trials": 450})
-    assert len(prepare.draw_plan(config, directory=Path(), say=said.append).trials) == 450
-    assert said == ["plan: draws 450 trials", "plan: checks 450 trials", "plan: 200 of 450 trials checked"]
-    said.clear()
-    prepare.draw_plan(Config.model_validate({**CONFIG, "trials": 399}), directory=Path(), say=said.append)
-    assert said[0].endswith("of 399 trials checked")
+    assert len(prepare.draw_plan(config, directory=Path(), onlooker=told).trials) == 450
+    assert told.said == ["plan: draws 450 trials", "plan: checks 450 trials", "plan: 200 of 450 trials checked"]
+    told.said.clear()
+    prepare.draw_plan(Config.model_validate({**CONFIG, "trials": 399}), directory=Path(), onlooker=told)
+    assert told.said[0].endswith("of 399 trials checked")
+    assert told.warnings == []
 
 
 def test_whoever_wants_is_told_how_far_a_plan_is_and_can_give_it_up(tmp_path: Path) -> None:
     config = Config.model_validate({**CONFIG, "trials": 250})
     told: list[tuple[int, int]] = []
 
-    def update_plan(checked: int, trials: int) -> None:
-        told.append((checked, trials))
-        if checked == 200:
-            raise Interrupted("enough")
+    class Impatient(Onlooker):
+        def update_plan(self, checked: int, trials: int) -> None:
+            told.append((checked, trials))
+            if checked == 200:
+                raise Interrupted("enough")
 
     with pytest.raises(Interrupted, match="enough"):
-        prepare.prepare(config, tmp_path / "data", sweep_directory=tmp_path, update_plan=update_plan)
+        prepare.prepare(config, tmp_path / "data", sweep_directory=tmp_path, onlooker=Impatient())
     assert told == [(0, 250), (0, 250), (100, 250), (200, 250)]
     assert not (tmp_path / "data").exists()
 
 
-def test_a_robot_in_the_ground_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_users_are_warned_of_a_robot_in_the_ground(monkeypatch: pytest.MonkeyPatch) -> None:
     def told(height_m: float) -> list[str]:
-        said: list[str] = []
+        listener = Listener()
         config = Config.model_validate({**CONFIG, "trials": 1, "robot": {"base_height_m": height_m}})
         monkeypatch.setattr(prepare, "feasibility_check", lambda _: lambda _: None)
-        prepare.draw_plan(config, directory=Path(), say=said.append)
-        return said
+        prepare.draw_plan(config, directory=Path(), onlooker=listener)
+        assert listener.said == []
+        return listener.warnings
 
     assert told(0.5) == [
         "warning: robot.base_height_m: 0.5: leg_left_6_link is 0.52 m below the ground at the start; "

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from tests.unit.coordinator.listener import Listener
 from tests.unit.dataset.conftest import Collection
 
 from throwcollect.coordinator.resume import finished, resume
@@ -41,10 +42,10 @@ class Trials:
         return kept
 
     def go_on(self, directory: Path, *, check: bool = False) -> tuple[set[int] | None, list[str]]:
-        """Resume; the trials that were not run again, None if nothing was left to do; and what was said."""
-        said: list[str] = []
-        plan = resume(self.plan.config, directory, sweep_directory=directory, check=check, say=said.append)
-        return None if finished(directory, plan) else self.run(directory), said
+        """Resume; the trials that were not run again, None if nothing was left to do; and the warnings."""
+        told = Listener()
+        plan = resume(self.plan.config, directory, sweep_directory=directory, check=check, onlooker=told)
+        return None if finished(directory, plan) else self.run(directory), told.warnings
 
 
 @pytest.fixture(scope="module")

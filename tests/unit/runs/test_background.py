@@ -11,10 +11,10 @@ from typing import Any
 
 import pytest
 
+from throwcollect.coordinator.onlooker import SILENT
 from throwcollect.errors import ConfigError, ConflictError, Interrupted, WorkerError
 from throwcollect.runs import background
 from throwcollect.runs.background import begin_run, carry_out
-from throwcollect.runs.onlooker import SILENT
 from throwcollect.runs.record import Origin, Planning
 from throwcollect.runs.records import OpenRun, Records
 from throwcollect.runs.state_directory import STATE_VARIABLE

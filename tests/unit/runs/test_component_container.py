@@ -12,13 +12,13 @@ import pytest
 from tests.unit.runtimes.docker.engine import Engine, engine_at
 
 from throwcollect.config.containers import ContainerSpec, NodeContainerConfig
+from throwcollect.coordinator.onlooker import SILENT
 from throwcollect.errors import ConfigError, ConflictError, NotFoundError, WorkerError
 from throwcollect.ros.connection import Connection
 from throwcollect.ros.middleware import Middleware
 from throwcollect.run_key import RunKey
 from throwcollect.runs.component_container import ContainerOrder, check_order, launch_container
 from throwcollect.runs.control import down
-from throwcollect.runs.onlooker import SILENT
 from throwcollect.runs.record import Kind, Origin, Record
 from throwcollect.runs.records import OpenRun, Records
 from throwcollect.runs.state_directory import STATE_VARIABLE

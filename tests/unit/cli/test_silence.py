@@ -1,0 +1,65 @@
+"""With `--json` the result is one document, and standard error has only what is wrong."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from subprocess import CompletedProcess
+
+import pytest
+from tests.e2e.collection import CONFIG, FAST, call_here, write_config
+from tests.unit.dataset.conftest import Collection
+
+from throwcollect.cluster import slurm
+from throwcollect.coordinator import prepare
+from throwcollect.dataset import verify
+
+SLICED = CONFIG + "record: {{trials_per_shard: 1}}\n"
+
+
+def say_alone_and_as_json(*arguments: str | Path) -> tuple[str, CompletedProcess[str]]:
+    """What a command says besides its result; and what it prints with `--json`."""
+    return call_here(*arguments).stderr, call_here(*arguments, "--json")
+
+
+def test_of_a_large_plan_only_the_document_is_printed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(prepare, "_TOLD_TRIALS", 1)
+    said, printed = say_alone_and_as_json("plan", write_config(tmp_path, trials=2, sim=FAST))
+    assert "plan: checks 2 trials" in said
+    assert printed.stderr == ""
+    assert len(json.loads(printed.stdout)) == 2
+
+
+def test_a_misplaced_robot_is_told_in_spite_of_json(tmp_path: Path) -> None:
+    sunken = CONFIG + "robot: {{base_height_m: 0.5}}\n"
+    said, printed = say_alone_and_as_json("plan", write_config(tmp_path, trials=2, text=sunken, sim=FAST))
+    assert "below the ground" in said
+    assert printed.stderr in said
+    assert "below the ground" in printed.stderr
+
+
+def test_of_a_large_dataset_only_the_document_is_printed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    source = Collection({"trials": 2}).collect(tmp_path / "data")
+    monkeypatch.setattr(verify, "_MANY_EPISODES", 1)
+    said, printed = say_alone_and_as_json("dataset", "verify", source)
+    assert "checks 1 recording" in said
+    assert (printed.stderr, json.loads(printed.stdout)) == ("", [])
+
+
+def test_of_a_submission_only_the_document_is_printed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(slurm, "submit", lambda *_: "7")
+    monkeypatch.setattr(slurm, "check", lambda _: None)
+    monkeypatch.setattr(slurm, "find_largest_array", lambda: None)
+    monkeypatch.setattr(slurm, "find_tasks", lambda: {})
+    monkeypatch.setattr(slurm, "find_ended", lambda _: {})
+    config = write_config(tmp_path, trials=2, text=SLICED, sim=FAST)
+    submission = ("submit", config, "--tasks", "2")
+    assert "plan: 2 trials" in call_here(*submission, "--output", tmp_path / "told").stderr
+    printed = call_here(*submission, "--output", tmp_path / "silent", "--json")
+    assert printed.stderr == ""
+    assert json.loads(printed.stdout)["array"] == "7"
+
+    said, printed = say_alone_and_as_json("resume", tmp_path / "silent")
+    assert "submitted" in said
+    assert printed.stderr == ""
+    assert json.loads(printed.stdout)["array"] == "7"

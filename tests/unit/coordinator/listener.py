@@ -1,0 +1,19 @@
+"""An onlooker that keeps what it is told."""
+
+from __future__ import annotations
+
+from throwcollect.coordinator.onlooker import Onlooker
+
+
+class Listener(Onlooker):
+    """Keeps lines of information, and warnings."""
+
+    def __init__(self) -> None:
+        self.said: list[str] = []
+        self.warnings: list[str] = []
+
+    def say(self, line: str) -> None:
+        self.said.append(line)
+
+    def warn(self, line: str) -> None:
+        self.warnings.append(line)
