@@ -82,14 +82,17 @@ SLOW := cli coordinator dataset derive engines export learning replay report run
 test-fast: $(READY_DEV)
 	$(BIN)/python -m pytest -n logical tests/architecture tests/contract tests/unit $(addprefix --ignore=tests/unit/,$(SLOW))
 
-# What waits for others is run beside what computes, so that both cores always have something to do. Continuous integration
-# makes the image meanwhile, and names the process that does.
+# What waits for others is run beside what computes, so that both cores always have something to do: what waits most begins
+# first, and what never waits comes last.
 BESIDE := --no-print-directory --output-sync=target
 test: $(READY_DEV)
 	$(MAKE) $(BESIDE) -j 2 check
-	$(MAKE) $(BESIDE) -j 2 test-units test-ros
-	@while [ -n "$(MAKES_IMAGE)" ] && kill -0 $(MAKES_IMAGE) 2> /dev/null; do sleep 1; done
-	$(MAKE) $(BESIDE) -j 3 test-containers test-processes test-cluster
+	$(MAKE) $(BESIDE) -j 3 test-containers test-processes test-ros test-cluster test-units
+
+# Continuous integration makes the image meanwhile, and names the process that does.
+define wait_for_image
+@while [ -n "$(MAKES_IMAGE)" ] && kill -0 $(MAKES_IMAGE) 2> /dev/null; do sleep 1; done
+endef
 
 # The ROS client alone, on the embedded backend: what somebody runs who changes it.
 test-ros-client: $(READY_DEV)
@@ -115,6 +118,7 @@ test-ros: ros
 
 # Tests with an engine look at all that is on it, so one by one; also those of containers on genuine rclpy.
 test-containers: ros
+	$(wait_for_image)
 	$(call twice,$(BIN)/python -m pytest tests/docker)
 	$(call twice,$(ROS_VENV)/bin/python -m pytest $(WITH_ENGINE))
 
@@ -125,6 +129,7 @@ test-processes:
 
 # Slurm with four nodes of this machine, and Apptainer; `.ci/cluster.sh` installs both on Debian.
 test-cluster:
+	$(wait_for_image)
 	$(call twice,$(BIN)/python -m pytest tests/cluster)
 
 # Format, lint, types, the direction of imports, and the rules of the house; its tests build the documentation site, too.
