@@ -6,6 +6,7 @@ Fields and their order are those of ``rosbag2_storage/yaml.hpp`` (ROS 2 Jazzy an
 from __future__ import annotations
 
 import io
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -169,12 +170,18 @@ def _name_nearby(directory: Path) -> str | None:
 
 
 def to_yaml(data: Mapping[str, Any]) -> str:
-    """Encode a mapping as YAML in block style, with the keys in their order."""
+    """Encode a mapping of plain values as YAML in block style, with the keys in their order."""
+    return _write_yaml(json.dumps(data))
+
+
+@lru_cache(maxsize=8)
+def _write_yaml(text: str) -> str:
+    """Encode what JSON says; the last ones are remembered, because what checks a file writes its metadata once more."""
     yaml = YAML()
     # By default, long values would be broken at 80 characters.
     yaml.width = 4096
     # A mapping that occurs twice, such as an infinite duration, would become an alias, which `from_yaml` refuses.
     yaml.representer.ignore_aliases = lambda *_: True
     stream = io.StringIO()
-    yaml.dump(data, stream)
+    yaml.dump(json.loads(text), stream)
     return stream.getvalue()
