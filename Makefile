@@ -86,7 +86,7 @@ test-fast: $(READY_DEV)
 # first, and what never waits comes last.
 BESIDE := --no-print-directory --output-sync=target
 test: $(READY_DEV)
-	$(MAKE) $(BESIDE) -j 2 check
+	$(MAKE) $(BESIDE) -j 3 check ros
 	$(MAKE) $(BESIDE) -j 3 test-containers test-processes test-ros test-cluster test-units
 
 # Continuous integration makes the image meanwhile, and names the process that does.
