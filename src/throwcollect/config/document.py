@@ -15,6 +15,7 @@ from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 
 from throwcollect.config.default_path import DEFAULT_CONFIG
 from throwcollect.config.problems import Location, join_key, quote
+from throwcollect.config.shape import index_or_key
 from throwcollect.config.yaml_nodes import MOST_LEVELS, MOST_VALUES, compose, line, reason
 from throwcollect.errors import ConfigError, Problem
 from throwcollect.wording import command
@@ -254,7 +255,7 @@ def _parts(key: str) -> tuple[str, ...]:
 
 
 def _index(holder: Any, part: str) -> str | int:
-    return int(part) if isinstance(holder, list) and part.isdecimal() else part
+    return index_or_key(part) if isinstance(holder, list) else part
 
 
 def _holds(holder: Any, index: str | int) -> bool:

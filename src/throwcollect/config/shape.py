@@ -10,6 +10,9 @@ from typing import Any
 from throwcollect.config.schema import Config
 from throwcollect.units import unit_of_name
 
+_MOST_DIGITS = 9
+"""No list of a configuration is so long; of thousands of digits, Python makes no number."""
+
 _NOUNS = {"number": "a number", "integer": "a whole number", "string": "text", "boolean": "true or false"}
 
 
@@ -79,7 +82,12 @@ def unit_of_key(key: str) -> str:
     Args:
         key: Dotted key, in which an index is a part of its own; a name that is no key is allowed.
     """
-    return shape_of([int(part) if part.isdecimal() else part for part in key.split(".")]).unit or unit_of_name(key)
+    return shape_of([index_or_key(part) for part in key.split(".")]).unit or unit_of_name(key)
+
+
+def index_or_key(part: str) -> int | str:
+    """Read a part of a dotted key where a list may be: as an index, unless no list has so many items."""
+    return int(part) if part.isdecimal() and len(part) <= _MOST_DIGITS else part
 
 
 def shape_of(parts: Sequence[str | int]) -> Shape:

@@ -12,6 +12,7 @@ from throwcollect.config.key import Effect, Key, key_of_field
 from throwcollect.config.problems import Location, findings, join_key, unknown_key
 from throwcollect.config.schema import Config
 from throwcollect.config.section import Section
+from throwcollect.config.shape import index_or_key
 from throwcollect.errors import ConfigError, Problem
 
 AnySection = TypeVar("AnySection", bound=Section)
@@ -138,7 +139,7 @@ def _replace(value: Any, change: Any, location: Location) -> Any:
     # A list is changed as a mapping from index to item; of any other value, each part is an unknown key.
     copy: Any = dict(enumerate(value)) if isinstance(value, list) else dict(value) if isinstance(value, dict) else {}
     for part, inner in change.items():
-        index = int(part) if isinstance(value, list) and part.isdecimal() else part
+        index = index_or_key(part) if isinstance(value, list) else part
         if index not in copy:
             raise _unknown((*location, part), list(map(str, copy)))
         copy[index] = _replace(copy[index], inner, (*location, index))

@@ -105,6 +105,12 @@ def test_an_override_that_is_too_large_does_not_name_the_file(read):
         document.override(f"b=[{30_000 * '1,'}]")
 
 
+def test_an_index_of_absurd_length_is_no_index(read):
+    document = read("a: [1]\n")
+    document.override(f"a.{'9' * 5000}=2")
+    assert [problem.message for problem in document.problems] == ["nothing of this name can be set; got '2'"]
+
+
 def test_a_swept_key_that_is_called_as_a_field_keeps_its_name(read):
     document = read("a: 1\n")
     document.override("sweep.parameters.min=1")

@@ -16,7 +16,7 @@ from throwcollect.errors import ConfigError, Problem, WorkerError
 from throwcollect.runtimes.docker.address import engine_address
 from throwcollect.runtimes.docker.engine import engine_errors
 from throwcollect.runtimes.docker.image import default_tag
-from throwcollect.runtimes.docker.options import RUN_LABEL, RunPlace, image, mount_source, section_of
+from throwcollect.runtimes.docker.options import ROUTER_PORT, RUN_LABEL, RunPlace, image, mount_source, section_of
 from throwcollect.runtimes.nodes import COORDINATOR, ROUTER
 from throwcollect.runtimes.ports import reserve_port
 
@@ -30,7 +30,8 @@ def check(client: DockerClient, place: RunPlace, config: Config) -> str:
         Id of the image, which is a SHA-256 of its content.
 
     Raises:
-        ConfigError: If a mount or a network is not there or must not be used, or the router's port is taken.
+        ConfigError: If a mount or a network is not there or must not be used, or the router's port is taken,
+            or published twice.
         WorkerError: If the engine does not answer, or does not have the image.
     """
     with engine_errors("the Docker engine cannot be asked"):
@@ -38,6 +39,12 @@ def check(client: DockerClient, place: RunPlace, config: Config) -> str:
         begun = client.api.containers(all=True, filters={"label": f"{RUN_LABEL}={place.run_id}"})
     sections = {f"containers.{kind}": section_of(config, node) for kind, node in _NODES.items()}
     image_id = _check(client, image(config), sections)
+    if config.run.router_port and (
+        twice := {str(ROUTER_PORT), f"{ROUTER_PORT}/tcp"} & set(config.containers.router.ports)
+    ):
+        (port,) = twice
+        wrong = "should be left out, as run.router_port publishes the same port"
+        raise ConfigError([Problem(wrong, f"containers.router.ports.{port}")])
     if config.run.router_port and not begun:
         # The engine binds the port later; trying it here gives an error that names the key of the configuration.
         reserve_port(config.run).close()

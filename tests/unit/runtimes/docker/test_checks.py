@@ -86,3 +86,14 @@ def test_a_device_that_leads_to_another_one_is_refused(
     assert problems(options={"devices": ["/dev/nvidia99:/dev/nvidia99:rw"]}) == [
         "options.devices.0: /dev/nvidia99 does not exist on this machine"
     ]
+
+
+@pytest.mark.parametrize("port", ["7447", "7447/tcp"])
+def test_the_port_of_the_router_is_published_once(engine: Engine, port: str) -> None:
+    published = {"containers": {"image": "image", "router": {"ports": {port: 7450, "80": 8080}}}}
+    with closing(connect()) as client:
+        check(client, RunPlace("run", "/data"), Config.model_validate(published))
+        with pytest.raises(
+            ConfigError, match=f"^containers.router.ports.{port}: should be left out, as run.router_port"
+        ):
+            check(client, RunPlace("run", "/data"), Config.model_validate({**published, "run": {"router_port": 7448}}))
