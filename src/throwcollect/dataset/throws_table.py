@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -34,6 +34,7 @@ Row = dict[str, Any]
 
 _KINDS = {"number": pa.float64(), "count": pa.int64(), "text": pa.string()}
 """Types of the columns that tasks declare."""
+_ROWS_A_PIECE = 500
 
 
 @dataclass(frozen=True)
@@ -181,6 +182,33 @@ def read_throws_table(path: Path, plan: Plan) -> pa.Table:
         wrong = sorted(set(table.schema.names) ^ set(schema.names)) or "types of columns"
         raise DatasetError(f"not the table of this plan: differs in {wrong}", path=path)
     return table
+
+
+class RowsByTrial(Mapping[int, Row]):
+    """The rows of a table of throws, by trial; those of no trial are left out.
+
+    Only a piece of the table at a time is made into rows, which take ten times its memory: those of a million throws
+    would take 3 GB.
+    """
+
+    def __init__(self, table: pa.Table) -> None:
+        self._table = table
+        self._places = {trial: place for place, trial in enumerate(table["trial"].to_pylist()) if trial is not None}
+        self._start = 0
+        self._piece: list[Row] = []
+
+    def __getitem__(self, trial: int) -> Row:
+        place = self._places[trial]
+        if not self._start <= place < self._start + len(self._piece):
+            self._start = place - place % _ROWS_A_PIECE
+            self._piece = self._table.slice(self._start, _ROWS_A_PIECE).to_pylist()
+        return self._piece[place - self._start]
+
+    def __iter__(self) -> Iterator[int]:
+        return iter(self._places)
+
+    def __len__(self) -> int:
+        return len(self._places)
 
 
 def read_throws(directory: Path, plan: Plan) -> pa.Table:

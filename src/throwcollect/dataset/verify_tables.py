@@ -12,7 +12,7 @@ from throwcollect.config.loader import load
 from throwcollect.config.schema import Config
 from throwcollect.dataset.directory import CONFIG, PLAN, THROWS, TRIALS, config_path, shard_of
 from throwcollect.dataset.findings import Finding
-from throwcollect.dataset.throws_table import REFUSED, Row, read_throws_table
+from throwcollect.dataset.throws_table import REFUSED, Row, RowsByTrial, read_throws_table
 from throwcollect.errors import ConfigError, DatasetError, ForeignPlanError
 from throwcollect.sweep.digest import trial_digests
 from throwcollect.sweep.plan import Plan
@@ -73,12 +73,12 @@ def check_tables(directory: Path) -> Tables:
             tables.findings.append(Finding(PLAN, f"trial {trial}", problem))
             tables.doubtful.add(trial)
         try:
-            rows = read_throws_table(directory / THROWS, tables.plan).to_pylist()
+            throws = read_throws_table(directory / THROWS, tables.plan)
         except DatasetError as error:
             tables.findings.append(Finding.of(THROWS, error))
         else:
-            tables.findings += _find_row_problems(tables.plan, rows)
-            tables.rows = {row["trial"]: row for row in rows if row["trial"] is not None}
+            tables.findings += _find_row_problems(tables.plan, throws["trial"].to_pylist())
+            tables.rows = RowsByTrial(throws)
             tables.findings += _plan_findings(tables.plan, tables.rows, tables.doubtful)
     return tables
 
@@ -112,10 +112,11 @@ def find_wrong_trials(plan: Plan) -> dict[int, str]:
     return {trials.first + row: digests[row].tobytes().hex() for row in wrong}
 
 
-def _find_row_problems(plan: Plan, rows: list[Row]) -> Iterator[Finding]:
-    numbers = [row["trial"] for row in rows if row["trial"] is not None]
-    if len(numbers) < len(rows):
-        yield Finding(THROWS, "", f"{len(rows) - len(numbers)} rows are of no trial")
+def _find_row_problems(plan: Plan, trials: list[int | None]) -> Iterator[Finding]:
+    """Find what is wrong with the trials that the rows name, in their order."""
+    numbers = [trial for trial in trials if trial is not None]
+    if len(numbers) < len(trials):
+        yield Finding(THROWS, "", f"{len(trials) - len(numbers)} rows are of no trial")
     known = set(numbers)
     for trial in plan.trials:
         if trial.number not in known:

@@ -1,12 +1,14 @@
 from dataclasses import make_dataclass, replace
 from pathlib import Path
 
+import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 from tests.unit.dataset.conftest import Collection
 
 from throwcollect.config.schema import Config
-from throwcollect.dataset.throws_table import Place, ThrowsTable, read_throws
+from throwcollect.dataset import throws_table
+from throwcollect.dataset.throws_table import Place, RowsByTrial, ThrowsTable, read_throws
 from throwcollect.dataset.verify import verify
 from throwcollect.derive.selection import merge
 from throwcollect.episode.record import Contact, EpisodeHeader, Samples
@@ -89,3 +91,15 @@ def test_a_table_of_an_earlier_version_is_read_and_verified_and_merged(collectio
     pq.write_table(earlier.drop_columns(["recontacts"]), directory / "throws.parquet")
     with pytest.raises(DatasetError, match=r"not the table of this plan: differs in \['recontacts'\]"):
         read_throws(directory, collection.plan)
+
+
+def test_rows_are_found_by_trial_a_piece_at_a_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(throws_table, "_ROWS_A_PIECE", 2)
+    table = pa.table({"trial": [4, None, 0, 2, 4], "outcome": ["a", "b", "c", "d", "e"]})
+    rows = RowsByTrial(table)
+    # Of two rows of a trial, the later one counts.
+    expected = {4: "e", 0: "c", 2: "d"}
+    assert list(rows) == list(expected)
+    for trial in (2, 4, 0, 0, 4, 2):
+        assert rows[trial] == {"trial": trial, "outcome": expected[trial]}
+    assert rows.get(1) is None
