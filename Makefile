@@ -60,12 +60,11 @@ $(READY_DEV): pyproject.toml | $(VENV)/bin/python
 	@touch $(READY) $@
 
 # An environment with genuine rclpy on top of the one for development: `.venv-ros/bin/python -m pytest tests/ros`.
-ros: $(READY_DEV)
-	$(BIN)/python packaging/ros_wheels.py $(ROS_WHEELS)
-	@$(MAKE) --no-print-directory $(READY_ROS)
+ros: $(READY_ROS)
 
 # NumPy and all that is not ROS comes from that other environment, so that it is there once, in one version.
-$(READY_ROS): $(ROS_WHEELS)/made-from.sha256 | $(READY_DEV)
+$(READY_ROS): pyproject.toml $(shell find packaging/ros_* src/rclzenoh/interfaces/definitions -type f ! -name '*.pyc') | $(READY_DEV)
+	$(BIN)/python packaging/ros_wheels.py $(ROS_WHEELS)
 	rm -rf $(ROS_VENV)
 	packaging/environment.sh $(ROS_VENV) $(BIN)/python
 	packaging/install.sh $(ROS_VENV)/bin/python --quiet --no-deps $$(ls $(ROS_WHEELS)/*.whl | grep -v /numpy-)
@@ -113,11 +112,11 @@ test-units:
 WITH_ENGINE := tests/ros/test_containers.py
 
 # On Fast DDS, nodes at times do not find each other on a busy machine. A run starts them again; so do its tests.
-test-ros: ros
+test-ros: $(READY_ROS)
 	$(call twice,$(ROS_VENV)/bin/python -m pytest -n 2 --dist loadfile tests/contract tests/ros --ignore=$(WITH_ENGINE))
 
 # Tests with an engine look at all that is on it, so one by one; also those of containers on genuine rclpy.
-test-containers: ros
+test-containers: $(READY_ROS)
 	$(wait_for_image)
 	$(call twice,$(BIN)/python -m pytest tests/docker)
 	$(call twice,$(ROS_VENV)/bin/python -m pytest $(WITH_ENGINE))
@@ -153,7 +152,7 @@ docs: $(READY_DEV)
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
 
 # Throws a second against the raw limit of the same machine, in the same run; `make bench BEFORE=REVISION` measures that commit beside it.
-bench: $(READY_DEV) ros
+bench: $(READY_DEV) $(READY_ROS)
 	$(BIN)/python -m bench $(if $(BEFORE),--before '$(BEFORE)')
 	$(ROS_VENV)/bin/python -m bench.backends
 
