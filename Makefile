@@ -60,11 +60,12 @@ $(READY_DEV): pyproject.toml | $(VENV)/bin/python
 	@touch $(READY) $@
 
 # An environment with genuine rclpy on top of the one for development: `.venv-ros/bin/python -m pytest tests/ros`.
-ros: $(READY_ROS)
+ros: $(READY_DEV)
+	$(BIN)/python packaging/ros_wheels.py $(ROS_WHEELS)
+	@$(MAKE) --no-print-directory $(READY_ROS)
 
 # NumPy and all that is not ROS comes from that other environment, so that it is there once, in one version.
-$(READY_ROS): pyproject.toml $(shell find packaging/ros_* src/rclzenoh/interfaces/definitions -type f ! -name '*.pyc') | $(READY_DEV)
-	$(BIN)/python packaging/ros_wheels.py $(ROS_WHEELS)
+$(READY_ROS): $(ROS_WHEELS)/made-from.sha256 | $(READY_DEV)
 	rm -rf $(ROS_VENV)
 	packaging/environment.sh $(ROS_VENV) $(BIN)/python
 	packaging/install.sh $(ROS_VENV)/bin/python --quiet --no-deps $$(ls $(ROS_WHEELS)/*.whl | grep -v /numpy-)
@@ -81,17 +82,14 @@ SLOW := cli coordinator dataset derive engines export learning replay report run
 test-fast: $(READY_DEV)
 	$(BIN)/python -m pytest -n logical tests/architecture tests/contract tests/unit $(addprefix --ignore=tests/unit/,$(SLOW))
 
-# What waits for others is run beside what computes, so that both cores always have something to do: what waits most begins
-# first, and what never waits comes last.
+# What waits for others is run beside what computes, so that both cores always have something to do. Continuous integration
+# makes the image meanwhile, and names the process that does.
 BESIDE := --no-print-directory --output-sync=target
 test: $(READY_DEV)
-	$(MAKE) $(BESIDE) -j 3 check ros
-	$(MAKE) $(BESIDE) -j 3 test-containers test-processes test-ros test-cluster test-units
-
-# Continuous integration makes the image meanwhile, and names the process that does.
-define wait_for_image
-@while [ -n "$(MAKES_IMAGE)" ] && kill -0 $(MAKES_IMAGE) 2> /dev/null; do sleep 1; done
-endef
+	$(MAKE) $(BESIDE) -j 2 check
+	$(MAKE) $(BESIDE) -j 2 test-units test-ros
+	@while [ -n "$(MAKES_IMAGE)" ] && kill -0 $(MAKES_IMAGE) 2> /dev/null; do sleep 1; done
+	$(MAKE) $(BESIDE) -j 3 test-containers test-processes test-cluster
 
 # The ROS client alone, on the embedded backend: what somebody runs who changes it.
 test-ros-client: $(READY_DEV)
@@ -112,12 +110,11 @@ test-units:
 WITH_ENGINE := tests/ros/test_containers.py
 
 # On Fast DDS, nodes at times do not find each other on a busy machine. A run starts them again; so do its tests.
-test-ros: $(READY_ROS)
+test-ros: ros
 	$(call twice,$(ROS_VENV)/bin/python -m pytest -n 2 --dist loadfile tests/contract tests/ros --ignore=$(WITH_ENGINE))
 
 # Tests with an engine look at all that is on it, so one by one; also those of containers on genuine rclpy.
-test-containers: $(READY_ROS)
-	$(wait_for_image)
+test-containers: ros
 	$(call twice,$(BIN)/python -m pytest tests/docker)
 	$(call twice,$(ROS_VENV)/bin/python -m pytest $(WITH_ENGINE))
 
@@ -128,7 +125,6 @@ test-processes:
 
 # Slurm with four nodes of this machine, and Apptainer; `.ci/cluster.sh` installs both on Debian.
 test-cluster:
-	$(wait_for_image)
 	$(call twice,$(BIN)/python -m pytest tests/cluster)
 
 # Format, lint, types, the direction of imports, and the rules of the house; its tests build the documentation site, too.
@@ -152,7 +148,7 @@ docs: $(READY_DEV)
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
 
 # Throws a second against the raw limit of the same machine, in the same run; `make bench BEFORE=REVISION` measures that commit beside it.
-bench: $(READY_DEV) $(READY_ROS)
+bench: $(READY_DEV) ros
 	$(BIN)/python -m bench $(if $(BEFORE),--before '$(BEFORE)')
 	$(ROS_VENV)/bin/python -m bench.backends
 
