@@ -162,7 +162,9 @@ def test_clients_who_ask_at_once_never_get_one_too_many(server: Server) -> None:
         assert server.ask("DELETE", f"/instances/{name}")[0] == 202
     for name in begun:
         end = server.wait_until(name, "ended")
-        assert (end["exit_code"], end["message"]) == (130, "stopped before any node was started")
+        assert end["exit_code"] == 130
+        # On a busy machine the nodes of the first one may have been started meanwhile.
+        assert end["message"].startswith(("stopped before any node was started", "interrupted; finished throws are in"))
         assert server.ask("PUT", f"/instances/{name}", wish) == (200, end)
         assert server.ask("PUT", f"/instances/{name}", {"component": "throws"})[0] == 409
         assert server.ask("DELETE", f"/instances/{name}")[0] == 409
