@@ -42,7 +42,7 @@ class Key:
 
     Attributes:
         effect: What the value has an effect on.
-        swept: Whether a sweep may vary the value from trial to trial, if it is a number.
+        swept: Whether a sweep may vary the value from trial to trial, if it is a number that may have decimals.
         later: Whether the key was added after datasets had been published. Digests leave it out where it has its
             default, so that older digests hold.
     """

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import Field, PositiveFloat
 
-from throwcollect.config.key import Key
 from throwcollect.config.kinds import Joint
 from throwcollect.config.section import Section, any_of
 
@@ -26,7 +25,7 @@ class DynamicMovementPrimitive(Section):
 
     family: Literal["dmp"]
     """Trajectory family."""
-    basis_functions: Annotated[int, Field(ge=2, le=500), Key(swept=False)] = 20
+    basis_functions: Annotated[int, Field(ge=2, le=500)] = 20
     """Number of Gaussian basis functions of each joint."""
     weights: dict[Joint, list[Annotated[float, Field(json_schema_extra={"unit": "rad"})]]] = {}
     """Weights of the forcing term of each moving joint; a joint that is absent has zero weights [rad]."""

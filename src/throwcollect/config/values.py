@@ -93,7 +93,9 @@ def reason_not_sweepable(config: Config, key: str) -> str | None:
 def _find_obstacle(config: Config, leaf: Leaf) -> str | None:
     if not leaf.key.swept:
         return "cannot vary from trial to trial"
-    if not isinstance(leaf.value, (int, float)):
+    if isinstance(leaf.value, int) and not isinstance(leaf.value, bool):
+        return "cannot be swept, as it is a whole number; the values of a sweep have decimals"
+    if not isinstance(leaf.value, float):
         return "cannot be swept, as it is not a number"
     joint = leaf.name.removeprefix("task.start.")
     if joint != leaf.name and joint not in config.task.end:

@@ -98,7 +98,10 @@ def test_what_a_trial_may_change_can_be_swept(key):
             "task.start.arm_right_3_joint",
             "cannot vary from trial to trial, as task.end does not name arm_right_3_joint",
         ),
-        ("task.trajectory.basis_functions", "cannot vary from trial to trial"),
+        (
+            "task.trajectory.basis_functions",
+            "cannot be swept, as it is a whole number; the values of a sweep have decimals",
+        ),
         ("task.trajectory.family", "cannot be swept, as it is not a number"),
         ("task.points_hz", "cannot vary from trial to trial"),
         ("task.recatch_gap_s", "cannot vary from trial to trial"),
