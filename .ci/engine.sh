@@ -7,6 +7,7 @@
 # that need one are then skipped, with that reason.
 set -euo pipefail
 cd "$(dirname "$0")/.."
+. .ci/apt.sh
 python=${PYTHON:-.venv/bin/python}
 base=throwcollect-base:bookworm
 wheelhouse=build/wheelhouse
@@ -34,7 +35,7 @@ install_missing() {
         if ! command -v "$command" > /dev/null; then
             [ "$(id -u)" = 0 ] || { echo "$command is not installed, and only root can install $package"; return 1; }
             command -v apt-get > /dev/null || { echo "$command is not installed, and there is no apt-get"; return 1; }
-            { apt-get update -qq && apt-get install -qq -y --no-install-recommends "$package"; } > build/apt.log 2>&1 \
+            install_packages "$package" > build/apt.log 2>&1 \
                 || { echo "$package cannot be installed: $(tail -n 1 build/apt.log)"; return 1; }
             return
         fi
