@@ -1,4 +1,4 @@
-# Packages of Debian, for the scripts beside this one, which are in the clone's directory and have a build/ there.
+# Installs and downloads packages of Debian; the scripts beside this one source it in the root of the clone, which has a build/.
 
 # Whether a file was made within the last hour: lists of packages are fetched once for all that is installed together.
 is_new() { [ -n "$(find "$1" -mmin -60 2> /dev/null)" ]; }

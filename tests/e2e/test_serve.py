@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import signal
 import socket
 import subprocess
@@ -163,8 +164,9 @@ def test_clients_who_ask_at_once_never_get_one_too_many(server: Server) -> None:
     for name in begun:
         end = server.wait_until(name, "ended")
         assert end["exit_code"] == 130
-        # On a busy machine the nodes of the first one may have been started meanwhile.
-        assert end["message"].startswith(("stopped before any node was started", "interrupted; finished throws are in"))
+        # On a busy machine the first one may be on its way already; otherwise `test_background.py` has the exact words.
+        stopped = "(stopped|interrupted) before any node was started|interrupted; finished throws are in"
+        assert re.match(stopped, end["message"])
         assert server.ask("PUT", f"/instances/{name}", wish) == (200, end)
         assert server.ask("PUT", f"/instances/{name}", {"component": "throws"})[0] == 409
         assert server.ask("DELETE", f"/instances/{name}")[0] == 409

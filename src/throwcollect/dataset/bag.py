@@ -176,12 +176,12 @@ def to_yaml(data: Mapping[str, Any]) -> str:
 
 @lru_cache(maxsize=8)
 def _write_yaml(text: str) -> str:
-    """Encode what JSON says; the last ones are remembered, because what checks a file writes its metadata once more."""
+    """Encode what JSON says; the last texts are remembered, because whoever checks a file writes its metadata again."""
     yaml = YAML()
     # By default, long values would be broken at 80 characters.
     yaml.width = 4096
-    # A mapping that occurs twice, such as an infinite duration, would become an alias, which `from_yaml` refuses.
-    yaml.representer.ignore_aliases = lambda *_: True
     stream = io.StringIO()
+    # A value that occurs twice, such as an infinite duration, is two values here; else it would become an alias, which
+    # `from_yaml` refuses.
     yaml.dump(json.loads(text), stream)
     return stream.getvalue()

@@ -35,6 +35,7 @@ Row = dict[str, Any]
 _KINDS = {"number": pa.float64(), "count": pa.int64(), "text": pa.string()}
 """Types of the columns that tasks declare."""
 _ROWS_A_PIECE = 500
+"""So many rows are made at a time: enough that making them costs no more than making all at once."""
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,6 @@ import copy
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import lru_cache
 from types import MappingProxyType
 
 import numpy as np
@@ -95,8 +94,7 @@ def full_description(config: Config) -> str:
         ConfigError: If the robot's files cannot be read.
     """
     robot, tool = robot_of(config), tool_of(config.tool)
-    # A copy with the same children, as the description that was read is that of all who ask for it.
-    description = copy.copy(_read_description(robot))
+    description = _read_description(robot)
     description.append(_tool_link(tool, visual=True))
     description.append(_tool_joint(tool, robot.hand, tool.mount))
     return _text(description)
@@ -158,7 +156,6 @@ def physics_description(config: Config) -> Description:
     return Description(urdf=_text(description), moving=moving, locked=locked)
 
 
-@lru_cache(maxsize=4)
 def _read_description(robot: Robot) -> ElementTree.Element:
     """Read the links and joints of the robot's URDF, without the collision shapes of the hand that holds the tool.
 

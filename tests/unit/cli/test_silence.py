@@ -17,14 +17,14 @@ from throwcollect.dataset import verify
 SLICED = CONFIG + "record: {{trials_per_shard: 1}}\n"
 
 
-def say_alone_and_as_json(*arguments: str | Path) -> tuple[str, CompletedProcess[str]]:
-    """What a command says besides its result; and what it prints with `--json`."""
+def call_without_and_with_json(*arguments: str | Path) -> tuple[str, CompletedProcess[str]]:
+    """Call a command twice; returns what it says besides its result, and all that it prints with `--json`."""
     return call_here(*arguments).stderr, call_here(*arguments, "--json")
 
 
 def test_of_a_large_plan_only_the_document_is_printed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(prepare, "_TOLD_TRIALS", 1)
-    said, printed = say_alone_and_as_json("plan", write_config(tmp_path, trials=2, sim=FAST))
+    said, printed = call_without_and_with_json("plan", write_config(tmp_path, trials=2, sim=FAST))
     assert "plan: checks 2 trials" in said
     assert printed.stderr == ""
     assert len(json.loads(printed.stdout)) == 2
@@ -32,7 +32,7 @@ def test_of_a_large_plan_only_the_document_is_printed(tmp_path: Path, monkeypatc
 
 def test_a_misplaced_robot_is_told_in_spite_of_json(tmp_path: Path) -> None:
     sunken = CONFIG + "robot: {{base_height_m: 0.5}}\n"
-    said, printed = say_alone_and_as_json("plan", write_config(tmp_path, trials=2, text=sunken, sim=FAST))
+    said, printed = call_without_and_with_json("plan", write_config(tmp_path, trials=2, text=sunken, sim=FAST))
     assert "below the ground" in said
     assert printed.stderr in said
     assert "below the ground" in printed.stderr
@@ -41,7 +41,7 @@ def test_a_misplaced_robot_is_told_in_spite_of_json(tmp_path: Path) -> None:
 def test_of_a_large_dataset_only_the_document_is_printed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     source = Collection({"trials": 2}).collect(tmp_path / "data")
     monkeypatch.setattr(verify, "_MANY_EPISODES", 1)
-    said, printed = say_alone_and_as_json("dataset", "verify", source)
+    said, printed = call_without_and_with_json("dataset", "verify", source)
     assert "checks 1 recording" in said
     assert (printed.stderr, json.loads(printed.stdout)) == ("", [])
 
@@ -59,7 +59,7 @@ def test_of_a_submission_only_the_document_is_printed(tmp_path: Path, monkeypatc
     assert printed.stderr == ""
     assert json.loads(printed.stdout)["array"] == "7"
 
-    said, printed = say_alone_and_as_json("resume", tmp_path / "silent")
+    said, printed = call_without_and_with_json("resume", tmp_path / "silent")
     assert "submitted" in said
     assert printed.stderr == ""
     assert json.loads(printed.stdout)["array"] == "7"
