@@ -3,6 +3,18 @@
 # Whether a file was made within the last hour: lists of packages are fetched once for all that is installed together.
 is_new() { [ -n "$(find "$1" -mmin -60 2> /dev/null)" ]; }
 
+# Installs the packages whose commands are missing: `install_missing COMMAND:PACKAGE...`. All at once, as the machine's manual pages
+# are indexed after each installation. Says on standard output why it cannot.
+install_missing() {
+    local pair packages=()
+    for pair; do command -v "${pair%%:*}" > /dev/null || packages+=("${pair#*:}"); done
+    [ ${#packages[@]} -gt 0 ] || return 0
+    [ "$(id -u)" = 0 ] || { echo "only root can install ${packages[*]}"; return 1; }
+    command -v apt-get > /dev/null || { echo "there is no apt-get to install ${packages[*]}"; return 1; }
+    install_packages "${packages[@]}" > build/apt.log 2>&1 \
+        || { echo "${packages[*]} cannot be installed: $(tail -n 1 build/apt.log)"; return 1; }
+}
+
 # Installs packages of the release that this machine runs.
 install_packages() {
     # Another installation may be under way.
@@ -22,7 +34,7 @@ download_packages() {
     printf 'Types: deb\nURIs: %s\nSuites: %s\nComponents: main\nSigned-By: %s\n' "$mirror" "$release" \
         /usr/share/keyrings/debian-archive-keyring.gpg > "$own/debian.sources"
     local apt=(apt-get -qq -o Dir::Etc::sourcelist="$own/debian.sources" -o Dir::Etc::sourceparts=/dev/null
-        -o Dir::State::lists="$own/lists" -o Dir::Cache="$own/cache" -o APT::Sandbox::User=root)
+        -o Dir::State::lists="$own/lists" -o Dir::Cache="$own/cache" -o APT::Sandbox::User=root -o Acquire::Languages=none)
     is_new "$own/updated" || { "${apt[@]}" update && touch "$own/updated"; } || return
     (cd "$directory" && "${apt[@]}" download "$@")
 }

@@ -29,17 +29,6 @@ unavailable() {
 
 have() { command -v "$1" > /dev/null; }
 
-# Installs the packages whose commands are missing: pairs of a command and its package.
-need() {
-    local pair missing=()
-    for pair; do have "${pair%%:*}" || missing+=("${pair#*:}"); done
-    [ ${#missing[@]} = 0 ] && return
-    [ "$(id -u)" = 0 ] || unavailable "only root can install: ${missing[*]}"
-    have apt-get || unavailable "there is no apt-get to install: ${missing[*]}"
-    install_packages "${missing[@]}" > build/cluster-apt.log 2>&1 \
-        || unavailable "${missing[*]} cannot be installed: $(tail -n 1 build/cluster-apt.log)"
-}
-
 download_apptainer() {
     [ -e $packages/complete ] && return
     rm -rf $packages
@@ -72,7 +61,8 @@ install_apptainer() {
 }
 
 [ "$(uname -m)" = x86_64 ] || have apptainer || unavailable "Apptainer is not installed, and is set up for x86-64 alone"
-need mksquashfs:squashfs-tools squashfuse:squashfuse fuse2fs:fuse2fs newuidmap:uidmap slurmctld:slurm-wlm munged:munge
+why=$(install_missing mksquashfs:squashfs-tools squashfuse:squashfuse fuse2fs:fuse2fs newuidmap:uidmap \
+    slurmctld:slurm-wlm munged:munge) || unavailable "$why"
 have apptainer || install_apptainer
 [ "$(id -u)" = 0 ] || unavailable "only root can start a Slurm of several nodes"
 id $user > /dev/null 2>&1 || useradd --create-home --shell /bin/bash $user

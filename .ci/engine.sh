@@ -27,32 +27,15 @@ unavailable() {
 
 answers() { docker version --format '{{.Server.Version}}' > /dev/null 2>&1; }
 
-# Installs a package unless all of its commands are there, or says why it cannot.
-install_missing() {
-    local package=$1 command
-    shift
-    for command; do
-        if ! command -v "$command" > /dev/null; then
-            [ "$(id -u)" = 0 ] || { echo "$command is not installed, and only root can install $package"; return 1; }
-            command -v apt-get > /dev/null || { echo "$command is not installed, and there is no apt-get"; return 1; }
-            install_packages "$package" > build/apt.log 2>&1 \
-                || { echo "$package cannot be installed: $(tail -n 1 build/apt.log)"; return 1; }
-            return
-        fi
-    done
-}
-
-need() {
-    local why
-    why=$(install_missing "$@") || unavailable "$why"
-}
-
 start_engine() {
     [ -z "${DOCKER_HOST:-}" ] || unavailable "no Docker engine answers at $DOCKER_HOST"
     [ "$(id -u)" = 0 ] || unavailable "no Docker engine answers, and only root can start one"
     # Engines share the machine's bridge and packet filter: a second one takes them from the first.
     [ -z "$(pidof dockerd)" ] || unavailable "dockerd runs, but does not answer"
-    need docker.io dockerd docker
+    # Together with what is needed further down, if all of it can be had.
+    local tools=(dockerd:docker.io docker:docker.io) why
+    install_missing "${tools[@]}" mmdebstrap:mmdebstrap docker-compose:docker-compose > /dev/null \
+        || why=$(install_missing "${tools[@]}") || unavailable "$why"
     # Where services are started when they are installed, it runs by now.
     answers && return
     mkdir -p "$state"
@@ -78,12 +61,12 @@ else
     start_engine
 fi
 if ! docker image inspect "$base" > /dev/null 2>&1; then
-    need mmdebstrap mmdebstrap
+    why=$(install_missing mmdebstrap:mmdebstrap) || unavailable "$why"
     docker/base.sh "$base" > build/base.log 2>&1 || { tail -n 5 build/base.log; unavailable "no base image could be made"; }
     echo "base image: $base"
 fi
 # Without one of the two, its own tests alone are skipped.
-why=$(install_missing docker-compose docker-compose) || echo "no Compose 1.29 for the tests: $why"
+why=$(install_missing docker-compose:docker-compose) || echo "no Compose 1.29 for the tests: $why"
 .ci/compose.sh || echo "no Compose v2 for the tests"
 [ -z "${AFTER:-}" ] || tail --pid="$AFTER" -f /dev/null
 "$python" docker/wheelhouse.py --ros "$wheelhouse"
