@@ -19,7 +19,8 @@ export PYTHONDONTWRITEBYTECODE :=
 .DELETE_ON_ERROR:
 
 .PHONY: up ros dist test test-fast \
-    test-units test-ros test-ros-client test-containers test-processes test-cluster \
+    test-units test-units-of-data test-units-of-faces test-units-of-nodes test-ros test-ros-client test-containers \
+    test-processes test-cluster \
     check check-format check-types check-imports check-house docs bench bench-full clean
 
 # Where the Python is too new for pybullet, MuJoCo simulates; `packaging/environment.sh` has said so.
@@ -87,7 +88,7 @@ test-fast: $(READY_DEV)
 BESIDE := --no-print-directory --output-sync=target
 test: $(READY_DEV)
 	$(MAKE) $(BESIDE) -j 2 check
-	$(MAKE) $(BESIDE) -j 2 test-units test-ros
+	$(MAKE) $(BESIDE) -j 4 test-units test-ros
 	@while [ -n "$(MAKES_IMAGE)" ] && kill -0 $(MAKES_IMAGE) 2> /dev/null; do sleep 1; done
 	$(MAKE) $(BESIDE) -j 3 test-containers test-processes test-cluster
 
@@ -101,10 +102,21 @@ define twice
 $(1) -o cache_dir=.pytest_cache/$@ || $(1) -o cache_dir=.pytest_cache/$@ --last-failed --last-failed-no-failures none
 endef
 
-# Some tests wait, for clients that never read or for a pause, so there is one worker more than the machine has cores.
-WORKERS = $$(( $$(nproc) + 1 ))
-test-units:
-	$(call twice,$(BIN)/python -m pytest -n $(WORKERS) tests/unit tests/install tests/rclzenoh tests/contract tests/physics)
+# A process for each group, and none with several workers: each of those would find and import the tests of all. There is a group
+# more than most small machines have cores, as some tests wait, for clients that never read or for a pause.
+DATA := $(addprefix tests/unit/,coordinator dataset)
+FACES := $(addprefix tests/unit/,cli derive export learning report runs serve view)
+test-units: test-units-of-data test-units-of-faces test-units-of-nodes
+
+test-units-of-data:
+	$(call twice,$(BIN)/python -m pytest $(DATA))
+
+test-units-of-faces:
+	$(call twice,$(BIN)/python -m pytest $(FACES))
+
+test-units-of-nodes:
+	$(call twice,$(BIN)/python -m pytest tests/unit tests/install tests/rclzenoh tests/contract tests/physics \
+	    $(addprefix --ignore=,$(DATA) $(FACES)))
 
 # These tests of genuine ROS 2 need an engine, too.
 WITH_ENGINE := tests/ros/test_containers.py
