@@ -32,8 +32,9 @@ def test_what_a_slice_has_no_use_for_is_refused_and_not_forgotten(
 @pytest.fixture
 def submitted(monkeypatch: pytest.MonkeyPatch) -> None:
     """Every dataset was submitted to a cluster, and nothing is left to submit."""
-    monkeypatch.setattr("throwcollect.cluster.submission.is_submitted", lambda _: True)
+    # In this order: the module of the first line, if it is imported for it, would keep what the second one patches.
     monkeypatch.setattr("throwcollect.cluster.submit.submit_missing", lambda *_, **__: None)
+    monkeypatch.setattr("throwcollect.cluster.submission.is_submitted", lambda _: True)
 
 
 @pytest.mark.usefixtures("submitted")
