@@ -78,11 +78,13 @@ def robot(shared: Robot, defaults: dict[str, object]) -> Robot:
 def running(endpoint: str, session: Context, tmp_path: Path) -> Iterator[tuple[subprocess.Popen[str], Robot]]:
     """The process of a simulation of the test's own, which it may end, and a client."""
     process = start_simulation(tmp_path, endpoint, OWN)
-    robot = Robot(session, OWN)
-    robot.wait_until_ready(process)
-    yield process, robot
-    process.kill()
-    process.communicate()
+    try:
+        robot = Robot(session, OWN)
+        robot.wait_until_ready(process)
+        yield process, robot
+    finally:
+        process.kill()
+        process.communicate()
     robot.wait_until_gone()
     # Last: a session of rmw_zenoh_cpp hangs for good if a client is destroyed while its last answer is being taken in.
     robot.node.destroy_node()

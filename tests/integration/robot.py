@@ -104,12 +104,17 @@ def running_simulation(
 ) -> Iterator[Robot]:
     """A simulation, which must end without an error."""
     process = start_simulation(directory, endpoint, name, config)
-    robot = Robot(session, name)
-    robot.wait_until_ready(process)
-    yield robot
-    process.terminate()
-    output, _ = process.communicate(timeout=20)
-    assert process.returncode == 0, output
+    try:
+        robot = Robot(session, name)
+        robot.wait_until_ready(process)
+        yield robot
+        process.terminate()
+        output, _ = process.communicate(timeout=20)
+        assert process.returncode == 0, output
+    finally:
+        # Whatever failed, nothing goes on behind the tests.
+        process.kill()
+        process.communicate()
     robot.wait_until_gone()
 
 
