@@ -45,6 +45,7 @@ class BulletEngine(Engine):
         WorkerError: If Bullet refuses to start another world in this process.
     """
 
+    can_be_forked = True
     _scenery: Scenery
     _ball: int
     _forces: list[float]
