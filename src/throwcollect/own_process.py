@@ -6,6 +6,7 @@ of it would have them, too.
 
 from __future__ import annotations
 
+import gc
 import sys
 import threading
 
@@ -20,6 +21,16 @@ def claim_process() -> None:
 def may_be_forked() -> bool:
     """Whether this process runs a command, and has no other thread whose locks a fork would copy."""
     return bool(_commands) and threading.active_count() == 1
+
+
+def keep_objects() -> None:
+    """Have the garbage collector pass over all present objects until the end of this process, if it runs a command.
+
+    Nearly all of them belong to modules, and the end of the interpreter would look through them once more, for a tenth
+    of a second. What comes later is still looked through: sessions of Zenoh leave files behind where it is not.
+    """
+    if _commands:
+        gc.freeze()
 
 
 def make_command(module: str = "throwcollect") -> list[str]:

@@ -47,3 +47,10 @@ def test_all_processes_of_ours_are_started_like_that() -> None:
     asked = {path.name for path in sources if re.search(r'sys\.executable, "-[mc]"', path.read_text(encoding="utf-8"))}
     # The other one only names processes for `ps`.
     assert asked == {"own_process.py", "node_server.py"}
+
+
+@pytest.mark.parametrize(("claims", "kept"), [("pass", False), ("claim_process()", True)])
+def test_only_the_objects_of_a_command_are_kept_from_the_garbage_collector(claims: str, kept: bool) -> None:
+    asks = f"import gc; from throwcollect.own_process import *; {claims}; keep_objects(); print(gc.get_freeze_count())"
+    done = subprocess.run([sys.executable, "-c", asks], capture_output=True, text=True, check=True)
+    assert (int(done.stdout) > 0) == kept
