@@ -38,7 +38,7 @@ CONFIGURATION = "configuration"
 """Name of the launcher's parameter that holds the text of the configuration, for machines that join."""
 MOST_SIMULATIONS = 256
 
-_POLL_S = 0.05
+_POLL_S = 0.1
 _LAST_POLL_S = 0.005
 """The same when all known trials have ended, after which the coordinator ends, too, and the user waits for that."""
 _MEET_S = 12.0

@@ -29,7 +29,7 @@ def test_the_end_of_the_coordinator_is_noticed_soon_once_all_trials_have_ended(
 ) -> None:
     collection = collection_of(monkeypatch, Mock())
     spin = collection._listener.spin
-    for ended, longest_s in ((3, 0.05), (4, 0.01)):
+    for ended, longest_s in ((3, 0.1), (4, 0.01)):
         collection._report(replace(BLIND, ended=ended))
         collection._listen()
         assert spin.call_args.args[1] <= longest_s
