@@ -3,6 +3,7 @@ import subprocess
 import sys
 from importlib.metadata import EntryPoint, EntryPoints
 from pathlib import Path
+from unittest.mock import Mock
 
 import pytest
 
@@ -56,6 +57,16 @@ def test_a_member_of_another_package_is_found_and_takes_the_place_of_none_of_our
     assert load_member("engines", "bullet") is BulletEngine
     for cached in caches:
         cached.cache_clear()
+
+
+def test_installed_packages_are_asked_once_for_all_families(monkeypatch: pytest.MonkeyPatch) -> None:
+    ask = Mock(return_value=EntryPoints())
+    monkeypatch.setattr(members, "entry_points", ask)
+    members._table.cache_clear()
+    for family in ("robots", "tools", "engines", "tasks", "runtimes", "exporters"):
+        assert names_of(family)
+    assert ask.call_count == 1
+    members._table.cache_clear()
 
 
 def test_a_member_that_there_is_not_is_an_error() -> None:

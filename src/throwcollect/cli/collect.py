@@ -20,6 +20,7 @@ from throwcollect.cli.terminal import display
 from throwcollect.config.default_path import DEFAULT_CONFIG
 from throwcollect.errors import ConfigError
 from throwcollect.files import write_secret
+from throwcollect.own_process import keep_objects
 from throwcollect.side_by_side import count_cores
 from throwcollect.wording import command
 
@@ -231,6 +232,7 @@ def _collect(
                 _announce(run, token_file, view=view)
                 if not detach:
                     with count_interruptions() as interruptions:
+                        keep_objects()
                         summary = run.collect(interruptions=interruptions)
         if run is not None and detach:
             _start(run, json=json)

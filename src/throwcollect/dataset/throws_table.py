@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import pyarrow as pa
-import pyarrow.compute as pc
 
 from throwcollect.config.schema import Config
 from throwcollect.config.shape import unit_of_key
@@ -239,6 +238,9 @@ def _explain_unusable(table: pa.Table, plan: Plan) -> str | None:
     without = table["shard"].is_null()
     if not all(table[name].is_null().equals(without) for name in ("chunk_offset", "samples", "digest")):
         return "some row has only a part of the place of an episode"
+    # This import takes long, and who makes a plan needs it only after the nodes are started.
+    import pyarrow.compute as pc
+
     # To compare with a number, Arrow would import pandas.
     least = pc.min(table["samples"]).as_py()
     if least is not None and least < 1:

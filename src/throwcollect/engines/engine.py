@@ -11,6 +11,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -248,9 +249,12 @@ class Engine(ABC):
 
     Attributes:
         bodies: Further bodies; None if the engine has no place for them.
+        can_be_forked: Whether a world goes on in a process that is forked off the one that made it, with the same bits.
+            It does not if it needs threads, open files or devices.
     """
 
     bodies: Bodies | None = None
+    can_be_forked: ClassVar[bool] = False
 
     @abstractmethod
     def close(self) -> None:

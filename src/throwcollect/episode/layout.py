@@ -8,7 +8,7 @@ to its own size counted from the end of that header (OMG DDSI-RTPS 2.3, 10.2; DD
 from __future__ import annotations
 
 import itertools
-from collections.abc import Generator, Sequence
+from collections.abc import Generator, Iterable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -87,8 +87,8 @@ class MessageLayout:
 
     def __init__(self, message: Message, variable: Sequence[str]) -> None:
         self.template: bytes = serialize(message)
-        numbers = list(_walk(message, "", 0))
-        places = [_merge(numbers, path, message.TYPE) for path in variable]
+        numbers = _group(_walk(message, "", 0))
+        places = [_merge(numbers.get(path, []), path, message.TYPE) for path in variable]
         self.dtype = np.dtype(
             {
                 "names": list(variable),
@@ -120,8 +120,16 @@ class MessageLayout:
         return all(rows[:, part].tobytes() == self.template[part] * len(rows) for part in self._fixed_parts)
 
 
-def _merge(numbers: Sequence[_Numbers], path: str, type_name: str) -> _Numbers:
-    inside = [place for place in numbers if place.path == path or place.path.startswith(f"{path}.")]
+def _group(numbers: Iterable[_Numbers]) -> dict[str, list[_Numbers]]:
+    """List the numbers at each path, and at the paths of the messages that they are in."""
+    groups: dict[str, list[_Numbers]] = {}
+    for place in numbers:
+        for path in itertools.accumulate(place.path.split("."), "{}.{}".format):
+            groups.setdefault(path, []).append(place)
+    return groups
+
+
+def _merge(inside: Sequence[_Numbers], path: str, type_name: str) -> _Numbers:
     if not inside:
         raise ValueError(f"{type_name} has no numbers at {path!r}")
     if len(inside) == 1:

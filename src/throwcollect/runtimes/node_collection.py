@@ -38,7 +38,9 @@ CONFIGURATION = "configuration"
 """Name of the launcher's parameter that holds the text of the configuration, for machines that join."""
 MOST_SIMULATIONS = 256
 
-_POLL_S = 0.05
+_POLL_S = 0.1
+_LAST_POLL_S = 0.005
+"""The same when all known trials have ended, after which the coordinator ends, too, and the user waits for that."""
 _MEET_S = 12.0
 """Nodes that are ready usually see each other within a second; after this time, something is wrong."""
 
@@ -77,6 +79,7 @@ class NodeCollection:
         self._set_aside: set[str] = set()
         self._apart_since = math.inf
         self._started_again = False
+        self._about_to_end = False
         self._supervisor = Supervisor(host, host.config.run, roster(host, self._simulations))
         self._listener = RunListener(self._report, name=LAUNCHER, reports=host.place.collects, on_connect=self._offer)
 
@@ -135,10 +138,14 @@ class NodeCollection:
             raise kind(f"the coordinator stopped: {end.reason}", evidence=end.log or None, hint=hint)
 
     def _listen(self) -> None:
-        self._listener.spin(self._host.connection, _POLL_S)
+        self._listener.spin(self._host.connection, _LAST_POLL_S if self._about_to_end else _POLL_S)
 
     def _report(self, progress: Progress) -> None:
         self._session.update(progress)
+        if progress.ended:
+            # This import takes long, and is needed at the end. Nobody waits for it now, as the simulations have work.
+            importlib.import_module("throwcollect.dataset.inspect")
+        self._about_to_end = progress.ended >= progress.total
         self._check_that_nodes_meet(progress)
         self._supervisor.replace(progress.hung)
         for name in progress.set_aside.keys() - self._set_aside:
@@ -179,8 +186,6 @@ class NodeCollection:
         node.declare_parameter(CONFIGURATION, dump_yaml(self._host.config), ros.ParameterDescriptor(read_only=True))
         most = 1 if self._host.config.run.root_namespace else MOST_SIMULATIONS
         offer_scaling(node, self._simulations, self._want, most=most)
-        # This import takes long, and is needed at the end. The simulations are starting now, so nobody waits for it.
-        importlib.import_module("throwcollect.dataset.inspect")
 
     def _want(self, simulations: int) -> None:
         # `_follow` scales the run, so that the client that set the parameter does not wait for nodes to end.

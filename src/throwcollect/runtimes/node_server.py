@@ -31,7 +31,6 @@ from throwcollect.config import shape
 from throwcollect.config.schema import Config
 from throwcollect.errors import ThrowcollectError
 from throwcollect.interruption import die_with_parent, leave_when_stopped, stop_signals
-from throwcollect.members import load_member
 from throwcollect.own_process import make_command
 from throwcollect.ros.middleware import Middleware
 from throwcollect.runtimes.forked_process import ForkedProcess
@@ -357,22 +356,26 @@ def _import_libraries() -> None:
 def _prepare_for(values: Mapping[str, Any]) -> None:
     """Compute and cache what all nodes of a configuration need; if that fails, a node reports the error.
 
-    This is the digest of the build, the types and layouts of messages, and a model of the robot. The task and the
-    physics engine are only imported.
+    This is the parsed text of the configuration, the digest of the build, the types and layouts of messages, a model of
+    the robot and, if the physics engine allows it, the world. The task is only imported.
     """
     from throwcollect.build import build_digest
+    from throwcollect.config.loader import dump_yaml
+    from throwcollect.config.yaml_nodes import compose
     from throwcollect.episode.channels import Channels
     from throwcollect.robots.description import full_description
     from throwcollect.robots.tool_motion import ToolMotion
+    from throwcollect.sim.main import make_ahead
     from throwcollect.tasks.task import task_of
 
     with contextlib.suppress(ImportError, ValueError, ThrowcollectError):
         config = Config.model_validate(values)
-        load_member("engines", config.sim.engine)
         task_of(config)
         build_digest(config.sim.engine)
+        compose(dump_yaml(config))
         Channels(config, full_description(config))
         ToolMotion(config)
+        make_ahead(config)
 
 
 if __name__ == "__main__":

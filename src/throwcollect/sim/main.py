@@ -9,12 +9,43 @@ from types import FrameType
 
 from throwcollect import ros
 from throwcollect.config.loader import load
+from throwcollect.config.schema import Config
 from throwcollect.errors import ConfigError
 from throwcollect.heartbeat import Heartbeat, ready_line
 from throwcollect.interruption import stop_signals
+from throwcollect.members import load_member
 from throwcollect.ros.self_check import check_answers
 from throwcollect.sim.node import SimulationNode
 from throwcollect.sim.simulation import Simulation
+
+_made: list[Simulation] = []
+"""The simulation that `make_ahead` has made; empty if there is none."""
+
+
+def make_ahead(config: Config) -> None:
+    """Make the simulation that `run` takes in processes that are forked off this one, if its engine can be forked.
+
+    Raises:
+        ConfigError: As `Simulation`.
+        WorkerError: As `Simulation`.
+    """
+    if load_member("engines", config.sim.engine).can_be_forked:
+        _made.append(Simulation(config))
+
+
+def _take(config: Config) -> Simulation:
+    """Take the simulation that was made ahead if it is one of this configuration, or else make one.
+
+    Raises:
+        ConfigError: As `Simulation`.
+        WorkerError: As `Simulation`.
+    """
+    while _made:
+        simulation = _made.pop()
+        if simulation.config == config:
+            return simulation
+        simulation.world.close()
+    return Simulation(config)
 
 
 def run(config: Path, *, name: str, namespace: str | None = None) -> None:
@@ -31,7 +62,7 @@ def run(config: Path, *, name: str, namespace: str | None = None) -> None:
         ConfigError: If the configuration or the namespace cannot be used.
         WorkerError: If the physics engine does not start, or the ROS 2 backend does not answer.
     """
-    simulation = Simulation(load(config))
+    simulation = _take(load(config))
     if namespace is None and simulation.config.run.root_namespace:
         namespace = "/"
     ros.init()

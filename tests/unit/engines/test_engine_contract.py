@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import hashlib
+import os
 import re
+import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
@@ -103,6 +106,24 @@ def test_the_ball_rests_in_the_tool_of_the_still_robot(engine: Engine) -> None:
     assert ball.linear_velocity == pytest.approx((0, 0, 0), abs=1e-4)
     engine.run(still(engine, 100), Observer())
     assert ball_of(engine.state.sample).position == pytest.approx(ball.position, abs=1e-4)
+
+
+def test_a_world_that_can_be_forked_goes_on_with_the_same_bits(engine: Engine) -> None:
+    assert engine.can_be_forked
+    reader, writer = os.pipe()
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DeprecationWarning)
+        forked = os.fork()
+    if forked == 0:
+        try:
+            os.write(writer, hashlib.sha256(repr(thrown(engine)).encode()).digest())
+        finally:
+            os._exit(0)
+    os.close(writer)
+    with open(reader, "rb") as there:
+        found = there.read()
+    os.waitpid(forked, 0)
+    assert found == hashlib.sha256(repr(thrown(engine)).encode()).digest()
 
 
 def test_the_names_of_links_have_no_effect(engine: Engine) -> None:

@@ -1,3 +1,4 @@
+from dataclasses import replace
 from types import SimpleNamespace
 from unittest.mock import Mock
 
@@ -12,16 +13,33 @@ from throwcollect.runtimes.runtime import NodeState
 BLIND = Progress(total=4, ended=0, outcomes={}, simulations=0, throws_per_s=0.0, hung=[])
 
 
-def test_nodes_that_are_started_again_have_as_much_time_to_meet_as_before(monkeypatch: pytest.MonkeyPatch) -> None:
-    now = [0.0]
-    monkeypatch.setattr(node_collection.time, "monotonic", lambda: now[0])
-    monkeypatch.setattr(node_collection, "Supervisor", Mock())
+def collection_of(monkeypatch: pytest.MonkeyPatch, session: Mock) -> NodeCollection:
+    """One that has no nodes."""
+    supervisor = Mock(states=Mock(return_value=[]))
+    monkeypatch.setattr(node_collection, "Supervisor", Mock(return_value=supervisor))
     monkeypatch.setattr(node_collection, "RunListener", Mock())
     monkeypatch.setattr(node_collection, "roster", Mock())
     place = SimpleNamespace(simulations=1, collects=True, middleware=SimpleNamespace(rmw="rmw_fastrtps_cpp"))
-    host = SimpleNamespace(place=place, config=SimpleNamespace(run=None), endpoint=None)
+    host = SimpleNamespace(place=place, config=SimpleNamespace(run=None), endpoint=None, connection=None)
+    return NodeCollection(host, session)
+
+
+def test_the_end_of_the_coordinator_is_noticed_soon_once_all_trials_have_ended(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    collection = collection_of(monkeypatch, Mock())
+    spin = collection._listener.spin
+    for ended, longest_s in ((3, 0.1), (4, 0.01)):
+        collection._report(replace(BLIND, ended=ended))
+        collection._listen()
+        assert spin.call_args.args[1] <= longest_s
+
+
+def test_nodes_that_are_started_again_have_as_much_time_to_meet_as_before(monkeypatch: pytest.MonkeyPatch) -> None:
+    now = [0.0]
+    monkeypatch.setattr(node_collection.time, "monotonic", lambda: now[0])
     session = Mock()
-    collection = NodeCollection(host, session)
+    collection = collection_of(monkeypatch, session)
     supervisor = collection._supervisor
     supervisor.states.return_value = [NodeState("sim_0", "running", 0, "1", None)]
     for now[0] in (0.0, 11.0, 13.0):

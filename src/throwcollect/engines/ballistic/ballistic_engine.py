@@ -43,6 +43,7 @@ class BallisticEngine(Engine):
     - The ball never spins. There are no other bodies, and nothing touches the robot.
     """
 
+    can_be_forked = True
     _scene: Scene
     _physics: Physics
     _joints: Array

@@ -45,6 +45,7 @@ class BulletEngine(Engine):
         WorkerError: If Bullet refuses to start another world in this process.
     """
 
+    can_be_forked = True
     _scenery: Scenery
     _ball: int
     _forces: list[float]
@@ -191,10 +192,12 @@ class BulletEngine(Engine):
     def _sample(self) -> Sample:
         client, ball = self._client, self._ball
         joints = pybullet.getJointStates(self._scenery.robot, self._scenery.joints, client)
-        positions, velocities, _, torques = zip(*joints, strict=True)
+        # Each joint has four values here, so nothing has to be strict. Adding tuples is the fastest way to join them.
+        positions, velocities, _, torques = zip(*joints)  # noqa: B905
         place, turn = pybullet.getBasePositionAndOrientation(ball, client)
         linear, angular = pybullet.getBaseVelocity(ball, client)
-        return (*positions, *velocities, *torques, *place, *turn, *linear, *angular)
+        sample: Sample = positions + velocities + torques + place + turn + linear + angular
+        return sample
 
     def _apply_drag(self, drag_kgpm: float) -> None:
         position, _ = pybullet.getBasePositionAndOrientation(self._ball, physicsClientId=self._client)
