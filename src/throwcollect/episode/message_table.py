@@ -184,7 +184,7 @@ class MessageTable(RowLayout):
 
     @cached_property
     def samples(self) -> Samples:
-        """The samples; joint columns and the ball's pose are views of the records.
+        """The samples, as copies.
 
         Raises:
             DatasetError: If joint states or the ball's odometry are missing, or have another layout than this version
