@@ -126,6 +126,11 @@ FORGERIES: dict[str, tuple[Forgery, str]] = {
     "other start": (in_samples("position", slice(0, 3), ELBOW, lambda was: was + 0.1), "rad away from the start"),
     "other motion": (in_samples("position", slice(50, 60), ELBOW, lambda was: was + 0.1), "although its torque is"),
     "locked joint moves": (in_samples("position", 50, LOCKED, lambda was: was + 1e-9), "head_1_joint is locked at"),
+    "locked joint moves down": (
+        in_samples("position", 50, LOCKED, lambda was: was - 1e-9),
+        "head_1_joint is locked at",
+    ),
+    "locked joint has speed": (in_samples("velocity", 50, LOCKED, lambda _: -1e-9), "head_1_joint is locked, and"),
     "locked joint has torque": (in_samples("effort", 50, LOCKED, lambda _: 1e-9), "head_1_joint is locked, and"),
     "too much torque": (in_samples("effort", 50, ELBOW, lambda _: 1e3), "of the most that its motor has"),
     "dropped contact": (in_header(contacts=lambda _: ()), "departs from ballistic motion .* where no contact is"),
