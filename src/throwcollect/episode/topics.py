@@ -94,7 +94,8 @@ def rotate(quaternion_xyzw: NDArray[np.float64], *vectors: NDArray[np.float64], 
     v = _twice(np.array([vector.T for vector in vectors]).swapaxes(0, 1))
     # v' = v + w t + u × t with t = 2 u × v, for a unit quaternion (u, w).
     t = _twice(2 * _cross(u, v))
-    return (v[:3] + w * t[:3] + _cross(u, t)).transpose(1, 2, 0)
+    turned: NDArray[np.float64] = (v[:3] + w * t[:3] + _cross(u, t)).transpose(1, 2, 0)
+    return turned
 
 
 def _twice(axes: NDArray[np.float64]) -> NDArray[np.float64]:
