@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from tests.unit.dataset.conftest import SETTINGS, Change, Collection, throw
+from tests.unit.dataset.damage import flip, stored
 
 from throwcollect.config.schema import Config
 from throwcollect.coordinator.prepare import draw_plan, feasibility_check
@@ -18,15 +19,19 @@ from throwcollect.dataset.throws_table import ThrowsTable
 from throwcollect.dataset.verify import verify
 from throwcollect.dataset.verify_episode import EpisodeCheck
 from throwcollect.dataset.verify_plan import find_drawing_problems, find_refusal_problems
+from throwcollect.dataset.verify_shard import check_shard
 from throwcollect.episode.channels import Channels
 from throwcollect.episode.record import Contact, EpisodeHeader, Samples
+from throwcollect.errors import ConfigError
 from throwcollect.robots.description import full_description
 from throwcollect.robots.talos import TALOS
+from throwcollect.robots.trajectory import JointTrajectory
 from throwcollect.sweep.digest import trial_digests
 from throwcollect.sweep.plan import Plan, make_trials
 from throwcollect.sweep.points import Points
 from throwcollect.sweep.samplers import draw_points
 from throwcollect.sweep.trials import Trials
+from throwcollect.tasks.task import trajectory_of
 from throwcollect.tasks.throw.outcome import ThrowOutcome, ThrowResult
 
 FORGED = 2
@@ -121,6 +126,11 @@ FORGERIES: dict[str, tuple[Forgery, str]] = {
     "other start": (in_samples("position", slice(0, 3), ELBOW, lambda was: was + 0.1), "rad away from the start"),
     "other motion": (in_samples("position", slice(50, 60), ELBOW, lambda was: was + 0.1), "although its torque is"),
     "locked joint moves": (in_samples("position", 50, LOCKED, lambda was: was + 1e-9), "head_1_joint is locked at"),
+    "locked joint moves down": (
+        in_samples("position", 50, LOCKED, lambda was: was - 1e-9),
+        "head_1_joint is locked at",
+    ),
+    "locked joint has speed": (in_samples("velocity", 50, LOCKED, lambda _: -1e-9), "head_1_joint is locked, and"),
     "locked joint has torque": (in_samples("effort", 50, LOCKED, lambda _: 1e-9), "head_1_joint is locked, and"),
     "too much torque": (in_samples("effort", 50, ELBOW, lambda _: 1e3), "of the most that its motor has"),
     "dropped contact": (in_header(contacts=lambda _: ()), "departs from ballistic motion .* where no contact is"),
@@ -175,6 +185,61 @@ def test_verify_names_the_trial(collection: Collection, tmp_path: Path) -> None:
 
     (finding,) = verify(collection.collect(tmp_path / "dataset", change=change))
     assert str(finding).startswith("quick_00000.mcap: trial 2: arm_right_4_joint departs from the trajectory")
+
+
+def forged_at_once(samples: Samples, header: EpisodeHeader) -> tuple[Samples, EpisodeHeader]:
+    """Every other trial is forged, each for another step of the check."""
+    forgeries = {
+        0: FORGERIES["infinite position"],
+        2: FORGERIES["velocity in flight"],
+        3: FORGERIES["locked joint moves"],
+        5: FORGERIES["cut as timeout"],
+    }
+    forge, _ = forgeries.get(header.trial, (lambda *same: same, ""))
+    return forge(samples, header)
+
+
+def test_episodes_that_are_checked_together_are_told_apart(tmp_path: Path) -> None:
+    collection = Collection({"record": {"trials_per_shard": 10}})
+    alone = EpisodeCheck(collection.plan, {})
+    channels = Channels(collection.config, full_description(collection.config))
+    expected = [
+        (f"trial {trial}", problem)
+        for trial in range(7)
+        for problem in alone.find_content_problems(collection.episode(trial, forged_at_once), channels)
+    ]
+    assert list(dict.fromkeys(place for place, _ in expected)) == ["trial 0", "trial 2", "trial 3", "trial 5"]
+    path = collection.collect(tmp_path / "dataset", change=forged_at_once)
+    assert [(each.place, each.problem) for each in verify(path)] == expected
+
+
+def test_what_lies_between_episodes_is_told_between_their_problems(tmp_path: Path) -> None:
+    collection = Collection({"record": {"trials_per_shard": 10}})
+    path = collection.collect(tmp_path / "dataset", change=forged_at_once) / "quick_00000.mcap"
+    start = stored(path, 1).offset
+    flip(path, start)
+    report = check_shard(path, collection.config, range(7), EpisodeCheck(collection.plan, {}).find_problems)
+    places = list(dict.fromkeys(finding.place for finding in report.findings))
+    assert places == ["trial 0", f"byte {start}", "trial 2", "trial 3", "trial 5", "trial 1"]
+    assert sorted(report.digests) == [0, 2, 3, 4, 5, 6]
+
+
+def test_an_error_of_a_check_ends_it_behind_the_problems_so_far(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    collection = Collection({"record": {"trials_per_shard": 10}})
+    path = collection.collect(tmp_path / "dataset", change=forged_at_once) / "quick_00000.mcap"
+
+    def plan_motion(config: Config) -> JointTrajectory:
+        if config.task.duration_s == collection.plan.trial(3).values["task.duration_s"]:
+            raise ConfigError("no usable motion")
+        return trajectory_of(config)
+
+    monkeypatch.setattr("throwcollect.dataset.verify_episode.trajectory_of", plan_motion)
+    report = check_shard(path, collection.config, range(7), EpisodeCheck(collection.plan, {}).find_problems)
+    assert list(dict.fromkeys(finding.place for finding in report.findings)) == ["trial 0", "trial 2", ""]
+    assert report.findings[-1].problem == "no usable motion"
+    assert sorted(report.digests) == [0, 1, 2]
 
 
 def replanned(plan: Plan, points: Points, *, seed: int | None = None) -> Plan:

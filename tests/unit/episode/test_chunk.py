@@ -14,7 +14,7 @@ from mcap.records import Chunk as McapChunk
 from mcap.records import Message, MessageIndex
 
 from throwcollect.config.schema import Config
-from throwcollect.episode.channels import Channels
+from throwcollect.episode.channels import BALL_ODOMETRY_ID, JOINT_STATES_ID, Channels
 from throwcollect.episode.chunk import Chunk
 from throwcollect.episode.encoder import ChunkEncoder
 from throwcollect.episode.message import Episode
@@ -212,3 +212,22 @@ def test_times_are_compared_with_stamps(encoder: ChunkEncoder, make_samples: Any
     assert MessageTable(bytes(contents), 5).are_timed_by(samples.stamps_ns)
     contents[len(contents) // 5 + 11] ^= 1
     assert not MessageTable(bytes(contents), 5).are_timed_by(samples.stamps_ns)
+
+
+@pytest.mark.parametrize("place", [11, 15, 23], ids=["sequence", "log time", "publish time"])
+@pytest.mark.parametrize("channel", [JOINT_STATES_ID, BALL_ODOMETRY_ID])
+def test_each_part_of_a_header_is_compared_with_stamps(
+    encoder: ChunkEncoder, make_samples: Any, place: int, channel: int
+) -> None:
+    samples = make_samples(5)
+    contents = bytearray(encoder.encode(samples).decompress())
+    contents[4 * len(contents) // 5 + MessageTable(contents, 5).columns[channel].offset + place] ^= 1
+    assert not MessageTable(bytes(contents), 5).are_timed_by(samples.stamps_ns)
+
+
+def test_a_stamp_before_time_0_is_not_the_time_of_a_record(encoder: ChunkEncoder, make_samples: Any) -> None:
+    contents = bytearray(encoder.encode(make_samples(1)).decompress())
+    table = MessageTable(contents, 1)
+    for channel in table.columns:
+        table.headers(channel)["log_time"] = table.headers(channel)["publish_time"] = 2**64 - 1
+    assert not table.are_timed_by(np.array([-1]))
