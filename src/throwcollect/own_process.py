@@ -7,7 +7,6 @@ of it would have them, too.
 from __future__ import annotations
 
 import gc
-import os
 import sys
 import threading
 
@@ -18,11 +17,9 @@ hundred times while libraries are imported, which make many objects that stay.""
 
 
 def claim_process() -> None:
-    """Declare that this process runs a command and nothing else, and have it import libraries in less time."""
+    """Declare that this process runs a command and nothing else, and have it look for garbage less often."""
     _commands.append(True)
     gc.set_threshold(_NEW_OBJECTS)
-    # Pydantic would look for plugins in all installed packages, and they could change how configurations are read.
-    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
 
 
 def may_be_forked() -> bool:

@@ -1,6 +1,5 @@
 """What tells a command of ours from somebody's program."""
 
-import os
 import re
 import subprocess
 import sys
@@ -55,17 +54,3 @@ def test_only_the_objects_of_a_command_are_kept_from_the_garbage_collector(claim
     asks = f"import gc; from throwcollect.own_process import *; {claims}; keep_objects(); print(gc.get_freeze_count())"
     done = subprocess.run([sys.executable, "-c", asks], capture_output=True, text=True, check=True)
     assert (int(done.stdout) > 0) == kept
-
-
-def test_no_plugin_of_pydantic_takes_part_in_a_command(tmp_path: Path) -> None:
-    loaded = tmp_path / "loaded"
-    (tmp_path / "spy.py").write_text(f"open({str(loaded)!r}, 'w').close()\nplugin = None\n")
-    about = tmp_path / "spy-1.0.dist-info"
-    about.mkdir()
-    (about / "METADATA").write_text("Metadata-Version: 2.1\nName: spy\nVersion: 1.0\n")
-    (about / "entry_points.txt").write_text("[pydantic]\nspy = spy:plugin\n")
-    config = tmp_path / "config.yaml"
-    config.write_text("name: usual\n")
-    path = os.pathsep.join([str(tmp_path), *filter(None, [os.environ.get("PYTHONPATH")])])
-    subprocess.run([*make_command(), "config", config], env={**os.environ, "PYTHONPATH": path}, check=True)
-    assert not loaded.exists()
