@@ -1,6 +1,7 @@
 """What starting a collection does, and what it leaves alone."""
 
 import os
+import pty
 import subprocess
 import sys
 from collections.abc import Callable
@@ -49,7 +50,8 @@ def test_no_process_of_a_collection_imports_pandas(yaml, tmp_path: Path) -> None
     assert not imported.exists(), imported.read_text()
 
 
-def test_a_collection_is_one_interpreter_and_what_is_forked_off_it(yaml, tmp_path: Path) -> None:
+@pytest.mark.parametrize("on_terminal", [False, True])
+def test_a_collection_is_one_interpreter_and_what_is_forked_off_it(on_terminal, yaml, tmp_path: Path) -> None:
     started = tmp_path / "started"
     (tmp_path / "before").mkdir()
     (tmp_path / "before" / "sitecustomize.py").write_text(
@@ -58,7 +60,16 @@ def test_a_collection_is_one_interpreter_and_what_is_forked_off_it(yaml, tmp_pat
     path = os.pathsep.join([str(tmp_path / "before"), *filter(None, [os.environ.get("PYTHONPATH")])])
     words = ["up", "-n", "2", "--set", "run.replay=0", "--output", tmp_path / "data", yaml()]
     command = [sys.executable, "-m", "throwcollect", *words]
-    subprocess.run(command, env={**os.environ, "PYTHONPATH": path}, check=True, capture_output=True)
+    terminal, errors = pty.openpty() if on_terminal else os.pipe()
+    done = subprocess.run(
+        command, env={**os.environ, "PYTHONPATH": path}, stdout=subprocess.PIPE, stderr=errors, check=False
+    )
+    os.close(errors)
+    said = os.read(terminal, 65536)
+    os.close(terminal)
+    assert done.returncode == 0, said
+    # A bar hides the cursor.
+    assert (b"\x1b[?25l" in said) == on_terminal
     assert len(started.read_text().splitlines()) == 1, started.read_text()
 
 

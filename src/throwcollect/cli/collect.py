@@ -225,15 +225,16 @@ def _collect(
 
     `prepare_run` returns None if the dataset in the directory, with which the run was to go on, is finished already.
     """
+    shown = display(quiet=json, bar=not detach)
     with ExitStack() as held:
-        with display(quiet=json, bar=not detach) as shown:
-            if (run := prepare_run(ahead=not detach, onlooker=shown)) is not None:
-                held.enter_context(run)
-                _announce(run, token_file, view=view)
-                if not detach:
-                    with count_interruptions() as interruptions:
-                        keep_objects()
-                        summary = run.collect(interruptions=interruptions)
+        if (run := prepare_run(ahead=not detach, onlooker=shown)) is not None:
+            held.enter_context(run)
+            _announce(run, token_file, view=view)
+            if not detach:
+                # Not before: where the thread of a bar runs, nodes are not forked off this process, and start later.
+                with shown, count_interruptions() as interruptions:
+                    keep_objects()
+                    summary = run.collect(interruptions=interruptions)
         if run is not None and detach:
             _start(run, json=json)
             return
