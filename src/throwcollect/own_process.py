@@ -11,15 +11,11 @@ import sys
 import threading
 
 _commands: list[bool] = []
-_NEW_OBJECTS = 10_000
-"""After so many new objects the garbage collector looks for garbage among them. With Python's 700, it would do so two
-hundred times while libraries are imported, which make many objects that stay."""
 
 
 def claim_process() -> None:
-    """Declare that this process runs a command and nothing else, and have it look for garbage less often."""
+    """Declare that this process runs a command and nothing else."""
     _commands.append(True)
-    gc.set_threshold(_NEW_OBJECTS)
 
 
 def may_be_forked() -> bool:
