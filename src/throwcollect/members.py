@@ -112,17 +112,11 @@ def load_object(path: str, kind: type | None = None) -> Any:
     Raises:
         ConfigError: If it is of another package, and cannot be imported or is not of this kind.
     """
-    if path.partition(".")[0] == __package__:
-        return _load_own(path)
+    module, _, name = path.partition(":")
+    if module.partition(".")[0] == __package__:
+        return getattr(import_module(module), name)
     found = _import(path, path)
     return found if kind is None else _check_class(found, kind, path)
-
-
-@cache
-def _load_own(path: str) -> Any:
-    """Import an object of our own; the cache is for callers that ask with every trial."""
-    module, _, name = path.partition(":")
-    return getattr(import_module(module), name)
 
 
 @contextmanager

@@ -43,20 +43,16 @@ def find_joint_problems(trial: RecordedTrial) -> Iterator[str]:
     samples, config, trajectory = trial.samples, trial.config, trial.trajectory
     robot = robot_of(config)
     locked = find_locked_joints(config)
-    columns = [column for column, joint in enumerate(robot.joints) if joint in locked]
-    angles = np.array(list(locked.values()))
-    # What is never below a number and never above it is always there.
-    low, high = samples.position.min(axis=0)[columns], samples.position.max(axis=0)[columns]
-    away = (low != angles) | (high != angles)
-    speeds, torques = np.abs(samples.velocity).max(axis=0), np.abs(samples.effort).max(axis=0)
-    moved = (speeds[columns] != 0) | (torques[columns] != 0)
+    columns = [robot.joints.index(joint) for joint in locked]
+    away = (samples.position[:, columns] != list(locked.values())).any(axis=0)
+    moved = (samples.velocity[:, columns] != 0).any(axis=0) | (samples.effort[:, columns] != 0).any(axis=0)
     for joint, is_away, has_moved in zip(locked, away, moved, strict=True):
         if is_away:
             yield f"{joint} is locked at {locked[joint]:.6g} rad and is somewhere else"
         if has_moved:
             yield f"{joint} is locked, and moves or has a torque"
-    limits = joint_limits(robot).effort * config.robot.effort_scale
-    peaks = torques / limits
+    torques, limits = np.abs(samples.effort), joint_limits(robot).effort * config.robot.effort_scale
+    peaks = torques.max(axis=0) / limits
     if peaks.max() > 1 + 1e-6:
         joint = robot.joints[int(peaks.argmax())]
         yield f"the torque of {joint} is {peaks.max():.4f} of the most that its motor has"
@@ -70,10 +66,10 @@ def find_joint_problems(trial: RecordedTrial) -> Iterator[str]:
     # A motor at its limit falls behind, so from there on honest recordings depart from the trajectory, too.
     followed = len(samples)
     if peaks.max() >= _AT_LIMIT:
-        followed = int((np.abs(samples.effort) / limits >= _AT_LIMIT).any(axis=1).argmax())
+        followed = int((torques / limits >= _AT_LIMIT).any(axis=1).argmax())
     wanted = _where_motors_should_be(trial)[:followed]
     moving = [robot.joints.index(joint) for joint in trajectory.joints]
-    errors = np.abs(samples.position.T[moving].T[:followed] - wanted)
+    errors = np.abs(samples.position[:followed, moving] - wanted)
     if followed and errors.max() > tolerance:
         joint = trajectory.joints[int(errors.max(axis=0).argmax())]
         said = f"departs from the trajectory of the trial by {errors.max():.3g} rad"
@@ -177,50 +173,38 @@ def _measure_departures(
     position, velocity = ballistic_steps(
         samples.ball_position[:-1], samples.ball_linear_velocity[:-1], steps=stride, config=config
     )
-    before, after = samples.ball_orientation_xyzw[:-1], samples.ball_orientation_xyzw[1:]
     spin = samples.ball_angular_velocity
     rate = _measure_lengths(spin[:-1])
-    turned = _turn(before, spin[:-1], rate, stride / config.sim.physics_hz)
+    turned = _turn(samples.ball_orientation_xyzw[:-1], spin[:-1], stride / config.sim.physics_hz)
     # A quaternion and its negative are the same orientation.
-    cosine = _multiply_rows(turned, after)
-    apart = 2 * _measure_lengths(turned * np.sign(cosine)[:, np.newaxis] - after)
+    cosine = _multiply_rows(turned, samples.ball_orientation_xyzw[1:])
+    apart = 2 * _measure_lengths(turned * np.sign(cosine)[:, np.newaxis] - samples.ball_orientation_xyzw[1:])
     apart[rate > _MOST_TURN_RAD * config.sim.physics_hz] = 0.0
     return {
         "position": (_measure_lengths(samples.ball_position[1:] - position), _POSITION_M, "m"),
         "velocity": (_measure_lengths(samples.ball_linear_velocity[1:] - velocity), _VELOCITY_MPS, "m/s"),
-        "spin": (_measure_lengths(spin[1:] - spin[:-1]), _SPIN * np.maximum(rate, 1.0), "rad/s"),
+        "spin": (_measure_lengths(np.diff(spin, axis=0)), _SPIN * np.maximum(rate, 1.0), "rad/s"),
         "orientation": (apart, _ORIENTATION_RAD, "rad"),
     }
 
 
-def _turn(
-    orientation: NDArray[np.float64], spin: NDArray[np.float64], rate: NDArray[np.float64], duration_s: float
-) -> NDArray[np.float64]:
-    """Turn unit quaternions (xyzw) with constant angular velocities in world [rad/s]; shape ``(n, 4)``.
-
-    `rate` has the lengths of these velocities, shape ``(n,)``.
-    """
+def _turn(orientation: NDArray[np.float64], spin: NDArray[np.float64], duration_s: float) -> NDArray[np.float64]:
+    """Turn unit quaternions (xyzw) with constant angular velocities in world [rad/s]; shape ``(n, 4)``."""
+    rate = _measure_lengths(spin)[:, np.newaxis]
     half = rate * (duration_s / 2)
     # sin(x)/x, also where nothing turns.
-    axis = spin.T * (duration_s / 2 * np.sinc(half / np.pi))
-    vector, scalar = orientation.T[:3], orientation.T[3]
+    axis = spin * (duration_s / 2 * np.sinc(half / np.pi))
+    vector, scalar = orientation[:, :3], orientation[:, 3:]
     turn = np.cos(half)
     # This is the product of two quaternions, that of the turn and the orientation.
-    turned = np.empty_like(orientation.T)
-    turned[:3] = turn * vector + scalar * axis + _cross(axis, vector)
-    turned[3] = turn * scalar - _multiply_rows(axis.T, vector.T)
-    return turned.T
-
-
-def _cross(left: NDArray[np.float64], right: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Cross products of columns, shape ``(3, n)``, in a third of the time that NumPy's own function takes."""
-    (x, y, z), (u, v, w) = left, right
-    return np.stack([y * w - z * v, z * u - x * w, x * v - y * u])
+    turned = turn * vector + scalar * axis + np.cross(axis, vector)
+    return np.hstack([turned, turn * scalar - _multiply_rows(axis, vector)[:, np.newaxis]])
 
 
 def _multiply_rows(left: NDArray[np.float64], right: NDArray[np.float64]) -> NDArray[np.float64]:
     """Scalar product of each row with the same row of the other, shape ``(n,)``."""
-    products: NDArray[np.float64] = (left * right).sum(axis=1)
+    # `sum` and `norm` over an axis of three or four take several times as long.
+    products: NDArray[np.float64] = np.einsum("ij,ij->i", left, right)
     return products
 
 

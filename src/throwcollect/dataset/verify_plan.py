@@ -15,7 +15,7 @@ from throwcollect.dataset.findings import Finding
 from throwcollect.dataset.throws_table import REFUSED, Row, ThrowsTable
 from throwcollect.errors import ConfigError
 from throwcollect.extras import is_installed
-from throwcollect.sweep.plan import ROUND_TRIALS, Check, Plan, draw_seeds, refusal
+from throwcollect.sweep.plan import ROUND_TRIALS, Check, Plan, make_trials, refusal
 from throwcollect.sweep.points import Points
 from throwcollect.sweep.rounds import Rounds, find_same
 from throwcollect.sweep.samplers import draw_points
@@ -51,18 +51,16 @@ def find_drawing_problems(directory: Path, plan: Plan, rows: Mapping[int, Row] |
         return
     if drawing.problem is not None:
         yield Finding(PLAN, "", drawing.problem)
-    # Digests follow from values and seeds, and are compared elsewhere.
-    drawn = drawing.values[: len(plan.trials)]
-    seeds = draw_seeds(plan.config, range(len(drawn)))
+    drawn = make_trials(plan.config, Points(plan.keys, drawing.values[: len(plan.trials)]))
     planned = plan.trials[: len(drawn)]
-    same = find_same(planned.values, drawn).all(axis=1) & (planned.seeds == seeds)
-    for index in np.flatnonzero(~same).tolist():
-        trial, seed = planned[index], int(seeds[index])
-        for key, value in zip(plan.keys, drawn[index].tolist(), strict=True):
+    same = find_same(planned.values, drawn.values).all(axis=1) & (planned.seeds == drawn.seeds)
+    for index in np.flatnonzero(~same):
+        trial, again = planned[int(index)], drawn[int(index)]
+        for key, value in again.values.items():
             if not find_same(np.array(trial.values[key]), np.array(value)):
-                yield _of_trial(index, f"has {key} = {trial.values[key]!r}, the configuration draws {value!r}")
-        if trial.seed != seed:
-            yield _of_trial(index, f"has seed {trial.seed}, the configuration gives {seed}")
+                yield _of_trial(again.number, f"has {key} = {trial.values[key]!r}, the configuration draws {value!r}")
+        if trial.seed != again.seed:
+            yield _of_trial(again.number, f"has seed {trial.seed}, the configuration gives {again.seed}")
 
 
 def find_refusal_problems(plan: Plan, doubtful: Collection[int], check_of: CheckOf) -> Iterator[Finding]:

@@ -18,7 +18,7 @@ from throwcollect.config.schema import Config
 from throwcollect.dataset.bag import FileSummary
 from throwcollect.dataset.directory import THROWS
 from throwcollect.dataset.findings import Finding
-from throwcollect.dataset.mcap_file import BAG, LIBRARY, MAGIC, PROFILE, McapFile, Run
+from throwcollect.dataset.mcap_file import BAG, LIBRARY, MAGIC, PROFILE, McapFile
 from throwcollect.dataset.mcap_reader import McapContents, Record, StoredEpisode, map_file, read_latched_table
 from throwcollect.dataset.scan import scan
 from throwcollect.episode.channels import Channels
@@ -243,7 +243,8 @@ class _ShardCheck:
             if stored.offset > expected:
                 self._report_gap(expected, resumed=stored.offset)
             if self.model is not None:
-                self.model.append(stored.intact_run if found.intact else self._read_run(stored))
+                # The model gets the bytes as they lie here, as its indexes and its CRC are compared with those here.
+                self.model.append(replace(stored.run(), data=contents.slice(stored.offset, stored.end)))
                 # The bytes of episodes are checked elsewhere, so here only those before and behind them are kept.
                 self.expected.clear()
             self._check_place(stored)
@@ -258,10 +259,6 @@ class _ShardCheck:
             pass  # `_report_gap` reports it, as an episode could begin there
         self._report_gap(expected)
         return -1
-
-    def _read_run(self, stored: StoredEpisode) -> Run:
-        """Read an episode byte for byte, as the indexes and the CRC of the model are compared with those here."""
-        return replace(stored.run(), data=self.contents.slice(stored.offset, stored.end))
 
     def _report_gap(self, start: int, *, resumed: int = -1) -> None:
         """Report that no episode can be read from `start` on; the next one begins at `resumed` [bytes], -1 if none."""

@@ -40,8 +40,6 @@ _HEADERS = np.dtype(
 """`MESSAGE_HEADER`, of many records at once."""
 _ALIKE_BYTES = 11
 """Size of opcode, length and channel, which are the same in all records of a channel."""
-_TIMES = np.dtype([("sequence", "<u4"), ("log_time", "<u8"), ("publish_time", "<u8")])
-"""The rest of the header of a record."""
 _STAMP_OFFSET = 4
 """Place of the stamp in a message that begins with its std_msgs/Header: behind the CDR encapsulation [bytes]."""
 
@@ -159,13 +157,12 @@ class MessageTable(RowLayout):
 
     def are_timed_by(self, stamps_ns: NDArray[np.int64]) -> bool:
         """Say whether all records are numbered from 0, with these times of logging and publication [ns]."""
-        wanted = np.empty(len(self), _TIMES)
-        wanted["sequence"] = np.arange(len(self))
-        wanted["log_time"] = wanted["publish_time"] = stamps_ns
-        starts = [column.offset + _ALIKE_BYTES for column in self.columns.values()]
-        parts = (self._table[:, start : start + _TIMES.itemsize] for start in starts)
-        # Times in records have no sign.
-        return bool((stamps_ns >= 0).all()) and all(part.tobytes() == wanted.tobytes() for part in parts)
+        return all(
+            np.array_equal(headers["sequence"], np.arange(len(self)))
+            and np.array_equal(headers["log_time"], stamps_ns)
+            and np.array_equal(headers["publish_time"], stamps_ns)
+            for headers in map(self.headers, self.columns)
+        )
 
     def messages(self, channel: int) -> NDArray[np.uint8]:
         """View the CDR messages of one channel, shape ``(n_samples, size)``.
@@ -187,7 +184,7 @@ class MessageTable(RowLayout):
 
     @cached_property
     def samples(self) -> Samples:
-        """The samples, as copies.
+        """The samples; joint columns and the ball's pose are views of the records.
 
         Raises:
             DatasetError: If joint states or the ball's odometry are missing, or have another layout than this version

@@ -86,7 +86,7 @@ def rotate(quaternion_xyzw: NDArray[np.float64], *vectors: NDArray[np.float64], 
     It is done element by element, so a row's result does not depend on other rows.
 
     Returns:
-        Shape ``(len(vectors), n, 3)``; the numbers of one axis lie side by side.
+        Shape ``(len(vectors), n, 3)``.
     """
     # The elements of recorded columns lie far apart in memory, and the code below reads them many times.
     *axis, w = np.ascontiguousarray(quaternion_xyzw.T)
@@ -94,8 +94,7 @@ def rotate(quaternion_xyzw: NDArray[np.float64], *vectors: NDArray[np.float64], 
     v = _twice(np.array([vector.T for vector in vectors]).swapaxes(0, 1))
     # v' = v + w t + u × t with t = 2 u × v, for a unit quaternion (u, w).
     t = _twice(2 * _cross(u, v))
-    turned: NDArray[np.float64] = (v[:3] + w * t[:3] + _cross(u, t)).transpose(1, 2, 0)
-    return turned
+    return np.ascontiguousarray((v[:3] + w * t[:3] + _cross(u, t)).transpose(1, 2, 0))
 
 
 def _twice(axes: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -170,19 +169,18 @@ def _fill_ball_odometry(rows: Rows, recording: Recording) -> None:
 def read_samples(joint_rows: Rows, ball_rows: Rows) -> Samples:
     """Read samples from the messages of `joint_states` and `ball_odometry`, each of shape ``(n_samples,)``.
 
-    Velocities are turned back into world. The numbers are copied, and those of one column lie side by side: arithmetic
-    on the messages themselves, where they lie far apart and at odd places, takes several times as long.
+    Joint columns and the ball's pose are views of the messages; velocities are turned back into world.
     """
-    orientation = np.asfortranarray(ball_rows["pose.pose.orientation"])
+    orientation = ball_rows["pose.pose.orientation"]
     linear, angular = rotate(
         orientation, ball_rows["twist.twist.linear"], ball_rows["twist.twist.angular"], inverse=False
     )
     return Samples(
         stamps_ns=read_stamps(joint_rows, "header.stamp"),
-        position=np.asfortranarray(joint_rows["position"]),
-        velocity=np.asfortranarray(joint_rows["velocity"]),
-        effort=np.asfortranarray(joint_rows["effort"]),
-        ball_position=np.asfortranarray(ball_rows["pose.pose.position"]),
+        position=joint_rows["position"],
+        velocity=joint_rows["velocity"],
+        effort=joint_rows["effort"],
+        ball_position=ball_rows["pose.pose.position"],
         ball_orientation_xyzw=orientation,
         ball_linear_velocity=linear,
         ball_angular_velocity=angular,

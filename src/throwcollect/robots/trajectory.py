@@ -9,8 +9,6 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from throwcollect.control.interpolation import quintic
-
 
 @dataclass(frozen=True)
 class JointTrajectory:
@@ -29,20 +27,6 @@ class JointTrajectory:
     positions: NDArray[np.float64]
     velocities: NDArray[np.float64]
     accelerations: NDArray[np.float64]
-
-    @cached_property
-    def polynomials(self) -> NDArray[np.float64]:
-        """Coefficients of the quintic polynomials between the points [rad], ``(n_points - 1, 6, n_joints)``.
-
-        They are those of ascending powers of the share of the segment that has passed, and nobody may change them.
-        """
-        scale = (self.times[1:] - self.times[:-1])[:, np.newaxis]
-        moved = self.positions[1:] - self.positions[:-1]
-        v0, v1 = self.velocities[:-1] * scale, self.velocities[1:] * scale
-        a0, a1 = self.accelerations[:-1] * scale**2, self.accelerations[1:] * scale**2
-        coefficients = np.stack([self.positions[:-1], *quintic(moved, v0, v1, a0, a1)], axis=1)
-        coefficients.flags.writeable = False
-        return coefficients
 
     @cached_property
     def digest(self) -> str:

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from throwcollect.config.schema import Config
 from throwcollect.config.target import is_target
@@ -209,15 +208,15 @@ def draw_first_points(config: Config, *, directory: Path) -> Points:
 
 def make_trials(config: Config, points: Points, *, first: int = 0) -> Trials:
     """Make trials of points, with numbers from `first` on; none of them is refused."""
-    seeds = draw_seeds(config, range(first, first + len(points.values)))
-    return Trials(points, seeds, trial_digests(config, points, seeds), first=first)
+    count = len(points.values)
+    seeds = np.fromiter((_seed(config.seed, number) for number in range(first, first + count)), np.uint64, count)
+    digests = trial_digests(config, points, seeds)
+    return Trials(points, seeds, digests, first=first)
 
 
-def draw_seeds(config: Config, numbers: range) -> NDArray[np.uint64]:
-    """Draw the seeds of the trials of these numbers, shape ``(n,)``; that of a trial depends on no other trial."""
-    # So a plan can be made longer, or in parts.
-    sequences = (np.random.SeedSequence(config.seed, spawn_key=(number,)) for number in numbers)
-    return np.fromiter((each.generate_state(1, np.uint64)[0] for each in sequences), np.uint64, len(numbers))
+def _seed(root: int, number: int) -> int:
+    # The seed of a trial depends on no other trial, so a plan can be made longer, or in parts.
+    return int(np.random.SeedSequence(root, spawn_key=(number,)).generate_state(1, np.uint64)[0])
 
 
 def refusal(config: Config, check: Check) -> str | None:

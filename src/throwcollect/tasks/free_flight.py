@@ -58,10 +58,8 @@ def ballistic_steps(
     dt, drag_per_m = 1 / config.sim.physics_hz, _drag_per_m(config)
     gravity = np.array([0.0, 0.0, -config.scene.gravity_mps2])
     for _ in range(steps):
-        acceleration = gravity
-        if drag_per_m:
-            acceleration = gravity - drag_per_m * np.linalg.norm(velocity, axis=1, keepdims=True) * velocity
-        velocity = velocity + acceleration * dt
+        braking = drag_per_m * np.linalg.norm(velocity, axis=1, keepdims=True)
+        velocity = velocity + (gravity - braking * velocity) * dt
         position = position + velocity * dt
     return position, velocity
 
