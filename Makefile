@@ -102,8 +102,8 @@ define twice
 $(1) -o cache_dir=.pytest_cache/$@ || $(1) -o cache_dir=.pytest_cache/$@ --last-failed --last-failed-no-failures none
 endef
 
-# A process for each group, and none with several workers: each of those would find and import the tests of all. There is a group
-# more than most small machines have cores, as some tests wait, for clients that never read or for a pause.
+# Each group is one process: workers of pytest-xdist would each find and import the tests of all groups. There are three groups, so
+# that two cores have something to do while a test waits, for a client that never reads or for a pause.
 DATA := $(addprefix tests/unit/,coordinator dataset)
 FACES := $(addprefix tests/unit/,cli derive export learning report runs serve view)
 test-units: test-units-of-data test-units-of-faces test-units-of-nodes

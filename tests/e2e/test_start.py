@@ -1,5 +1,6 @@
 """What starting a collection does, and what it leaves alone."""
 
+import contextlib
 import os
 import pty
 import subprocess
@@ -60,14 +61,18 @@ def test_a_collection_is_one_interpreter_and_what_is_forked_off_it(on_terminal, 
     path = os.pathsep.join([str(tmp_path / "before"), *filter(None, [os.environ.get("PYTHONPATH")])])
     words = ["up", "-n", "2", "--set", "run.replay=0", "--output", tmp_path / "data", yaml()]
     command = [sys.executable, "-m", "throwcollect", *words]
-    terminal, errors = pty.openpty() if on_terminal else os.pipe()
-    done = subprocess.run(
-        command, env={**os.environ, "PYTHONPATH": path}, stdout=subprocess.PIPE, stderr=errors, check=False
-    )
-    os.close(errors)
-    said = os.read(terminal, 65536)
-    os.close(terminal)
-    assert done.returncode == 0, said
+    reader, writer = pty.openpty() if on_terminal else os.pipe()
+    with subprocess.Popen(
+        command, env={**os.environ, "PYTHONPATH": path}, stdout=subprocess.DEVNULL, stderr=writer
+    ) as running:
+        os.close(writer)
+        said = b""
+        # Whoever writes to a terminal that nobody reads waits. On Linux, its end is an error.
+        with contextlib.suppress(OSError):
+            while piece := os.read(reader, 65536):
+                said += piece
+    os.close(reader)
+    assert running.returncode == 0, said
     # A bar hides the cursor.
     assert (b"\x1b[?25l" in said) == on_terminal
     assert len(started.read_text().splitlines()) == 1, started.read_text()

@@ -188,7 +188,7 @@ def test_verify_names_the_trial(collection: Collection, tmp_path: Path) -> None:
 
 
 def forged_at_once(samples: Samples, header: EpisodeHeader) -> tuple[Samples, EpisodeHeader]:
-    """Every other trial is forged, each for another step of the check."""
+    """Forge some trials, each so that another step of the check finds it."""
     forgeries = {
         0: FORGERIES["infinite position"],
         2: FORGERIES["velocity in flight"],
@@ -199,7 +199,7 @@ def forged_at_once(samples: Samples, header: EpisodeHeader) -> tuple[Samples, Ep
     return forge(samples, header)
 
 
-def test_episodes_that_are_checked_together_are_told_apart(tmp_path: Path) -> None:
+def test_of_many_forged_episodes_each_is_reported_as_if_it_were_alone(tmp_path: Path) -> None:
     collection = Collection({"record": {"trials_per_shard": 10}})
     alone = EpisodeCheck(collection.plan, {})
     channels = Channels(collection.config, full_description(collection.config))
@@ -213,7 +213,7 @@ def test_episodes_that_are_checked_together_are_told_apart(tmp_path: Path) -> No
     assert [(each.place, each.problem) for each in verify(path)] == expected
 
 
-def test_what_lies_between_episodes_is_told_between_their_problems(tmp_path: Path) -> None:
+def test_damage_between_forged_episodes_is_reported_between_their_problems(tmp_path: Path) -> None:
     collection = Collection({"record": {"trials_per_shard": 10}})
     path = collection.collect(tmp_path / "dataset", change=forged_at_once) / "quick_00000.mcap"
     start = stored(path, 1).offset
@@ -224,7 +224,7 @@ def test_what_lies_between_episodes_is_told_between_their_problems(tmp_path: Pat
     assert sorted(report.digests) == [0, 2, 3, 4, 5, 6]
 
 
-def test_an_error_of_a_check_ends_it_behind_the_problems_so_far(
+def test_an_error_while_a_file_is_checked_is_reported_after_the_problems_found_before(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     collection = Collection({"record": {"trials_per_shard": 10}})
