@@ -82,12 +82,13 @@ class Clearance:
             configurations: In the order of the model [rad], shape ``(n, n_joints)``.
         """
         unknown = [known.find_unknown(configurations) for known in self._clear]
-        for index, configuration in enumerate(configurations):
+        for index in np.flatnonzero(np.any(unknown, axis=0)).tolist():
             if self._is_clear(configurations[index:], [rows[index:] for rows in unknown]):
                 continue
+            posture = configurations[index]
             # The tree tells quickly whether anything is too close, and no more. The message has to say what it is.
-            if pinocchio.computeCollisions(self._model, self._data, self._broadphase, configuration, True):
-                pinocchio.computeDistances(self._model, self._data, self.geometry, self._distances, configuration)
+            if pinocchio.computeCollisions(self._model, self._data, self._broadphase, posture, True):
+                pinocchio.computeDistances(self._model, self._data, self.geometry, self._distances, posture)
                 distances = [result.min_distance for result in self._distances.distanceResults]
                 closest = int(np.argmin(distances))
                 pair = self.geometry.collisionPairs[closest]
@@ -146,10 +147,12 @@ def _read_shapes(robot: Robot) -> pinocchio.GeometryModel:
     Raises:
         ConfigError: If the robot's meshes cannot be read.
     """
-    model = joint_model(robot)
+    model, kind = joint_model(robot), pinocchio.GeometryType.COLLISION
+    # Only the vertices are used, so the boxes that come with them are of the kind that is made fastest.
+    loader = pinocchio.coal.MeshLoader(pinocchio.coal.BV_OBB)
     try:
         geometry = pinocchio.buildGeomFromUrdf(
-            model, str(robot.urdf_path), pinocchio.GeometryType.COLLISION, package_dirs=[str(robot.share())]
+            model, str(robot.urdf_path), kind, package_dirs=[str(robot.share())], mesh_loader=loader
         )
     except (ValueError, RuntimeError) as error:
         raise ConfigError(f"{robot.urdf_path}: its meshes cannot be read: {error}") from error

@@ -6,6 +6,7 @@ import copy
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from types import MappingProxyType
 
 import numpy as np
@@ -110,8 +111,9 @@ def touchable_bodies(config: Config) -> frozenset[str]:
     return frozenset({tool_of(config.tool).name, "ground", *(link.get("name", "") for link in links)})
 
 
+@lru_cache(maxsize=4)
 def joint_model(robot: Robot) -> pinocchio.Model:
-    """Build a model of all joints of a robot, without a tool.
+    """Build a model of all joints of a robot, without a tool; to be changed by nobody.
 
     Raises:
         ConfigError: If the robot's files cannot be read, or lack something.

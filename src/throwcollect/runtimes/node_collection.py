@@ -11,7 +11,10 @@ import time
 from collections.abc import Callable
 
 from throwcollect import ros
+from throwcollect.config import shape
 from throwcollect.config.loader import dump_yaml
+from throwcollect.config.schema import Config
+from throwcollect.config.yaml_nodes import compose
 from throwcollect.coordinator.progress import Progress
 from throwcollect.dataset.summary import Info
 from throwcollect.errors import DatasetError, Interrupted, LossError, WorkerError
@@ -79,7 +82,7 @@ class NodeCollection:
         self._set_aside: set[str] = set()
         self._apart_since = math.inf
         self._started_again = False
-        self._about_to_end = False
+        self._ready_for_the_end = self._about_to_end = False
         self._supervisor = Supervisor(host, host.config.run, roster(host, self._simulations))
         self._listener = RunListener(self._report, name=LAUNCHER, reports=host.place.collects, on_connect=self._offer)
 
@@ -142,9 +145,10 @@ class NodeCollection:
 
     def _report(self, progress: Progress) -> None:
         self._session.update(progress)
-        if progress.ended:
-            # This import takes long, and is needed at the end. Nobody waits for it now, as the simulations have work.
-            importlib.import_module("throwcollect.dataset.inspect")
+        # Nobody waits for this process now, as the simulations have work.
+        if progress.ended and not self._ready_for_the_end:
+            self._ready_for_the_end = True
+            _get_ready_for_the_end(self._host.config)
         self._about_to_end = progress.ended >= progress.total
         self._check_that_nodes_meet(progress)
         self._supervisor.replace(progress.hung)
@@ -190,3 +194,11 @@ class NodeCollection:
     def _want(self, simulations: int) -> None:
         # `_follow` scales the run, so that the client that set the parameter does not wait for nodes to end.
         self._wanted = simulations
+
+
+def _get_ready_for_the_end(config: Config) -> None:
+    """Import and remember what the summary of the dataset needs, so that it comes soon after the last trial."""
+    importlib.import_module("throwcollect.dataset.inspect")
+    # The text of the dataset's ``config.yaml``, and the units of its columns.
+    compose(dump_yaml(config))
+    shape.root()

@@ -3,10 +3,11 @@
 import re
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
-from throwcollect.cli.main import command
+from throwcollect.cli.main import assemble_command
 
+COMMAND: Any = assemble_command()
 PAGE = (Path(__file__).parents[3] / "docs" / "cli.md").read_text(encoding="utf-8")
 
 
@@ -34,14 +35,14 @@ def read_options() -> dict[tuple[str, ...], set[str]]:
     told: dict[tuple[str, ...], set[str]] = {}
     for cell in re.findall(r"^\| (`.*?`) \| ", PAGE, flags=re.MULTILINE):
         for line in re.findall(r"`([^`]*)`", cell.replace("\\|", "|")):
-            for path in find_commands(line.split(), command):
+            for path in find_commands(line.split(), COMMAND):
                 told.setdefault(path, set()).update(re.findall(r"(?<![\w-])--?[a-z][a-z-]*", line))
     return told
 
 
 def test_the_page_has_the_commands_and_the_options_that_there_are() -> None:
     told, wrong = read_options(), []
-    for path, found in list_commands(command):
+    for path, found in list_commands(COMMAND):
         if path not in told:
             wrong.append(f"{' '.join(path)}: is missing")
             continue
@@ -55,7 +56,16 @@ def test_the_page_has_the_commands_and_the_options_that_there_are() -> None:
 
 
 def test_help_shows_arguments_that_may_be_left_out_in_one_pair_of_brackets() -> None:
-    for path, found in list_commands(command):
+    for path, found in list_commands(COMMAND):
         context = found.make_context(path[-1], [], resilient_parsing=True)
         usage = " ".join(found.collect_usage_pieces(context))
         assert not re.search(r"\[\[|\.\.\.[\]}]", usage), f"{' '.join(path)}: {usage}"
+
+
+def test_a_command_line_assembles_only_what_it_needs() -> None:
+    for name, whole in COMMAND.commands.items():
+        made: Any = assemble_command(name)
+        assert list(made.commands) == [name]
+        assert [path for path, _ in list_commands(made)] == [path for path, _ in list_commands(whole, (name,))]
+    for other in (None, "--help", "upp", ""):
+        assert list(cast(Any, assemble_command(other)).commands) == list(COMMAND.commands)
