@@ -1,9 +1,8 @@
-"""Reads and checks what is in a SIF, the file that Apptainer runs, and in an archive from which one is made."""
+"""Reads and checks what is in a SIF, the file that Apptainer runs."""
 
 from __future__ import annotations
 
 import json
-import tarfile
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +16,6 @@ from throwcollect.wording import command
 _MAGIC_AT = 32
 """The bytes before hold the line with which a shell finds the program for such files."""
 _MAGIC = b"SIF_MAGIC\0"
-_ENTRY_POINT = "throwcollect"
 
 
 def is_sif(path: Path) -> bool:
@@ -67,40 +65,6 @@ def check_sif(sif: Path) -> None:
         raise ConfigError(f"{sif}: holds throwcollect {version}, and this is {__version__}", hint=hint)
     if are_others(labels.get(SOURCES_LABEL)):
         raise ConfigError(f"{sif}: was made from other sources than these", hint=hint)
-
-
-def check_archive(archive: Path) -> None:
-    """Make sure that a file is an archive, as `docker save` writes it, with one image of throwcollect.
-
-    Raises:
-        ConfigError: If the file is something else.
-        DatasetError: If this user may not read the file.
-    """
-    hint = "docker save throwcollect:TAG -o FILE writes one"
-    try:
-        with tarfile.open(archive) as files:
-            images = _read_json(files, "manifest.json")
-            configs = [_read_json(files, image["Config"]) for image in images]
-        # `[None]` stands for an image without an entry point. In that of ROS 2, a script comes before the command.
-        entry_points = [config["config"].get("Entrypoint") or [None] for config in configs]
-    except (FileNotFoundError, IsADirectoryError) as error:
-        raise ConfigError(f"{archive}: {error.strerror}", hint=hint) from error
-    except OSError as error:
-        raise unreadable(archive, error) from error
-    except (tarfile.TarError, EOFError, LookupError, TypeError, AttributeError, ValueError) as error:
-        raise ConfigError(f"{archive}: is no archive of an image", hint=hint) from error
-    if len(entry_points) != 1:
-        raise ConfigError(f"{archive}: holds {len(entry_points)} images", expected="one", hint=hint)
-    if entry_points[0][-1] != _ENTRY_POINT:
-        raise ConfigError(f"{archive}: holds another image than one of throwcollect", hint=hint)
-
-
-def _read_json(files: tarfile.TarFile, name: str) -> Any:
-    file = files.extractfile(name)
-    # `extractfile` returns None for a directory and other members that are no files.
-    if file is None:
-        raise KeyError(name)
-    return json.load(file)
 
 
 def _labels_of(document: Any) -> dict[str, str]:

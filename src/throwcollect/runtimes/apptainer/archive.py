@@ -1,0 +1,102 @@
+"""Reads an archive with an image, as `docker save` writes it."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import tarfile
+from pathlib import Path
+from typing import IO, Any
+
+from throwcollect.errors import ConfigError
+from throwcollect.files import unreadable
+
+_ENTRY_POINT = "throwcollect"
+_HINT = "docker save throwcollect:TAG -o FILE writes one"
+_OCI = "application/vnd.oci.image"
+_LAYER = f"{_OCI}.layer.v1.tar"
+_COMPRESSIONS = {b"\x1f\x8b": "gzip", b"\x28\xb5": "zstd"}
+"""How a layer is compressed, by its first two bytes; most engines save layers as they are."""
+_PIECE_BYTES = 1 << 20
+_DAMAGED = (tarfile.TarError, EOFError, LookupError, TypeError, AttributeError, ValueError)
+"""What reading an archive raises that is none, or holds no image."""
+
+
+def check_archive(archive: Path) -> None:
+    """Make sure that a file is an archive, as `docker save` writes it, with one image of throwcollect.
+
+    Raises:
+        ConfigError: If the file is something else.
+        DatasetError: If this user may not read the file.
+    """
+    try:
+        with tarfile.open(archive) as files:
+            images = _read_json(files, "manifest.json")
+            configs = [_read_json(files, image["Config"]) for image in images]
+        # `[None]` stands for an image without an entry point. In that of ROS 2, a script comes before the command.
+        entry_points = [config["config"].get("Entrypoint") or [None] for config in configs]
+    except (FileNotFoundError, IsADirectoryError) as error:
+        raise ConfigError(f"{archive}: {error.strerror}", hint=_HINT) from error
+    except OSError as error:
+        raise unreadable(archive, error) from error
+    except _DAMAGED as error:
+        raise ConfigError(f"{archive}: is no archive of an image", hint=_HINT) from error
+    if len(entry_points) != 1:
+        raise ConfigError(f"{archive}: holds {len(entry_points)} images", expected="one", hint=_HINT)
+    if entry_points[0][-1] != _ENTRY_POINT:
+        raise ConfigError(f"{archive}: holds another image than one of throwcollect", hint=_HINT)
+
+
+def unpack_archive(archive: Path, directory: Path) -> None:
+    """Unpack the image of an archive into a new directory, in the layout of OCI, which Apptainer converts fastest.
+
+    It would compress the layers of an archive, only to unpack them again, which takes four times as long as all the
+    rest. Those of such a directory it takes as they are.
+
+    Raises:
+        ConfigError: If the archive is damaged.
+        OSError: If the archive cannot be read, or the directory cannot be written.
+    """
+    blobs = directory / "blobs" / "sha256"
+    blobs.mkdir(parents=True)
+    try:
+        with tarfile.open(archive) as files:
+            (image,) = _read_json(files, "manifest.json")
+            config = {"mediaType": f"{_OCI}.config.v1+json", **_store(_open(files, image["Config"]), blobs)}
+            layers = []
+            for name in image["Layers"]:
+                compression = _COMPRESSIONS.get(_open(files, name).read(2))
+                kind = f"{_LAYER}+{compression}" if compression else _LAYER
+                layers.append({"mediaType": kind, **_store(_open(files, name), blobs)})
+    except _DAMAGED as error:
+        raise ConfigError(f"{archive}: is damaged", hint=_HINT) from error
+    manifest = {"schemaVersion": 2, "mediaType": f"{_OCI}.manifest.v1+json", "config": config, "layers": layers}
+    written = directory / "manifest.json"
+    written.write_text(json.dumps(manifest), encoding="utf-8")
+    with written.open("rb") as file:
+        index = [{"mediaType": manifest["mediaType"], **_store(file, blobs)}]
+    (directory / "index.json").write_text(json.dumps({"schemaVersion": 2, "manifests": index}), encoding="utf-8")
+    (directory / "oci-layout").write_text(json.dumps({"imageLayoutVersion": "1.0.0"}), encoding="utf-8")
+
+
+def _store(file: IO[bytes], blobs: Path) -> dict[str, str | int]:
+    """Copy a file to where its digest names it, and return what refers to it there."""
+    new, digest, size = blobs / "new", hashlib.sha256(), 0
+    with new.open("wb") as copy:
+        while piece := file.read(_PIECE_BYTES):
+            digest.update(piece)
+            size += copy.write(piece)
+    new.replace(blobs / digest.hexdigest())
+    return {"digest": f"sha256:{digest.hexdigest()}", "size": size}
+
+
+def _read_json(files: tarfile.TarFile, name: str) -> Any:
+    return json.load(_open(files, name))
+
+
+def _open(files: tarfile.TarFile, name: str) -> IO[bytes]:
+    file = files.extractfile(name)
+    # `extractfile` returns None for a directory and other members that are no files.
+    if file is None:
+        raise KeyError(name)
+    return file
