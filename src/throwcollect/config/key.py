@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from enum import Enum
+from functools import cache
 
 from throwcollect.config.section import Section
 
@@ -56,12 +57,15 @@ class Key:
         """Whether the value may change the samples of a trial."""
         return self.effect in (Effect.PHYSICS, Effect.TASK)
 
-    def overlay(self, key: Key) -> Key:
-        """Combine this annotation of a section with that of a key in it, which wins where it is not None."""
-        own = {name: value for name, value in vars(key).items() if value is not None}
-        return replace(self, **own)
 
-
+@cache
 def key_of_field(section: type[Section], name: str) -> Key:
     """Return the annotation of a field; an empty one if it has none."""
     return next((each for each in section.model_fields[name].metadata if isinstance(each, Key)), Key())
+
+
+@cache
+def overlay(above: Key, section: type[Section], name: str) -> Key:
+    """Combine the annotation of a section with that of a field of it, which wins where it is not None."""
+    own = {name: value for name, value in vars(key_of_field(section, name)).items() if value is not None}
+    return replace(above, **own)

@@ -23,6 +23,10 @@ class Section(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
+    def __deepcopy__(self, memo: dict[int, Any] | None = None) -> Self:
+        """The section itself, as its values never change; Pydantic copies those of keys that are left out."""
+        return self
+
     def _find_contradictions(self) -> Iterator[tuple[str, str]]:
         """List the keys that are right alone and wrong together.
 

@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 
 from pydantic import ValidationError
 
-from throwcollect.config.key import Effect, Key, key_of_field
+from throwcollect.config.key import Effect, Key, overlay
 from throwcollect.config.problems import Location, findings, join_key, unknown_key
 from throwcollect.config.schema import Config
 from throwcollect.config.section import Section
@@ -106,7 +106,7 @@ def _find_obstacle(config: Config, leaf: Leaf) -> str | None:
 def _leaves(value: Any, location: Location, key: Key, default: Any) -> Iterator[Leaf]:
     if isinstance(value, Section):
         for name, inner in value.__dict__.items():
-            own = key.overlay(key_of_field(type(value), name))
+            own = overlay(key, type(value), name)
             # The default may be another task or another family, which need not have this key.
             yield from _leaves(inner, (*location, name), own, getattr(default, name, None))
     elif isinstance(value, dict) and value:

@@ -15,6 +15,7 @@ from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from datetime import datetime, timezone
+from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
@@ -132,6 +133,7 @@ def read_provenance(directory: Path) -> Provenance | None:
         return None
 
 
+@cache
 def _read_revision() -> str | None:
     """Git revision of the clone that these sources lie in; None if there is none, or no git."""
     root = Path(__file__).parents[3]
@@ -147,7 +149,8 @@ def _read_revision() -> str | None:
     return None
 
 
-def _versions() -> dict[str, str]:
+@cache
+def _versions() -> Mapping[str, str]:
     versions = {}
     for name in _LIBRARIES:
         # A machine that only coordinates has no engines.

@@ -22,6 +22,10 @@ from throwcollect.robots.robot import Robot, read_xml
 from throwcollect.tools.tool import Tool, tool_of
 
 _PACKAGE = "package://"
+_written: dict[tuple[Robot, str], str] = {}
+"""The last full descriptions, by robot and configuration of the tool: all that looks at a dataset needs the same one,
+and to write it takes 20 ms."""
+_MOST_WRITTEN = 8
 
 
 @dataclass(frozen=True)
@@ -94,7 +98,16 @@ def full_description(config: Config) -> str:
     Raises:
         ConfigError: If the robot's files cannot be read.
     """
-    robot, tool = robot_of(config), tool_of(config.tool)
+    robot = robot_of(config)
+    key = robot, config.tool.model_dump_json()
+    if key not in _written:
+        if len(_written) == _MOST_WRITTEN:
+            _written.clear()
+        _written[key] = _write_full(robot, tool_of(config.tool))
+    return _written[key]
+
+
+def _write_full(robot: Robot, tool: Tool) -> str:
     description = _read_description(robot)
     description.append(_tool_link(tool, visual=True))
     description.append(_tool_joint(tool, robot.hand, tool.mount))
@@ -107,8 +120,12 @@ def touchable_bodies(config: Config) -> frozenset[str]:
     Raises:
         ConfigError: If the robot's files cannot be read.
     """
-    links = _read_description(robot_of(config)).iter("link")
-    return frozenset({tool_of(config.tool).name, "ground", *(link.get("name", "") for link in links)})
+    return frozenset({tool_of(config.tool).name, "ground", *_list_links(robot_of(config))})
+
+
+@lru_cache(maxsize=4)
+def _list_links(robot: Robot) -> tuple[str, ...]:
+    return tuple(link.get("name", "") for link in _read_description(robot).iter("link"))
 
 
 @lru_cache(maxsize=4)

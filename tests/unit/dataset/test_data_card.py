@@ -80,4 +80,6 @@ def test_provenance_says_which_sources_image_and_robot_there_were(
 
 def test_sources_that_lie_in_no_clone_have_no_revision(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setattr(provenance, "__file__", str(tmp_path / "site-packages" / "throwcollect" / "dataset" / "x.py"))
+    # That of this clone is remembered.
+    monkeypatch.setattr(provenance, "_read_revision", provenance._read_revision.__wrapped__)
     assert Provenance.of_this_machine(simulations=1, wall_s=1.0, was_open=False, robot="").revision is None

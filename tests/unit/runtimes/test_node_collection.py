@@ -4,6 +4,7 @@ from unittest.mock import Mock
 
 import pytest
 
+from throwcollect.config.schema import Config
 from throwcollect.coordinator.progress import Progress
 from throwcollect.errors import WorkerError
 from throwcollect.runtimes import node_collection
@@ -20,7 +21,7 @@ def collection_of(monkeypatch: pytest.MonkeyPatch, session: Mock) -> NodeCollect
     monkeypatch.setattr(node_collection, "RunListener", Mock())
     monkeypatch.setattr(node_collection, "roster", Mock())
     place = SimpleNamespace(simulations=1, collects=True, middleware=SimpleNamespace(rmw="rmw_fastrtps_cpp"))
-    host = SimpleNamespace(place=place, config=SimpleNamespace(run=None), endpoint=None, connection=None)
+    host = SimpleNamespace(place=place, config=Config(), endpoint=None, connection=None)
     return NodeCollection(host, session)
 
 
