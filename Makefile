@@ -19,7 +19,7 @@ export PYTHONDONTWRITEBYTECODE :=
 .DELETE_ON_ERROR:
 
 .PHONY: up ros dist test test-fast \
-    test-units test-units-of-data test-units-of-faces test-units-of-nodes test-ros test-ros-client test-containers \
+    test-units test-units-of-data test-units-of-faces test-units-of-nodes test-ros test-ros-client wait-for-image test-containers \
     test-processes test-cluster \
     check check-format check-types check-imports check-house docs bench bench-full clean
 
@@ -83,14 +83,12 @@ SLOW := cli coordinator dataset derive engines export learning replay report run
 test-fast: $(READY_DEV)
 	$(BIN)/python -m pytest -n logical tests/architecture tests/contract tests/unit $(addprefix --ignore=tests/unit/,$(SLOW))
 
-# What waits for others is run beside what computes, so that both cores always have something to do. Continuous integration
-# makes the image meanwhile, and names the process that does.
+# What waits for others is run beside what computes, and each group begins as soon as another one has ended, so that both cores
+# always have something to do. Continuous integration makes the image meanwhile, and names the process that does.
 BESIDE := --no-print-directory --output-sync=target
 test: $(READY_DEV)
 	$(MAKE) $(BESIDE) -j 2 check
-	$(MAKE) $(BESIDE) -j 4 test-units test-ros
-	@while [ -n "$(MAKES_IMAGE)" ] && kill -0 $(MAKES_IMAGE) 2> /dev/null; do sleep 1; done
-	$(MAKE) $(BESIDE) -j 3 test-containers test-processes test-cluster
+	$(MAKE) $(BESIDE) -j 4 test-units test-ros test-containers test-processes test-cluster
 
 # The ROS client alone, on the embedded backend: what somebody runs who changes it.
 test-ros-client: $(READY_DEV)
@@ -118,6 +116,9 @@ test-units-of-nodes:
 	$(call twice,$(BIN)/python -m pytest tests/unit tests/install tests/rclzenoh tests/contract tests/physics \
 	    $(addprefix --ignore=,$(DATA) $(FACES)))
 
+wait-for-image:
+	@while [ -n "$(MAKES_IMAGE)" ] && kill -0 $(MAKES_IMAGE) 2> /dev/null; do sleep 1; done
+
 # These tests of genuine ROS 2 need an engine, too.
 WITH_ENGINE := tests/ros/test_containers.py
 
@@ -126,7 +127,7 @@ test-ros: ros
 	$(call twice,$(ROS_VENV)/bin/python -m pytest -n 2 --dist loadfile tests/contract tests/ros --ignore=$(WITH_ENGINE))
 
 # Tests with an engine look at all that is on it, so one by one; also those of containers on genuine rclpy.
-test-containers: ros
+test-containers: ros wait-for-image
 	$(call twice,$(BIN)/python -m pytest tests/docker)
 	$(call twice,$(ROS_VENV)/bin/python -m pytest $(WITH_ENGINE))
 
@@ -136,7 +137,7 @@ test-processes:
 	$(call twice,$(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder tests/e2e tests/integration)
 
 # Slurm with four nodes of this machine, and Apptainer; `.ci/cluster.sh` installs both on Debian.
-test-cluster:
+test-cluster: wait-for-image
 	$(call twice,$(BIN)/python -m pytest tests/cluster)
 
 # Format, lint, types, the direction of imports, and the rules of the house; its tests build the documentation site, too.

@@ -1,8 +1,8 @@
 """Signs of a node that need no ROS: a line in its log when it is ready, and a file that shows that its loop runs.
 
-The loop of a node touches the file, and a health check reads its time. The file exists for nodes on Fast DDS: to join
-their graph takes a second of processor time, too much for a check that runs often. The image names the file; outside
-of containers there is none.
+The loop of a node touches the file, and the health check of its container looks at its time, which costs nearly
+nothing: to ask the node itself would take a process that joins its graph, every few seconds in every container. The
+image names the file; outside of containers there is none.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from pathlib import Path
 VARIABLE = "THROWCOLLECT_HEARTBEAT"
 """Name of the environment variable that names the file."""
 SILENT_S = 5.0
-"""Age of the file at which a node counts as stuck: its loop runs several times a second."""
+"""Age of the file at which a node counts as stuck: its loop runs several times a second. The image has the same."""
 _PERIOD_S = 1.0
 
 

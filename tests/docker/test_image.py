@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 import uuid
 from collections.abc import Iterator
 from typing import Any
@@ -11,6 +12,7 @@ from docker.client import DockerClient
 from docker.errors import ContainerError
 
 import throwcollect
+from throwcollect.heartbeat import SILENT_S
 from throwcollect.runtimes.docker.image import default_tag
 
 pytestmark = pytest.mark.docker
@@ -105,21 +107,23 @@ def router(client: DockerClient) -> Iterator[Any]:
 def healthcheck(client: DockerClient, container: Any, **environment: str) -> int:
     command = client.images.get(default_tag()).attrs["Config"]["Healthcheck"]["Test"]
     assert command[0] == "CMD-SHELL"
+    assert f"'{SILENT_S:g} seconds ago'" in command[1]
     code: int = container.exec_run(["sh", "-c", command[1]], environment=environment).exit_code
     return code
 
 
-def test_the_health_check_asks_the_node_that_the_container_names(client: DockerClient, router: Any) -> None:
+def test_a_node_whose_loop_goes_round_is_healthy(client: DockerClient, router: Any) -> None:
     assert healthcheck(client, router) == 0
-    assert healthcheck(client, router, THROWCOLLECT_NODE="sim_0") == 1
+    assert healthcheck(client, router, THROWCOLLECT_HEARTBEAT="/tmp/nobody") == 1
 
 
-def test_a_container_that_runs_no_node_is_not_asked(client: DockerClient, router: Any) -> None:
-    assert healthcheck(client, router, THROWCOLLECT_NODE="") == 0
+def test_a_container_that_runs_no_node_is_healthy(client: DockerClient, router: Any) -> None:
+    assert healthcheck(client, router, THROWCOLLECT_NODE="", THROWCOLLECT_HEARTBEAT="/tmp/nobody") == 0
 
 
 def test_a_router_that_is_stuck_is_unhealthy(client: DockerClient, router: Any) -> None:
     assert router.exec_run(["sh", "-c", "kill -STOP $(cat /proc/1/task/1/children)"]).exit_code == 0
+    time.sleep(SILENT_S + 1)
     assert healthcheck(client, router) == 1
 
 

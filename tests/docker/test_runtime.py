@@ -323,7 +323,7 @@ def test_a_node_has_the_key_as_files_of_the_caller_which_the_engine_tells_nobody
     volume = client.volumes.get(mount["Name"])
     told = json.dumps([router.attrs, volume.attrs])
     assert not any(line in told for line in key.splitlines())
-    assert router.exec_run(["python", "-m", "throwcollect.ros.health"]).exit_code == 0
+    assert router.exec_run(["throwcollect", "health"]).exit_code == 0
     runtime.close()
     with pytest.raises(NotFound):
         volume.reload()

@@ -99,14 +99,17 @@ def episodes(part: Path, *, cut: bool = False) -> Counter[str]:
     return found
 
 
-def assert_goes_on(directory: Path, reference: Path) -> None:
-    """Resuming ends with the files of an undisturbed collection, and runs no trial twice."""
+def assert_goes_on(directory: Path, reference: Path, *, untold: int = 0) -> None:
+    """Resuming ends with the files of an undisturbed collection, and runs no trial twice.
+
+    Of so many trials at most, the journal may not tell that they were written.
+    """
     said = call_here("resume", directory, *INPROCESS)
     assert said.returncode == 0, said.stderr
     assert fingerprints(directory) == fingerprints(reference)
-    assert Counter(event["trial"] for event in events(directory) if event["event"] == "commit") == dict.fromkeys(
-        range(TRIALS), 1
-    )
+    written = Counter(event["trial"] for event in events(directory) if event["event"] == "commit")
+    assert set(written.values()) == {1}
+    assert len(set(range(TRIALS)) - set(written)) <= untold
 
 
 def events(directory: Path) -> list[dict[str, Any]]:
@@ -196,7 +199,8 @@ def test_a_killed_launcher_takes_its_nodes_along(
     running.process.send_signal(signal.SIGKILL)
     running.finish()
     assert_gone(nodes)
-    assert_goes_on(tmp_path / "data", reference)
+    # The coordinator may be killed between an episode and its line in the journal.
+    assert_goes_on(tmp_path / "data", reference, untold=1)
 
 
 def test_a_killed_coordinator_is_started_again_and_takes_in_what_is_there(

@@ -1,15 +1,10 @@
-"""Health checks of nodes, which run often and in every container, so they must cost next to nothing.
-
-``python -m throwcollect.ros.health`` does the same as ``throwcollect health``, whose command line costs five times as
-much as the check.
-"""
+"""Asks a node for a sign of life, from wherever its router can be reached; containers look at a `heartbeat` instead."""
 
 from __future__ import annotations
 
 import os
 import re
 import socket
-import sys
 
 import zenoh
 
@@ -88,17 +83,3 @@ def _check_discovery_server(endpoint: str) -> None:
             connection.recv(1)
     except OSError as error:
         raise ThrowcollectError(f"{_ROUTER}: no session with the router at {endpoint}: {error}") from error
-
-
-def main() -> int:
-    """Check the node that the environment names, and return the exit code."""
-    try:
-        check()
-    except ThrowcollectError as error:
-        print(error, file=sys.stderr)
-        return error.exit_code
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())

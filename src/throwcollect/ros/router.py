@@ -18,6 +18,7 @@ import zenoh
 
 from rclzenoh.session_config import OPEN, PROTECTED, in_words, router_config
 from throwcollect.errors import ConfigError, ThrowcollectError
+from throwcollect.heartbeat import Heartbeat
 from throwcollect.interruption import stop_signals
 from throwcollect.ros.connection import session_key
 from throwcollect.ros.discovery_server import discovery_server
@@ -126,8 +127,10 @@ def serve(listen: str = DEFAULT_LISTEN, key_directory: Path | None = None) -> No
     by_server = Middleware.of_process().is_fast_dds and not listen.startswith(OPEN)
     with _discovery_server(listen) if by_server else router(listen, key) as endpoint:
         print(f"router listening on {endpoint}", flush=True)
+        heartbeat = Heartbeat()
         # Python runs the handler of a signal that comes just before a wait only after it, so the waits are short.
         while True:
+            heartbeat.beat()
             with suppress(Empty):
                 stop.get(timeout=_SLICE_S)
                 return

@@ -124,17 +124,3 @@ def test_a_session_is_waited_for_no_longer_than_an_answer(environment, monkeypat
     with pytest.raises(ThrowcollectError, match="router: no session"):
         check("router")
     assert opened == [health.TIMEOUT_S * 1000]
-
-
-def test_the_check_loads_neither_the_command_line_nor_the_interfaces(environment):
-    code = "import sys, throwcollect.ros.health; print(*({'typer', 'numpy', 'rosbags'} & sys.modules.keys()))"
-    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "\n"
-
-
-@pytest.mark.parametrize(("node", "code", "message"), [("router", 0, ""), ("sim_4", 1, "sim_4: does not answer\n")])
-def test_as_a_module_it_ends_with_the_exit_code_and_one_line(environment, monkeypatch, node, code, message):
-    monkeypatch.setenv("THROWCOLLECT_NODE", node)
-    ended = subprocess.run(
-        [sys.executable, "-m", "throwcollect.ros.health"], capture_output=True, text=True, check=False
-    )
-    assert (ended.returncode, ended.stderr, ended.stdout) == (code, message, "")

@@ -1,6 +1,7 @@
 import signal
 import subprocess
 import sys
+import time
 
 import pytest
 
@@ -8,6 +9,7 @@ from rclzenoh import session
 from rclzenoh.session_config import OVERRIDE_VARIABLE, client_override, is_protected
 from throwcollect import ros
 from throwcollect.errors import ConfigError, ThrowcollectError
+from throwcollect.heartbeat import VARIABLE, is_beating
 from throwcollect.interruption import stop_signals
 from throwcollect.ros.connection import session_key
 from throwcollect.ros.health import check
@@ -142,3 +144,18 @@ def test_the_key_of_the_environment_is_used_and_never_made(monkeypatch, tmp_path
     with pytest.raises(ConfigError, match=r"cannot be read: .*gone/key.pem"):
         serve("tls/127.0.0.1:0")
     assert not (tmp_path / "gone").exists()
+
+
+def test_a_router_shows_that_its_loop_goes_round(tmp_path, monkeypatch):
+    monkeypatch.setenv(VARIABLE, str(tmp_path / "alive"))
+    with subprocess.Popen([*COMMAND, "tcp/127.0.0.1:0"], stdout=subprocess.PIPE, text=True) as process:
+        try:
+            assert process.stdout.readline()
+            for _ in range(2):
+                deadline = time.monotonic() + 20
+                while not is_beating():
+                    assert time.monotonic() < deadline
+                    time.sleep(0.02)
+                (tmp_path / "alive").unlink()
+        finally:
+            process.kill()
