@@ -100,11 +100,12 @@ def full_description(config: Config) -> str:
     """
     robot = robot_of(config)
     key = robot, config.tool.model_dump_json()
-    if key not in _written:
-        if len(_written) == _MOST_WRITTEN:
+    # Another thread may clear the dictionary at any moment.
+    if (text := _written.get(key)) is None:
+        if len(_written) >= _MOST_WRITTEN:
             _written.clear()
-        _written[key] = _write_full(robot, tool_of(config.tool))
-    return _written[key]
+        text = _written[key] = _write_full(robot, tool_of(config.tool))
+    return text
 
 
 def _write_full(robot: Robot, tool: Tool) -> str:

@@ -16,6 +16,11 @@ def test_every_key_has_a_default_so_that_an_empty_configuration_is_one():
     assert Config().task.trajectory.family == "minimum_jerk"
 
 
+def test_defaults_are_the_same_objects_in_all_configurations():
+    assert Config().ball is Config(trials=3).ball
+    assert Config().task.end is Config(trials=3).task.end
+
+
 def test_values_never_change():
     with pytest.raises(ValidationError, match="frozen"):
         Config().ball.mass_kg = 1.0

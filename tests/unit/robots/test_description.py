@@ -56,6 +56,15 @@ def test_the_same_configuration_gives_the_same_bytes():
     assert full_description(CONFIG) == full_description(Config())
 
 
+def test_descriptions_of_many_tools_are_told_apart():
+    lengths = [0.1 + 0.01 * number for number in range(12)]
+    configs = [Config.model_validate({"tool": {"handle_length_m": length}}) for length in lengths]
+    described = [full_description(config) for config in configs]
+    assert len(set(described)) == len(configs)
+    # Those that were remembered, and those that were not.
+    assert [full_description(config) for config in configs] == described
+
+
 def test_by_default_what_the_task_does_not_move_is_locked():
     made = physics_description(CONFIG)
     assert made.moving == tuple(joint for joint in JOINTS if joint in MOVED)
