@@ -10,6 +10,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -104,7 +105,8 @@ def endpoint() -> Iterator[str]:
         executor.add_node(Robot(context))
 
         def spin() -> None:
-            with pytest.raises(ExternalShutdownException, match="shut down"):
+            # If the end of the context comes between two messages, `spin` just returns.
+            with suppress(ExternalShutdownException):
                 executor.spin()
 
         thread = threading.Thread(target=spin)

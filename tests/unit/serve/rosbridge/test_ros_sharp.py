@@ -126,18 +126,21 @@ def test_what_is_published_is_heard_letter_for_letter(party: Party, node: Node) 
 
 
 def test_what_it_publishes_is_heard(party: Party, node: Node) -> None:
-    heard: list[Any] = []
-    node.create_subscription(String, "/sharp/words", heard.append, 10)
-    node.create_subscription(Scan, "/sharp/scan", heard.append, 10)
-    for advertise, topic, publish in ((ADVERTISE, "/sharp/words", PUBLISH), (ADVERTISE_SCAN, "/sharp/scan", SCAN)):
+    words: list[Any] = []
+    scans: list[Any] = []
+    node.create_subscription(String, "/sharp/words", words.append, 10)
+    node.create_subscription(Scan, "/sharp/scan", scans.append, 10)
+    for advertise, topic, publish, heard in (
+        (ADVERTISE, "/sharp/words", PUBLISH, words),
+        (ADVERTISE_SCAN, "/sharp/scan", SCAN, scans),
+    ):
         party.client.receive(advertise)
         wait_for(lambda topic=topic: node.count_publishers(topic))  # type: ignore[misc]
-        before = len(heard)
         # What is said before a subscription has found the publisher is heard by nobody.
-        wait_for(lambda: party.client.receive(publish) or len(heard) > before)  # noqa: B023
-    assert heard[0].data == "grüße ° 度"
-    assert heard[-1].ranges.tolist() == [1.5, pytest.approx(0.1), pytest.approx(3e-8)]
-    assert heard[-1].range_max == 30
+        wait_for(lambda: party.client.receive(publish) or heard)  # noqa: B023
+    assert words[0].data == "grüße ° 度"
+    assert scans[0].ranges.tolist() == [1.5, pytest.approx(0.1), pytest.approx(3e-8)]
+    assert scans[0].range_max == 30
     party.client.receive(UNADVERTISE)
     wait_for(lambda: not node.count_publishers("/sharp/words"))
 
