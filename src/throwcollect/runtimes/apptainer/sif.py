@@ -108,7 +108,7 @@ def _convert(archive: Path, new: Path, work: Path, say: Callable[[str], None]) -
             archive.unlink()
     except OSError as error:
         hint = _HINTS[_NO_SPACE] if error.errno == errno.ENOSPC else None
-        raise WorkerError(f"{new.with_suffix('')}: cannot be made: {error}", hint=hint) from error
+        raise WorkerError(f"{new.with_suffix('')}: cannot be made: {error.strerror}", hint=hint) from error
     _run(new, work, f"oci:{_UNPACKED}", cwd=work)
 
 

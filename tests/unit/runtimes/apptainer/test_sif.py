@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import errno
 import json
+import os
 from pathlib import Path
 
 import pytest
@@ -11,6 +13,7 @@ from tests.unit.runtimes.apptainer.test_archive import write_archive
 import throwcollect
 from throwcollect.errors import ConfigError, DatasetError, WorkerError
 from throwcollect.extras import MissingExtraError
+from throwcollect.runtimes.apptainer import sif
 from throwcollect.runtimes.apptainer.contents import check_sif, read_labels
 from throwcollect.runtimes.apptainer.sif import make_sif
 from throwcollect.runtimes.image_sources import SOURCES_LABEL, VERSION_LABEL, digest_sources, source_root
@@ -131,6 +134,20 @@ def test_a_full_disk_is_named_with_the_place_that_is_needed(apptainer: Path, tmp
     with pytest.raises(WorkerError, match=r"it\.sif: cannot be made: no space left on device") as caught:
         make(tmp_path / "it.sif")
     assert "TMPDIR" in str(caught.value.hint)
+
+
+def test_a_disk_that_is_full_before_apptainer_begins_is_named_as_well(
+    apptainer: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fill(_archive: Path, _directory: Path) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), "/somewhere")
+
+    monkeypatch.setattr(sif, "unpack_archive", fill)
+    archive = write_archive(tmp_path / "image.tar", "throwcollect")
+    with pytest.raises(WorkerError, match=r"it\.sif: cannot be made: No space left on device") as caught:
+        make(tmp_path / "it.sif", archive=archive)
+    assert "TMPDIR" in str(caught.value.hint)
+    assert archive.exists()
 
 
 def test_a_base_image_that_cannot_be_had_is_told_with_a_way_out(apptainer: Path, tmp_path: Path) -> None:
