@@ -14,7 +14,7 @@ from pathlib import Path
 VARIABLE = "THROWCOLLECT_HEARTBEAT"
 """Name of the environment variable that names the file."""
 SILENT_S = 5.0
-"""Age of the file at which a node counts as stuck: its loop runs several times a second. The image has the same."""
+"""Age of the file at which a node counts as stuck, also in the image: its loop runs several times a second."""
 _PERIOD_S = 1.0
 
 

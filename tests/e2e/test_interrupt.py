@@ -102,7 +102,7 @@ def episodes(part: Path, *, cut: bool = False) -> Counter[str]:
 def assert_goes_on(directory: Path, reference: Path, *, untold: int = 0) -> None:
     """Resuming ends with the files of an undisturbed collection, and runs no trial twice.
 
-    Of so many trials at most, the journal may not tell that they were written.
+    The journal may lack the lines of up to `untold` trials.
     """
     said = call_here("resume", directory, *INPROCESS)
     assert said.returncode == 0, said.stderr

@@ -148,7 +148,7 @@ def _read_shapes(robot: Robot) -> pinocchio.GeometryModel:
         ConfigError: If the robot's meshes cannot be read.
     """
     model, kind = joint_model(robot), pinocchio.GeometryType.COLLISION
-    # Only the vertices are used, so the boxes that come with them are of the kind that is made fastest.
+    # Only the vertices of meshes are used. Bounding boxes come with them; those of this kind are built fastest.
     loader = pinocchio.coal.MeshLoader(pinocchio.coal.BV_OBB)
     try:
         geometry = pinocchio.buildGeomFromUrdf(

@@ -19,7 +19,7 @@ _COMPRESSIONS = {b"\x1f\x8b": "gzip", b"\x28\xb5": "zstd"}
 """How a layer is compressed, by its first two bytes; most engines save layers as they are."""
 _PIECE_BYTES = 1 << 20
 _DAMAGED = (tarfile.TarError, EOFError, LookupError, TypeError, AttributeError, ValueError)
-"""What reading an archive raises that is none, or holds no image."""
+"""Errors that reading raises if a file is no archive, or holds no image."""
 
 
 def check_archive(archive: Path) -> None:

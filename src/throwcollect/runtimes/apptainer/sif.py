@@ -104,7 +104,7 @@ def _convert(archive: Path, new: Path, work: Path, say: Callable[[str], None]) -
     try:
         unpack_archive(archive, work / _UNPACKED)
         if archive.parent == work:
-            # Apptainer makes two more copies of the image, so there is less room needed without this one.
+            # Apptainer writes two more copies of the image, which need the room that this one takes.
             archive.unlink()
     except OSError as error:
         hint = _HINTS[_NO_SPACE] if error.errno == errno.ENOSPC else None
