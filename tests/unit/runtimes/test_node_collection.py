@@ -38,7 +38,7 @@ def test_the_end_of_the_coordinator_is_noticed_soon_once_all_trials_have_ended(
 
 def test_nodes_that_are_started_again_have_as_much_time_to_meet_as_before(monkeypatch: pytest.MonkeyPatch) -> None:
     now = [0.0]
-    monkeypatch.setattr(node_collection.time, "monotonic", lambda: now[0])
+    monkeypatch.setattr(node_collection, "time", SimpleNamespace(monotonic=lambda: now[0]))
     session = Mock()
     collection = collection_of(monkeypatch, session)
     supervisor = collection._supervisor

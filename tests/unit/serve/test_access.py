@@ -2,6 +2,7 @@
 
 import logging
 from collections.abc import Iterator
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -188,7 +189,7 @@ def test_a_code_is_exchanged_once(served: Served) -> None:
 
 def test_a_code_lasts_ten_minutes(monkeypatch: pytest.MonkeyPatch) -> None:
     now = 1000.0
-    monkeypatch.setattr(access.time, "monotonic", lambda: now)
+    monkeypatch.setattr(access, "time", SimpleNamespace(monotonic=lambda: now))
     keys = Keys()
     late, early = keys.new_code(), keys.new_code()
     now += 599
@@ -199,7 +200,7 @@ def test_a_code_lasts_ten_minutes(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_codes_that_nobody_exchanged_are_not_kept(monkeypatch: pytest.MonkeyPatch) -> None:
     now = 1000.0
-    monkeypatch.setattr(access.time, "monotonic", lambda: now)
+    monkeypatch.setattr(access, "time", SimpleNamespace(monotonic=lambda: now))
     keys = Keys()
     for _ in range(5):
         keys.new_code()
