@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from datetime import datetime
 from functools import lru_cache
 from pathlib import Path
 from typing import Literal
 
 from pydantic import TypeAdapter
+from pydantic.dataclasses import dataclass
 
 from throwcollect.config.loader import load
 from throwcollect.config.sweep import LANDING_HEIGHT, TargetConfig
