@@ -20,6 +20,8 @@ _STARTS = 8
 """Number of throws, those that ended nearest to a target, from whose parameters the search begins."""
 _MANY_STARTS = 48
 """The same number for choices other than the nearest: these need more candidates to choose from."""
+_TOGETHER = 32
+"""Number of targets that are aimed at together, as operations on short arrays take most of their time to begin."""
 _STEPS = 25
 _SMALL_STEP = 1e-9
 """The search ends after a scaled step that is smaller."""
@@ -72,45 +74,71 @@ def aim(learned: LearnedMap, targets: Array, context: Array, choice: Choice = Ch
     if not len(targets):
         places = np.empty_like(targets)
         return Aims(np.empty((0, len(learned.axes_of(Role.PARAMETER)))), places, places, np.empty(0, np.bool_))
-    rows = [_aim_at(learned, target, given, choice) for target, given in zip(targets, context, strict=True)]
-    parameters, predicted, nearest = (np.array(column) for column in zip(*rows, strict=True))
+    blocks = [slice(first, first + _TOGETHER) for first in range(0, len(targets), _TOGETHER)]
+    found = [_aim_at_once(learned, targets[block], context[block], choice) for block in blocks]
+    parameters, predicted, nearest = (np.concatenate(column) for column in zip(*found, strict=True))
     away, missed = (np.linalg.norm(places - targets, axis=1) for places in (nearest, predicted))
     return Aims(parameters, predicted, nearest, (away <= REACH) & (missed <= TOLERANCE))
 
 
-def _aim_at(learned: LearnedMap, target: Array, context: Array, choice: Choice) -> tuple[Array, Array, Array]:
-    """Find parameters for one target; also their predicted place, and where the nearest throw would have ended."""
-    landings = learned.carry_over(context)
-    squares = ((landings - target) ** 2).sum(axis=1)
-    starts = np.argsort(squares, kind="stable")[: _STARTS if choice is Choice.NEAREST else _MANY_STARTS]
-    begun = np.clip(learned.inputs[starts][:, learned.columns_of(Role.PARAMETER)], -1.0, 1.0)
-    given = np.tile(context, (len(starts), 1))
+def _aim_at_once(learned: LearnedMap, targets: Array, context: Array, choice: Choice) -> tuple[Array, Array, Array]:
+    """Find parameters for a few targets; also their predicted places, and where the nearest throws would have ended."""
+    numbers = np.arange(len(targets))
+    landings = _carry_over(learned, context)
+    squares = ((landings - targets[:, np.newaxis]) ** 2).sum(axis=2)
+    starts = np.argsort(squares, axis=1, kind="stable")[:, : _STARTS if choice is Choice.NEAREST else _MANY_STARTS]
+    begun = np.clip(learned.inputs[starts][..., learned.columns_of(Role.PARAMETER)], -1.0, 1.0)
+    given = np.repeat(context[:, np.newaxis], starts.shape[1], axis=1)
     # On its way, a candidate keeps the residual of the throw at which it begins, so only the polynomial has to be
     # inverted.
     shift = learned.residuals[starts] + learned.correction.offset
-    parameters = _walk(learned, begun, given, target - shift)
-    inputs = learned.in_world(parameters, given)
-    predicted = learned.forward.predict(inputs) + shift
-    missed = np.linalg.norm(predicted - target, axis=1)
-    costs = _weigh(learned, choice, inputs, parameters - begun)
+    parameters = _walk(learned, begun, given, targets[:, np.newaxis] - shift)
+    inputs = learned.in_world(_list_rows(parameters), _list_rows(given))
+    predicted = learned.forward.predict(inputs).reshape(shift.shape) + shift
+    missed = np.linalg.norm(predicted - targets[:, np.newaxis], axis=2)
+    costs = _weigh(learned, choice, inputs, _list_rows(parameters - begun)).reshape(starts.shape)
     # The last key counts first: the misses, of which all small ones are equal, and among equal ones the cost.
-    best = int(np.lexsort((costs, np.maximum(missed, _CLOSE)))[0])
-    return parameters[best], predicted[best], landings[starts[0]]
+    best = np.lexsort((costs, np.maximum(missed, _CLOSE)), axis=1)[:, 0]
+    return parameters[numbers, best], predicted[numbers, best], landings[numbers, starts[:, 0]]
+
+
+def _carry_over(learned: LearnedMap, context: Array) -> Array:
+    """Where all throws would have ended with the context of each target, shape ``(n, n_throws, n_targets)``."""
+    # Most often, all targets have the same context.
+    different, which = np.unique(context, axis=0, return_inverse=True)
+    # In NumPy 2.0, the inverse has a second axis.
+    return np.stack([learned.carry_over(each) for each in different])[which.reshape(-1)]
+
+
+def _list_rows(values: Array) -> Array:
+    """Put the candidates of all targets into one list, shape ``(n · n_candidates, n_columns)``."""
+    targets, candidates, columns = values.shape
+    return values.reshape(targets * candidates, columns)
 
 
 def _walk(learned: LearnedMap, parameters: Array, context: Array, goals: Array) -> Array:
-    """Step from parameters to ones for which the polynomial predicts the goals, inside of the ranges."""
+    """Step from parameters to ones for which the polynomial predicts the goals, inside of the ranges.
+
+    All arrays have the shape ``(n, n_candidates, n_columns)``. The candidates of a target stand still together, so that
+    where they end does not depend on the other targets.
+    """
     columns = learned.columns_of(Role.PARAMETER)
+    parameters = parameters.copy()
+    walking = np.arange(len(parameters))
     for _ in range(_STEPS):
-        inputs = learned.in_world(parameters, context)
-        missing = goals - learned.forward.predict(inputs)
+        before = _list_rows(parameters[walking])
+        inputs = learned.in_world(before, _list_rows(context[walking]))
+        missing = _list_rows(goals[walking]) - learned.forward.predict(inputs)
         slopes = learned.forward.slopes(inputs, columns)
         step = _step(slopes, missing)
         # A parameter that would leave its range stays, and the others make up for it.
-        stuck = np.abs(np.clip(parameters + step, -1.0, 1.0) - parameters) < 1e-12
+        stuck = np.abs(np.clip(before + step, -1.0, 1.0) - before) < 1e-12
         step = _step(np.where(stuck[:, np.newaxis], 0.0, slopes), missing)
-        before, parameters = parameters, np.clip(parameters + step, -1.0, 1.0)
-        if np.abs(parameters - before).max() < _SMALL_STEP:
+        after = np.clip(before + step, -1.0, 1.0)
+        parameters[walking] = after.reshape(parameters[walking].shape)
+        moved = np.abs(after - before).reshape(len(walking), -1).max(axis=1)
+        walking = walking[moved >= _SMALL_STEP]
+        if not len(walking):
             break
     return parameters
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from tests.unit.learning.worlds import HIGH, KEYS, LOW, draw, effort, land, learn
+from tests.unit.learning.worlds import HIGH, KEYS, LOW, draw, effort, land, learn, learn_with_drag
 
 from throwcollect.learning.aiming import Choice, aim
 from throwcollect.learning.learned_map import Correction, Kind, LearnedMap, Role
@@ -27,6 +27,27 @@ def test_throws_end_at_their_targets(kind: Kind, off_m: float, targets: np.ndarr
     assert np.linalg.norm(found.predicted - targets, axis=1).max() < 1e-3
     assert np.median(off) < off_m / 4
     assert off.max() < off_m
+
+
+@pytest.mark.parametrize("choice", Choice)
+def test_where_a_throw_ends_does_not_depend_on_the_other_targets(choice: Choice, targets: np.ndarray) -> None:
+    learned = learn(60)
+    far = np.concatenate([targets, targets * 3])
+    together, _, _ = throw(learned, far, choice)
+    for number in (0, 31, 32, 79):
+        alone, _, _ = throw(learned, far[number : number + 1], choice)
+        for name in ("parameters", "predicted", "nearest_place", "reachable"):
+            np.testing.assert_array_equal(getattr(together, name)[number], getattr(alone, name)[0])
+
+
+def test_each_target_has_a_context_of_its_own(targets: np.ndarray) -> None:
+    learned = learn_with_drag(role=Role.CONTEXT)
+    context = np.linspace(-1.0, 1.0, len(targets))[:, np.newaxis]
+    together = aim(learned, targets, context)
+    for number in (0, 20, 39):
+        alone = aim(learned, targets[number : number + 1], context[number : number + 1])
+        np.testing.assert_array_equal(together.parameters[number], alone.parameters[0])
+        np.testing.assert_array_equal(together.nearest_place[number], alone.nearest_place[0])
 
 
 def test_parameters_stay_inside_of_their_ranges(targets: np.ndarray) -> None:

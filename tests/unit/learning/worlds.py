@@ -56,12 +56,12 @@ def learn(count: int = 800, kind: Kind = Kind.LOCAL) -> LearnedMap:
 
 
 @cache
-def learn_with_drag(count: int = 600) -> LearnedMap:
-    """A map of worlds that differ in the ball's drag."""
+def learn_with_drag(count: int = 600, role: Role = Role.LATENT) -> LearnedMap:
+    """A map of worlds that differ in the ball's drag, which has this role."""
     values = draw(count)
     drag = np.random.default_rng(9).random(count)
     inputs = np.column_stack([values, drag])
-    axes = (*parameter_axes(), DRAG)
+    axes = (*parameter_axes(), replace(DRAG, role=role))
     return fit_throws(Kind.LOCAL, axes, TARGETS, inputs, land(values, drag), effort(values)).learned
 
 
