@@ -7,15 +7,26 @@ of it would have them, too.
 from __future__ import annotations
 
 import gc
+import os
 import sys
 import threading
+from types import MappingProxyType
+
+SERIAL_LIBRARIES = MappingProxyType({"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"})
+"""Environment variables for processes that import numerical libraries.
+
+These would start threads, which wait busily for work in the beginning. Ours has none for them: one process per core
+fills the machine, and what ends up in files is computed without BLAS.
+"""
 
 _commands: list[bool] = []
 
 
 def claim_process() -> None:
-    """Declare that this process runs a command and nothing else."""
+    """Declare that this process runs a command and nothing else, before it imports numerical libraries."""
     _commands.append(True)
+    for name, value in SERIAL_LIBRARIES.items():
+        os.environ.setdefault(name, value)
 
 
 def may_be_forked() -> bool:

@@ -1,5 +1,6 @@
 """What tells a command of ours from somebody's program."""
 
+import os
 import re
 import subprocess
 import sys
@@ -8,7 +9,7 @@ from pathlib import Path
 import pytest
 
 import throwcollect
-from throwcollect.own_process import make_command
+from throwcollect.own_process import SERIAL_LIBRARIES, make_command
 
 WHOSE = """
 import sys, threading
@@ -27,6 +28,28 @@ def test_only_a_command_without_further_threads_may_be_forked() -> None:
     with subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as asked:
         assert asked.stdout is not None
         assert [asked.stdout.readline().strip() for _ in range(3)] == ["False", "True", "False"]
+
+
+THREADS = """
+import sys, types
+
+def run_command():
+    import numpy
+    print(*(line for line in open("/proc/self/status") if line.startswith("Threads")))
+
+# It stands for the command line.
+sys.modules["throwcollect.cli.main"] = types.SimpleNamespace(main=run_command)
+from throwcollect.__main__ import main
+
+main()
+"""
+
+
+def test_numerical_libraries_start_no_threads_in_a_command() -> None:
+    environment = {name: value for name, value in os.environ.items() if name not in SERIAL_LIBRARIES}
+    words = [sys.executable, "-c", THREADS]
+    done = subprocess.run(words, env=environment, capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["Threads:", "1"]
 
 
 @pytest.mark.parametrize("version", [(3, 10), (3, 11)])

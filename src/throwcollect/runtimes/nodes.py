@@ -12,6 +12,7 @@ from enum import Enum
 from typing import TYPE_CHECKING
 
 from throwcollect.config.run import RunConfig
+from throwcollect.own_process import SERIAL_LIBRARIES
 from throwcollect.ros.connection import Connection
 from throwcollect.ros.middleware import Middleware
 from throwcollect.runtimes.node_logs import NodeLogs
@@ -213,9 +214,4 @@ def node_environment(connection: Connection) -> Mapping[str, str]:
 
 def library_environment(middleware: Middleware) -> Mapping[str, str]:
     """Environment variables that have to be set before a node imports its libraries."""
-    return {
-        **middleware.environment(),
-        # One simulation per core fills the machine; threads of numerical libraries would only slow it down.
-        "OMP_NUM_THREADS": "1",
-        "OPENBLAS_NUM_THREADS": "1",
-    }
+    return {**middleware.environment(), **SERIAL_LIBRARIES}
