@@ -68,8 +68,8 @@ ros: $(READY_DEV)
 # NumPy and all that is not ROS comes from that other environment, so that it is there once, in one version.
 $(READY_ROS): $(ROS_WHEELS)/made-from.sha256 | $(READY_DEV)
 	rm -rf $(ROS_VENV)
-	packaging/environment.sh $(ROS_VENV) $(BIN)/python
-	packaging/install.sh $(ROS_VENV)/bin/python --quiet --no-deps $$(ls $(ROS_WHEELS)/*.whl | grep -v /numpy-)
+	$(BIN)/uv venv --quiet --python $(BIN)/python $(ROS_VENV)
+	$(BIN)/uv pip install --quiet --python $(ROS_VENV)/bin/python --no-deps $$(ls $(ROS_WHEELS)/*.whl | grep -v /numpy-)
 	$(ROS_VENV)/bin/python -c "import os, sysconfig; print('import site; site.addsitedir(' \
 	    + repr(sysconfig.get_path('purelib', vars={'base': os.path.abspath('$(VENV)')})) + ')')" > $@.pth
 	mv $@.pth "$$($(ROS_VENV)/bin/python -c "import sysconfig; print(sysconfig.get_path('purelib'))")/development.pth"

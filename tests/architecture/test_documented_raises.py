@@ -14,6 +14,8 @@ import re
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
+from tests.architecture.parsing import parse
+
 ROOT = Path(__file__).parents[2]
 MODULES = {path: path.read_text(encoding="utf-8") for path in sorted((ROOT / "src").rglob("*.py"))}
 RAISES = re.compile(r"^ *Raises:\n((?: +.*\n?|\n)+)", flags=re.MULTILINE)
@@ -35,7 +37,7 @@ class Errors:
     def __init__(self, texts: Mapping[Path, str]) -> None:
         self._bases: dict[str, list[str]] = {}
         self._makers: dict[str, str] = {}
-        for node in (node for text in texts.values() for node in ast.walk(ast.parse(text))):
+        for node in (node for text in texts.values() for node in ast.walk(parse(text))):
             if isinstance(node, ast.ClassDef):
                 self._bases[node.name] = list(map(last_name, node.bases))
             elif isinstance(node, ast.FunctionDef) and (name := last_name(node.returns)):
@@ -74,7 +76,7 @@ def raises(node: ast.AST, errors: Errors, caught: frozenset[str] = frozenset()) 
 
 
 def undocumented(path: Path, text: str, errors: Errors) -> Iterator[str]:
-    for function in (node for node in ast.walk(ast.parse(text)) if isinstance(node, ast.FunctionDef)):
+    for function in (node for node in ast.walk(parse(text)) if isinstance(node, ast.FunctionDef)):
         docstring = ast.get_docstring(function)
         is_command = "cli" in path.parts and not function.name.startswith("_")
         if docstring is None or is_command:  # The docstring of a command is its help.

@@ -9,6 +9,8 @@ import tokenize
 from collections.abc import Iterator
 from pathlib import Path
 
+from tests.architecture.parsing import parse
+
 ROOT = Path(__file__).parents[2]
 MODULES = sorted((ROOT / "src" / "throwcollect").rglob("*.py"))
 PUBLISHED = {"WorkerError"}
@@ -40,7 +42,7 @@ def texts(code: str) -> Iterator[str]:
 
 def offences(code: str, words: list[str]) -> Iterator[str]:
     pattern = re.compile(rf"\b({'|'.join(words)})s?\b", flags=re.IGNORECASE)
-    for name in set(names(ast.parse(code))) - PUBLISHED:
+    for name in set(names(parse(code))) - PUBLISHED:
         parts = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", name).replace("_", " ")
         yield from (f"{name}: {found[0]}" for found in pattern.finditer(parts))
     for text in texts(code):

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from tests.architecture.parsing import parse
 
 ROOT = Path(__file__).parents[2]
 SOURCE = ROOT / "src" / "throwcollect"
@@ -24,7 +25,7 @@ def name(path: Path) -> str:
 
 def offences(path: Path, text: str) -> Iterator[str]:
     """What a module does that no module may do."""
-    tree = ast.parse(text)
+    tree = parse(text)
     if not ast.get_docstring(tree):
         yield "has no docstring"
     if path.stem in VAGUE:
@@ -74,7 +75,7 @@ def unfolded(statement: ast.stmt) -> list[ast.stmt]:
 
 def test_package_faces_hold_re_exports_only() -> None:
     for path in (path for path in MODULES if path.name == "__init__.py"):
-        statements = ast.parse(path.read_text(encoding="utf-8")).body
+        statements = parse(path.read_text(encoding="utf-8")).body
         for node in [inner for each in statements for inner in unfolded(each)]:
             plain = isinstance(node, ast.Expr | ast.ImportFrom | ast.Import)
             lazy = isinstance(node, ast.FunctionDef) and node.name in {"__getattr__", "__dir__"}
@@ -114,14 +115,14 @@ def processor_dependent(tree: ast.AST) -> set[str]:
 
 def test_the_rule_about_processors_sees_what_it_should() -> None:
     code = "np.exp(x) + np.linalg.solve(a, b) + a @ b + x**3 + x**y + x**2 + 10**9 + np.sqrt(x) + math.exp(1)"
-    assert processor_dependent(ast.parse(code)) == {"np.exp", "np.linalg.solve", "@", "**"}
+    assert processor_dependent(parse(code)) == {"np.exp", "np.linalg.solve", "@", "**"}
 
 
 @pytest.mark.parametrize("room", PURE_ROOMS)
 def test_what_ends_up_in_a_dataset_does_not_depend_on_the_processor(room: str) -> None:
     paths = sorted((SOURCE / room).rglob("*.py"))
     assert paths
-    found = {name(path): processor_dependent(ast.parse(path.read_text(encoding="utf-8"))) for path in paths}
+    found = {name(path): processor_dependent(parse(path.read_text(encoding="utf-8"))) for path in paths}
     assert {path: names for path, names in found.items() if names} == {
         path: names for path, names in HARMLESS.items() if path.startswith(f"{room}/")
     }

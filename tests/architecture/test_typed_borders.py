@@ -6,6 +6,8 @@ import ast
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
+from tests.architecture.parsing import parse
+
 SOURCE = Path(__file__).parents[2] / "src"
 LOOSE = {f"{kind}[str, {value}]" for kind in ("dict", "Mapping") for value in ("Any", "object")}
 DOCUMENTS = {"as_dict", "to_yaml", "bag_information", "Qos.profile", "Shape.node"}
@@ -18,7 +20,7 @@ def room_of(module: str) -> str:
 
 def parse_modules() -> dict[str, ast.Module]:
     return {
-        ".".join(path.relative_to(SOURCE).with_suffix("").parts): ast.parse(path.read_text(encoding="utf-8"))
+        ".".join(path.relative_to(SOURCE).with_suffix("").parts): parse(path.read_text(encoding="utf-8"))
         for path in sorted(SOURCE.rglob("*.py"))
     }
 
@@ -82,6 +84,6 @@ class Dataset:
     _kept: Mapping[str, Any]
     def as_dict(self) -> dict[str, object]: ...
 """
-    names = [name for definition in ast.parse(code).body for name in loose_names(definition)]
+    names = [name for definition in parse(code).body for name in loose_names(definition)]
     assert names == ["read", "write", "Dataset.facts", "Dataset.as_dict"]
     assert [name for name in names if is_document(name)] == ["Dataset.as_dict"]

@@ -6,6 +6,8 @@ import ast
 from collections.abc import Iterator
 from pathlib import Path
 
+from tests.architecture.parsing import parse
+
 ROOT = Path(__file__).parents[2]
 SOURCE = ROOT / "src"
 IRREGULAR = """
@@ -43,7 +45,7 @@ def participles(tree: ast.AST) -> Iterator[str]:
 
 
 def test_functions_are_verbs() -> None:
-    modules = {path: ast.parse(path.read_text(encoding="utf-8")) for path in sorted(SOURCE.rglob("*.py"))}
+    modules = {path: parse(path.read_text(encoding="utf-8")) for path in sorted(SOURCE.rglob("*.py"))}
     found = {str(path.relative_to(SOURCE)): set(participles(tree)) - OTHERS_CALL_IT for path, tree in modules.items()}
     assert {path: names for path, names in found.items() if names} == {}
 
@@ -64,4 +66,4 @@ class Lease:
     def malformed(self) -> RequestError: ...
     def held_by(self) -> int: ...
 """
-    assert list(participles(ast.parse(code))) == ["checked_plan", "_found", "held_by"]
+    assert list(participles(parse(code))) == ["checked_plan", "_found", "held_by"]
