@@ -18,6 +18,7 @@ import sys
 import tempfile
 import zipfile
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from pathlib import Path
 
@@ -60,16 +61,24 @@ def digest(*, ros: bool) -> str:
     return hashlib.sha256(b"\0".join([*scripts, "\n".join(requirements()).encode(), *more])).hexdigest()
 
 
-def add_ros(directory: Path) -> None:
-    """Add the wheels of the extra `ros` to downloaded ones.
+def collect(directory: Path, *, ros: bool) -> None:
+    """Collect the wheels as they are.
 
     Args:
-        directory: Where they go; what is there in some version stays in that one.
+        directory: Where they go.
+        ros: Whether those of the extra `ros` are wanted, too; what is there in some version stays in that one.
 
     Raises:
         subprocess.CalledProcessError: If a wheel cannot be had or built; pip has said why.
     """
-    ros_wheels.fill(ROS_WHEELS)
+    if not ros:
+        download(directory)
+        return
+    # One waits for the network while the other compiles.
+    with ThreadPoolExecutor(max_workers=1) as pool:
+        filling = pool.submit(ros_wheels.fill, ROS_WHEELS)
+        download(directory)
+        filling.result()
     there = {path.name.partition("-")[0].lower() for path in directory.glob("*.whl")}
     for wheel in ROS_WHEELS.glob("*.whl"):
         if wheel.name.partition("-")[0].lower() not in there:
@@ -149,9 +158,7 @@ def main(directory: Path, *, ros: bool = False) -> None:
     ):
         sys.exit(f"{directory}: holds {foreign[0].name}, which is no wheel; name a new or empty directory")
     with tempfile.TemporaryDirectory() as downloads:
-        download(Path(downloads))
-        if ros:
-            add_ros(Path(downloads))
+        collect(Path(downloads), ros=ros)
         wheels = sorted(Path(downloads).glob("*.whl"))
         shutil.rmtree(directory, ignore_errors=True)
         directory.mkdir(parents=True)
