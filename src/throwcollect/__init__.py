@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from throwcollect.version import __version__
 
 if TYPE_CHECKING:
+    from throwcollect import runs
     from throwcollect.config.loader import load as load_config
     from throwcollect.config.schema import Config
     from throwcollect.dataset.reader import Dataset
@@ -19,7 +20,15 @@ if TYPE_CHECKING:
     from throwcollect.derive.selection import sample as sample_dataset
     from throwcollect.derive.split import split as split_dataset
     from throwcollect.derive.statistics import statistics as compute_statistics
-    from throwcollect.errors import ConfigError, DatasetError, PlanError, ThrowcollectError, WorkerError
+    from throwcollect.errors import (
+        ConfigError,
+        ConflictError,
+        DatasetError,
+        NotFoundError,
+        PlanError,
+        ThrowcollectError,
+        WorkerError,
+    )
     from throwcollect.export.export import export as export_dataset
     from throwcollect.extras import MissingExtraError
     from throwcollect.learning.model import Aim, Model, fit, load_model
@@ -31,10 +40,12 @@ __all__ = [
     "Aim",
     "Config",
     "ConfigError",
+    "ConflictError",
     "Dataset",
     "DatasetError",
     "MissingExtraError",
     "Model",
+    "NotFoundError",
     "PlanError",
     "Score",
     "Simulator",
@@ -51,6 +62,7 @@ __all__ = [
     "load_config",
     "load_model",
     "merge_datasets",
+    "runs",
     "sample_dataset",
     "split_dataset",
     "verify_dataset",
@@ -60,10 +72,12 @@ _PLACES = {
     "Aim": "learning.model:Aim",
     "Config": "config.schema:Config",
     "ConfigError": "errors:ConfigError",
+    "ConflictError": "errors:ConflictError",
     "Dataset": "dataset.reader:Dataset",
     "DatasetError": "errors:DatasetError",
     "MissingExtraError": "extras:MissingExtraError",
     "Model": "learning.model:Model",
+    "NotFoundError": "errors:NotFoundError",
     "PlanError": "errors:PlanError",
     "Score": "learning.score:Score",
     "Simulator": "simulator:Simulator",
@@ -79,11 +93,12 @@ _PLACES = {
     "load_config": "config.loader:load",
     "load_model": "learning.model:load_model",
     "merge_datasets": "derive.selection:merge",
+    "runs": "runs",
     "sample_dataset": "derive.selection:sample",
     "split_dataset": "derive.split:split",
     "verify_dataset": "replay.verification:verify_dataset",
 }
-"""Module and attribute of each name, for `__getattr__`; type checkers need the imports above instead."""
+"""Module and attribute of each name, or a module alone, for `__getattr__`; type checkers need the imports above."""
 
 
 def __getattr__(name: str) -> object:
@@ -101,7 +116,8 @@ def __getattr__(name: str) -> object:
 
     module, _, attribute = _PLACES[name].partition(":")
     with explain_missing():
-        return getattr(import_module(f"{__name__}.{module}"), attribute)
+        found = import_module(f"{__name__}.{module}")
+    return getattr(found, attribute) if attribute else found
 
 
 def __dir__() -> list[str]:

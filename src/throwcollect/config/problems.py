@@ -37,11 +37,13 @@ class Finding:
         location: The key, which need not exist.
         sentence: Says what is wrong, which value was given and which would be right.
         unknown: Whether the key itself is wrong, and not its value.
+        meant: Name of the key that is most like an unknown one; empty if none is.
     """
 
     location: Location
     sentence: str
     unknown: bool = False
+    meant: str = ""
 
     @property
     def key(self) -> str:
@@ -56,8 +58,8 @@ def join_key(location: Location) -> str:
 
 def unknown_key(name: str, known: list[str]) -> str:
     """Make the sentence for a key that does not exist, by the keys that would be right in its place."""
-    if meant := _did_you_mean(name, known):
-        return f"unknown key{meant}"
+    if meant := _find_nearest(name, known):
+        return f"unknown key{_did_you_mean(meant)}"
     return "unknown key; " + (f"known keys here: {', '.join(known)}" if known else "no keys are expected here")
 
 
@@ -94,13 +96,9 @@ def findings(error: ValidationError, values: Any, *, above: Location = (), shape
         found.pop(location, None)
     unknown = [finding for finding in found.values() if finding.unknown]
     # A misspelt key is also missing under its right name, which is no second mistake.
-    meant = {(*finding.location[:-1], _nearest(finding)) for finding in unknown}
+    meant = {(*finding.location[:-1], finding.meant) for finding in unknown}
     rest = [finding for finding in found.values() if not finding.unknown and finding.location not in meant]
     return [*unknown, *rest]
-
-
-def _nearest(finding: Finding) -> str:
-    return finding.sentence.partition("did you mean '")[2].partition("'")[0]
 
 
 def _findings(details: ErrorDetails, values: Any, above: Location, expected: Shape) -> Iterator[Finding]:
@@ -109,14 +107,17 @@ def _findings(details: ErrorDetails, values: Any, above: Location, expected: Sha
     cause = details.get("ctx", {}).get("error")
     is_key = details["loc"][-1:] == ("[key]",)
     if kind == "extra_forbidden":
-        name = str(location[-1])
-        yield Finding(location, section.refused.get(name) or unknown_key(name, list(section.keys)), unknown=True)
+        name, known = str(location[-1]), list(section.keys)
+        refused = section.refused.get(name)
+        meant = "" if refused else _find_nearest(name, known)
+        yield Finding(location, refused or unknown_key(name, known), unknown=True, meant=meant)
     elif isinstance(cause, ContradictionError):
         for key, sentence in cause.sentences.items():
             yield Finding((*location, *_split(key)), sentence)
     elif isinstance(cause, UnknownJointError):
-        meant = _did_you_mean(cause.name, cause.joints)
-        yield Finding(location, f"{cause.robot} has no joint {quote(cause.name)}{meant}", unknown=is_key)
+        meant = _find_nearest(cause.name, cause.joints)
+        sentence = f"{cause.robot} has no joint {quote(cause.name)}{_did_you_mean(meant)}"
+        yield Finding(location, sentence, unknown=is_key, meant=meant)
     elif cause is not None:
         yield Finding(location, str(cause), unknown=is_key)
     elif kind == "missing":
@@ -134,13 +135,17 @@ def _findings(details: ErrorDetails, values: Any, above: Location, expected: Sha
 
 def _should_be(words: str, value: Any, choices: list[str], *, strange: str = "") -> str:
     """Say what would be right, and which choice the user meant; if none is like the value, append `strange`."""
-    return f"should be {words}, got {quote(value)}{_did_you_mean(value, choices) or strange}"
+    return f"should be {words}, got {quote(value)}{_did_you_mean(_find_nearest(value, choices)) or strange}"
 
 
-def _did_you_mean(value: Any, choices: Sequence[str]) -> str:
+def _find_nearest(value: Any, choices: Sequence[str]) -> str:
+    """Find the choice that is most like a value; an empty text if none is."""
     looks_like_a_word = isinstance(value, str) and len(value) <= _LONGEST_WORD
-    near = get_close_matches(value, choices, 1) if looks_like_a_word else []
-    return f"; did you mean '{near[0]}'?" if near else ""
+    return next(iter(get_close_matches(value, choices, 1)), "") if looks_like_a_word else ""
+
+
+def _did_you_mean(choice: str) -> str:
+    return f"; did you mean '{choice}'?" if choice else ""
 
 
 def _radians(kind: str, shape: Shape, value: Any) -> str:

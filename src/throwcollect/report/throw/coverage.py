@@ -14,17 +14,25 @@ from throwcollect.report.points import read_numbers
 from throwcollect.report.throw.landings import Landings
 
 _BINS = 14
-_LABELS = {
-    "distance_m": "landing distance [m]",
-    "hit_angle_rad": "hit angle below the horizontal [°]",
-    "height_m": "landing height [m]",
+_TITLES = {
+    "distance_m": ("landing distance", "landing distance [m]"),
+    "hit_angle_rad": ("hit angle", "hit angle below the horizontal [°]"),
+    "height_m": ("landing height", "landing height [m]"),
 }
+"""Name of each dimension, and the label of its axis."""
 
 
 @dataclass(frozen=True)
 class Axis:
-    """One dimension of the cells: its title, with the unit, and the edges of its bins, shape ``(n_bins + 1,)``."""
+    """One dimension of the cells.
 
+    Attributes:
+        name: What it is called.
+        label: What stands beside an axis: the same, how it is measured, and the unit.
+        edges: Edges of its bins, shape ``(n_bins + 1,)``.
+    """
+
+    name: str
     label: str
     edges: NDArray[np.float64]
 
@@ -81,7 +89,7 @@ def count_throws(landings: Landings, throws: pa.Table, *, target: TargetConfig |
             # The configuration has radians, and the values above are degrees, as the axis shows them.
             edges["hit_angle_rad"] = np.degrees(edges["hit_angle_rad"])
     counts, _ = np.histogramdd(np.column_stack(list(values.values())), list(edges.values()))
-    axes = tuple(Axis(_LABELS[name], edges[name]) for name in values)
+    axes = tuple(Axis(*_TITLES[name], edges[name]) for name in values)
     return Coverage(axes, counts.astype(np.intp), len(landings), target is not None)
 
 

@@ -102,10 +102,9 @@ def _show_targets(coverage: Coverage | None) -> Iterator[Panel]:
         figure = figures.draw_coverage_bars(coverage.axes[0], coverage.counts)
         yield Panel("cells", "Throws by target", figure, f"{text}.", picture="target_coverage")
     for number, (first, second, counts) in enumerate(coverage.pairs):
-        names = [axis.label.partition(" [")[0].removesuffix(" below the horizontal") for axis in (first, second)]
         yield Panel(
             key=f"cells-{number}",
-            title=f"{'Targets:' if coverage.configured else 'Throws by'} {names[0]} and {names[1]}",
+            title=f"{'Targets:' if coverage.configured else 'Throws by'} {first.name} and {second.name}",
             figure=figures.draw_coverage_map(first, second, counts),
             text="" if number else f"{text}.",
             picture="" if number else "target_coverage",
