@@ -41,10 +41,14 @@ _STYLES = {
     REFUSED: Style("#B3B3B3", "star"),
 }
 _UNKNOWN = Style("#882255", "pentagon")
+_SHARED = (LIMIT_VIOLATED, TRACKING_FAILED, LOST, REFUSED)
+"""Failures of any task."""
+_FAILURES = (_UNKNOWN, *(style for name, style in _STYLES.items() if name not in (LANDED, *_SHARED)))
+"""Styles for failures that only a task of another package has: such a task has none of those of a throw."""
 
 
 def style_of(outcome: str) -> Style:
-    """How an outcome is drawn."""
+    """How an outcome of a throw is drawn."""
     return _STYLES.get(outcome, _UNKNOWN)
 
 
@@ -88,7 +92,10 @@ class Outcomes:
 
     def style_of(self, name: str) -> Style:
         """How an outcome is drawn; the success of any task is drawn as a landing is."""
-        return style_of(LANDED if name == self.success else name)
+        if name == self.success:
+            return style_of(LANDED)
+        others = [each for each in self.names if each not in _STYLES and each != self.success]
+        return _FAILURES[others.index(name) % len(_FAILURES)] if name in others else style_of(name)
 
     def are(self, name: str) -> NDArray[np.bool_]:
         """Which trials have an outcome, shape ``(n_trials,)``."""

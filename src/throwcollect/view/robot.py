@@ -20,7 +20,7 @@ Rgba = tuple[float, float, float, float]
 BALL_RGBA: Rgba = (1.0, 0.45, 0.0, 1.0)
 """Colour of the ball."""
 
-_SPOON_RGBA: Rgba = (0.55, 0.35, 0.2, 1.0)
+_TOOL_RGBA: Rgba = (0.55, 0.35, 0.2, 1.0)
 _DEFAULT_RGBA: Rgba = (1.0, 1.0, 1.0, 1.0)
 _PACKAGE = "package://"
 
@@ -111,7 +111,7 @@ def read_drawn_robot(description: str, tool: str, share: Path) -> DrawnRobot:
                 for shape in link.findall("visual"):
                     for material in shape.findall("material"):
                         shape.remove(material)
-                    shape.append(_material("spoon", _SPOON_RGBA))
+                    shape.append(_material("tool", _TOOL_RGBA))
         # A material may be defined in one place of a URDF, and only named in others.
         colors = {name: rgba for each in robot.iter("material") for name, rgba in _color(each).items() if name}
         shapes = tuple(

@@ -18,3 +18,11 @@ def test_every_outcome_is_drawn_in_a_way_of_its_own() -> None:
     styles = [style_of(name) for name in (*(outcome.value for outcome in ThrowOutcome), REFUSED, "unheard of")]
     for part in ("colour", "symbol"):
         assert len({getattr(style, part) for style in styles}) == len(styles)
+
+
+def test_failures_of_another_task_are_told_apart() -> None:
+    found = Outcomes.of(["swung", "stuck", "slipped", "lost", "stuck"], success="swung")
+    assert found.names == ("swung", "lost", "slipped", "stuck")
+    assert len({(found.style_of(name).colour, found.style_of(name).symbol) for name in found.names}) == 4
+    assert found.style_of("swung") == style_of("landed")
+    assert found.style_of("lost") == style_of("lost")
