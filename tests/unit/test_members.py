@@ -90,6 +90,20 @@ def test_joints_are_those_of_the_robot_that_the_configuration_names(tmp_path: Pa
     assert f"{path}:4: task.end.elbow: the planar arm has no joint 'elbow'; did you mean 'elbow_joint'?" in done.stderr
 
 
+def test_without_postures_of_its_own_a_robot_gets_none_of_another_one(tmp_path: Path) -> None:
+    path = tmp_path / "arm.yaml"
+    path.write_text("trials: 4\nrobot: {name: planar_arm}\n")
+    done = with_plugins("config", str(path))
+    assert done.returncode == 2
+    wants = (
+        "missing, and the default has joints that the planar arm lacks; `throwcollect init --robot planar_arm` writes"
+    )
+    assert [line.partition(" writes")[0] + " writes" for line in done.stderr.splitlines()] == [
+        f"throwcollect: {path}: task.start: {wants}",
+        f"{path}: task.end: {wants}",
+    ]
+
+
 def test_with_a_robot_that_there_is_not_its_joints_are_not_complained_of(tmp_path: Path) -> None:
     path = tmp_path / "arm.yaml"
     path.write_text(ARM.replace("planar_arm", "planar_hand"))

@@ -110,6 +110,9 @@ def _findings(details: ErrorDetails, values: Any, above: Location, expected: Sha
         name, known = str(location[-1]), list(section.keys)
         refused = section.refused.get(name)
         meant = "" if refused else _find_nearest(name, known)
+        if name.isdecimal() and value is None:
+            # YAML takes what follows a comma for the next key.
+            refused = "unknown key; if it is the end of a number, decimals are written with a point, as in 1.5"
         yield Finding(location, refused or unknown_key(name, known), unknown=True, meant=meant)
     elif isinstance(cause, ContradictionError):
         for key, sentence in cause.sentences.items():

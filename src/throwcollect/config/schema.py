@@ -253,9 +253,14 @@ class Config(Section):
             "task.end": self.task.end,
         }
         for section, joints in named.items():
-            for joint in joints:
-                if joint not in robot.joints:
-                    yield f"{section}.{joint}", f"{robot.title} has no joint {joint!r}"
+            strange = [joint for joint in joints if joint not in robot.joints]
+            if strange and section in ("task.start", "task.end") and section[5:] not in self.task.model_fields_set:
+                # The user has written none of these joints: they are those of the default.
+                init = f"throwcollect init --robot {self.robot.name}"
+                yield section, f"missing, and the default has joints that {robot.title} lacks; `{init}` writes one"
+                continue
+            for joint in strange:
+                yield f"{section}.{joint}", f"{robot.title} has no joint {joint!r}"
 
     @property
     def grows(self) -> bool:

@@ -193,7 +193,7 @@ def _check_room(directory: Path, trials: int) -> None:
     parent = next(path for path in (directory, *directory.absolute().parents) if path.is_dir())
     least, free = trials * _LEAST_BYTES, shutil.disk_usage(parent).free
     if free < least:
-        sizes = f"takes {least / 1e6:.1f} MB or more, and {free / 1e6:.1f} MB are free"
+        sizes = f"takes {least / 1e3:.0f} kB or more, and {free / 1e3:.0f} kB are free"
         raise ConfigError(
             f"{directory}: a plan of {trials} trials {sizes}",
             hint="free space on that disk, or choose another one with --output",

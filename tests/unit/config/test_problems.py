@@ -87,6 +87,13 @@ JOINT_LIST = "joint names, each with a number from -6.3 to 6.3 rad"
                 "angles are in radians: -60 degrees are -1.0472"
             ],
         ),
+        (
+            "task: {duration_s: 1,5}",
+            [
+                "run.yaml:1: task.5: unknown key; "
+                "if it is the end of a number, decimals are written with a point, as in 1.5"
+            ],
+        ),
         ("task: {end: {}}", ["run.yaml:1: task.end: names no joint, so nothing would move"]),
         (
             "task: {end: {arm_left_1_joint: 0}}",

@@ -43,7 +43,7 @@ def test_a_disk_that_is_too_small_at_any_rate_is_told_of_before_a_trial_is_drawn
 ) -> None:
     monkeypatch.delattr("throwcollect.coordinator.prepare.draw_first_points")
     with pytest.raises(
-        ConfigError, match=r"a plan of 10000 trials takes 0\.4 MB or more, and 0\.3 MB are free\n  try: free"
+        ConfigError, match=r"a plan of 10000 trials takes 400 kB or more, and 262 kB are free\n  try: free"
     ):
         prepare(config(10_000), disk / "below" / "data", sweep_directory=disk)
     assert list(disk.iterdir()) == []

@@ -110,5 +110,6 @@ def _describe_misses(name: str, misses: MissSummary) -> str:
 def _describe_landing(landing: Mapping[str, tuple[float, float]] | None) -> str:
     if landing is None:
         return "no ball landed"
-    x, y = landing["x_m"], landing["y_m"]
+    # Adding 0 makes 0 of what rounds to a negative one.
+    x, y = ([round(end, 3) + 0.0 for end in landing[name]] for name in ("x_m", "y_m"))
     return f"x {x[0]:.3f} to {x[1]:.3f} m, y {y[0]:.3f} to {y[1]:.3f} m"
