@@ -95,7 +95,7 @@ def load_member(family: str, name: str) -> Any:
         return entry.load()
     what, namesakes = _describe(family, name), _find_namesakes(family, name)
     if len({each.value for each in namesakes}) > 1:
-        raise ConfigError(f"{what}: a name has to be that of one", hint="uninstall all of these packages but one")
+        raise ConfigError(f"{what}: only one package may use a name", hint="uninstall all of these packages but one")
     found = _import(entry.value, what)
     kind = load_object(_KINDS[family])
     where = f"{what}: {entry.value}"

@@ -163,7 +163,7 @@ def test_two_packages_with_a_member_of_one_name_are_refused(tmp_path: Path, monk
     for cached in (members._table, load_member):
         cached.cache_clear()
     with pytest.raises(
-        ConfigError, match=r"the engine mine of first 1\.0 and second 1\.0: a name has to be that of one"
+        ConfigError, match=r"the engine mine of first 1\.0 and second 1\.0: only one package may use a name"
     ):
         load_member("engines", "mine")
     monkeypatch.undo()

@@ -134,9 +134,9 @@ def scale(
     """Change the number of simulations of a run."""
     from throwcollect.runs import control
     from throwcollect.runs.records import Records
-    from throwcollect.runs.selection import to_change
+    from throwcollect.runs.selection import find_run_to_change
 
-    found = to_change(Records(), run, command=f"scale {simulations}")
+    found = find_run_to_change(Records(), run, command=f"scale {simulations}")
     control.scale(found, simulations)
     typer.echo(f"{found.id}: {found.record.simulations} -> {format_count(simulations, 'simulation')}")
 
@@ -150,9 +150,9 @@ def stop(run: RunOption = None) -> None:
         return
     from throwcollect.runs import control
     from throwcollect.runs.records import Records
-    from throwcollect.runs.selection import describe_death, require_living, to_change
+    from throwcollect.runs.selection import describe_death, find_run_to_change, require_living
 
-    found = to_change(Records(), run, command="stop")
+    found = find_run_to_change(Records(), run, command="stop")
     require_living(found)
     collects = found.record.kind == "collection"
     if collects:
@@ -206,9 +206,9 @@ def _find_submitted(run: str | None) -> ClusterRun | None:
 def _find_run(named: str | None) -> Run:
     """The run of this machine that a command is to look at."""
     from throwcollect.runs.records import Records
-    from throwcollect.runs.selection import to_watch
+    from throwcollect.runs.selection import find_run_to_watch
 
-    return to_watch(Records(), named, say=tell)
+    return find_run_to_watch(Records(), named, say=tell)
 
 
 def _make_document(run: Run) -> dict[str, Any]:

@@ -299,7 +299,7 @@ class JointTrajectoryController:
             self.logger.warning("%s: %s%s", self.name, decision.text, holds)
             self._stop()
         # An end that no goal waits for is judged again in each update until its goal time is over.
-        elif self.goal_id is not None or self._judge.settled(motion):
+        elif self.goal_id is not None or self._judge.is_settled(motion):
             self._hold(Waypoints.single(*motion.curve.state(motion.curve.end_ns)))
         self._finish(decision)
         return decision

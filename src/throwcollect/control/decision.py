@@ -91,7 +91,7 @@ class Judge:
         late = [motion.updates_until_late(limit_ns) for limit_ns in limits if limit_ns]
         return max(0, min(late)) if late else None
 
-    def settled(self, motion: Motion) -> bool:
+    def is_settled(self, motion: Motion) -> bool:
         """Whether an end that no goal waits for has been judged for the last time."""
         tolerances = self.tolerances
         waits = bool(tolerances.goal.any()) and not self.timeout_ns

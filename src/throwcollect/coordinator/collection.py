@@ -268,7 +268,7 @@ class TrialCollection:
             WorkerError: If every simulation refuses every trial.
             DatasetError: If the disk fails.
         """
-        if (reason := self._leases.hopeless(self._names)) is not None:
+        if (reason := self._leases.explain_hopelessness(self._names)) is not None:
             raise WorkerError("every simulation refuses its trials, and none was ever done", evidence=reason)
         if time.monotonic() >= self._synced_at + _SYNC_EVERY_S:
             self._synced_at = time.monotonic()

@@ -22,7 +22,12 @@ class EarlierRound(NamedTuple):
 
 
 class WrongTrials(NamedTuple):
-    """Trials that an earlier collection has planned and the results do not give: the first, and how many had ended."""
+    """Planned trials that are given up, because the results known now call for others.
+
+    Attributes:
+        first: The first of them; all later ones are given up, too.
+        episodes: How many of them have episodes, which are removed.
+    """
 
     first: int
     episodes: int

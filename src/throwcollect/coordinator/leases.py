@@ -68,7 +68,7 @@ class Leases:
             return None
         return self._refusals[simulation][-1][1]
 
-    def hopeless(self, simulations: Collection[str]) -> str | None:
+    def explain_hopelessness(self, simulations: Collection[str]) -> str | None:
         """Why none of these simulations will ever do a trial: none ever did, and all refuse. None if there is hope."""
         if self._completed or not simulations or not all(map(self._is_doubted, simulations)):
             return None

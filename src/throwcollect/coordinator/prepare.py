@@ -30,11 +30,11 @@ _MANY_TRIALS = 500
 _TRIALS_A_PIECE = 100
 _MOST_PIECES = 10_000
 """To hand over many more pieces takes a minute, in which no trial is checked and Ctrl-C has no effect."""
-_TOLD_TRIALS = 20_000
+_ANNOUNCED_TRIALS = 20_000
 """From here on the user is told at once what happens, because seconds pass until the first trials are checked."""
 _TELL_FIRST_S = 2.0
 _TELL_EVERY_S = 10.0
-_SUNKEN_M = 0.01
+_DEEPEST_SOLE_M = 0.01
 """A robot that stands deeper in the ground is misplaced; less can come from the shape of its sole."""
 _LEAST_BYTES = 40
 """Bytes that each trial takes in the file of a plan: its digest and its seed, which nothing compresses."""
@@ -59,7 +59,7 @@ def draw_plan(config: Config, *, directory: Path, processes: int = 1, onlooker: 
 
 
 def _draw_points(config: Config, directory: Path, onlooker: Onlooker) -> Points:
-    if (count := _count_before(config)) >= _TOLD_TRIALS:
+    if (count := _count_before(config)) >= _ANNOUNCED_TRIALS:
         onlooker.say(f"plan: draws {count} trials")
     return draw_first_points(config, directory=directory)
 
@@ -77,7 +77,7 @@ def _check_trials(config: Config, points: Points, *, processes: int, onlooker: O
     ThrowsTable((), config)
     count = len(points.values)
     size = max(_TRIALS_A_PIECE, count // _MOST_PIECES)
-    if count >= _TOLD_TRIALS:
+    if count >= _ANNOUNCED_TRIALS:
         onlooker.say(f"plan: checks {count} trials")
     # The first pieces are small, so that progress can be reported soon.
     firsts = [*range(0, min(size, count), _TRIALS_A_PIECE), *range(size, count, size)]
@@ -112,7 +112,7 @@ def find_sunken_robot(config: Config) -> str | None:
     if height_m == RobotConfig().base_height_m:
         return None
     link, below_m = Feasibility(config).find_lowest(config)
-    if height_m + below_m > -_SUNKEN_M:
+    if height_m + below_m > -_DEEPEST_SOLE_M:
         return None
     return (
         f"warning: robot.base_height_m: {height_m:g}: {link} is {-below_m - height_m:.2f} m below the ground at the "
@@ -142,11 +142,11 @@ def feasibility_check(config: Config) -> Check:
     """
     feasibility = Feasibility(config)
     if config.sweep.feasibility == "nominal":
-        return lambda trial: feasibility.check(_believe(trial), trajectory_of(trial))
+        return lambda trial: feasibility.check(_with_nominal_robot(trial), trajectory_of(trial))
     return lambda trial: feasibility.check(trial, trajectory_of(trial))
 
 
-def _believe(config: Config) -> Config:
+def _with_nominal_robot(config: Config) -> Config:
     """The configuration with the defaults in place of all numbers of robot, tool and ball that one has to measure."""
     robot, defaults = config.robot, RobotConfig()
     kept = {"name": robot.name, "posture": robot.posture, "locked": robot.locked, "base_height_m": robot.base_height_m}

@@ -34,7 +34,7 @@ _MUCH_BYTES = 50_000_000
 """A core takes a second to look through so many bytes."""
 
 
-def begun(directory: Path) -> bool:
+def is_begun(directory: Path) -> bool:
     """Whether a directory holds a dataset that was at least created."""
     return (directory / CONFIG).is_file() or (directory / PLAN).is_file()
 
@@ -89,7 +89,7 @@ def prepare_or_resume(path: Path, directory: Path) -> Plan:
         ConfigError: If the configuration, the sweep or the directory cannot be used.
         DatasetError: If files cannot be written, or something is damaged that cannot be made again.
     """
-    freeze = resume if begun(directory) else prepare
+    freeze = resume if is_begun(directory) else prepare
     with load_locating_errors(path) as config:
         return freeze(config, directory, sweep_directory=path.parent)
 
@@ -117,7 +117,7 @@ def _write(
         # The dataset may be finished only by its earlier configuration, or by files that are gone.
         remove(directory / METADATA)
     # A finished dataset stays as it is, without the keys that say how it is run.
-    kept = config.without_run() if finished(directory, plan) else config
+    kept = config.without_run() if has_all_trials(directory, plan) else config
     replanned = old is None or plan.trials != old.trials or kept.without_run() != old.config.without_run()
     if stored != kept:
         if replanned:
@@ -157,7 +157,7 @@ def _find_damaged(directory: Path, plan: Plan | None, *, check: bool, onlooker: 
     return frozenset(finding.file for finding in findings)
 
 
-def finished(directory: Path, plan: Plan) -> bool:
+def has_all_trials(directory: Path, plan: Plan) -> bool:
     """Whether a dataset has every trial of a plan, and none of them was lost."""
     if not (directory / METADATA).is_file():
         return False
@@ -172,7 +172,7 @@ def is_complete(directory: Path) -> bool:
     """Whether a directory holds a dataset in which nothing is left to collect, and no file of it is missing."""
     try:
         plan = Plan.read(directory / PLAN, read_config(directory))
-        return finished(directory, plan) and not find_damage(directory, plan, in_full=False)
+        return has_all_trials(directory, plan) and not find_damage(directory, plan, in_full=False)
     except (ConfigError, DatasetError):
         return False
 

@@ -21,7 +21,7 @@ from ruamel.yaml.events import AliasEvent
 from rclzenoh.interfaces import type_hash
 from throwcollect.config.yaml_nodes import line, reason
 from throwcollect.dataset.directory import METADATA, PLAN, has_files
-from throwcollect.dataset.way_on import find_way_on
+from throwcollect.dataset.next_command import find_next_command
 from throwcollect.episode.channels import Channel
 from throwcollect.errors import DatasetError
 from throwcollect.files import read_text
@@ -142,7 +142,7 @@ def read_bag_metadata(directory: Path) -> Mapping[str, Any]:
     path = directory / METADATA
     if not path.exists():
         if (directory / PLAN).is_file():
-            on = find_way_on(directory)
+            on = find_next_command(directory)
             raise DatasetError(f"the dataset {on.state}: it has no {METADATA}", path=directory, hint=on.command)
         raise DatasetError("holds no dataset", path=directory, hint=_name_nearby(directory))
     bag = from_yaml(path).get("rosbag2_bagfile_information")

@@ -8,10 +8,10 @@ from pathlib import Path
 
 from throwcollect.dataset.configuration import read_config
 from throwcollect.dataset.directory import METADATA, PLAN, list_shards, path_of_part
+from throwcollect.dataset.next_command import find_next_command
 from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.recovery import find_episodes
 from throwcollect.dataset.throws_table import Row, ThrowsTable
-from throwcollect.dataset.way_on import find_way_on
 from throwcollect.files import StrPath, is_there
 from throwcollect.sweep.plan import Plan
 from throwcollect.wording import format_count
@@ -41,7 +41,7 @@ def load(directory: StrPath) -> Dataset:
         return Dataset.open(path)
     plan = Plan.read(path / PLAN, read_config(path))
     rows = sorted(_list_rows(path, plan), key=lambda row: int(row["trial"]))
-    on = find_way_on(path)
+    on = find_next_command(path)
     warnings.warn(
         f"{path} {on.state}: it has {len(rows)} of {format_count(len(plan.trials), 'trial')} so far; "
         f"`{on.command}` {on.purpose}",

@@ -22,7 +22,7 @@ def check_appearance(description: str, drawn: str) -> None:
     if differing := _physics_of(description) ^ _physics_of(drawn):
         first = min(text.split(">", 1)[0].removeprefix("<") for text in differing)
         raise ConflictError(
-            f"robot_description: should differ in what is seen alone, but {first} is another one",
+            f"robot_description: may differ only in what is seen, but {first} is another one",
             hint="other joints, masses or collision shapes are another configuration",
         )
 

@@ -14,7 +14,7 @@ from throwcollect.ros.endpoint import answers
 from throwcollect.ros.names import make_own_name
 from throwcollect.runs.record import Record
 from throwcollect.runs.records import Records, Run
-from throwcollect.runs.selection import find_held_runs, id_of, require_living, to_change
+from throwcollect.runs.selection import find_held_runs, find_run_to_change, id_of, require_living
 from throwcollect.runtimes.nodes import LAUNCHER
 from throwcollect.runtimes.registry import get_runtime
 from throwcollect.wording import command
@@ -57,9 +57,9 @@ def stop(run: Run, *, keep_on: Callable[[], bool] = lambda: True) -> Run:
 def down(named: str | Run | None, *, volumes: bool = False) -> tuple[str, list[str]]:
     """End all nodes of a run, by force if need be, and forget the run; a dataset in a directory stays.
 
-    It is named as for `to_change`, or by the id of a run that has no record, but of which a runtime holds containers.
-    None takes the only run of the current directory that lives, or whose launcher died. A volume that holds the dataset
-    is removed only if `volumes` is true.
+    It is named as for `find_run_to_change`, or by the id of a run that has no record, but of which a runtime holds
+    containers. None takes the only run of the current directory that lives, or whose launcher died. A volume that holds
+    the dataset is removed only if `volumes` is true.
 
     Returns:
         Id of the run, and names of the containers, networks and volumes that were removed.
@@ -71,7 +71,7 @@ def down(named: str | Run | None, *, volumes: bool = False) -> tuple[str, list[s
     records, held = Records(), find_held_runs()
     # A run without a record may be another user's, so it is removed only if it is named.
     if named is None:
-        run = to_change(records, None, command="down -v" if volumes else "down", died=True).id
+        run = find_run_to_change(records, None, command="down -v" if volumes else "down", died=True).id
     elif isinstance(named, Run):
         run = named.id
     else:

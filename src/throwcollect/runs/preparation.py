@@ -22,7 +22,7 @@ from throwcollect.runs.choice import Choice, begin, choose
 from throwcollect.runs.prepared_run import PreparedRun
 from throwcollect.runs.record import Origin, Record
 from throwcollect.runs.records import OpenRun, Records
-from throwcollect.runs.selection import busy, find_left_in
+from throwcollect.runs.selection import busy_error, find_left_in
 from throwcollect.runtimes.ports import reserve_port
 from throwcollect.wording import command, format_count
 
@@ -130,12 +130,12 @@ def resume(
         WorkerError: If the runtime that is asked for cannot be used.
         DatasetError: If its configuration is lost or damaged, or it cannot be written.
     """
-    from throwcollect.coordinator.resume import begun, finished
+    from throwcollect.coordinator.resume import has_all_trials, is_begun
     from throwcollect.coordinator.resume import resume as resume_plan
 
     started = datetime.now(timezone.utc)
     directory = Path(directory)
-    if not begun(directory):
+    if not is_begun(directory):
         refuse_lost_config(directory)
         raise ConfigError(f"{directory}: holds no dataset", expected="a directory that throwcollect up has made")
     with ExitStack() as places:
@@ -156,7 +156,7 @@ def resume(
             return left
         sweep_directory = directory if config is None else Path(config).parent
         plan = resume_plan(read, directory, sweep_directory=sweep_directory, check=check, onlooker=onlooker)
-        if finished(directory, plan):
+        if has_all_trials(directory, plan):
             onlooker.say(f"{directory}: every trial has ended, nothing is left to do")
             return None
         origin = None if run is None else run.record.origin
@@ -187,7 +187,7 @@ def _take_over(
         )
     run = records.take(left.id)
     if run is None:
-        raise busy(left.record)
+        raise busy_error(left.record)
     # If this launcher dies, too, the containers are still there.
     run.update(ended=None, exit_code=None, failure=None, left=True)
     fate = "died" if left.status == "died" else "given up"

@@ -19,7 +19,7 @@ from throwcollect.wording import command
 _MOST_LISTED = 5
 
 
-def to_change(records: Records, named: str | None, *, command: str, died: bool = False) -> Run:
+def find_run_to_change(records: Records, named: str | None, *, command: str, died: bool = False) -> Run:
     """Find the run that a command is to change, whose name without its option ``--run`` is `command`.
 
     The user names it as for `id_of`. None takes the only run that lives, or with `died` whose launcher died, and that
@@ -52,7 +52,7 @@ def find(named: str | os.PathLike[str]) -> Run:
     return records.get(id_of(records, os.fspath(named)))
 
 
-def to_watch(records: Records, named: str | None, *, say: Callable[[str], object]) -> Run:
+def find_run_to_watch(records: Records, named: str | None, *, say: Callable[[str], object]) -> Run:
     """Find the run that a command is to look at, and `say` which it is if it belongs to another directory.
 
     The user names it as for `id_of`. None takes the only run that lives, or else the latest run, of the current
@@ -158,7 +158,7 @@ def find_left_in(records: Records, directory: Path, *, own: str | None = None) -
         if run.id == own:
             continue
         if run.status == "running":
-            raise busy(run.record)
+            raise busy_error(run.record)
         if run.status not in ("died", "abandoned"):
             continue
         try:
@@ -172,7 +172,7 @@ def find_left_in(records: Records, directory: Path, *, own: str | None = None) -
     return None
 
 
-def busy(record: Record) -> ConflictError:
+def busy_error(record: Record) -> ConflictError:
     """The error that a run collects into a directory."""
     return ConflictError(
         f"{record.directory}: run {record.run} collects into it",

@@ -33,12 +33,12 @@ from throwcollect.serve.resumption import check_resumption
 from throwcollect.serve.robot_files import description_of
 from throwcollect.serve.state import simulations_of
 
-_KEPT = ("run", "containers", "cluster", "sweep.file")
+_OPERATOR_KEYS = ("run", "containers", "cluster", "sweep.file")
 """Keys of a configuration that only the operator sets, because they name files and resources of this machine."""
 _KEY = r"[A-Za-z0-9_-]+(\.[A-Za-z0-9_-]+)*"
 _LOCK = "instances.lock"
 _LOOK_S = 0.02
-_HEEDED_S = 2.0
+_LONGEST_STOP_S = 2.0
 """Longest wait until a launcher has written that it is stopping."""
 
 
@@ -213,7 +213,7 @@ def _stop_once(run: Run) -> None:
     now = run.now()
     if not (now.lives and now.record.stopping):
         control.stop(now, keep_on=lambda: False)
-    deadline = time.monotonic() + _HEEDED_S
+    deadline = time.monotonic() + _LONGEST_STOP_S
     while now.lives and not now.record.stopping and time.monotonic() < deadline:
         time.sleep(_LOOK_S)
         now = run.now()
@@ -309,7 +309,7 @@ def _overrides(origin: Origin) -> list[str]:
         *(
             Problem("is the operator's alone; a request may not set it", key=kept)
             for key, value in origin.changes.items()
-            for kept in _KEPT
+            for kept in _OPERATOR_KEYS
             if _sets(key, value, kept)
         ),
     ]

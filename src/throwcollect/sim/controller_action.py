@@ -39,7 +39,7 @@ class ControllerAction:
         self._controller = controller
         self._aborts_refused = aborts_refused
         self._count = 0
-        self._told_ns = 0
+        self._published_ns = 0
         self._goals: dict[Hashable, _Goal] = {}
         """The goals whose results have not been sent, by their identities in the simulation, the oldest first."""
         name = f"{node.get_name()}/follow_joint_trajectory"
@@ -73,15 +73,15 @@ class ControllerAction:
     @property
     def owes_feedback(self) -> bool:
         """Whether feedback has subscribers, and enough simulated time has passed since the last message."""
-        passed_ns = self._simulation.now_ns - self._told_ns
+        passed_ns = self._simulation.now_ns - self._published_ns
         # After a reset the clock may be behind the last message, and feedback is due then, too.
         return passed_ns != 0 and not 0 < passed_ns < self._simulation.feedback_ns and self.watched
 
     def publish_feedback(self, state: ControllerState) -> None:
         """Send feedback on all goals."""
-        passed_ns = self._simulation.now_ns - self._told_ns
+        passed_ns = self._simulation.now_ns - self._published_ns
         # Feedback is due by a clock of its own, as slices of time need not end just then.
-        self._told_ns += passed_ns - passed_ns % (self._simulation.feedback_ns or 1)
+        self._published_ns += passed_ns - passed_ns % (self._simulation.feedback_ns or 1)
         feedback = feedback_message(state)
         for goal in self._goals.values():
             # A goal that has ended gets no more feedback, even if it ended in the middle of the last slice.
@@ -100,7 +100,7 @@ class ControllerAction:
             return GoalResponse.REJECT
         self._count += 1
         # Send no feedback until simulated time has passed since the goal was accepted.
-        self._told_ns = self._simulation.now_ns
+        self._published_ns = self._simulation.now_ns
         self._goals[self._count] = _Goal(Future())
         if refusal is not None:
             self.finish(GoalResult(self._count, GoalStatus.ABORTED, refusal.error_code, refusal.text))

@@ -33,10 +33,10 @@ class LeaseQueue:
         self._waiting = deque(lease for lease in pending if lease.token != running)
 
     def clear(self) -> None:
-        """Forget all leases; the trial that runs goes on without one."""
+        """Forget all leases; the trial that runs goes on, and its episode belongs to none."""
         self._running = None
         self._waiting.clear()
-        self._runner.disown()
+        self._runner.release_lease()
 
     def begin_next(self) -> Refusal | None:
         """Begin the next trial if none runs; return the refusal of one that cannot begin."""

@@ -64,10 +64,10 @@ _REPEAT_S = 0.02
 _FACTOR = "sim.real_time_factor"
 DESCRIPTION = "robot_description"
 """Named as the parameter of ROS' robot_state_publisher."""
-_OF_ONLOOKERS = (_FACTOR, DESCRIPTION)
-"""Parameters that change nothing that is recorded, so anybody may set them even in the middle of a trial.
+_NOT_RECORDED = (_FACTOR, DESCRIPTION)
+"""Parameters that change nothing that is recorded, so clients may set them during a trial.
 
-Slow motion alone waits for its end, because the coordinator would take the simulation for one that hangs."""
+A lower real-time factor waits for the end of the trial, as the coordinator would think that the simulation hangs."""
 _NO_LIMIT = 0.0
 _FACTORS = f"a number from {SLOWEST} to {FASTEST}, or 0 for no limit"
 _HIDDEN = (Effect.PLAN, Effect.RUN)
@@ -101,13 +101,13 @@ class SimulationNode(Node):
         self._controllers = {name: ControllerNode(self, simulation, name) for name in simulation.limbs}
         self._manager = ControllerManager(self, simulation)
         self._listened: list[tuple[Topic, Publisher]] = []
-        self._heard: list[ControllerNode] = []
+        self._subscribed: list[ControllerNode] = []
         self._noticed_changes = -1
         self._published_at = 0.0
-        self._told_ns = -1
+        self._published_ns = -1
         self._signer = Signer.of_environment()
         self._restoring = False
-        self._asked: tuple[Lease, ...] = ()
+        self._requested: tuple[Lease, ...] = ()
         SimulationControl(self, simulation)
         self._stepping = Stepping(self, simulation)
         # Episodes come last: a coordinator that sees their publisher takes the whole simulation for ready.
@@ -132,7 +132,7 @@ class SimulationNode(Node):
     def watched(self) -> bool:
         """Whether samples, states or feedback have subscribers."""
         self._notice_listeners()
-        return bool(self._listened) or any(controller.watched for controller in self._heard)
+        return bool(self._listened) or any(controller.watched for controller in self._subscribed)
 
     def follow_up(self) -> None:
         """Publish what has happened since the last call: time, samples, feedback, results, the episode."""
@@ -144,7 +144,7 @@ class SimulationNode(Node):
             self._controllers[name].action.finish(result)
         self._notice_listeners()
         self._publish_samples()
-        for controller in self._heard:
+        for controller in self._subscribed:
             controller.publish_state()
         if (handed := self._leases.hand_over()) is not None:
             # The next trial begins before the last one leaves, so that no client can reach a controller in between.
@@ -196,10 +196,10 @@ class SimulationNode(Node):
     def _publish_steps(self, samples: Samples) -> None:
         """Publish the time after steps of a paused simulation, which may end between two samples."""
         simulation = self._simulation
-        self._told_ns = int(samples.stamps_ns[-1]) if len(samples) else self._told_ns
-        if simulation.state != State.PAUSED or simulation.now_ns == self._told_ns:
+        self._published_ns = int(samples.stamps_ns[-1]) if len(samples) else self._published_ns
+        if simulation.state != State.PAUSED or simulation.now_ns == self._published_ns:
             return
-        self._told_ns = simulation.now_ns
+        self._published_ns = simulation.now_ns
         message = Clock()
         message.clock.sec, message.clock.nanosec = divmod(simulation.now_ns, 10**9)
         for topic, publisher in self._listened:
@@ -213,8 +213,8 @@ class SimulationNode(Node):
             return
         self._noticed_changes = changes
         self._listened = [(topic, publisher) for topic, publisher in self._live if publisher.get_subscription_count()]
-        self._heard = [controller for controller in self._controllers.values() if controller.heard]
-        self._simulation.watch(controller.controller for controller in self._heard if controller.wants_states)
+        self._subscribed = [controller for controller in self._controllers.values() if controller.heard]
+        self._simulation.watch(controller.controller for controller in self._subscribed if controller.wants_states)
 
     def _publish_latched(self, channels: Channels) -> None:
         self._latched = []
@@ -270,7 +270,7 @@ class SimulationNode(Node):
             if values.get(LEASES):
                 # Trials begin in `_take_leases` only, because a callback that is asked after this one may still refuse
                 # the parameters.
-                self._asked = self._read_leases(values)
+                self._requested = self._read_leases(values)
             elif not self._restoring:
                 self._prepare(values)
         except (ConfigError, DatasetError) as error:
@@ -298,7 +298,7 @@ class SimulationNode(Node):
         """Begin the trials that a coordinator has asked for; parameters that clients have set do not count for them."""
         if not any(parameter.name == LEASES and parameter.value for parameter in parameters):
             return
-        self._leases.replace(self._asked)
+        self._leases.replace(self._requested)
         self._restore_parameters()
         self._begin_next()
 
@@ -313,7 +313,7 @@ class SimulationNode(Node):
             ConfigError: If the simulation is leased, so that only its coordinator may change it.
         """
         trial = self._simulation.trial
-        changed = [name for name in values if name not in _OF_ONLOOKERS]
+        changed = [name for name in values if name not in _NOT_RECORDED]
         if trial.leased and changed == [NUMBER] and values[NUMBER] < 0:
             self._leases.clear()
             trial.set_up_nothing()

@@ -64,13 +64,13 @@ class TrialRunner:
         self._simulation.lease(trial, config, trial_goals(robot_of(config), trajectory, start_posture(config)))
         self._begun = _Begun(trajectory, token)
 
-    def disown(self) -> None:
+    def release_lease(self) -> None:
         """Take its lease from the trial that runs: its episode is not judged, and names no lease."""
         self._begun = None
 
     def drop(self) -> None:
         """Break off the trial that runs, and go back to the configuration."""
-        self.disown()
+        self.release_lease()
         self._simulation.end_lease()
 
     def hand_over(self) -> Delivery | None:

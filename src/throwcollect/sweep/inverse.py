@@ -19,11 +19,12 @@ _LEAST = 1e-300
 _DAMPING_BINS = 0.1
 """Error in the target [bins] that a step may leave in order to be smaller."""
 _LONGEST_STEP = 0.3
+"""Longest step of the parameters, in widths of the unit cube."""
 _ALONG_NOISE = 0.1
 """Standard deviation of the noise along directions in which, by the model, the ball lands at the same place."""
 _NOISE = 0.02
 """Standard deviation of the noise in all directions."""
-_JUDGES = 8
+_FAILURE_NEIGHBOURS = 8
 """Number of ended throws near a proposal from which the probability that it lands is estimated."""
 _PROGRESS = 0.7
 """A proposal is promising if its predicted distance from its goal is at most this share of the smallest so far."""
@@ -64,7 +65,7 @@ class InverseModel:
         landed, parameters = self._landed.points.shape
         return bool(landed >= parameters + 2)
 
-    def away(self, places: NDArray[np.float64]) -> NDArray[np.float64]:
+    def measure_distances(self, places: NDArray[np.float64]) -> NDArray[np.float64]:
         """Compute the distance of places from the nearest landing [bins], shape ``(n_places,)``."""
         return self._landings.find(places, 1)[0][:, 0]
 
@@ -107,9 +108,9 @@ class InverseModel:
         ends = np.clip(ends, 0.0, 1.0 - 1e-9)
         missing = landing + _product(slope, ends - start) - goal
         error = np.sqrt((missing**2).sum(axis=-1))
-        near = self._all.find(ends.reshape(-1, ends.shape[-1]), _JUDGES)[1]
+        near = self._all.find(ends.reshape(-1, ends.shape[-1]), _FAILURE_NEIGHBOURS)[1]
         failing = 1.0 - self._success.all[near].mean(axis=-1).reshape(error.shape)
-        promising = error <= np.maximum(_CLOSE_BINS, _PROGRESS * self.away(flat)[:, np.newaxis])
+        promising = error <= np.maximum(_CLOSE_BINS, _PROGRESS * self.measure_distances(flat)[:, np.newaxis])
         best = (error + _FAILURE_BINS * failing).reshape(len(goals), -1).argmin(axis=1)
         proposals = np.arange(len(goals))
         chosen: NDArray[np.float64] = ends.reshape(len(goals), -1, ends.shape[-1])[proposals, best]

@@ -11,7 +11,7 @@ from typing import Any
 from throwcollect.errors import DatasetError
 from throwcollect.files import open_regular, unreadable
 
-_OPENED = "/proc/self/fd/{}"
+_DESCRIPTOR_PATH = "/proc/self/fd/{}"
 _MOST_ROWS = 20_000_000
 _MOST_VALUES = 2_000_000_000
 _BUFFER_BYTES = 1 << 20
@@ -89,7 +89,10 @@ def open_parquet(path: Path) -> Iterator[Any]:
         with (
             open(descriptor, "rb"),
             pq.ParquetFile(
-                _OPENED.format(descriptor), page_checksum_verification=True, buffer_size=_BUFFER_BYTES, pre_buffer=False
+                _DESCRIPTOR_PATH.format(descriptor),
+                page_checksum_verification=True,
+                buffer_size=_BUFFER_BYTES,
+                pre_buffer=False,
             ) as file,
         ):
             rows, columns = file.metadata.num_rows, file.metadata.num_columns

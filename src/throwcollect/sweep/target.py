@@ -116,7 +116,7 @@ class TargetSampler:
             landed=self._landed,
             asked=np.bincount(self._aims[self._aims != NOWHERE], minlength=cells),
             missed=self._missed,
-            away=self._model.away(self._cells.corners(np.arange(cells)) + 0.5),
+            away=self._model.measure_distances(self._cells.corners(np.arange(cells)) + 0.5),
             randomness=randomness,
         )
 

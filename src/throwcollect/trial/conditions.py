@@ -19,7 +19,7 @@ from throwcollect.config.schema import Config
 from throwcollect.config.values import leaves, sweepable_keys
 from throwcollect.errors import DatasetError
 
-_HEEDED = (Effect.PHYSICS, Effect.ENCODING)
+_EFFECTS_IN_DIGEST = (Effect.PHYSICS, Effect.ENCODING)
 
 
 @dataclass(frozen=True)
@@ -90,7 +90,7 @@ class Settings:
         keys = list(leaves(config))
         physics = set(sweepable_keys(config, Effect.PHYSICS))
         self._physics = [(leaf.name, leaf.name.split("."), leaf.value) for leaf in keys if leaf.name in physics]
-        heeded = {leaf.name: leaf.value for leaf in keys if leaf.key.effect in _HEEDED}
+        heeded = {leaf.name: leaf.value for leaf in keys if leaf.key.effect in _EFFECTS_IN_DIGEST}
         # Which joints move decides which are simulated as rigid; where they go, the trajectory says.
         heeded["task.end"] = sorted(config.task.end)
         lines = [f"{key}={json.dumps(value)}" for key, value in sorted(heeded.items())]

@@ -23,7 +23,7 @@ def call_without_and_with_json(*arguments: str | Path) -> tuple[str, CompletedPr
 
 
 def test_of_a_large_plan_only_the_document_is_printed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(prepare, "_TOLD_TRIALS", 1)
+    monkeypatch.setattr(prepare, "_ANNOUNCED_TRIALS", 1)
     said, printed = call_without_and_with_json("plan", write_config(tmp_path, trials=2, sim=FAST))
     assert "plan: checks 2 trials" in said
     assert printed.stderr == ""

@@ -159,12 +159,12 @@ def test_trials_that_nobody_can_do_cost_no_simulation_its_place() -> None:
 def test_there_is_no_hope_when_all_refuse_and_none_ever_did_a_trial() -> None:
     leases = Leases(range(30), retries=3)
     for _ in range(3):
-        assert leases.hopeless("ab") is None
+        assert leases.explain_hopelessness("ab") is None
         trials = {name: leases.lease(name, others="ab") for name in "ab"}
         for name, trial in trials.items():
             leases.fail(name, trial, "other sources", refused=True)
-    assert leases.hopeless("ab") == "other sources"
-    assert leases.hopeless("abc") is None
+    assert leases.explain_hopelessness("ab") == "other sources"
+    assert leases.explain_hopelessness("abc") is None
 
 
 def test_one_completed_trial_gives_hope_for_good() -> None:
@@ -172,7 +172,7 @@ def test_one_completed_trial_gives_hope_for_good() -> None:
     leases.complete("a", leases.lease("a"))
     for _ in range(9):
         leases.fail("a", leases.lease("a", others="a"), "no", refused=True)
-    assert leases.hopeless("a") is None
+    assert leases.explain_hopelessness("a") is None
 
 
 def test_a_new_simulation_of_an_old_name_is_not_blamed() -> None:

@@ -47,7 +47,7 @@ def test_a_directory_that_is_taken_is_refused_before_trials_are_checked(
 
 
 def test_of_a_large_plan_it_is_told_at_once_what_goes_on(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(prepare, "_TOLD_TRIALS", 400)
+    monkeypatch.setattr(prepare, "_ANNOUNCED_TRIALS", 400)
     monkeypatch.setattr(prepare, "_MOST_PIECES", 1)
     monkeypatch.setattr(prepare, "_TELL_FIRST_S", 0.0)
     monkeypatch.setattr(prepare, "feasibility_check", lambda _: lambda _: None)

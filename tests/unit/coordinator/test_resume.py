@@ -10,7 +10,7 @@ import pytest
 from throwcollect.config.loader import load
 from throwcollect.config.schema import Config
 from throwcollect.coordinator.prepare import prepare
-from throwcollect.coordinator.resume import begun, finished, resume
+from throwcollect.coordinator.resume import has_all_trials, is_begun, resume
 from throwcollect.errors import ConfigError, DatasetError
 
 SETTINGS: dict[str, Any] = {
@@ -128,12 +128,12 @@ def test_without_plan_and_configuration_nobody_knows_what_it_was(directory: Path
 
 
 def test_a_directory_without_either_is_not_begun(directory: Path, tmp_path_factory: pytest.TempPathFactory) -> None:
-    assert begun(directory)
-    assert not begun(tmp_path_factory.mktemp("empty"))
+    assert is_begun(directory)
+    assert not is_begun(tmp_path_factory.mktemp("empty"))
 
 
 def test_a_dataset_without_metadata_is_not_finished(directory: Path) -> None:
-    assert not finished(directory, resume(config_with(), directory, sweep_directory=directory))
+    assert not has_all_trials(directory, resume(config_with(), directory, sweep_directory=directory))
 
 
 def test_what_was_finished_is_not_so_with_more_trials(directory: Path) -> None:

@@ -10,7 +10,7 @@ import pytest
 from tests.unit.coordinator.listener import Listener
 from tests.unit.dataset.conftest import Collection
 
-from throwcollect.coordinator.resume import finished, resume
+from throwcollect.coordinator.resume import has_all_trials, resume
 from throwcollect.dataset.creation import create
 from throwcollect.dataset.manifest import entry_of_file, list_promised_names, manifest_text
 from throwcollect.dataset.writer import DatasetWriter
@@ -45,7 +45,7 @@ class Trials:
         """Resume; the trials that were not run again, None if nothing was left to do; and the warnings."""
         told = Listener()
         plan = resume(self.plan.config, directory, sweep_directory=directory, check=check, onlooker=told)
-        return None if finished(directory, plan) else self.run(directory), told.warnings
+        return None if has_all_trials(directory, plan) else self.run(directory), told.warnings
 
 
 @pytest.fixture(scope="module")

@@ -18,10 +18,10 @@ from throwcollect.runs.selection import (
     describe_death,
     find_held_runs,
     find_left_in,
+    find_run_to_change,
+    find_run_to_watch,
     has_complete_dataset,
     require_living,
-    to_change,
-    to_watch,
 )
 from throwcollect.runs.state_directory import STATE_VARIABLE
 from throwcollect.runtimes.docker import engine as docker_engine
@@ -32,17 +32,17 @@ Make = Callable[..., Record]
 
 
 def find(records: Records, named: str | None) -> Run:
-    return to_change(records, named, command="stop")
+    return find_run_to_change(records, named, command="stop")
 
 
 def find_to_watch(records: Records, named: str) -> Run:
-    return to_watch(records, named, say=print)
+    return find_run_to_watch(records, named, say=print)
 
 
 def watched(records: Records) -> tuple[Record, list[str]]:
     """The run that is looked at without being named, and what is said of it."""
     said: list[str] = []
-    return to_watch(records, None, say=said.append).record, said
+    return find_run_to_watch(records, None, say=said.append).record, said
 
 
 @pytest.fixture
@@ -180,12 +180,12 @@ def test_a_run_of_another_directory_is_not_changed_without_its_name(
     record = make("a", "lives", **elsewhere)
     origin = "was begun in /other" if "begun_in" in elsewhere else "collects into /other/data"
     with pytest.raises(ConfigError) as caught:
-        to_change(records, None, command="scale 4")
+        find_run_to_change(records, None, command="scale 4")
     assert str(caught.value) == (
         f"no run of this directory lives; a-0123 {origin}\n"
         "  try: throwcollect scale 4 --run a-0123, if that one is meant"
     )
-    assert to_change(records, "a", command="scale 4").record == record
+    assert find_run_to_change(records, "a", command="scale 4").record == record
     assert watched(records) == (record, [f"run a-0123, which {origin}"])
 
 
@@ -216,7 +216,7 @@ def test_a_run_whose_dataset_is_in_a_volume_belongs_to_where_it_was_begun_alone(
 
 def test_whose_launcher_died_may_be_ended(records: Records, make: Make) -> None:
     record = make("a", "died")
-    assert to_change(records, None, command="down", died=True).record == record
+    assert find_run_to_change(records, None, command="down", died=True).record == record
     with pytest.raises(ConfigError, match="no run lives"):
         find(records, None)
 

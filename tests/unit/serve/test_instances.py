@@ -242,7 +242,7 @@ def test_all_that_clients_have_begun_are_stopped_and_nothing_else(
 ) -> None:
     told: list[str] = []
     monkeypatch.setattr(instances_module.control, "stop", lambda run, **_: told.append(run.id))
-    monkeypatch.setattr(instances_module, "_HEEDED_S", 0.0)
+    monkeypatch.setattr(instances_module, "_LONGEST_STOP_S", 0.0)
     remember("begun", origin=Origin("throws"))
     remember("over", origin=Origin("throws"), **ended())
     remember("of-a-command")

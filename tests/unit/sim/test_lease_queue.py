@@ -19,7 +19,7 @@ class Runner:
     def __init__(self) -> None:
         self.begun: list[int] = []
         self.dropped = 0
-        self.disowned = False
+        self.is_released = False
         self.yields: Any = None
 
     def begin(self, trial: int, _values: Mapping[str, float], *, token: str) -> None:
@@ -30,8 +30,8 @@ class Runner:
     def drop(self) -> None:
         self.dropped += 1
 
-    def disown(self) -> None:
-        self.disowned = True
+    def release_lease(self) -> None:
+        self.is_released = True
 
     def hand_over(self) -> Any:
         yields, self.yields = self.yields, None
@@ -119,6 +119,6 @@ def test_a_trial_by_hand_is_handed_over_like_any_other() -> None:
 def test_leases_that_are_cleared_are_forgotten() -> None:
     queue, runner = queue_of(A, B)
     queue.clear()
-    assert runner.disowned
+    assert runner.is_released
     assert queue.begin_next() is None
     assert (runner.begun, runner.dropped) == ([0], 0)

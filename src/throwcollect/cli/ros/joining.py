@@ -5,7 +5,7 @@ from __future__ import annotations
 from throwcollect.errors import WorkerError
 from throwcollect.ros.connection import Connection
 from throwcollect.runs.records import Records, Run
-from throwcollect.runs.selection import require_living, to_change
+from throwcollect.runs.selection import find_run_to_change, require_living
 
 
 def find_way(run: str | None) -> tuple[Run, Connection]:
@@ -15,7 +15,7 @@ def find_way(run: str | None) -> tuple[Run, Connection]:
         ConfigError: If there is no such run, or it has ended.
         WorkerError: If the run has no router (any more).
     """
-    found = to_change(Records(), run, command="ros env")
+    found = find_run_to_change(Records(), run, command="ros env")
     record = require_living(found)
     if record.endpoint is None:
         raise WorkerError(f"run {record.run} has no router yet", hint="try once more")

@@ -29,7 +29,7 @@ from throwcollect.runtimes.docker.options import (
     RUN_LABEL,
     RunPlace,
     node_options,
-    published,
+    publishes_port,
     router_endpoint,
     section_of,
 )
@@ -143,7 +143,7 @@ class DockerNodes(NodeHost):
         only in a network whose range was named, so a first network serves to find a free range.
         """
         place = self._place
-        options = {"driver": "bridge", "internal": not published(self.config), "labels": place.labels()}
+        options = {"driver": "bridge", "internal": not publishes_port(self.config), "labels": place.labels()}
         network = self._client.networks.create(place.network, **options)
         if self.place.middleware.is_fast_dds:
             network.reload()

@@ -110,7 +110,7 @@ def section_of(config: Config, name: str) -> NodeContainerConfig:
     return config.containers.sim if name not in (ROUTER, COORDINATOR) else getattr(config.containers, name)
 
 
-def published(config: Config) -> bool:
+def publishes_port(config: Config) -> bool:
     """Whether a port is published to this machine, which is impossible from a network without a way out."""
     sections = (config.containers.router, config.containers.sim, config.containers.coordinator)
     return bool(config.run.router_port or any(section.ports for section in sections))

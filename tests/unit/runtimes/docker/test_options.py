@@ -10,7 +10,7 @@ from rclzenoh.session_config import client_override
 from throwcollect.config.schema import Config
 from throwcollect.ros.middleware import Middleware
 from throwcollect.runtimes.docker.image import default_tag
-from throwcollect.runtimes.docker.options import RunPlace, image, mount_source, node_options, published
+from throwcollect.runtimes.docker.options import RunPlace, image, mount_source, node_options, publishes_port
 from throwcollect.runtimes.nodes import NodeSpec, Role
 
 DIRECTORY = RunPlace("throws-1a2b", "/home/me/data set")
@@ -121,9 +121,9 @@ def test_what_is_published_is_published_on_the_loopback_interface() -> None:
 
 
 def test_the_network_has_a_way_out_only_if_something_is_published() -> None:
-    assert not published(Config())
-    assert published(Config.model_validate({"run": {"router_port": 7448}}))
-    assert published(Config.model_validate({"containers": {"coordinator": {"ports": {"80": 80}}}}))
+    assert not publishes_port(Config())
+    assert publishes_port(Config.model_validate({"run": {"router_port": 7448}}))
+    assert publishes_port(Config.model_validate({"containers": {"coordinator": {"ports": {"80": 80}}}}))
 
 
 def test_further_options_are_passed_on_and_never_replace_what_protects_the_host() -> None:

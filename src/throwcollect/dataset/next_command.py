@@ -9,7 +9,7 @@ from throwcollect.dataset.lock import is_locked
 from throwcollect.wording import command
 
 
-class WayOn(NamedTuple):
+class NextCommand(NamedTuple):
     """The state of an unfinished dataset, such as ``is not finished``; a command to go on with, and what it does."""
 
     state: str
@@ -17,8 +17,8 @@ class WayOn(NamedTuple):
     purpose: str
 
 
-def find_way_on(directory: Path) -> WayOn:
+def find_next_command(directory: Path) -> NextCommand:
     """Find the state of an unfinished dataset; on a file system without locks, no run is known to work on it."""
     if is_locked(directory):
-        return WayOn("is being collected", command("wait", "--run", directory), "waits for its end")
-    return WayOn("is not finished", command("resume", directory), "goes on with it")
+        return NextCommand("is being collected", command("wait", "--run", directory), "waits for its end")
+    return NextCommand("is not finished", command("resume", directory), "goes on with it")
