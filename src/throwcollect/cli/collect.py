@@ -105,7 +105,7 @@ def up(
     elif output is not None:
         raise ConfigError(f"--output {output}: should be left out with --resume, which names the directory")
     else:
-        prepare_run = partial(go_on, resume, config=config, overrides=changes)
+        prepare_run = partial(go_on, resume, config=config, overrides=changes, processes=count_cores())
     _collect(prepare_run, directory=resume, detach=detach, json=json, token_file=token_file, view=view)
 
 
@@ -133,7 +133,7 @@ def resume(
         return
     from throwcollect.runs.preparation import resume as go_on
 
-    prepare_run = partial(go_on, directory, overrides=changes, check=check)
+    prepare_run = partial(go_on, directory, overrides=changes, processes=count_cores(), check=check)
     _collect(prepare_run, directory=directory, detach=detach, json=json)
 
 

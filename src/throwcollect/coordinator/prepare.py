@@ -59,12 +59,12 @@ def draw_plan(config: Config, *, directory: Path, processes: int = 1, onlooker: 
 
 
 def _draw_points(config: Config, directory: Path, onlooker: Onlooker) -> Points:
-    if (count := _count_before(config)) >= _ANNOUNCED_TRIALS:
+    if (count := count_before(config)) >= _ANNOUNCED_TRIALS:
         onlooker.say(f"plan: draws {count} trials")
     return draw_first_points(config, directory=directory)
 
 
-def _count_before(config: Config) -> int:
+def count_before(config: Config) -> int:
     """Number of trials as far as it is known before they are drawn."""
     return 0 if config.grows else config.trials or 0
 
@@ -183,7 +183,7 @@ def read_listed_points(config: Config, *, directory: Path) -> Points | None:
     return None if config.sweep.file is None else read_points(directory / config.sweep.file, config)
 
 
-def _check_room(directory: Path, trials: int) -> None:
+def check_room(directory: Path, trials: int) -> None:
     """Refuse, before trials are checked for hours, a plan that is certainly too large for the disk.
 
     Raises:
@@ -219,10 +219,10 @@ def prepare(
     """
     # To check many trials takes minutes, so what needs no plan is looked at before.
     refuse_taken(directory)
-    _check_room(directory, _count_before(config))
-    onlooker.update_plan(0, _count_before(config))
+    check_room(directory, count_before(config))
+    onlooker.update_plan(0, count_before(config))
     points = _draw_points(config, sweep_directory, onlooker)
-    _check_room(directory, len(points.values))
+    check_room(directory, len(points.values))
     plan = _check_trials(config, points, processes=processes, onlooker=onlooker)
     # This comes after the plan is drawn, because the configuration as it was given names the place of its list.
     plan = replace(plan, config=make_self_contained(config))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,7 +13,14 @@ from throwcollect.config.problems import quote
 from throwcollect.config.schema import Config
 from throwcollect.config.values import differences
 from throwcollect.coordinator.onlooker import SILENT, Onlooker
-from throwcollect.coordinator.prepare import draw_plan, make_self_contained, prepare, read_listed_points
+from throwcollect.coordinator.prepare import (
+    check_room,
+    count_before,
+    draw_plan,
+    make_self_contained,
+    prepare,
+    read_listed_points,
+)
 from throwcollect.dataset.configuration import read_config
 from throwcollect.dataset.directory import CONFIG, METADATA, PLAN, SHARD_SUFFIX, SOURCES, TRIALS, config_path
 from throwcollect.dataset.lock import hold_lock
@@ -26,6 +33,7 @@ from throwcollect.errors import ConfigError, DatasetError, ForeignPlanError, Pro
 from throwcollect.files import check_regular, is_there, remove, write_file
 from throwcollect.sweep.plan import Plan
 from throwcollect.sweep.point_file import encode_points
+from throwcollect.sweep.points import Points
 from throwcollect.tasks.result import LOST
 from throwcollect.wording import command
 
@@ -40,7 +48,14 @@ def is_begun(directory: Path) -> bool:
 
 
 def resume(
-    config: Config, directory: Path, *, sweep_directory: Path, check: bool = False, onlooker: Onlooker = SILENT
+    config: Config,
+    directory: Path,
+    *,
+    sweep_directory: Path,
+    processes: int = 1,
+    check: bool = False,
+    before_writing: Callable[[], object] = lambda: None,
+    onlooker: Onlooker = SILENT,
 ) -> Plan:
     """Write a configuration and its plan into a dataset's directory; some of its trials may have run already.
 
@@ -50,12 +65,15 @@ def resume(
         config: The configuration to go on with. It may differ in how it is run, and have more trials.
         directory: Directory of the dataset.
         sweep_directory: Where a relative `sweep.file` is looked for, should the plan be made anew.
+        processes: How many processes may check the trials of a large plan, as for `draw_plan`.
         check: Whether the files of a finished dataset are compared byte for byte, and not only by their sizes.
+        before_writing: Is called before anything is written, unless every trial has ended; what it raises leaves the
+            dataset as it is.
         onlooker: Is warned of what is missing or damaged in a finished dataset, and told how much there is to look
             through.
 
     Raises:
-        ConfigError: If the configuration is another one, or has fewer trials, or other ones.
+        ConfigError: If the configuration is another one, has fewer trials or other ones, or too many for the disk.
         DatasetError: If another process changes the dataset, files cannot be written, or something is damaged that
             cannot be made again.
     """
@@ -76,8 +94,18 @@ def resume(
         if old is not None and PLAN in damaged and (not config.grows or find_wrong_trials(old)):
             # The plan is drawn again. One that grew with the results cannot be, and stays if its trials are intact.
             old = None
+        plan, listed = _plan_again(config, directory, sweep_directory, old, damaged, processes, onlooker)
+        # The dataset may be finished only by its earlier configuration, or by files that are gone.
+        changes = bool(damaged) or (stored is not None and stored.without_run() != plan.config.without_run())
+        ended = not changes and has_all_trials(directory, plan)
+        if not ended:
+            before_writing()
         remove_unfinished(directory)
-        plan = _write(config, directory, sweep_directory, stored, old, damaged, onlooker)
+        if listed is not None:
+            write_file(directory / TRIALS, encode_points(listed))
+        if changes:
+            remove(directory / METADATA)
+        _write(plan, directory, stored, old, replan=PLAN in damaged, ended=ended)
         _announce_search(directory, onlooker)
         return plan
 
@@ -94,39 +122,45 @@ def prepare_or_resume(path: Path, directory: Path) -> Plan:
         return freeze(config, directory, sweep_directory=path.parent)
 
 
-def _write(
+def _plan_again(
     given: Config,
     directory: Path,
     sweep_directory: Path,
-    stored: Config | None,
     old: Plan | None,
     damaged: Collection[str],
+    processes: int,
     onlooker: Onlooker,
-) -> Plan:
+) -> tuple[Plan, Points | None]:
+    """Make the plan to go on with: the old one, or what the configuration draws, which has to begin with the old one.
+
+    Returns:
+        The plan, and the list of its trials, if that has to be written.
+
+    Raises:
+        ConfigError: If the sweep cannot be drawn, or draws other trials.
+    """
     config = make_self_contained(given)
-    if old is None or TRIALS in damaged or old.config.without_run() != config.without_run():
-        drawn = replace(draw_plan(given, directory=sweep_directory, onlooker=onlooker), config=config)
-        plan = _extend(directory, old, drawn)
-        if (listed := read_listed_points(given, directory=sweep_directory)) is not None:
-            write_file(directory / TRIALS, encode_points(listed))
-    else:
+    if old is not None and TRIALS not in damaged and old.config.without_run() == config.without_run():
         # The digest of the plan also depends on the order of keys, which may have been changed in the file.
-        config = old.config.run_as(config)
-        plan = replace(old, config=config)
-    if damaged or (stored is not None and stored.without_run() != config.without_run()):
-        # The dataset may be finished only by its earlier configuration, or by files that are gone.
-        remove(directory / METADATA)
+        return replace(old, config=old.config.run_as(config)), None
+    check_room(directory, count_before(given))
+    drawn = draw_plan(given, directory=sweep_directory, processes=processes, onlooker=onlooker)
+    plan = _extend(directory, old, replace(drawn, config=config))
+    return plan, read_listed_points(given, directory=sweep_directory)
+
+
+def _write(plan: Plan, directory: Path, stored: Config | None, old: Plan | None, *, replan: bool, ended: bool) -> None:
+    """Write configuration and plan if they are other ones than those that are stored, or the plan is damaged."""
     # A finished dataset stays as it is, without the keys that say how it is run.
-    kept = config.without_run() if has_all_trials(directory, plan) else config
+    kept = plan.config.without_run() if ended else plan.config
     replanned = old is None or plan.trials != old.trials or kept.without_run() != old.config.without_run()
     if stored != kept:
         if replanned:
             # No kill may leave a plan beside another configuration; a missing plan is made again.
             remove(directory / PLAN)
         write_file(directory / CONFIG, dump_yaml(kept).encode())
-    if replanned or PLAN in damaged:
+    if replanned or replan:
         plan.write(directory / PLAN)
-    return plan
 
 
 def _announce_search(directory: Path, onlooker: Onlooker) -> None:

@@ -282,7 +282,14 @@ def _move_log(before: Path, after: Path) -> None:
 def _prepare_collection(records: Records, run: OpenRun, order: Order, onlooker: Onlooker) -> PreparedRun | None:
     record = run.record
     if order.resumed:
-        return resume(order.output, overrides=order.overrides, ahead=True, onlooker=onlooker, run=run)
+        return resume(
+            order.output,
+            overrides=order.overrides,
+            processes=count_cores(),
+            ahead=True,
+            onlooker=onlooker,
+            run=run,
+        )
     with load_locating_errors(order.config, order.overrides) as config:
         request = Request(
             config,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from contextlib import ExitStack, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime, timezone
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -46,6 +46,8 @@ class Request:
         processes: Number of processes that may check the trials of a large plan.
         ahead: Whether the runtime begins what it can before there is a plan, for `PreparedRun.collect`.
         origin: The request of a client; None if a command or a program asks.
+        begun: The runtime that has begun what it can, if it has by now; see `choice.begin`.
+        choice: The runtime, if it is chosen by now.
     """
 
     config: Config
@@ -56,6 +58,8 @@ class Request:
     processes: int = 1
     ahead: bool = False
     origin: Origin | None = None
+    begun: Choice | None = None
+    choice: Choice | None = None
 
 
 def prepare(
@@ -106,6 +110,7 @@ def resume(
     *,
     config: str | os.PathLike[str] | None = None,
     overrides: Sequence[str] = (),
+    processes: int = 1,
     check: bool = False,
     ahead: bool = False,
     onlooker: Onlooker = SILENT,
@@ -117,6 +122,7 @@ def resume(
         directory: Directory of the dataset.
         config: File with its configuration; None takes the configuration that lies in the directory.
         overrides: Keys to change, as for `prepare`.
+        processes: Number of processes that may check the trials of a larger plan, as for `prepare`.
         check: Whether the files of a finished dataset are compared byte for byte, and not only by their sizes.
         ahead: As for `prepare`.
         onlooker: Is told what goes on.
@@ -155,13 +161,48 @@ def resume(
         if (left := _take_over(records, directory, read, onlooker, own=own)) is not None:
             return left
         sweep_directory = directory if config is None else Path(config).parent
-        plan = resume_plan(read, directory, sweep_directory=sweep_directory, check=check, onlooker=onlooker)
+        origin = None if run is None else run.record.origin
+        request = Request(read, sweep_directory, directory, started, ahead=ahead, origin=origin)
+
+        def choose_runtime() -> None:
+            # A finished dataset has to stay one where nothing can be simulated.
+            nonlocal request
+            request = _choose_runtime(request, onlooker)
+
+        plan = resume_plan(
+            read,
+            directory,
+            sweep_directory=sweep_directory,
+            processes=processes,
+            check=check,
+            before_writing=choose_runtime,
+            onlooker=onlooker,
+        )
         if has_all_trials(directory, plan):
             onlooker.say(f"{directory}: every trial has ended, nothing is left to do")
             return None
-        origin = None if run is None else run.record.origin
-        request = Request(read, sweep_directory, directory, started, plan, ahead=ahead, origin=origin)
-        return prepare_run(records, request, onlooker, run=run)
+        return prepare_run(records, replace(request, plan=plan), onlooker, run=run)
+
+
+def _choose_runtime(request: Request, onlooker: Onlooker) -> Request:
+    """Choose the runtime of a run that goes on with a dataset.
+
+    Raises:
+        ConfigError: If the dataset would be in a volume, from which a collection cannot go on.
+        WorkerError: If the runtime that is asked for cannot be used.
+    """
+    config = request.config
+    with ExitStack() as undo:
+        if (begun := begin(config) if request.ahead else None) is not None:
+            undo.callback(begun.runtime.close)
+        choice = choose(config, say=onlooker.say, warn=onlooker.warn, begun=begun)
+        if (volume := config.containers.volume) and choice.runtime.has_volumes:
+            raise ConfigError(
+                [Problem(f"a dataset in the volume {volume} cannot be resumed from here", key="containers.volume")],
+                expected="a dataset in a directory",
+            )
+        undo.pop_all()
+    return replace(request, begun=begun, choice=choice)
 
 
 def _take_over(
@@ -199,13 +240,14 @@ def prepare_run(records: Records, request: Request, onlooker: Onlooker, *, run: 
     """Prepare a run, a new one if None is given; if that fails, all files that were made here are removed.
 
     Raises:
-        ConfigError: If the dataset is in a volume, from which a collection cannot go on.
+        ConfigError: If the sweep, the directory or the port cannot be used.
         WorkerError: If the runtime that is asked for cannot be used.
         DatasetError: If another process changes the dataset, or it cannot be written.
     """
     config, plan = request.config, request.plan
     with ExitStack() as held, ExitStack() as undo:
-        if (begun := begin(config) if request.ahead else None) is not None:
+        begun = request.begun or (begin(config) if request.ahead else None)
+        if begun is not None:
             undo.callback(begun.runtime.close)
         if run is None:
             run = records.new(config.name)
@@ -215,14 +257,11 @@ def prepare_run(records: Records, request: Request, onlooker: Onlooker, *, run: 
         # A runtime may take minutes to get an image, so it is chosen after all other checks. Only where a volume is
         # named it comes first, as it decides whether the dataset goes there.
         volume = config.containers.volume
-        choice = choose(config, say=onlooker.say, warn=onlooker.warn, begun=begun) if volume else None
+        choice = request.choice
+        if volume and choice is None:
+            choice = choose(config, say=onlooker.say, warn=onlooker.warn, begun=begun)
         if choice is not None and not choice.runtime.has_volumes:
             volume = None
-        if volume and plan is not None:
-            raise ConfigError(
-                [Problem(f"a dataset in the volume {volume} cannot be resumed from here", key="containers.volume")],
-                expected="a dataset in a directory",
-            )
         directory = run.directory / "data" if volume else request.directory
         is_new = not directory.exists()
         plan = plan or _make_plan(request, directory, onlooker)

@@ -10,6 +10,7 @@ import pytest
 
 from throwcollect.config.schema import Config
 from throwcollect.coordinator.prepare import prepare
+from throwcollect.coordinator.resume import resume
 from throwcollect.errors import ConfigError
 
 DISK = "256k"
@@ -57,3 +58,15 @@ def test_a_plan_that_fills_the_disk_leaves_nothing_behind(disk: Path, monkeypatc
         prepare(config(5_000), disk / "data", sweep_directory=disk)
     assert list(disk.iterdir()) == []
     assert len(prepare(config(50), disk / "data", sweep_directory=disk).trials) == 50
+
+
+def test_a_dataset_that_would_become_too_large_stays_as_it_is(disk: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("throwcollect.coordinator.prepare.feasibility_check", lambda _: refuse_nothing)
+    prepare(config(50), disk / "data", sweep_directory=disk)
+    before = {path: path.read_bytes() for path in (disk / "data").iterdir() if path.is_file()}
+    monkeypatch.delattr("throwcollect.coordinator.prepare.draw_first_points")
+    with pytest.raises(
+        ConfigError, match=r"a plan of 10000 trials takes 400 kB or more, and \d+ kB are free\n  try: free"
+    ):
+        resume(config(10_000), disk / "data", sweep_directory=disk)
+    assert {path: path.read_bytes() for path in (disk / "data").iterdir() if path.is_file()} == before

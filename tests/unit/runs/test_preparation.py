@@ -1,11 +1,14 @@
-"""Where a dataset goes if nobody says so."""
+"""Where a dataset goes if nobody says so, and what becomes of one with which nothing can go on."""
 
 import re
 from pathlib import Path
 
 import pytest
+from tests.e2e.collection import FAST, collect_here, write_config
 
-from throwcollect.runs.preparation import _name_directory
+from throwcollect.errors import ThrowcollectError
+from throwcollect.runs.preparation import _name_directory, resume
+from throwcollect.runs.state_directory import STATE_VARIABLE
 
 
 def test_the_name_alone_and_the_time_where_something_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -18,3 +21,36 @@ def test_the_name_alone_and_the_time_where_something_is(tmp_path: Path, monkeypa
     assert re.fullmatch(r"datasets/quick-\d{8}-\d{6}", str(_name_directory("quick")))
     (tmp_path / "datasets/link").symlink_to("nowhere")
     assert _name_directory("link") != Path("datasets/link")
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A finished dataset."""
+    directory = tmp_path_factory.mktemp("finished")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv(STATE_VARIABLE, str(directory / "state"))
+        collect_here(write_config(directory, trials=3, sim=FAST), directory / "data")
+    return directory / "data"
+
+
+def read_files(directory: Path) -> dict[str, bytes]:
+    return {str(path): path.read_bytes() for path in directory.rglob("*") if path.is_file()}
+
+
+@pytest.mark.parametrize(
+    ("overrides", "problem"),
+    [
+        (["run.runtime=docker"], "no Docker engine answers"),
+        (["run.runtime=docker", "containers.volume=throws"], "no Docker engine answers"),
+    ],
+)
+def test_where_nothing_can_go_on_a_finished_dataset_stays_one(
+    overrides: list[str], problem: str, finished: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv(STATE_VARIABLE, str(tmp_path / "state"))
+    monkeypatch.setenv("DOCKER_HOST", "unix:///nowhere.sock")
+    before = read_files(finished)
+    with pytest.raises(ThrowcollectError, match=problem):
+        resume(finished, overrides=["trials=5", *overrides])
+    assert read_files(finished) == before
+    assert resume(finished) is None
