@@ -43,8 +43,9 @@ def test_the_engine_is_another_one_that_is_there(monkeypatch: pytest.MonkeyPatch
 
 
 def test_a_picture_that_cannot_be_written_is_no_defect_of_ours(tmp_path: Path) -> None:
-    with pytest.raises(ConfigError, match=r"apart\.txt: no picture ends like this"):
-        check_picture(tmp_path / "apart.txt")
+    for name in ("apart.txt", "apart.svg", "apart.jpg", "apart"):
+        with pytest.raises(ConfigError, match=rf"{name}: should end with \.png"):
+            check_picture(tmp_path / name)
     with pytest.raises(ConfigError, match=r"apart\.png: its directory does not exist"):
         check_picture(tmp_path / "missing" / "apart.png")
     check_picture(tmp_path / "apart.png")
@@ -52,9 +53,9 @@ def test_a_picture_that_cannot_be_written_is_no_defect_of_ours(tmp_path: Path) -
     with pytest.raises(ConfigError, match=r"apart\.png: exists"):
         check_picture(tmp_path / "apart.png")
     with pytest.raises(DatasetError, match=r"apart\.png: cannot be written: No such file or directory"):
-        write_deviations([[0.001, -0.002], [0.0, 0.003]], tmp_path / "missing" / "apart.png")
+        write_deviations([[0.001, -0.002], [0.0, 0.003]], "mujoco", tmp_path / "missing" / "apart.png")
 
 
 def test_a_picture_of_landings_is_written(tmp_path: Path) -> None:
-    write_deviations([[0.001, -0.002], [0.0, 0.003]], tmp_path / "apart.png")
+    write_deviations([[0.001, -0.002], [0.0, 0.003]], "mujoco", tmp_path / "apart.png")
     assert (tmp_path / "apart.png").read_bytes().startswith(b"\x89PNG")

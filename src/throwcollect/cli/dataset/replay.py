@@ -95,7 +95,7 @@ def _compare_engines(directory: Path, engine: str, trials: Sequence[int], plot: 
         landed = [each.values for each in deviations if all(column in each.values for column in LANDING)]
         if not landed:
             raise ConfigError("--plot: no throw landed with both engines")
-        write_deviations([[each[column] for each in landed] for column in LANDING], plot)
+        write_deviations([[each[column] for each in landed] for column in LANDING], engine, plot)
 
 
 def _print_deviations(directory: Path, engine: str, deviations: Sequence[Deviation], *, json: bool) -> None:
