@@ -253,9 +253,10 @@ def refuse_changes(directory: Path, stored: Config, config: Config) -> None:
         if key.partition(".")[0] not in _MAY_GROW or not _grows(before, after, config)
     ]
     if problems:
-        raise ConfigError(
-            problems, expected="the same configuration, but for `run`, `containers`, `cluster` and more `trials`"
-        )
+        same = "the same configuration, but for `run`, `containers`, `cluster` and more `trials`"
+        compare = command("dataset", "replay", directory, "--all", "--engine", config.sim.engine)
+        hint = f"{compare} tells by how much its throws differ" if "sim.engine" in changed else None
+        raise ConfigError(problems, expected=same, hint=hint)
 
 
 def _grows(before: int | None, after: int | None, config: Config) -> bool:

@@ -76,6 +76,15 @@ def test_anything_else_may_not_and_all_differences_are_told(directory: Path, pre
     assert contents(directory) == prepared
 
 
+def test_with_another_engine_the_command_that_compares_is_told(tmp_path: Path) -> None:
+    directory = tmp_path / "data"
+    prepare(config_with(), directory, sweep_directory=tmp_path)
+    with pytest.raises(ConfigError, match=r"sim\.engine: .* was begun with 'bullet', got 'mujoco'") as caught:
+        resume(config_with(sim={"engine": "mujoco"}), directory, sweep_directory=tmp_path)
+    compare = f"throwcollect dataset replay {directory} --all --engine mujoco"
+    assert caught.value.hint == f"{compare} tells by how much its throws differ"
+
+
 def test_more_trials_go_on_where_the_others_ended(directory: Path, tmp_path_factory: pytest.TempPathFactory) -> None:
     before = resume(config_with(), directory, sweep_directory=directory)
     after = resume(config_with(trials=6), directory, sweep_directory=directory)
