@@ -69,9 +69,9 @@ class MissingExtraError(ThrowcollectError, ImportError):
 
 
 _INSTEAD = {
-    "pybullet": "Python 3.11, such as that of `uv venv --python 3.11`; or `up --runtime docker`; or, instead of bullet, "
-    "the default, `--set sim.engine=mujoco` (for `dataset replay`: --engine mujoco), whose throws land some millimetres "
-    "elsewhere",
+    "pybullet": "Python 3.11, such as that of `uv venv --python 3.11`; or `up --runtime docker`; or, instead of the "
+    "default engine bullet, `--set sim.engine=mujoco` (for `dataset replay`: --engine mujoco), whose throws land some "
+    "millimetres elsewhere",
     "mujoco": "Python 3.11 or later, or `sim.engine: bullet`",
 }
 """The hint where the package of an engine has no wheel for this Python. Bullet also draws pictures."""

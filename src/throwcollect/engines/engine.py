@@ -294,6 +294,9 @@ class Engine(ABC):
     def run(self, steps: Steps, observer: Observer) -> int:
         """Take steps until the observer stops them.
 
+        A ball that nothing touches goes by the arithmetic with which `dataset verify` compares it, whatever the engine:
+        in each step of dt, v += (g - drag_kgpm / ball_mass_kg · |v| · v) · dt, and then x += v · dt.
+
         An engine may compute ahead, but it ends in the state of the last step that the observer wants.
 
         Returns:
