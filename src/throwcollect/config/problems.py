@@ -37,7 +37,7 @@ class Finding:
         location: The key, which need not exist.
         sentence: Says what is wrong, which value was given and which would be right.
         unknown: Whether the key itself is wrong, and not its value.
-        meant: Name of the key that was meant instead of an unknown one; empty if that is not known.
+        meant: Name of the key that is most like an unknown one; empty if none is.
     """
 
     location: Location
@@ -109,8 +109,7 @@ def _findings(details: ErrorDetails, values: Any, above: Location, expected: Sha
     if kind == "extra_forbidden":
         name, known = str(location[-1]), list(section.keys)
         refused = section.refused.get(name)
-        # Where there is only one key, that must be meant.
-        meant = "" if refused else _find_nearest(name, known) or (known[0] if len(known) == 1 else "")
+        meant = "" if refused else _find_nearest(name, known)
         if name.isdecimal() and value is None:
             # YAML takes what follows a comma for the next key.
             refused = "unknown key; if it is the end of a number, decimals are written with a point, as in 1.5"

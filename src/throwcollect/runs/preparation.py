@@ -136,8 +136,7 @@ def resume(
         WorkerError: If the runtime that is asked for cannot be used.
         DatasetError: If its configuration is lost or damaged, or it cannot be written.
     """
-    from throwcollect.coordinator.resume import has_all_trials, is_begun
-    from throwcollect.coordinator.resume import resume as resume_plan
+    from throwcollect.coordinator.resume import is_begun
 
     started = datetime.now(timezone.utc)
     directory = Path(directory)
@@ -145,43 +144,72 @@ def resume(
         refuse_lost_config(directory)
         raise ConfigError(f"{directory}: holds no dataset", expected="a directory that throwcollect up has made")
     with ExitStack() as places:
-        try:
-            read = places.enter_context(
-                load_locating_errors(Path(config) if config else config_path(directory), overrides)
-            )
-        except ConfigError as error:
-            # A problem without a place in a file is one of the overrides, which another file would not help.
-            if config or all(problem.path is None for problem in error.problems):
-                raise
-            refuse_damaged_config(directory, error)
-            hint = f"{command('up', 'CONFIG', '--resume', directory)}, if the dataset's own file is damaged"
-            raise ConfigError(error.problems, hint=hint) from error
+        read = _read_stored(places, config, directory, overrides)
         records = Records()
         own = None if run is None else run.run
         if (left := _take_over(records, directory, read, onlooker, own=own)) is not None:
             return left
-        sweep_directory = directory if config is None else Path(config).parent
-        origin = None if run is None else run.record.origin
-        request = Request(read, sweep_directory, directory, started, ahead=ahead, origin=origin)
-
-        def choose_runtime() -> None:
-            # A finished dataset has to stay one where nothing can be simulated.
-            nonlocal request
-            request = _choose_runtime(request, onlooker)
-
-        plan = resume_plan(
+        request = Request(
             read,
+            directory if config is None else Path(config).parent,
             directory,
-            sweep_directory=sweep_directory,
+            started,
             processes=processes,
-            check=check,
-            before_writing=choose_runtime,
-            onlooker=onlooker,
+            ahead=ahead,
+            origin=None if run is None else run.record.origin,
         )
-        if has_all_trials(directory, plan):
-            onlooker.say(f"{directory}: every trial has ended, nothing is left to do")
-            return None
-        return prepare_run(records, replace(request, plan=plan), onlooker, run=run)
+        planned = _plan_again(request, onlooker, check=check)
+        return None if planned is None else prepare_run(records, planned, onlooker, run=run)
+
+
+def _read_stored(
+    places: ExitStack, config: str | os.PathLike[str] | None, directory: Path, overrides: Sequence[str]
+) -> Config:
+    """Read the configuration to go on with; errors within `places` name places of its file.
+
+    Raises:
+        ConfigError: If it cannot be used.
+        DatasetError: If that of the dataset is damaged.
+    """
+    try:
+        return places.enter_context(load_locating_errors(Path(config or config_path(directory)), overrides))
+    except ConfigError as error:
+        # A problem without a place in a file is one of the overrides, which another file would not help.
+        if config or all(problem.path is None for problem in error.problems):
+            raise
+        refuse_damaged_config(directory, error)
+        hint = f"{command('up', 'CONFIG', '--resume', directory)}, if the dataset's own file is damaged"
+        raise ConfigError(error.problems, hint=hint) from error
+
+
+def _plan_again(request: Request, onlooker: Onlooker, *, check: bool) -> Request | None:
+    """Make the plan to go on with, and choose the runtime; None if every trial has ended.
+
+    Raises:
+        ConfigError: If the configuration is another one than that of the dataset, or cannot be used.
+        WorkerError: If the runtime that is asked for cannot be used.
+        DatasetError: If the dataset cannot be written.
+    """
+    from throwcollect.coordinator.resume import has_all_trials, resume
+
+    def choose_runtime() -> None:
+        # A finished dataset has to stay one where nothing can be simulated.
+        nonlocal request
+        request = _choose_runtime(request, onlooker)
+
+    plan = resume(
+        request.config,
+        request.directory,
+        sweep_directory=request.sweep_directory,
+        processes=request.processes,
+        check=check,
+        before_writing=choose_runtime,
+        onlooker=onlooker,
+    )
+    if has_all_trials(request.directory, plan):
+        onlooker.say(f"{request.directory}: every trial has ended, nothing is left to do")
+        return None
+    return replace(request, plan=plan)
 
 
 def _choose_runtime(request: Request, onlooker: Onlooker) -> Request:

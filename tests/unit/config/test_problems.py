@@ -87,7 +87,6 @@ JOINT_LIST = "joint names, each with a number from -6.3 to 6.3 rad"
                 "angles are in radians: -60 degrees are -1.0472"
             ],
         ),
-        ("until: {swung: 5}", ["run.yaml:1: until.swung: unknown key; known keys here: landed"]),
         (
             "task: {duration_s: 1,5}",
             [
