@@ -71,6 +71,16 @@ _WAY_OUT = f"mend or uninstall the package that it is of; {_DEBUG}=1 shows where
 """The hint where code of another package fails."""
 
 
+_left_out: set[str] = set()
+"""Families of which this process has no members of other packages."""
+
+
+def leave_out_others() -> None:
+    """Have only our own members in this process; to be called before anything asks for their names."""
+    _left_out.update(_OWN)
+    _table.cache_clear()
+
+
 def names_of(family: str) -> tuple[str, ...]:
     """List the names of the members of a family: our own first, then those of other packages, by name."""
     return tuple(_table()[family])
@@ -203,7 +213,8 @@ def _table() -> Mapping[str, Mapping[str, EntryPoint]]:
     group of entry points, which takes 10 ms.
     """
     select = entry_points().select
-    return MappingProxyType({family: _members_of(family, select(group=f"throwcollect.{family}")) for family in _OWN})
+    added = {family: () if family in _left_out else select(group=f"throwcollect.{family}") for family in _OWN}
+    return MappingProxyType({family: _members_of(family, entries) for family, entries in added.items()})
 
 
 def _members_of(family: str, added: Iterable[EntryPoint]) -> Mapping[str, EntryPoint]:

@@ -19,6 +19,10 @@ THROWS_A_START = 20
 """A process takes about as long to begin as to simulate so many throws."""
 
 _SAFE_PATH = "PYTHONSAFEPATH"
+_safe_path_lock = threading.Lock()
+_values_before: list[str | None] = []
+"""Value of that variable before each block that has set it and is not left yet, in whatever threads; oldest first."""
+
 _Piece = TypeVar("_Piece")
 _Found = TypeVar("_Found")
 
@@ -87,13 +91,10 @@ def working_side_by_side(
     if processes <= 1:
         yield _do_here(pieces, begin, arguments)
         return
-    # The calling program may have children of its own, which must not be killed at the end.
-    others = set(multiprocessing.active_children())
     # With several threads, new interpreters are started: a fork could wait for ever for a lock of another thread.
     context = multiprocessing.get_context("fork" if fork and threading.active_count() == 1 else "spawn")
     with _hiding_working_directory():
         pool = ProcessPoolExecutor(processes, context, _begin, (partial(begin, *arguments), os.getpid()))
-    started = set[Any]()
     try:
         # Only this process shall see Ctrl-C, and then end the others, so these start with the signal blocked.
         unblocked = signal.pthread_sigmask(signal.SIG_BLOCK, (signal.SIGINT,))
@@ -102,8 +103,6 @@ def working_side_by_side(
                 # From 3.12 on, Python warns of the threads of Arrow and BLAS, which forked processes do not use.
                 warnings.filterwarnings("ignore", "This process .* is multi-threaded", DeprecationWarning)
                 found = pool.map(_work, pieces)
-            # All have been started by now; later ones are somebody else's.
-            started = set(multiprocessing.active_children()) - others
         finally:
             signal.pthread_sigmask(signal.SIG_SETMASK, unblocked)
         yield found
@@ -112,8 +111,9 @@ def working_side_by_side(
             f"a process that {doing} was killed", hint="the kernel's log may say why: memory may be short"
         ) from error
     finally:
-        # `shutdown` waits for pieces that are being worked on, so the processes are killed first.
-        for process in started:
+        # `shutdown` waits for pieces that are being worked on, so the processes are killed first. Only the pool knows
+        # which are its own, as other threads start some, too; before 3.14, Python has no public way to kill them.
+        for process in list(pool._processes.values()):
             process.kill()
         pool.shutdown(cancel_futures=True)
 
@@ -126,15 +126,18 @@ def _hiding_working_directory() -> Iterator[None]:
     A pool starts a process, which looks after what the others share, as soon as it is made.
     Python before 3.11 knows no way to prevent that.
     """
-    before = os.environ.get(_SAFE_PATH)
-    os.environ[_SAFE_PATH] = "1"
+    with _safe_path_lock:
+        _values_before.append(os.environ.get(_SAFE_PATH))
+        os.environ[_SAFE_PATH] = "1"
     try:
         yield
     finally:
-        if before is None:
-            del os.environ[_SAFE_PATH]
-        else:
-            os.environ[_SAFE_PATH] = before
+        with _safe_path_lock:
+            # While other threads are in such a block, the newest value is that of a block, which keeps it for them.
+            if (before := _values_before.pop()) is None:
+                del os.environ[_SAFE_PATH]
+            else:
+                os.environ[_SAFE_PATH] = before
 
 
 def _do_here(

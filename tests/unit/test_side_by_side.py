@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -69,6 +70,22 @@ def begin_death() -> Callable[[int], None]:
     return lambda piece: os.kill(os.getpid(), signal.SIGKILL) if piece == 3 else None
 
 
+class SlowlySent(float):
+    """Takes so long to be sent to a process that several threads start theirs at the same time."""
+
+    def __reduce__(self) -> tuple[type[float], tuple[float]]:
+        time.sleep(0.2)
+        return float, (float(self),)
+
+
+def begin_nap(duration_s: float) -> Callable[[int], int]:
+    def nap(piece: int) -> int:
+        time.sleep(duration_s)
+        return piece
+
+    return nap
+
+
 def begin_sleep() -> Callable[[int], int]:
     def sleep(piece: int) -> int:
         time.sleep(0.01 if piece < 2 else 600)
@@ -97,6 +114,18 @@ def test_processes_of_others_are_left_alone() -> None:
     finally:
         mine.kill()
         mine.join()
+
+
+def test_threads_leave_the_processes_of_each_other_alone() -> None:
+    before = dict(os.environ)
+
+    def nap(duration_s: float) -> list[int]:
+        return list(work_side_by_side(range(4), begin_nap, (SlowlySent(duration_s),), processes=2, doing="naps"))
+
+    with ThreadPoolExecutor(2) as threads:
+        # The one that ends first must not end the other.
+        assert list(threads.map(nap, [0.0, 1.0])) == [[0, 1, 2, 3]] * 2
+    assert dict(os.environ) == before
 
 
 def test_one_process_or_one_piece_needs_no_other() -> None:

@@ -130,6 +130,10 @@ class Document:
         self._lines[location] = None
         holder[index] = self._plain(node, location)
 
+    def is_overridden(self, location: Location) -> bool:
+        """Whether an override has given the value at a location."""
+        return self._lines.get(location, 0) is None
+
     def _plain(self, node: Node | None, location: Location, inside: tuple[Node, ...] = ()) -> Any:
         if node is None:
             return None

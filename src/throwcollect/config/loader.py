@@ -22,6 +22,7 @@ from throwcollect.files import StrPath
 from throwcollect.members import names_of
 
 _PARAMETERS = ("sweep", "parameters")
+_SIMULATIONS = ("run", "simulations")
 _SHALLOWEST_MAPPING = 2
 """Least number of parts in the key of a mapping: keys of the first level are sections or single values."""
 _PLAIN_WORD = re.compile(r"[A-Za-z_][A-Za-z0-9_./-]*")
@@ -58,6 +59,8 @@ def load_locating_errors(path: Path, overrides: Sequence[str] = ()) -> Iterator[
     for override in overrides:
         document.override(override, find_default=partial(_find_default, document.values))
     config, found, more = _check(document.values)
+    if config is not None and document.is_overridden(_SIMULATIONS):
+        found += _simulations_findings(config)
     found = [each for each in found if each.location not in document.left_out]
     problems = [document.problem(each.location, each.sentence) for each in found]
     unknown = sum(each.unknown for each in found)
@@ -186,6 +189,17 @@ def _sweep_findings(config: Config) -> Iterator[Finding]:
                 with_values(config, {key: value})
             except ConfigError as error:
                 yield Finding((*location, *part), error.problems[0].message)
+
+
+def _simulations_findings(config: Config) -> Iterator[Finding]:
+    """Find a number of simulations that is asked for, and that a runtime cannot have.
+
+    The number in a file holds for whichever runtime the file is used with, and every dataset's file has one.
+    """
+    run = config.run
+    # A wrong value was replaced by the default, which nobody has asked for.
+    if run.runtime == "inprocess" and run.simulations > 1 and "simulations" in run.model_fields_set:
+        yield Finding(_SIMULATIONS, f"should be 1 with the runtime inprocess, got {run.simulations}")
 
 
 def _lines(values: dict[str, Any], indent: str) -> Iterator[str]:

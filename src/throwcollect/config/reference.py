@@ -1,153 +1,31 @@
-"""The reference of all keys, printed from the models: ``python -m throwcollect.config.reference``."""
+"""Prints the reference of all keys: ``python -m throwcollect.config.reference [--output FILE]``."""
 
 from __future__ import annotations
 
-import re
-from collections.abc import Iterator
+import argparse
+from pathlib import Path
 
-from throwcollect.config.kinds import all_joints
-from throwcollect.config.loader import value_as_yaml
-from throwcollect.config.schema import Config, DynamicMovementPrimitive
-from throwcollect.config.section import Section
-from throwcollect.config.shape import Shape, json_schema, root
-from throwcollect.config.values import sweepable_keys
-
-_INTRODUCTION = """\
-# Configuration
-
-<!-- Printed by `python -m throwcollect.config.reference`; edit the docstrings in src/throwcollect/config instead. -->
-
-A configuration is a YAML 1.2 file. Every key may be left out, unless it is marked as required; `throwcollect config`
-prints all keys with the values that they then have, and `throwcollect config --schema` the JSON Schema for editors.
-Units are part of the names; angles are in radians. A key that does not exist, a value out of bounds and a key that is
-there twice are errors, and all of them are reported at once.
-
-`--set KEY=VALUE` replaces one key, such as `--set task.duration_s=1.1` or `--set 'record.topics=[joint_states,
-ball/odometry, clock]'`. The value is read as YAML; later ones win. Items of a list that the
-file has go by their index from 0; any other list is given as a whole.
-"""
-
-_SAMPLERS = """\
-### Samplers
-
-| sampler | points | with more `trials` |
-|---|---|---|
-| `grid` | all combinations, the last key fastest; `trials` takes the first ones | same first points |
-| `uniform` | independent, evenly distributed | same first points |
-| `latin_hypercube` | one point in each of `trials` strips of every key | all points change, as the strips do |
-| `sobol` | scrambled Sobol' sequence, the most even one; any number of trials | same first points |
-| `list` | the rows of `sweep.file`; `trials` takes the first ones | same first points |
-
-The file of the sampler `list` is CSV (UTF-8, commas, a header line) or Parquet; its columns are named with dotted keys.
-A set of `values` is drawn from in equal shares. Everything is drawn from `seed`.
-
-With `sweep.target` or `until`, trials are added to the plan while it is collected: [targets.md](targets.md).
-"""
-
-_TARGETS = """\
-A list may also say where each trial should end, in columns that the task names; those of `throw` are below. The trial
-does not depend on them: the table of throws has them, and by how much each throw missed
-([dataset.md](dataset.md#targets)). A row without a target has empty cells there (Parquet: null).
-`throwcollect aim -o FILE` writes such lists ([learning.md](learning.md)).
-"""
-
-_ANY = {"containers.": "<node>", "sweep.target.": "<target>"}
-"""Placeholder for the names of sections that have the same keys, by the prefix of these names."""
+from throwcollect import members
+from throwcollect.files import write_file
 
 
-def page() -> str:
-    """Write the reference of all keys, as Markdown."""
-    return "\n".join([_INTRODUCTION, *_sections(root(), "")])
+def main() -> None:
+    """Print the reference, or write it into a file."""
+    parser = argparse.ArgumentParser(
+        prog="python -m throwcollect.config.reference", description="Reference of all keys"
+    )
+    parser.add_argument("--output", type=Path, metavar="FILE", help="write this file, and only once the page is whole")
+    output: Path | None = parser.parse_args().output
+    # The page must not depend on what is installed beside throwcollect.
+    members.leave_out_others()
+    # Not before, because the kinds of keys are made from the members when they are imported.
+    from throwcollect.config.reference_page import page
 
-
-def _sections(shape: Shape, prefix: str) -> Iterator[str]:
-    yield _table(shape, prefix)
-    for name, child in shape.keys.items():
-        key = prefix + name
-        alternatives = child.alternatives
-        if key == "sweep.parameters":
-            for parameter in child.child("").alternatives:
-                yield f"### `sweep.parameters.<key>`: {_sentence(parameter)}\n"
-                yield _table(parameter, "")
-            yield f"{_SAMPLERS}\n### Targets in a list\n\n{_list_targets()}"
-            yield f"### Keys that may be swept\n\n{_list_sweepable()}\n"
-        elif len(alternatives) > 1 and all(each.keys for each in alternatives):
-            for each in alternatives:
-                family = each.child("family").choices[0]
-                yield f"### `{key}` with `family: {family}`\n\n{each.node['description']}\n"
-                yield _table(each, f"{key}.")
-        elif len(twins := _twins(shape, child)) > 1:
-            if name == twins[0]:
-                yield f"## {', '.join(f'`{prefix}{twin}`' for twin in twins)}\n\n{_own_sentence(child)}\n"
-                yield from _sections(child, f"{prefix}{_ANY[prefix]}.")
-        elif child.keys:
-            yield f"## `{key}`\n\n{child.node['description']}\n"
-            yield from _sections(child, f"{key}.")
-        elif child.child(0).keys:
-            yield f"### Items of `{key}`\n\n{child.child(0).node['description']}\n"
-            yield _table(child.child(0), "")
-
-
-def _twins(shape: Shape, child: Shape) -> list[str]:
-    """Names of the sections that are of the same model as one of them."""
-    title = _title(child)
-    return [name for name, each in shape.keys.items() if title is not None and _title(each) == title]
-
-
-def _title(shape: Shape) -> str | None:
-    """Name of the model of a section, also of one that may be null; None if the shape is no section."""
-    return next((each.node.get("title") for each in shape.alternatives if each.keys), None)
-
-
-def _own_sentence(shape: Shape) -> str:
-    """The docstring of a section, and not of the key that holds it."""
-    return str(json_schema()["$defs"][_title(shape)]["description"])
-
-
-def _table(shape: Shape, prefix: str) -> str:
-    rows = ["| key | holds | default | meaning |", "|---|---|---|---|"]
-    for name, child in shape.keys.items():
-        if child.keys and "default" in child.node and len(child.alternatives) == 1:
-            continue
-        cells = [f"`{prefix}{name}`", str(child), _default(child, name, shape), _sentence(child)]
-        rows.append("| " + " | ".join(cells) + " |")
-    return "\n".join(rows) + "\n"
-
-
-def _sentence(shape: Shape) -> str:
-    return re.sub(r"\s+", " ", shape.node["description"])
-
-
-def _default(child: Shape, name: str, holder: Shape) -> str:
-    if any(name in each.node.get("required", []) for each in holder.alternatives):
-        return "required"
-    if "default" not in child.node:
-        return "absent"
-    return f"`{value_as_yaml(child.node['default'])}`"
-
-
-def _list_targets() -> str:
-    """List the columns of targets that lists of the task throw may have."""
-    columns = Config().task.target_columns
-    rows = [f"| `{each.name}` | {each.description} | {'yes' if each.required else 'no'} |" for each in columns]
-    return "\n".join([_TARGETS, "| column | meaning | required |", "|---|---|---|", *rows, ""])
-
-
-def _list_sweepable() -> str:
-    config = Config()
-    weights = {joint: [0.0] * 2 for joint in config.task.end}
-    primitive = DynamicMovementPrimitive(family="dmp", basis_functions=2, weights=weights)
-    learned: Section = config.task.model_copy(update={"trajectory": primitive})
-    keys = [*sweepable_keys(config), *sweepable_keys(config.model_copy(update={"task": learned}))]
-    joints = "|".join(all_joints())
-    general = dict.fromkeys(re.sub(rf"({joints})(\.\d+)?", _general, key) for key in keys)
-    where = "A joint must be in `task.end`, and a weight in `task.trajectory.weights`."
-    return ", ".join(f"`{key}`" for key in general) + f".\n{where}"
-
-
-def _general(match: re.Match[str]) -> str:
-    return "<joint>.<index>" if match[2] else "<joint>"
+    if output is None:
+        print(page(), end="")
+    else:
+        write_file(output, page().encode())
 
 
 if __name__ == "__main__":
-    print(page(), end="")
+    main()

@@ -14,7 +14,7 @@ from typing import Literal
 
 from throwcollect import ros_installation
 from throwcollect.engine_packages import PACKAGES
-from throwcollect.errors import ConfigError
+from throwcollect.errors import ConfigError, MemberError
 from throwcollect.extras import (
     EXTRA_OF,
     MissingExtraError,
@@ -24,8 +24,9 @@ from throwcollect.extras import (
     install_command,
     is_installed,
 )
-from throwcollect.members import names_of
+from throwcollect.members import explain_failure, load_member, names_of
 from throwcollect.robots.description import joint_model
+from throwcollect.robots.robot import Robot
 from throwcollect.robots.talos import TALOS
 from throwcollect.runtimes.registry import get_runtime
 from throwcollect.runtimes.runtime import Check
@@ -75,12 +76,18 @@ def _check_engine(name: str) -> Check:
     return Check(package.module, "note" if others else "problem", hint)
 
 
-def _check_robot() -> Check:
+def _check_robot(name: str) -> Check:
+    """Check the description of a robot; without that of another package, collections with others still run."""
+    is_own = name == TALOS.name
+    check = "robot" if is_own else f"robot {name}"
     try:
-        joint_model(TALOS)
-        return Check("robot", "ok", f"Talos of example-robot-data {version('example-robot-data')}, {TALOS.urdf_path}")
-    except (ConfigError, MissingExtraError, MissingLibraryError) as error:
-        return Check("robot", "problem", "; try: ".join(filter(None, [error.message, error.hint])))
+        with explain_failure("robots", name, "describe itself"):
+            robot: Robot = load_member("robots", name)
+            joint_model(robot)
+            package = f" of example-robot-data {version('example-robot-data')}" if is_own else ""
+            return Check(check, "ok", f"{robot.title}{package}, {robot.urdf_path}")
+    except (ConfigError, MemberError, MissingExtraError, MissingLibraryError) as error:
+        return Check(check, "problem" if is_own else "note", "; try: ".join(filter(None, [error.message, error.hint])))
 
 
 def _check_extras() -> Check:
@@ -157,7 +164,7 @@ def examine(directory: Path) -> list[Check]:
         _check_cores,
         _check_memory,
         *(partial(_check_engine, name) for name in PACKAGES),
-        _check_robot,
+        *(partial(_check_robot, name) for name in names_of("robots")),
         _check_rclpy,
         _check_embedded,
     ]

@@ -10,7 +10,7 @@ from typing import cast
 
 from throwcollect.config.schema import Config
 from throwcollect.coordinator.onlooker import Onlooker
-from throwcollect.errors import ConfigError
+from throwcollect.errors import ConfigError, ConflictError
 from throwcollect.ros.endpoint import split_address
 from throwcollect.runs.record import Record, Summary
 from throwcollect.runs.records import OpenRun, Records, Run
@@ -22,7 +22,7 @@ from throwcollect.runtimes.runtime import Place, Runtime
 class PreparedRun:
     """A run that is ready to be launched; use it as a context manager, which removes its files if it is not launched.
 
-    Until it is launched, nobody else can prepare a run into its directory.
+    Until it is launched, nobody else can prepare a run into its directory. It can be launched once.
 
     Attributes:
         directory: Directory of the dataset, as the user named it; None if the dataset is in a volume.
@@ -53,6 +53,7 @@ class PreparedRun:
         self._runtime = runtime
         self._held = held or ExitStack()
         self._undo = undo or ExitStack()
+        self._over = ""
 
     def __enter__(self) -> PreparedRun:
         return self
@@ -60,6 +61,7 @@ class PreparedRun:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        self._over = self._over or "was given up when its block was left"
         # Others are kept from the directory until the files that were made in it are gone.
         with self._held:
             self._undo.close()
@@ -99,12 +101,12 @@ class PreparedRun:
             The summary of the dataset; its outcomes tell whether trials are lost.
 
         Raises:
+            ConflictError: If the run was launched already, or given up.
             ThrowcollectError: As `launcher.launch`.
         """
         from throwcollect.runs.launcher import launch
 
-        # From here on the launcher answers for the run and writes its end, so nothing of the run may be removed here.
-        self._undo.pop_all()
+        self._hand_over()
         summary = launch(
             self._run, self.config, onlooker=self._onlooker, interruptions=interruptions, runtime=self._runtime
         )
@@ -117,13 +119,27 @@ class PreparedRun:
         If the user asks to stop, as `interruptions` counts, the launcher is asked, and waited for.
 
         Raises:
+            ConflictError: If the run was launched already, or given up.
             WorkerError: If the launcher cannot be started.
             ThrowcollectError: The error with which the run has ended, if it did so already.
         """
         from throwcollect.runs.launcher import start_launcher
 
-        self._undo.pop_all()
+        self._hand_over()
         if self._runtime is not None:
             # The launcher, as another process, cannot use what the runtime has begun in this one.
             self._runtime.close()
         return start_launcher(self._records, self._run, interruptions=interruptions)
+
+    def _hand_over(self) -> None:
+        """Hand the run over to its launcher, which answers for it and writes its end, so that nothing is removed here.
+
+        Raises:
+            ConflictError: If that was done already, or the run was given up.
+        """
+        if self._over:
+            raise ConflictError(
+                f"run {self._run.run}: {self._over}", expected="a run that is prepared and not launched"
+            )
+        self._over = "was launched already"
+        self._undo.pop_all()

@@ -213,3 +213,21 @@ def test_an_override_replaces_one_joint_and_leaves_the_others_as_they_are_by_def
     path.write_text("name: throws\n")
     with pytest.raises(ConfigError, match=r"^task\.end\.arm_right_9_joint: "):
         load(path, ["task.end.arm_right_9_joint=1"])
+
+
+@pytest.mark.parametrize(
+    "asked", [("run.simulations=3",), ("run.simulations=1", "run={runtime: inprocess, simulations: 3}")]
+)
+def test_more_simulations_than_a_runtime_has_cannot_be_asked_for(problems_of, asked: tuple[str, ...]) -> None:
+    (problem,) = problems_of("run: {simulations: 4}", "run.runtime=inprocess", *asked)
+    assert problem == "run.simulations: should be 1 with the runtime inprocess, got 3"
+
+
+@pytest.mark.parametrize("asked", [(), ("run.simulations=1",), ("run.replay=0",)])
+def test_the_number_of_simulations_in_a_file_is_for_other_runtimes(write, asked: tuple[str, ...]) -> None:
+    assert load(write("run: {simulations: 4}"), ["run.runtime=inprocess", *asked]).run.runtime == "inprocess"
+
+
+def test_a_wrong_number_of_simulations_is_told_once(problems_of) -> None:
+    (problem,) = problems_of("name: a", "run.runtime=inprocess", "run.simulations=many")
+    assert problem.startswith("run.simulations: should be a whole number")

@@ -1,15 +1,21 @@
 import json
 import socketserver
 import threading
+from dataclasses import replace
 from http.server import BaseHTTPRequestHandler
-from importlib.metadata import version
+from importlib.metadata import EntryPoint, EntryPoints, version
 from pathlib import Path
 
 import pytest
 
+from throwcollect import members
+from throwcollect.members import names_of
+from throwcollect.robots.talos import TALOS
 from throwcollect.ros.middleware import VARIABLE, _choose_installed
 from throwcollect.runs.doctor import examine
 from throwcollect.runtimes.docker.image import SOURCES_LABEL, default_tag
+
+PLUGINS = Path(__file__).parents[2] / "plugins"
 
 
 def test_a_machine_that_runs_the_tests_has_no_problem(tmp_path: Path) -> None:
@@ -22,6 +28,7 @@ def test_a_machine_that_runs_the_tests_has_no_problem(tmp_path: Path) -> None:
         "pybullet",
         "mujoco",
         "robot",
+        *(f"robot {name}" for name in names_of("robots")[1:]),
         "rclpy",
         "embedded",
         "docker",
@@ -38,6 +45,33 @@ def test_all_extras_that_are_there_are_listed(tmp_path: Path, monkeypatch: pytes
     (finding,) = (check.finding for check in examine(tmp_path) if check.name == "extras")
     there = "collect, docker, export, mujoco, pandas, report, serve"
     assert finding == f"{there}, without onnx (try: pip install 'throwcollect[onnx]')"
+
+
+def lack_disk() -> Path:
+    raise OSError("the disk is gone")
+
+
+LOST_ARM = replace(TALOS, name="lost", share=lack_disk)
+
+
+def test_robots_of_other_packages_are_examined_and_one_that_fails_is_noted(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.syspath_prepend(PLUGINS)
+    group = "throwcollect.robots"
+    places = {"planar_arm": "planar_arm.robot:PLANAR_ARM", "absent": "not_there:ARM", "lost": f"{__name__}:LOST_ARM"}
+    points = EntryPoints(EntryPoint(name, place, group) for name, place in places.items())
+    monkeypatch.setattr(members, "entry_points", lambda **_: points)
+    members._table.cache_clear()
+    checks = {check.name: check for check in examine(tmp_path)}
+    found = {name: (checks[f"robot {name}"].status, checks[f"robot {name}"].finding) for name in places}
+    assert found["planar_arm"] == ("ok", f"the planar arm, {PLUGINS / 'planar_arm' / 'planar_arm.urdf'}")
+    assert found["absent"][0] == found["lost"][0] == "note"
+    assert "the robot absent of an unknown package cannot be loaded: ModuleNotFoundError" in found["absent"][1]
+    assert "the robot lost of an unknown package cannot describe itself: OSError: the disk" in found["lost"][1]
+    assert (checks["robot"].status, checks["robot"].finding.partition(" of ")[0]) == ("ok", "Talos")
+    monkeypatch.undo()
+    members._table.cache_clear()
 
 
 def backends(directory: Path) -> dict[str, tuple[str, str]]:

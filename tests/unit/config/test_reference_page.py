@@ -1,0 +1,28 @@
+import pytest
+
+from throwcollect.config.reference_page import page
+from throwcollect.config.shape import json_schema
+
+MODELS = {"Config": json_schema(), **json_schema()["$defs"]}
+KEYS = [(model, key) for model, schema in MODELS.items() for key in schema["properties"]]
+
+
+@pytest.mark.parametrize(("model", "key"), KEYS, ids=".".join)
+def test_every_key_has_a_meaning(model, key):
+    node = MODELS[model]["properties"][key]
+    meaning = node.get("description") or MODELS[node["$ref"].rpartition("/")[2]]["description"]
+    assert meaning.endswith(".")
+
+
+def test_every_key_is_on_the_page():
+    text = page()
+    missing = [key for _, key in KEYS if f"`{key}`" not in text and f".{key}`" not in text]
+    assert missing == []
+
+
+def test_tables_are_not_torn_by_bars_in_their_cells():
+    table = 0
+    for line in page().splitlines():
+        bars = line.count("|") if line.startswith("|") else 0
+        assert not table or bars in (0, table)
+        table = bars
