@@ -293,7 +293,7 @@ class Dataset(Sequence[Throw]):
             DatasetError: If a trial is not among the throws.
         """
         if isinstance(which, str):
-            return self._take(Expression(which, place="select").rows(self.throws))
+            return self._take(Expression(which, place="select", is_argument=False).rows(self.throws))
         if isinstance(which, pc.Expression):
             try:
                 return self._with(self.throws.filter(which))

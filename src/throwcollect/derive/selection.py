@@ -10,11 +10,11 @@ from pathlib import Path
 
 import numpy as np
 
+from throwcollect.arguments import refuse_argument
 from throwcollect.dataset.expression import Expression
 from throwcollect.dataset.reader import Dataset
 from throwcollect.derive.derivation import Derived, derive
 from throwcollect.derive.source import source
-from throwcollect.errors import ConfigError, Problem
 from throwcollect.files import StrPath
 
 
@@ -35,12 +35,11 @@ def filter_trials(directory: StrPath, output: StrPath, *, where: str) -> Derived
         ConfigError: If the condition cannot be evaluated or no trial fulfils it, or the directory cannot be used.
         DatasetError: If the dataset is damaged, or the new one cannot be written.
     """
-    condition = Expression(where, place="--where")
+    condition = Expression(where, place="where")
     dataset = Dataset.open(Path(directory))
     chosen = source(dataset, condition.rows(dataset.throws))
     if not chosen.trials:
-        problem = f"no trial of {directory} that has an episode fulfils {where!r}"
-        raise ConfigError([Problem(problem, "--where")])
+        raise refuse_argument("where", f"no trial of {directory} that has an episode fulfils {where!r}")
     return derive([chosen], Path(output))
 
 
@@ -57,6 +56,6 @@ def sample(directory: StrPath, output: StrPath, *, count: int, seed: int = 0) ->
     candidates = source(dataset).trials
     if not 1 <= count <= len(candidates):
         problem = f"should be from 1 to {len(candidates)}, the number of episodes of {directory}, got {count}"
-        raise ConfigError([Problem(problem, "--count")])
+        raise refuse_argument("count", problem)
     order = np.random.default_rng(seed).permutation(len(candidates))
     return derive([source(dataset, [candidates[place] for place in order[:count]])], Path(output))

@@ -20,13 +20,13 @@ from typing import Any
 import pyarrow as pa
 from pydantic import TypeAdapter, ValidationError
 
+from throwcollect.arguments import refuse_argument
 from throwcollect.config.kinds import Name
 from throwcollect.dataset.expression import Expression
 from throwcollect.dataset.reader import Dataset
 from throwcollect.derive.derivation import Derived, derive
 from throwcollect.derive.source import Source, source
 from throwcollect.derive.trial_list import list_of_trials
-from throwcollect.errors import ConfigError, Problem
 from throwcollect.files import StrPath, new_directory
 from throwcollect.sweep.digest import trial_digests
 
@@ -123,8 +123,9 @@ def assign(
         part = _choose_part(f"trial {digest.tobytes().hex()}" if cell is None else f"cell {list(cell)}", shares, seed)
         members[part][trial] = cell
     if empty := [name for name, trials in members.items() if not trials]:
-        raise ConfigError(
-            [Problem(f"{', '.join(empty)} would get none of the {len(places)} trials", "--fractions")],
+        raise refuse_argument(
+            "fractions",
+            f"{', '.join(empty)} would get none of the {len(places)} trials",
             hint="larger fractions, smaller cells, or another seed",
         )
     return members
@@ -138,10 +139,10 @@ def _find_cells(axes: Sequence[str], throws: pa.Table) -> list[Cell | None]:
     """
     columns = []
     for text in axes:
-        name, width = _read_pair(text, "--cells", "an expression and the width of cells, such as landing_x_m=0.05")
+        name, width = _read_pair(text, "cells", "an expression and the width of cells, such as landing_x_m=0.05")
         if not float(width) > 0:
-            raise ConfigError([Problem(f"the width of cells should be above 0, got {text!r}", "--cells")])
-        values = Expression(name, place="--cells").numbers(throws)
+            raise refuse_argument("cells", f"the width of cells should be above 0, got {text!r}")
+        values = Expression(name, place="cells").numbers(throws)
         columns.append([_number_along(value, float(width)) for value in values])
     return [None if None in cell else cell for cell in zip(*columns, strict=True)]
 
@@ -159,7 +160,7 @@ def _choose_part(hashed: str, shares: Mapping[str, Fraction], seed: int) -> str:
 
 def _read_shares(text: str) -> dict[str, Fraction]:
     what = "a part and its share, such as train=0.8"
-    pairs = [_read_pair(item, "--fractions", what) for item in text.split(",")]
+    pairs = [_read_pair(item, "fractions", what) for item in text.split(",")]
     shares = dict(pairs)
     problem = None
     if len(shares) < len(pairs):
@@ -176,11 +177,11 @@ def _read_shares(text: str) -> dict[str, Fraction]:
         except ValidationError:
             problem = f"{name!r} should be lower-case letters, digits, - and _, first a letter or digit"
     if problem:
-        raise ConfigError([Problem(f"{problem}, got {text!r}", "--fractions")])
+        raise refuse_argument("fractions", f"{problem}, got {text!r}")
     return shares
 
 
-def _read_pair(text: str, option: str, what: str) -> tuple[str, Fraction]:
+def _read_pair(text: str, argument: str, what: str) -> tuple[str, Fraction]:
     # The expression itself may have `=` in it, such as `==`.
     name, _, number = text.rpartition("=")
     try:
@@ -190,7 +191,7 @@ def _read_pair(text: str, option: str, what: str) -> tuple[str, Fraction]:
     except (ValueError, ArithmeticError):
         value = None
     if value is None or not name.strip():
-        raise ConfigError([Problem(f"should be {what}, got {text!r}", option)])
+        raise refuse_argument(argument, f"should be {what}, got {text!r}")
     return name.strip(), value
 
 

@@ -10,11 +10,12 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
+from throwcollect.arguments import refuse_argument
 from throwcollect.config.target import TargetColumn
 from throwcollect.dataset.damage import locating_damage
 from throwcollect.dataset.reader import Dataset
 from throwcollect.episode.record import Samples
-from throwcollect.errors import ConfigError, DatasetError
+from throwcollect.errors import DatasetError
 from throwcollect.export.resampling import count_resampled, resample
 from throwcollect.export.signals import Signal, list_signals, unit_of
 from throwcollect.robots.quintic_curve import sample_quintic
@@ -98,8 +99,9 @@ class Source:
         dataset = Dataset.open(directory)
         recorded_hz = dataset.config.record.rate_hz
         if rate_hz is not None and not 1 <= rate_hz <= recorded_hz:
-            raise ConfigError(
-                f"--rate: {rate_hz} samples per second",
+            raise refuse_argument(
+                "rate_hz",
+                f"{rate_hz} samples per second",
                 expected=f"1 to {recorded_hz}, at which {directory} was recorded",
             )
         if not len(dataset.recorded):

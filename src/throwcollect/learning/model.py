@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from enum import Enum
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from throwcollect.arguments import read_word, refuse_argument
 from throwcollect.config.loader import dump_yaml
 from throwcollect.config.target import LARGEST_TARGET
 from throwcollect.errors import ConfigError
@@ -30,8 +30,6 @@ from throwcollect.version import __version__
 
 if TYPE_CHECKING:
     from throwcollect.dataset.reader import Dataset
-
-_Word = TypeVar("_Word", bound=Enum)
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,7 +115,7 @@ class Model:
         rows = np.array([self._check_target(target, names) for target in targets], np.float64).reshape(-1, len(names))
         ends, values = rows[:, : len(self.targets)], rows[:, len(self.targets) :]
         context = self.learned.scale(Role.CONTEXT, values)
-        found = aim(self.learned, ends, context, _read_word(Choice, "--choose", choose))
+        found = aim(self.learned, ends, context, read_word("choose", choose, Choice))
         chosen = self.learned.unscale(Role.PARAMETER, found.parameters)
         inside = np.all(np.abs(context) <= 1.0, axis=1).tolist()
         return [
@@ -161,7 +159,7 @@ class Model:
         """
         for name, number, least in (("targets", targets, 1), ("seeds", seeds, 1), ("seed", seed, 0)):
             if number < least:
-                raise ConfigError(f"--{name}: got {number}", expected=f"{least} or more")
+                raise refuse_argument(name, f"got {number}", expected=f"{least} or more")
         _check_scatter(scatter)
         distilled = None if self.file.distilled is None else distil(leave_out_correction(self.learned))
         scores = [
@@ -208,10 +206,11 @@ class Model:
                 f"{len(parameters)} throws and {len(measured)} places", expected="one place for each throw"
             )
         _check_scatter(scatter)
-        chosen = None if method is None else _read_word(Method, "--method", method)
+        chosen = None if method is None else read_word("method", method, Method)
         if chosen is Method.LATENT and not self.latents:
-            raise ConfigError(
-                "--method latent: the dataset has no latents",
+            raise refuse_argument(
+                "method",
+                "'latent': the dataset has no latents",
                 expected="a dataset whose sweep varies the world",
                 hint="try bias",
             )
@@ -324,14 +323,18 @@ def fit(
             or too few throws succeeded.
         DatasetError: If the directory holds no finished dataset, or the dataset is damaged.
     """
+    from throwcollect.dataset.expression import Expression
     from throwcollect.dataset.reader import Dataset
 
-    chosen = _read_word(Kind, "--kind", kind)
+    chosen = read_word("kind", kind, Kind)
     if not isinstance(dataset, Dataset):
         dataset = Dataset.open(dataset)
-    throws = dataset if where is None else dataset.select(where)
-    if where is not None and not throws:
-        raise ConfigError(f"--where: no {dataset.config.task.noun} of {dataset.directory} fulfils {where!r}")
+    throws = dataset
+    if where is not None:
+        rows = Expression(where, place="where").rows(dataset.throws)
+        if not rows:
+            raise refuse_argument("where", f"no {dataset.config.task.noun} of {dataset.directory} fulfils {where!r}")
+        throws = dataset.select(dataset["trial"][rows])
     found = fit_map(throws, kind=chosen, targets=targets, parameters=parameters, context=given)
     return Model(_describe(found, dataset, where), found.learned, found.trials, dump_yaml(dataset.config))
 
@@ -372,18 +375,6 @@ def _describe(found: Fit, dataset: Dataset, where: str | None) -> ModelFile:
     )
 
 
-def _read_word(words: type[_Word], name: str, text: str) -> _Word:
-    """Find the member of an enumeration that a word of the caller stands for.
-
-    Raises:
-        ConfigError: If there is no such member.
-    """
-    try:
-        return words(text)
-    except ValueError:
-        raise ConfigError(f"{name}: {text!r}", expected=f"one of {', '.join(each.value for each in words)}") from None
-
-
 def _check_scatter(scatter: float) -> None:
     """Refuse a number that is no standard deviation.
 
@@ -391,4 +382,5 @@ def _check_scatter(scatter: float) -> None:
         ConfigError: If it is negative, no number, or as large as no target is.
     """
     if not 0.0 <= scatter <= LARGEST_TARGET:
-        raise ConfigError(f"scatter: got {scatter}", expected=f"0 to {LARGEST_TARGET:g}, in the unit of the targets")
+        expected = f"0 to {LARGEST_TARGET:g}, in the unit of the targets"
+        raise refuse_argument("scatter", f"got {scatter}", expected=expected)

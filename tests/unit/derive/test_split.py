@@ -118,7 +118,7 @@ def test_cells_may_be_of_any_expression(some: Path) -> None:
     ],
 )
 def test_wrong_fractions_are_explained(some: Path, tmp_path: Path, fractions: str, message: str) -> None:
-    with pytest.raises(ConfigError, match=f"--fractions: .*{message}"):
+    with pytest.raises(ConfigError, match=f"^fractions: .*{message}"):
         split(some, tmp_path / "parts", fractions=fractions)
     assert not list(tmp_path.iterdir())
 
@@ -136,5 +136,5 @@ def test_wrong_fractions_are_explained(some: Path, tmp_path: Path, fractions: st
     ],
 )
 def test_wrong_cells_are_explained(some: Path, tmp_path: Path, axis: str, message: str) -> None:
-    with pytest.raises(ConfigError, match=f"--cells: {message}"):
+    with pytest.raises(ConfigError, match=f"^cells: {message}"):
         split(some, tmp_path / "parts", fractions=HALVES, cells=[axis])

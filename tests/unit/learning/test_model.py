@@ -125,11 +125,11 @@ def test_a_score_is_put_into_the_model_and_its_card(model: Model, tmp_path: Path
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"kind": "network"}, "--kind: 'network'"),
+        ({"kind": "network"}, "^kind: 'network'"),
         ({"targets": ["place"]}, "no column of numbers 'place'"),
         ({"parameters": ["task.points_hz"]}, "task.points_hz was not swept"),
         ({"where": "trial < 5"}, "5 throws of 5 landed"),
-        ({"where": "trial >="}, "cannot be understood"),
+        ({"where": "trial >="}, "^where: cannot be understood"),
     ],
 )
 def test_what_cannot_be_learned_is_refused(dataset: Dataset, options: dict[str, object], message: str) -> None:
@@ -194,7 +194,7 @@ def test_adapting_wants_a_place_for_each_throw(model: Model) -> None:
     point = dict.fromkeys(KEYS, 0.0)
     with pytest.raises(ConfigError, match="1 throws and 0 places"):
         model.adapt([point], [])
-    with pytest.raises(ConfigError, match="--method: 'magic'"):
+    with pytest.raises(ConfigError, match=r"^method: 'magic'"):
         model.adapt([point], [(1.0, 0.0)], method="magic")
     with pytest.raises(ConfigError, match="scatter"):
         model.adapt([point], [(1.0, 0.0)], scatter=-1.0)
