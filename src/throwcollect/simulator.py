@@ -5,12 +5,12 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from types import TracebackType
 
 import numpy as np
 from numpy.typing import NDArray
 
+from throwcollect.arguments import check_list
 from throwcollect.config.loader import load
 from throwcollect.config.schema import Config
 from throwcollect.config.sweep import MOST_TRIALS
@@ -60,7 +60,7 @@ class Simulator:
     """
 
     def __init__(self, config: StrPath, *, overrides: Sequence[str] = ()) -> None:
-        self._start(load(Path(config), tuple(overrides)), os.fspath(config))
+        self._start(load(config, overrides), os.fspath(config))
 
     def _start(self, config: Config, source: str) -> None:
         """Make the robot and the physics engine of a configuration; `source` is the file that it was read from."""
@@ -153,6 +153,7 @@ class Simulator:
         """
         if processes < 1:
             raise ConfigError(f"processes: got {processes}", expected="1 or more")
+        check_list("points", points, "mappings, one for each throw")
         self._require_open()
         if processes == 1:
             for trial, point in enumerate(points):

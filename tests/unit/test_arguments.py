@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterable
+
+import numpy as np
 import pytest
 
-from throwcollect.arguments import read_word, refuse_argument
+from throwcollect.arguments import as_float, check_list, read_list, read_word, refuse_argument
 from throwcollect.errors import ConfigError, Problem
 from throwcollect.learning.learned_map import Kind
 
@@ -21,3 +25,41 @@ def test_a_word_is_read_or_refused_with_those_that_there_are() -> None:
         with pytest.raises(ConfigError, match=r"^kind: ") as caught:
             read_word("kind", given, Kind)
         assert caught.value.expected == "one of local, polynomial"
+
+
+@pytest.mark.parametrize(
+    ("given", "problem", "expected"),
+    [
+        ("a", "'a' is a text", "a list of names: ['a']"),
+        (b"a", "b'a' is a text", "a list of names"),
+        ({"a": 1}, "{'a': 1} is a mapping", "a list of names"),
+        (1, "1 is no list", "a list of names"),
+        (["a", 1], "1 is in the list", "a list of names"),
+        (["a", ("b" * 200,)], f"('{'b' * 78}… is in the list", "a list of names"),
+    ],
+)
+def test_what_is_no_list_is_refused(given: object, problem: str, expected: str) -> None:
+    with pytest.raises(ConfigError) as caught:
+        read_list("columns", given, "names")
+    assert caught.value.problems == [Problem(problem, "columns", argument=True)]
+    assert caught.value.expected == expected
+
+
+def test_whatever_gives_its_elements_one_by_one_is_a_list() -> None:
+    assert read_list("columns", (name for name in "ab"), "names") == read_list("columns", ["a", "b"], "names")
+    rows = np.eye(2)
+    assert [row.tolist() for row in read_list("targets", rows, "targets", (Iterable,))] == rows.tolist()
+    with pytest.raises(ConfigError) as caught:
+        read_list("targets", "1,0", "targets", (Iterable,))
+    assert caught.value.expected == "a list of targets"
+
+
+def test_to_be_checked_takes_nothing_out_of_a_list() -> None:
+    points = iter([1, 2])
+    check_list("points", points, "points")
+    assert list(points) == [1, 2]
+
+
+def test_what_is_no_number_is_none_that_is_finite() -> None:
+    assert as_float(np.float32(0.5)) == as_float("0.5") == 0.5
+    assert all(math.isnan(as_float(each)) for each in ("a", None, [1], 10**400))

@@ -130,6 +130,13 @@ def test_there_are_no_numbers_but_those_of_trials(simulator: Simulator) -> None:
         next(simulator.throw_many([{}], processes=0))
 
 
+def test_lists_are_not_taken_letter_by_letter(simulator: Simulator) -> None:
+    with pytest.raises(ConfigError, match=r"^overrides: 'task\.duration_s=1' is a text"):
+        Simulator(ROOT / "configs" / "quickstart.yaml", overrides="task.duration_s=1")
+    with pytest.raises(ConfigError, match=r"^points: {'task\.duration_s': 1\.1.* is a mapping"):
+        next(simulator.throw_many(POINT))
+
+
 def test_a_configuration_that_is_not_there_is_named(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match=re.escape(f"{tmp_path / 'no.yaml'}: no such file")):
         Simulator(tmp_path / "no.yaml")

@@ -5,12 +5,13 @@ The directory of the new dataset must not exist, or be empty.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
-from throwcollect.arguments import refuse_argument
+from throwcollect.arguments import read_list, refuse_argument
 from throwcollect.dataset.expression import Expression
 from throwcollect.dataset.reader import Dataset
 from throwcollect.derive.derivation import Derived, derive
@@ -22,10 +23,13 @@ def merge(directories: Sequence[StrPath], output: StrPath) -> Derived:
     """Put the trials of several datasets, at least one, one after the other into a new one.
 
     Raises:
-        ConfigError: If the datasets differ in keys that cannot be swept, or the directory cannot be used.
+        ConfigError: If there is no dataset, they differ in keys that cannot be swept, or the directory cannot be used.
         DatasetError: If a dataset is damaged, or the new one cannot be written.
     """
-    return derive([source(Dataset.open(Path(directory))) for directory in directories], Path(output))
+    listed = read_list("directories", directories, "directories", (str, os.PathLike))
+    if not listed:
+        raise refuse_argument("directories", "got none", expected="at least one dataset")
+    return derive([source(Dataset.open(Path(directory))) for directory in listed], Path(output))
 
 
 def filter_trials(directory: StrPath, output: StrPath, *, where: str) -> Derived:

@@ -20,7 +20,7 @@ from typing import Any
 import pyarrow as pa
 from pydantic import TypeAdapter, ValidationError
 
-from throwcollect.arguments import refuse_argument
+from throwcollect.arguments import read_list, refuse_argument
 from throwcollect.config.kinds import Name
 from throwcollect.dataset.expression import Expression
 from throwcollect.dataset.reader import Dataset
@@ -138,7 +138,7 @@ def _find_cells(axes: Sequence[str], throws: pa.Table) -> list[Cell | None]:
         ConfigError: If an axis is no expression with a width, or cannot be evaluated.
     """
     columns = []
-    for text in axes:
+    for text in read_list("cells", axes, "texts EXPRESSION=WIDTH"):
         name, width = _read_pair(text, "cells", "an expression and the width of cells, such as landing_x_m=0.05")
         if not float(width) > 0:
             raise refuse_argument("cells", f"the width of cells should be above 0, got {text!r}")

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from throwcollect.arguments import read_word, refuse_argument
+from throwcollect.arguments import as_float, read_list, read_word, refuse_argument, show_value
 from throwcollect.config.loader import dump_yaml
 from throwcollect.config.target import LARGEST_TARGET
 from throwcollect.errors import ConfigError
@@ -112,7 +112,7 @@ class Model:
             ConfigError: If a target has another number of values, is no number or beyond 1e6, or the choice is unknown.
         """
         names = (*self.targets, *self.given)
-        rows = np.array([self._check_target(target, names) for target in targets], np.float64).reshape(-1, len(names))
+        rows = _read_places("targets", targets, names)
         ends, values = rows[:, : len(self.targets)], rows[:, len(self.targets) :]
         context = self.learned.scale(Role.CONTEXT, values)
         found = aim(self.learned, ends, context, read_word("choose", choose, Choice))
@@ -200,7 +200,7 @@ class Model:
                 there is no such method, or a parameter or context is far outside of the range of the dataset.
         """
         parameters, context = self._inputs(points)
-        measured = np.array([self._check_target(place, self.targets) for place in places], np.float64)
+        measured = _read_places("places", places, self.targets)
         if not len(measured) or len(measured) != len(parameters):
             raise ConfigError(
                 f"{len(parameters)} throws and {len(measured)} places", expected="one place for each throw"
@@ -268,34 +268,21 @@ class Model:
             ConfigError: If a key is missing or unknown, or a value is not finite.
         """
         names = (*self.parameters, *self.given)
+        listed = read_list("points", points, "mappings, one for each throw", (Mapping,))
         rows = []
-        for number, point in enumerate(points):
+        for number, point in enumerate(listed):
             if wrong := sorted(set(point) ^ set(names)):
                 state = "is missing" if wrong[0] in names else "is no key of this model"
                 raise ConfigError(f"throw {number}: {wrong[0]} {state}", expected=f"values of {', '.join(names)}")
-            rows.append([float(point[name]) for name in names])
+            rows.append([as_float(point[name]) for name in names])
         values = np.array(rows, np.float64).reshape(-1, len(names))
         if not np.isfinite(values).all():
             number, column = (int(each[0]) for each in np.nonzero(~np.isfinite(values)))
-            raise ConfigError(
-                f"throw {number}: {names[column]} is {values[number, column]}", expected="a finite number"
-            )
+            value = show_value(listed[number][names[column]])
+            raise ConfigError(f"throw {number}: {names[column]} is {value}", expected="a finite number")
         split = len(self.parameters)
         parameters = self.learned.scale(Role.PARAMETER, values[:, :split])
         return parameters, self.learned.scale(Role.CONTEXT, values[:, split:])
-
-    @staticmethod
-    def _check_target(values: Sequence[float], names: Sequence[str]) -> list[float]:
-        """Read the numbers of a target.
-
-        Raises:
-            ConfigError: If there are not as many as names, or one is not finite, or so large that powers of it are not.
-        """
-        row = [float(value) for value in values]
-        if len(row) != len(names) or not (np.abs(row) <= LARGEST_TARGET).all():
-            wanted = f"finite numbers of at most {LARGEST_TARGET:g}: {', '.join(names)}"
-            raise ConfigError(f"got {', '.join(map(str, row))}", expected=wanted)
-        return row
 
 
 def fit(
@@ -327,6 +314,8 @@ def fit(
     from throwcollect.dataset.reader import Dataset
 
     chosen = read_word("kind", kind, Kind)
+    columns = read_list("targets", targets, "names")
+    keys, known = read_list("parameters", parameters, "keys"), read_list("given", given, "keys")
     if not isinstance(dataset, Dataset):
         dataset = Dataset.open(dataset)
     throws = dataset
@@ -335,7 +324,7 @@ def fit(
         if not rows:
             raise refuse_argument("where", f"no {dataset.config.task.noun} of {dataset.directory} fulfils {where!r}")
         throws = dataset.select(dataset["trial"][rows])
-    found = fit_map(throws, kind=chosen, targets=targets, parameters=parameters, context=given)
+    found = fit_map(throws, kind=chosen, targets=columns, parameters=keys, context=known)
     return Model(_describe(found, dataset, where), found.learned, found.trials, dump_yaml(dataset.config))
 
 
@@ -373,6 +362,24 @@ def _describe(found: Fit, dataset: Dataset, where: str | None) -> ModelFile:
         ),
         adaptation=None,
     )
+
+
+def _read_places(argument: str, given: Iterable[Sequence[float]], names: Sequence[str]) -> Array:
+    """Read targets, or places where throws ended, shape ``(n, n_names)``.
+
+    Raises:
+        ConfigError: If there are not as many numbers as names in each, or one is not finite, or so large that powers
+            of it are not.
+    """
+    rows = []
+    for place in read_list(argument, given, f"{argument}, each with {', '.join(names)}", (Iterable,)):
+        numbers = read_list(argument, place, "numbers", (object,))
+        row = [as_float(number) for number in numbers]
+        if len(row) != len(names) or not (np.abs(row) <= LARGEST_TARGET).all():
+            wanted = f"finite numbers of at most {LARGEST_TARGET:g}: {', '.join(names)}"
+            raise ConfigError(f"got {', '.join(map(show_value, numbers))}", expected=wanted)
+        rows.append(row)
+    return np.array(rows, np.float64).reshape(-1, len(names))
 
 
 def _check_scatter(scatter: float) -> None:

@@ -213,3 +213,13 @@ def test_an_override_replaces_one_joint_and_leaves_the_others_as_they_are_by_def
     path.write_text("name: throws\n")
     with pytest.raises(ConfigError, match=r"^task\.end\.arm_right_9_joint: "):
         load(path, ["task.end.arm_right_9_joint=1"])
+
+
+def test_overrides_that_are_no_list_of_texts_are_refused_at_once(write) -> None:
+    path = write("name: some")
+    with pytest.raises(ConfigError, match=r"^overrides: 'task\.duration_s=1' is a text") as caught:
+        load(path, "task.duration_s=1")
+    assert caught.value.expected == "a list of texts KEY=VALUE: ['task.duration_s=1']"
+    for wrong in ({"task.duration_s": 1}, [1]):
+        with pytest.raises(ConfigError, match=r"^overrides: .*\n  expected: a list of texts KEY=VALUE$"):
+            load(path, wrong)

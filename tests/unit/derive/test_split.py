@@ -138,3 +138,8 @@ def test_wrong_fractions_are_explained(some: Path, tmp_path: Path, fractions: st
 def test_wrong_cells_are_explained(some: Path, tmp_path: Path, axis: str, message: str) -> None:
     with pytest.raises(ConfigError, match=f"^cells: {message}"):
         split(some, tmp_path / "parts", fractions=HALVES, cells=[axis])
+
+
+def test_one_axis_is_no_list_of_axes(some: Path, tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match=r"^cells: 'trial=1' is a text\n .*: \['trial=1'\]"):
+        split(some, tmp_path / "parts", fractions=HALVES, cells="trial=1")

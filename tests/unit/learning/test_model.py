@@ -190,6 +190,34 @@ def test_points_without_all_parameters_are_refused(model: Model) -> None:
         model.predict([dict.fromkeys(KEYS, float("inf"))])
 
 
+@pytest.mark.parametrize("argument", ["targets", "parameters", "given"])
+def test_one_name_is_no_list_of_names(dataset: Dataset, argument: str) -> None:
+    with pytest.raises(ConfigError, match=rf"^{argument}: 'task\.duration_s' is a text\n .* \['task\.duration_s'\]"):
+        fit(dataset, **{argument: "task.duration_s"})
+
+
+def test_one_throw_is_no_list_of_throws(model: Model) -> None:
+    point, place = dict.fromkeys(KEYS, 0.0), (1.2, -0.1)
+    for ask in (model.predict, lambda points: model.adapt(points, [place])):
+        with pytest.raises(ConfigError, match=r"^points: .* is a mapping\n  expected: a list of mappings"):
+            ask(point)
+    with pytest.raises(
+        ConfigError, match=r"^targets: 1\.2 is in the list\n  expected: a list of targets, each with land"
+    ):
+        model.aim(place)
+    with pytest.raises(ConfigError, match=r"^targets: '12' is a text"):
+        model.aim(["12"])
+    with pytest.raises(ConfigError, match=r"^places: 1\.2 is in the list\n  expected: a list of places"):
+        model.adapt([point], place)
+
+
+def test_what_is_no_number_is_shown(model: Model) -> None:
+    with pytest.raises(ConfigError, match="got 'a', 1"):
+        model.aim([("a", 1)])
+    with pytest.raises(ConfigError, match=f"throw 0: {KEYS[1]} is 'a'"):
+        model.predict([dict.fromkeys(KEYS, 0.0) | {KEYS[1]: "a"}])
+
+
 def test_adapting_wants_a_place_for_each_throw(model: Model) -> None:
     point = dict.fromkeys(KEYS, 0.0)
     with pytest.raises(ConfigError, match="1 throws and 0 places"):
