@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from enum import Enum
+from numbers import Integral
 from typing import Any, TypeVar
 
 from throwcollect.errors import ConfigError, Problem
@@ -65,6 +66,34 @@ def read_list(argument: str, given: Any, of: str, kinds: tuple[type, ...] = (str
         if not isinstance(each, kinds):
             raise refuse_argument(argument, f"{show_value(each)} is in the list", expected=f"a list of {of}")
     return elements
+
+
+def check_mapping(argument: str, given: object, example: str) -> None:
+    """Refuse what does not map keys to values, such as those of `example`.
+
+    Raises:
+        ConfigError: If it is no mapping, or a key in it is no text.
+    """
+    if not isinstance(given, Mapping) or not all(isinstance(key, str) for key in given):
+        raise refuse_argument(argument, f"got {show_value(given)}", expected=f"a mapping, such as {example}")
+
+
+def is_whole(given: object) -> bool:
+    """Whether a value is a whole number; True and False are none."""
+    return isinstance(given, Integral) and not isinstance(given, bool)
+
+
+def check_whole_number(argument: str, given: Any, *, least: int, most: int | None = None) -> None:
+    """Refuse what is no whole number of at least `least`, and at most `most` if there is such a bound.
+
+    Raises:
+        ConfigError: If it is none.
+    """
+    whole = is_whole(given)
+    if not whole or given < least or (most is not None and given > most):
+        bounds = f"{least} or more" if most is None else f"{least} to {most}"
+        expected = bounds if whole else f"a whole number, {bounds}"
+        raise refuse_argument(argument, f"got {show_value(given)}", expected=expected)
 
 
 def as_float(given: Any) -> float:

@@ -8,7 +8,15 @@ from collections.abc import Iterable
 import numpy as np
 import pytest
 
-from throwcollect.arguments import as_float, check_list, read_list, read_word, refuse_argument
+from throwcollect.arguments import (
+    as_float,
+    check_list,
+    check_mapping,
+    check_whole_number,
+    read_list,
+    read_word,
+    refuse_argument,
+)
 from throwcollect.errors import ConfigError, Problem
 from throwcollect.learning.learned_map import Kind
 
@@ -63,3 +71,26 @@ def test_to_be_checked_takes_nothing_out_of_a_list() -> None:
 def test_what_is_no_number_is_none_that_is_finite() -> None:
     assert as_float(np.float32(0.5)) == as_float("0.5") == 0.5
     assert all(math.isnan(as_float(each)) for each in ("a", None, [1], 10**400))
+
+
+def test_whole_numbers_have_bounds() -> None:
+    for given in (1, 3, np.int64(2)):
+        check_whole_number("processes", given, least=1, most=3)
+    for given, expected in (
+        (0, "1 to 3"),
+        (4, "1 to 3"),
+        (1.5, "a whole number, 1 to 3"),
+        (True, "a whole number, 1 to 3"),
+    ):
+        with pytest.raises(ConfigError, match=f"^processes: got {given}") as caught:
+            check_whole_number("processes", given, least=1, most=3)
+        assert caught.value.expected == expected
+    with pytest.raises(ConfigError, match=r"^replay: got '1'\n  expected: a whole number, 0 or more$"):
+        check_whole_number("replay", "1", least=0)
+
+
+@pytest.mark.parametrize("given", [[1], "a", {1: 2}])
+def test_what_maps_no_keys_is_refused(given: object) -> None:
+    check_mapping("values", {"a": 1}, "{'a': 1}")
+    with pytest.raises(ConfigError, match=r"^values: got .*\n  expected: a mapping, such as {'a': 1}$"):
+        check_mapping("values", given, "{'a': 1}")

@@ -17,10 +17,13 @@ from typing import Any, Literal
 import pyarrow as pa
 import pyarrow.compute as pc
 
+from throwcollect.arguments import show_value
 from throwcollect.errors import ConfigError, Problem
 
 _SHOWN = 100
 """Characters of an expression that a message shows."""
+
+_EXAMPLE = "outcome == 'landed' and landing_x_m > 1.5"
 
 _Kind = Literal["a number", "text", "a condition", "None"]
 
@@ -82,10 +85,13 @@ class Expression:
         is_argument: Whether that is an argument, for which commands have an option.
 
     Raises:
-        ConfigError: If it is no expression; all methods raise it for what cannot be evaluated.
+        ConfigError: If it is no expression, or no text; all methods raise it for what cannot be evaluated.
     """
 
     def __init__(self, text: str, *, place: str, is_argument: bool = True) -> None:
+        if not isinstance(text, str):
+            expected = f"a text, such as: {_EXAMPLE}"
+            raise ConfigError([Problem(f"got {show_value(text)}", place, argument=is_argument)], expected=expected)
         # Python would take a line break for the end of the expression.
         self._text = " ".join(text.splitlines()).strip()
         self._place = place
@@ -130,7 +136,7 @@ class Expression:
         shown = f"\n    {self._text[start : start + _SHOWN]}\n    {' ' * (column - start)}^"
         return ConfigError(
             [Problem(f"{problem} (character {column + 1}){shown}", self._place, argument=self._is_argument)],
-            expected="such as: outcome == 'landed' and landing_x_m > 1.5" if example else None,
+            expected=f"such as: {_EXAMPLE}" if example else None,
         )
 
 

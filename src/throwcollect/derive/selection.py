@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from throwcollect.arguments import read_list, refuse_argument
+from throwcollect.arguments import check_whole_number, is_whole, read_list, refuse_argument, show_value
 from throwcollect.dataset.expression import Expression
 from throwcollect.dataset.reader import Dataset
 from throwcollect.derive.derivation import Derived, derive
@@ -53,13 +53,15 @@ def sample(directory: StrPath, output: StrPath, *, count: int, seed: int = 0) ->
     With the same seed, which is not negative, fewer trials are some of more.
 
     Raises:
-        ConfigError: If the dataset has fewer episodes, or the directory cannot be used.
+        ConfigError: If the dataset has fewer episodes, a number is none, or the directory cannot be used.
         DatasetError: If the dataset is damaged, or the new one cannot be written.
     """
+    check_whole_number("seed", seed, least=0)
     dataset = Dataset.open(Path(directory))
     candidates = source(dataset).trials
-    if not 1 <= count <= len(candidates):
-        problem = f"should be from 1 to {len(candidates)}, the number of episodes of {directory}, got {count}"
+    if not (is_whole(count) and 1 <= count <= len(candidates)):
+        bounds = f"from 1 to {len(candidates)}, the number of episodes of {directory}"
+        problem = f"should be {bounds}, got {show_value(count)}"
         raise refuse_argument("count", problem)
     order = np.random.default_rng(seed).permutation(len(candidates))
     return derive([source(dataset, [candidates[place] for place in order[:count]])], Path(output))

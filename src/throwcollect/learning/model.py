@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from throwcollect.arguments import as_float, read_list, read_word, refuse_argument, show_value
+from throwcollect.arguments import as_float, check_whole_number, read_list, read_word, refuse_argument, show_value
 from throwcollect.config.loader import dump_yaml
 from throwcollect.config.target import LARGEST_TARGET
 from throwcollect.errors import ConfigError
@@ -157,9 +157,9 @@ class Model:
             ConfigError: If a number is out of its range.
             WorkerError: If a process of a simulator ends.
         """
-        for name, number, least in (("targets", targets, 1), ("seeds", seeds, 1), ("seed", seed, 0)):
-            if number < least:
-                raise refuse_argument(name, f"got {number}", expected=f"{least} or more")
+        for name, number in (("targets", targets), ("seeds", seeds), ("processes", processes)):
+            check_whole_number(name, number, least=1)
+        check_whole_number("seed", seed, least=0)
         _check_scatter(scatter)
         distilled = None if self.file.distilled is None else distil(leave_out_correction(self.learned))
         scores = [
@@ -388,6 +388,6 @@ def _check_scatter(scatter: float) -> None:
     Raises:
         ConfigError: If it is negative, no number, or as large as no target is.
     """
-    if not 0.0 <= scatter <= LARGEST_TARGET:
+    if not 0.0 <= as_float(scatter) <= LARGEST_TARGET:
         expected = f"0 to {LARGEST_TARGET:g}, in the unit of the targets"
-        raise refuse_argument("scatter", f"got {scatter}", expected=expected)
+        raise refuse_argument("scatter", f"got {show_value(scatter)}", expected=expected)

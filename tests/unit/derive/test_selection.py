@@ -177,3 +177,20 @@ def test_what_is_no_list_of_datasets_is_not_merged(collected: Path, tmp_path: Pa
     with pytest.raises(ConfigError, match=r"^directories: got none\n  expected: at least one dataset"):
         merge([], tmp_path / "new")
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("ask", "message"),
+    [
+        (
+            lambda *paths: filter_trials(*paths, where=lambda row: row),
+            "where: got <function .*\n  expected: a text, such as: ",
+        ),
+        (lambda *paths: sample(*paths, count="2"), "count: should be from 1 to 7, .*, got '2'"),
+        (lambda *paths: sample(*paths, count=2, seed=-1), "seed: got -1\n  expected: 0 or more"),
+    ],
+)
+def test_what_is_of_another_kind_is_told_by_its_name(collected: Path, tmp_path: Path, ask, message: str) -> None:
+    with pytest.raises(ConfigError, match=f"^{message}"):
+        ask(collected, tmp_path / "new")
+    assert list(tmp_path.iterdir()) == []

@@ -137,6 +137,12 @@ def test_a_rate_above_the_recorded_one_is_refused(rate_hz: int, source: Path, tm
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.parametrize("rate_hz", ["50", 50.5])
+def test_a_rate_is_a_whole_number(rate_hz: object, source: Path, tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match=f"^rate_hz: {rate_hz!r} samples.*\n  expected: a whole number, 1 to 250"):
+        export(source, tmp_path / "out", to="npz", rate_hz=rate_hz)
+
+
 @pytest.mark.parametrize("to", FORMATS)
 def test_a_dataset_without_episodes_cannot_be_exported(to: str, make_collection: Any, tmp_path: Path) -> None:
     empty = make_collection({"trials": 2}).collect(tmp_path / "empty", lost=[0, 1])

@@ -211,6 +211,12 @@ def test_one_throw_is_no_list_of_throws(model: Model) -> None:
         model.adapt([point], place)
 
 
+@pytest.mark.parametrize("argument", ["targets", "seed", "seeds", "processes", "scatter"])
+def test_a_score_takes_numbers_alone(model: Model, argument: str) -> None:
+    with pytest.raises(ConfigError, match=f"^{argument}: got 'a'"):
+        model.score(None, **{argument: "a"})
+
+
 def test_what_is_no_number_is_shown(model: Model) -> None:
     with pytest.raises(ConfigError, match="got 'a', 1"):
         model.aim([("a", 1)])
