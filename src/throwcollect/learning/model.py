@@ -27,6 +27,7 @@ from throwcollect.learning.model_file import AdaptationEntry, ModelFile, Trained
 from throwcollect.learning.score import Score, pool_scores
 from throwcollect.learning.scoring import Simulates, leave_out_correction, score_model
 from throwcollect.version import __version__
+from throwcollect.wording import format_count
 
 if TYPE_CHECKING:
     from throwcollect.dataset.reader import Dataset
@@ -51,7 +52,7 @@ class Aim:
     nearest: Array
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Model:
     """Where throws with given parameters end, and which parameters lead to a target.
 
@@ -68,6 +69,11 @@ class Model:
     learned: LearnedMap
     trials: NDArray[np.int64]
     config: str
+
+    def __repr__(self) -> str:
+        trained = self.file.trained_on
+        learned = f"{trained.name!r}, {self.learned.kind.value}, {format_count(trained.throws, 'throw')}"
+        return f"Model({learned}: {', '.join((*self.targets, *self.given))} -> {', '.join(self.parameters)})"
 
     @property
     def parameters(self) -> tuple[str, ...]:

@@ -45,6 +45,17 @@ def test_keys_have_the_role_that_they_play(model: Model) -> None:
     assert model.file.trained_on.throws == COUNT
 
 
+def test_a_model_shows_in_a_line_what_it_is(dataset: Dataset, model: Model) -> None:
+    assert (
+        repr(model)
+        == f"Model('{dataset.config.name}', local, {COUNT} throws: {', '.join(TARGETS)} -> {', '.join(KEYS)})"
+    )
+    given = fit(dataset, given=KEYS[2:])
+    assert repr(given).endswith(f"{', '.join((*TARGETS, KEYS[2]))} -> {', '.join(KEYS[:2])})")
+    for part in (model.file, model.learned):
+        assert len(repr(part)) < 1500 > len(str(part))
+
+
 def test_throws_that_all_end_close_together_are_learned_from(dataset: Dataset) -> None:
     near = dataset
     for number, column in enumerate(TARGETS):
