@@ -76,6 +76,8 @@ class Problem:
     """File that holds the key; None when it came from the command line."""
     line: int | None = None
     """Line in that file, counted from 1."""
+    argument: bool = False
+    """Whether the key is an argument of a function, for which commands have an option."""
 
     def __str__(self) -> str:
         where = str(self.path) if self.path else ""

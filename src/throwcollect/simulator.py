@@ -5,12 +5,12 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from types import TracebackType
 
 import numpy as np
 from numpy.typing import NDArray
 
+from throwcollect.arguments import as_float, check_list, check_mapping, check_whole_number, show_value
 from throwcollect.config.loader import load
 from throwcollect.config.schema import Config
 from throwcollect.config.sweep import MOST_TRIALS
@@ -36,6 +36,8 @@ require("pinocchio")
 
 Point = Mapping[str, float]
 """Values that replace those of the configuration, by dotted key, in the key's unit."""
+_POINT = "{'task.duration_s': 1.1}"
+_TARGET = "{'target_x_m': 1.4, 'target_y_m': -0.2}"
 
 
 class Simulator:
@@ -60,7 +62,7 @@ class Simulator:
     """
 
     def __init__(self, config: StrPath, *, overrides: Sequence[str] = ()) -> None:
-        self._start(load(Path(config), tuple(overrides)), os.fspath(config))
+        self._start(load(config, overrides), os.fspath(config))
 
     def _start(self, config: Config, source: str) -> None:
         """Make the robot and the physics engine of a configuration; `source` is the file that it was read from."""
@@ -101,14 +103,15 @@ class Simulator:
             PlanError: If the plan of a collection would refuse it, for the reason that it would have.
         """
         self._require_open()
-        if not 0 <= trial < MOST_TRIALS:
-            raise ConfigError(f"trial {trial}: there is no such trial", expected=f"0 to {MOST_TRIALS - 1}")
+        check_whole_number("trial", trial, least=0, most=MOST_TRIALS - 1)
+        check_mapping("values", {} if values is None else values, _POINT)
+        check_mapping("target", {} if target is None else target, _TARGET)
         point = dict(values or {})
         wrong = self.config.task.find_wrong_targets(target or {})
         wrong |= {
-            name: f"should be a number from {-LARGEST_TARGET:g} to {LARGEST_TARGET:g}, got {value}"
+            name: f"should be a number from {-LARGEST_TARGET:g} to {LARGEST_TARGET:g}, got {show_value(value)}"
             for name, value in (target or {}).items()
-            if not abs(value) <= LARGEST_TARGET
+            if not abs(as_float(value)) <= LARGEST_TARGET
         }
         if wrong:
             raise ConfigError([Problem(reason, key=name) for name, reason in wrong.items()])
@@ -127,6 +130,7 @@ class Simulator:
         Raises:
             ConfigError: If a key cannot vary, or a value is out of its range.
         """
+        check_mapping("values", values, _POINT)
         wrong = {key: reason for key in values if (reason := reason_not_sweepable(self.config, key)) is not None}
         if wrong:
             raise ConfigError([Problem(reason, key=key) for key, reason in wrong.items()])
@@ -151,8 +155,8 @@ class Simulator:
             ConflictError: If the simulator is closed.
             WorkerError: If the physics engine of a process does not start, or a process is killed.
         """
-        if processes < 1:
-            raise ConfigError(f"processes: got {processes}", expected="1 or more")
+        check_whole_number("processes", processes, least=1)
+        check_list("points", points, "mappings, one for each throw")
         self._require_open()
         if processes == 1:
             for trial, point in enumerate(points):

@@ -122,12 +122,40 @@ def test_wrong_values_are_named(simulator: Simulator, values: dict[str, float], 
 
 
 def test_there_are_no_numbers_but_those_of_trials(simulator: Simulator) -> None:
-    with pytest.raises(ConfigError, match="trial -1: there is no such trial"):
+    with pytest.raises(ConfigError, match="trial: got -1\n  expected: 0 to 9999999"):
         simulator.throw(trial=-1)
-    with pytest.raises(ConfigError, match="trial 10000000: there is no such trial"):
+    with pytest.raises(ConfigError, match="trial: got 10000000"):
         simulator.throw(trial=10_000_000)
     with pytest.raises(ConfigError, match="processes: got 0"):
         next(simulator.throw_many([{}], processes=0))
+
+
+def test_lists_are_not_taken_letter_by_letter(simulator: Simulator) -> None:
+    with pytest.raises(ConfigError, match=r"^overrides: 'task\.duration_s=1' is a text"):
+        Simulator(ROOT / "configs" / "quickstart.yaml", overrides="task.duration_s=1")
+    with pytest.raises(ConfigError, match=r"^points: {'task\.duration_s': 1\.1.* is a mapping"):
+        next(simulator.throw_many(POINT))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"trial": "1"}, "trial: got '1'"),
+        ({"values": [1.1]}, r"values: got \[1\.1\]\n  expected: a mapping, such as {'task\.duration_s': 1\.1}"),
+        ({"target": [1.4, 0.0]}, r"target: got \[1\.4, 0\.0\]\n  expected: a mapping, such as {'target_x_m'"),
+        ({"target": {"target_x_m": "a", "target_y_m": 0.0}}, "target_x_m: should be a number from .*, got 'a'"),
+    ],
+)
+def test_what_is_of_another_kind_is_told_by_its_name(simulator: Simulator, arguments, message: str) -> None:
+    with pytest.raises(ConfigError, match=f"^{message}"):
+        simulator.throw(**arguments)
+
+
+def test_values_are_a_mapping_for_all_who_ask(simulator: Simulator) -> None:
+    with pytest.raises(ConfigError, match=r"^values: got \[1\]"):
+        simulator.find_refusal([1])
+    with pytest.raises(ConfigError, match=r"^processes: got 1\.5\n  expected: a whole number, 1 or more"):
+        next(simulator.throw_many([{}], processes=1.5))
 
 
 def test_a_configuration_that_is_not_there_is_named(tmp_path: Path) -> None:

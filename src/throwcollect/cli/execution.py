@@ -9,6 +9,7 @@ import sys
 import traceback
 from collections.abc import Callable
 from contextlib import suppress
+from dataclasses import replace
 from typing import Any, NoReturn
 
 import typer
@@ -22,6 +23,8 @@ from throwcollect.wording import is_text, printable
 
 _WRONG_PATHS = (errno.ENAMETOOLONG, errno.ELOOP, errno.EACCES, errno.ENOTDIR)
 """Errors of the system that a path of the user may cause, and that are no errors of ours."""
+_OPTIONS = {"rate_hz": "--rate"}
+"""Options whose names are others than those of the arguments that they are given to."""
 
 
 def execute(command: Callable[..., Any]) -> NoReturn:
@@ -67,8 +70,21 @@ def _check_surroundings() -> None:
             raise ConfigError(f"{word}: should be UTF-8 text")
 
 
+def _name_options(error: ConfigError) -> ConfigError:
+    """Return the same error with the option in place of each argument, as users of commands know options alone."""
+    if not any(problem.argument for problem in error.problems):
+        return error
+    problems = [
+        replace(each, key=_OPTIONS.get(each.key, f"--{each.key}"), argument=False) if each.argument else each
+        for each in error.problems
+    ]
+    return type(error)(problems, expected=error.expected, hint=error.hint)
+
+
 def _describe(error: Exception) -> tuple[str, int]:
     """Message and exit code of an error."""
+    if isinstance(error, ConfigError):
+        error = _name_options(error)
     if isinstance(error, ThrowcollectError):
         return str(error), error.exit_code
     if isinstance(error, TyperException):

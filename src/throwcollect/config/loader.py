@@ -13,6 +13,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
+from throwcollect.arguments import read_list
 from throwcollect.config.document import Document, Plain
 from throwcollect.config.problems import MOST_EXAMINED, Finding, Location, findings, join_key
 from throwcollect.config.schema import Config, Range
@@ -43,6 +44,7 @@ def load(path: StrPath, overrides: Sequence[str] = ()) -> Config:
 
     Raises:
         ConfigError: If the file cannot be read or anything in it is wrong; it holds all problems, unknown keys first.
+            Also if the overrides are no list of texts.
     """
     with load_locating_errors(Path(path), overrides) as config:
         return config
@@ -55,8 +57,9 @@ def load_locating_errors(path: Path, overrides: Sequence[str] = ()) -> Iterator[
     Raises:
         ConfigError: If the file cannot be read or anything in it is wrong, or the block raises one.
     """
+    settings = read_list("overrides", overrides, "texts KEY=VALUE")
     document = Document(path)
-    for override in overrides:
+    for override in settings:
         document.override(override, find_default=partial(_find_default, document.values))
     config, found, more = _check(document.values)
     if config is not None and document.is_overridden(_SIMULATIONS):

@@ -17,10 +17,13 @@ from typing import Any, Literal
 import pyarrow as pa
 import pyarrow.compute as pc
 
+from throwcollect.arguments import show_value
 from throwcollect.errors import ConfigError, Problem
 
 _SHOWN = 100
 """Characters of an expression that a message shows."""
+
+_EXAMPLE = "outcome == 'landed' and landing_x_m > 1.5"
 
 _Kind = Literal["a number", "text", "a condition", "None"]
 
@@ -74,16 +77,25 @@ class _Value:
 
 
 class Expression:
-    """An expression on the columns of a table; messages say that it was given as `place`, such as ``--where``.
+    """An expression on the columns of a table.
+
+    Args:
+        text: The expression.
+        place: What messages begin with: the argument that the expression was given as, such as ``where``.
+        is_argument: Whether that is an argument, for which commands have an option.
 
     Raises:
-        ConfigError: If it is no expression; all methods raise it for what cannot be evaluated.
+        ConfigError: If it is no expression, or no text; all methods raise it for what cannot be evaluated.
     """
 
-    def __init__(self, text: str, *, place: str) -> None:
+    def __init__(self, text: str, *, place: str, is_argument: bool = True) -> None:
+        if not isinstance(text, str):
+            expected = f"a text, such as: {_EXAMPLE}"
+            raise ConfigError([Problem(f"got {show_value(text)}", place, argument=is_argument)], expected=expected)
         # Python would take a line break for the end of the expression.
         self._text = " ".join(text.splitlines()).strip()
         self._place = place
+        self._is_argument = is_argument
         try:
             self._tree = ast.parse(self._text, mode="eval").body
         except SyntaxError as error:
@@ -123,8 +135,8 @@ class Expression:
         start = max(0, column - _SHOWN // 2)
         shown = f"\n    {self._text[start : start + _SHOWN]}\n    {' ' * (column - start)}^"
         return ConfigError(
-            [Problem(f"{problem} (character {column + 1}){shown}", self._place)],
-            expected="such as: outcome == 'landed' and landing_x_m > 1.5" if example else None,
+            [Problem(f"{problem} (character {column + 1}){shown}", self._place, argument=self._is_argument)],
+            expected=f"such as: {_EXAMPLE}" if example else None,
         )
 
 

@@ -13,6 +13,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 from numpy.typing import NDArray
 
+from throwcollect.arguments import read_list
 from throwcollect.config.schema import Config
 from throwcollect.config.sweep import Range
 from throwcollect.dataset.bag import read_bag_metadata
@@ -293,7 +294,7 @@ class Dataset(Sequence[Throw]):
             DatasetError: If a trial is not among the throws.
         """
         if isinstance(which, str):
-            return self._take(Expression(which, place="select").rows(self.throws))
+            return self._take(Expression(which, place="select", is_argument=False).rows(self.throws))
         if isinstance(which, pc.Expression):
             try:
                 return self._with(self.throws.filter(which))
@@ -325,18 +326,16 @@ class Dataset(Sequence[Throw]):
             threads: How many of them work; None for one a core, up to 4.
 
         Raises:
-            ConfigError: If there is no such column or joint, or a text is given where a list of names belongs.
+            ConfigError: If there is no such column or joint, or columns or joints are no list of names.
             DatasetError: If an episode is not where the table says, or it is damaged; CRCs are compared.
         """
-        for given in (columns, joints):
-            if isinstance(given, str):
-                raise ConfigError(f"trajectories: {given!r} is a text", expected=f"a list of names: [{given!r}]")
         trials, known = self.throws["trial"].to_pylist(), self.joints
-        chosen = known if joints is None else tuple(joints)
+        chosen = known if joints is None else read_list("joints", joints, "names")
         for joint in chosen:
             if joint not in known:
                 raise ConfigError(f"{robot_of(self.config).title} has no joint {joint!r}", expected=", ".join(known))
-        return read_trajectories(trials, self._stored, tuple(columns), chosen, threads=threads)
+        wanted = read_list("columns", columns, "names")
+        return read_trajectories(trials, self._stored, wanted, chosen, threads=threads)
 
     @property
     def joints(self) -> tuple[str, ...]:

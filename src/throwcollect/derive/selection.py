@@ -5,16 +5,17 @@ The directory of the new dataset must not exist, or be empty.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
+from throwcollect.arguments import check_whole_number, is_whole, read_list, refuse_argument, show_value
 from throwcollect.dataset.expression import Expression
 from throwcollect.dataset.reader import Dataset
 from throwcollect.derive.derivation import Derived, derive
 from throwcollect.derive.source import source
-from throwcollect.errors import ConfigError, Problem
 from throwcollect.files import StrPath
 
 
@@ -22,10 +23,13 @@ def merge(directories: Sequence[StrPath], output: StrPath) -> Derived:
     """Put the trials of several datasets, at least one, one after the other into a new one.
 
     Raises:
-        ConfigError: If the datasets differ in keys that cannot be swept, or the directory cannot be used.
+        ConfigError: If there is no dataset, they differ in keys that cannot be swept, or the directory cannot be used.
         DatasetError: If a dataset is damaged, or the new one cannot be written.
     """
-    return derive([source(Dataset.open(Path(directory))) for directory in directories], Path(output))
+    listed = read_list("directories", directories, "directories", (str, os.PathLike))
+    if not listed:
+        raise refuse_argument("directories", "got none", expected="at least one dataset")
+    return derive([source(Dataset.open(Path(directory))) for directory in listed], Path(output))
 
 
 def filter_trials(directory: StrPath, output: StrPath, *, where: str) -> Derived:
@@ -35,12 +39,11 @@ def filter_trials(directory: StrPath, output: StrPath, *, where: str) -> Derived
         ConfigError: If the condition cannot be evaluated or no trial fulfils it, or the directory cannot be used.
         DatasetError: If the dataset is damaged, or the new one cannot be written.
     """
-    condition = Expression(where, place="--where")
+    condition = Expression(where, place="where")
     dataset = Dataset.open(Path(directory))
     chosen = source(dataset, condition.rows(dataset.throws))
     if not chosen.trials:
-        problem = f"no trial of {directory} that has an episode fulfils {where!r}"
-        raise ConfigError([Problem(problem, "--where")])
+        raise refuse_argument("where", f"no trial of {directory} that has an episode fulfils {where!r}")
     return derive([chosen], Path(output))
 
 
@@ -50,13 +53,15 @@ def sample(directory: StrPath, output: StrPath, *, count: int, seed: int = 0) ->
     With the same seed, which is not negative, fewer trials are some of more.
 
     Raises:
-        ConfigError: If the dataset has fewer episodes, or the directory cannot be used.
+        ConfigError: If the dataset has fewer episodes, a number is none, or the directory cannot be used.
         DatasetError: If the dataset is damaged, or the new one cannot be written.
     """
+    check_whole_number("seed", seed, least=0)
     dataset = Dataset.open(Path(directory))
     candidates = source(dataset).trials
-    if not 1 <= count <= len(candidates):
-        problem = f"should be from 1 to {len(candidates)}, the number of episodes of {directory}, got {count}"
-        raise ConfigError([Problem(problem, "--count")])
+    if not (is_whole(count) and 1 <= count <= len(candidates)):
+        bounds = f"from 1 to {len(candidates)}, the number of episodes of {directory}"
+        problem = f"should be {bounds}, got {show_value(count)}"
+        raise refuse_argument("count", problem)
     order = np.random.default_rng(seed).permutation(len(candidates))
     return derive([source(dataset, [candidates[place] for place in order[:count]])], Path(output))

@@ -15,18 +15,18 @@ from dataclasses import asdict, dataclass
 from fractions import Fraction
 from itertools import accumulate
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import pyarrow as pa
 from pydantic import TypeAdapter, ValidationError
 
+from throwcollect.arguments import as_float, check_mapping, read_list, refuse_argument
 from throwcollect.config.kinds import Name
 from throwcollect.dataset.expression import Expression
 from throwcollect.dataset.reader import Dataset
 from throwcollect.derive.derivation import Derived, derive
 from throwcollect.derive.source import Source, source
 from throwcollect.derive.trial_list import list_of_trials
-from throwcollect.errors import ConfigError, Problem
 from throwcollect.files import StrPath, new_directory
 from throwcollect.sweep.digest import trial_digests
 
@@ -36,6 +36,8 @@ _NUMBER = re.compile(r"\s*(\d*\.?\d+|\d+/\d+)\s*")
 _NAME = TypeAdapter[str](Name)
 _LONGEST_NAME = 64
 _HASHES = 2**64
+_FINEST = 10**9
+"""Largest denominator of a share that is given as a float."""
 
 Cell = tuple[int, ...]
 """Number of the cell along each axis."""
@@ -74,14 +76,19 @@ class Split:
 
 
 def split(
-    directory: StrPath, output: StrPath, *, fractions: str, cells: Sequence[str] = SQUARES, seed: int = 0
+    directory: StrPath,
+    output: StrPath,
+    *,
+    fractions: str | Mapping[str, float],
+    cells: Sequence[str] = SQUARES,
+    seed: int = 0,
 ) -> Split:
     """Split a dataset into parts, each a dataset of its own.
 
     Args:
         directory: The dataset.
         output: Directory that gets one directory a part; it must not exist or be empty.
-        fractions: Names of the parts and their shares of the cells: ``train=0.8,test=0.2``.
+        fractions: Names of the parts and their shares of the cells: ``train=0.8,test=0.2``, or a mapping of them.
         cells: Axes of the space that is cut into cells: an expression on columns of the table of throws (see
             `dataset.expression`) and the width of the cells along it, each: ``landing_x_m=0.05``.
         seed: Seed of the choice.
@@ -103,7 +110,7 @@ def split(
 
 
 def assign(
-    everything: Source, *, fractions: str, cells: Sequence[str] = SQUARES, seed: int = 0
+    everything: Source, *, fractions: str | Mapping[str, float], cells: Sequence[str] = SQUARES, seed: int = 0
 ) -> dict[str, dict[int, Cell | None]]:
     """Decide which trials each part gets by the arguments of `split`.
 
@@ -123,8 +130,9 @@ def assign(
         part = _choose_part(f"trial {digest.tobytes().hex()}" if cell is None else f"cell {list(cell)}", shares, seed)
         members[part][trial] = cell
     if empty := [name for name, trials in members.items() if not trials]:
-        raise ConfigError(
-            [Problem(f"{', '.join(empty)} would get none of the {len(places)} trials", "--fractions")],
+        raise refuse_argument(
+            "fractions",
+            f"{', '.join(empty)} would get none of the {len(places)} trials",
             hint="larger fractions, smaller cells, or another seed",
         )
     return members
@@ -137,11 +145,11 @@ def _find_cells(axes: Sequence[str], throws: pa.Table) -> list[Cell | None]:
         ConfigError: If an axis is no expression with a width, or cannot be evaluated.
     """
     columns = []
-    for text in axes:
-        name, width = _read_pair(text, "--cells", "an expression and the width of cells, such as landing_x_m=0.05")
+    for text in read_list("cells", axes, "texts EXPRESSION=WIDTH"):
+        name, width = _read_pair(text, "cells", "an expression and the width of cells, such as landing_x_m=0.05")
         if not float(width) > 0:
-            raise ConfigError([Problem(f"the width of cells should be above 0, got {text!r}", "--cells")])
-        values = Expression(name, place="--cells").numbers(throws)
+            raise refuse_argument("cells", f"the width of cells should be above 0, got {text!r}")
+        values = Expression(name, place="cells").numbers(throws)
         columns.append([_number_along(value, float(width)) for value in values])
     return [None if None in cell else cell for cell in zip(*columns, strict=True)]
 
@@ -157,9 +165,25 @@ def _choose_part(hashed: str, shares: Mapping[str, Fraction], seed: int) -> str:
     return next(name for name, end in zip(shares, accumulate(shares.values()), strict=True) if place < end)
 
 
-def _read_shares(text: str) -> dict[str, Fraction]:
+def _write_shares(shares: object) -> str:
+    """Write a mapping as commands have it; shares as fractions, as a float that is a third makes no whole.
+
+    Raises:
+        ConfigError: If it is no mapping.
+    """
+    check_mapping("fractions", shares, "{'train': 0.8, 'test': 0.2}, or the text train=0.8,test=0.2")
+    texts = []
+    for name, share in cast(Mapping[str, object], shares).items():
+        number = as_float(share)
+        # What is no number is refused where the text is read.
+        texts.append(f"{name}={Fraction(number).limit_denominator(_FINEST) if math.isfinite(number) else share}")
+    return ",".join(texts)
+
+
+def _read_shares(given: str | Mapping[str, float]) -> dict[str, Fraction]:
+    text = given if isinstance(given, str) else _write_shares(given)
     what = "a part and its share, such as train=0.8"
-    pairs = [_read_pair(item, "--fractions", what) for item in text.split(",")]
+    pairs = [_read_pair(item, "fractions", what) for item in text.split(",")]
     shares = dict(pairs)
     problem = None
     if len(shares) < len(pairs):
@@ -176,11 +200,11 @@ def _read_shares(text: str) -> dict[str, Fraction]:
         except ValidationError:
             problem = f"{name!r} should be lower-case letters, digits, - and _, first a letter or digit"
     if problem:
-        raise ConfigError([Problem(f"{problem}, got {text!r}", "--fractions")])
+        raise refuse_argument("fractions", f"{problem}, got {text!r}")
     return shares
 
 
-def _read_pair(text: str, option: str, what: str) -> tuple[str, Fraction]:
+def _read_pair(text: str, argument: str, what: str) -> tuple[str, Fraction]:
     # The expression itself may have `=` in it, such as `==`.
     name, _, number = text.rpartition("=")
     try:
@@ -190,7 +214,7 @@ def _read_pair(text: str, option: str, what: str) -> tuple[str, Fraction]:
     except (ValueError, ArithmeticError):
         value = None
     if value is None or not name.strip():
-        raise ConfigError([Problem(f"should be {what}, got {text!r}", option)])
+        raise refuse_argument(argument, f"should be {what}, got {text!r}")
     return name.strip(), value
 
 

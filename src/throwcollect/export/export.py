@@ -6,8 +6,8 @@ import shutil
 from dataclasses import dataclass
 from pathlib import Path
 
+from throwcollect.arguments import refuse_argument
 from throwcollect.dataset.directory import CARD, CONFIG
-from throwcollect.errors import ConfigError
 from throwcollect.export.exporter import Exporter
 from throwcollect.export.readme import render_card
 from throwcollect.export.throw_source import Source
@@ -47,7 +47,7 @@ def export(directory: StrPath, output: StrPath, *, to: str, rate_hz: int | None 
     """
     formats = names_of("exporters")
     if to not in formats:
-        raise ConfigError(f"--to: unknown format {to!r}", expected=f"one of {', '.join(formats)}")
+        raise refuse_argument("to", f"unknown format {to!r}", expected=f"one of {', '.join(formats)}")
     chosen: Exporter = load_member("exporters", to)
     require(*chosen.packages, extra="export")
     directory, output = Path(directory), Path(output)

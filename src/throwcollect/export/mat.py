@@ -13,9 +13,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from throwcollect.arguments import refuse_argument
 from throwcollect.config.schema import Config, DynamicMovementPrimitive
 from throwcollect.config.task import TaskConfig
-from throwcollect.errors import ConfigError, DatasetError
+from throwcollect.errors import DatasetError
 from throwcollect.export.exporter import Exporter
 from throwcollect.export.npz import to_array
 from throwcollect.export.readme import Layout, list_joints
@@ -89,13 +90,15 @@ def write(source: Source, directory: Path) -> None:
     """
     task = source.dataset.config.task
     if not task.throws:
-        raise ConfigError(
-            f"--to: mat has the structure of a throwing database, and the task {task.name} throws no ball",
+        raise refuse_argument(
+            "to",
+            f"mat has the structure of a throwing database, and the task {task.name} throws no ball",
             expected="another format",
         )
     if long := [name for name in source.table.column_names if len(name) > _LONGEST_NAME]:
-        raise ConfigError(
-            f"--to: mat has no room for the name of the column {long[0]}",
+        raise refuse_argument(
+            "to",
+            f"mat has no room for the name of the column {long[0]}",
             expected=f"at most {_LONGEST_NAME} characters, or another format",
         )
     # An array of objects, as texts are, becomes a cell array; one of texts would become a matrix of characters.
@@ -119,7 +122,7 @@ def _save(path: Path, variables: Mapping[str, Any]) -> None:
             raise DatasetError(
                 f"{path.name}: {name} would have {size / 2**30:.1f} GiB",
                 expected="less than 2 GiB, which is what MATLAB files of version 5 can hold",
-                hint="export at a lower --rate, or another format",
+                hint="export at a lower rate, or another format",
             )
     scipy_io.savemat(path, variables, do_compression=True, long_field_names=True)
 

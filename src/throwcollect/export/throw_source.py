@@ -10,11 +10,12 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
+from throwcollect.arguments import is_whole, refuse_argument, show_value
 from throwcollect.config.target import TargetColumn
 from throwcollect.dataset.damage import locating_damage
 from throwcollect.dataset.reader import Dataset
 from throwcollect.episode.record import Samples
-from throwcollect.errors import ConfigError, DatasetError
+from throwcollect.errors import DatasetError
 from throwcollect.export.resampling import count_resampled, resample
 from throwcollect.export.signals import Signal, list_signals, unit_of
 from throwcollect.robots.quintic_curve import sample_quintic
@@ -97,10 +98,12 @@ class Source:
         """
         dataset = Dataset.open(directory)
         recorded_hz = dataset.config.record.rate_hz
-        if rate_hz is not None and not 1 <= rate_hz <= recorded_hz:
-            raise ConfigError(
-                f"--rate: {rate_hz} samples per second",
-                expected=f"1 to {recorded_hz}, at which {directory} was recorded",
+        if rate_hz is not None and not (is_whole(rate_hz) and 1 <= rate_hz <= recorded_hz):
+            kind = "" if is_whole(rate_hz) else "a whole number, "
+            raise refuse_argument(
+                "rate_hz",
+                f"{show_value(rate_hz)} samples per second",
+                expected=f"{kind}1 to {recorded_hz}, at which {directory} was recorded",
             )
         if not len(dataset.recorded):
             raise DatasetError(f"{directory}: none of its {len(dataset.throws)} trials has an episode to export")

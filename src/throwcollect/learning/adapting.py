@@ -224,7 +224,7 @@ def _step_inside(normal: Array, right: Array, found: Array, low: Array, high: Ar
             raise ConfigError(
                 "the throws ended too far from where the model has them",
                 expected="places in the unit of the targets",
-                hint="--method offset takes any place",
+                hint="the method offset takes any place",
             )
         bounded = np.clip(unbounded, low, high)
         leaving = free & (bounded != unbounded)

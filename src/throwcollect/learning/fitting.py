@@ -86,7 +86,7 @@ def fit_map(
     columns = tuple(targets) or config.task.targets
     if not columns:
         raise ConfigError(
-            f"the task {config.task.name} names no targets", expected="columns of the table of throws, by --targets"
+            f"the task {config.task.name} names no targets", expected="columns of the table of throws as targets"
         )
     throws = dataset.throws.filter(pc.equal(dataset.throws["outcome"], config.task.success))
     axes = _find_axes(dataset, throws, parameters, context)
@@ -179,13 +179,14 @@ def _check_amount(dataset: Dataset, throws: pa.Table, axes: tuple[Axis, ...]) ->
     chosen = [axis.key for axis in axes if axis.role is Role.PARAMETER]
     if not chosen:
         raise ConfigError(
-            f"{dataset.directory}: no parameter of the task varies", expected="a sweep of task.… keys, or --parameters"
+            f"{dataset.directory}: no parameter of the task varies",
+            expected="a sweep of task.… keys, or other parameters",
         )
     if len(chosen) > MOST_PARAMETERS:
         raise ConfigError(
             f"{len(chosen)} parameters: {join_names(chosen)}",
             expected=f"at most {MOST_PARAMETERS}",
-            hint="choose some of them by --parameters; the others count as unknown",
+            hint="choose some of them as parameters; the others count as unknown",
         )
     if len(throws) < (needed := count_needed_throws(len(chosen))):
         raise ConfigError(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from enum import Enum
 from functools import cached_property
 
@@ -97,11 +97,11 @@ class LearnedMap:
     kind: Kind
     axes: tuple[Axis, ...]
     targets: tuple[str, ...]
-    forward: Polynomial
-    effort: Polynomial
-    values: Array
-    outputs: Array
-    efforts: Array
+    forward: Polynomial = field(repr=False)
+    effort: Polynomial = field(repr=False)
+    values: Array = field(repr=False)
+    outputs: Array = field(repr=False)
+    efforts: Array = field(repr=False)
     correction: Correction
 
     @cached_property

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from enum import Enum
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from throwcollect.arguments import as_float, check_whole_number, read_list, read_word, refuse_argument, show_value
 from throwcollect.config.loader import dump_yaml
 from throwcollect.config.target import LARGEST_TARGET
 from throwcollect.errors import ConfigError
@@ -27,11 +27,10 @@ from throwcollect.learning.model_file import AdaptationEntry, ModelFile, Trained
 from throwcollect.learning.score import Score, pool_scores
 from throwcollect.learning.scoring import Simulates, leave_out_correction, score_model
 from throwcollect.version import __version__
+from throwcollect.wording import format_count
 
 if TYPE_CHECKING:
     from throwcollect.dataset.reader import Dataset
-
-_Word = TypeVar("_Word", bound=Enum)
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +52,7 @@ class Aim:
     nearest: Array
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Model:
     """Where throws with given parameters end, and which parameters lead to a target.
 
@@ -70,6 +69,11 @@ class Model:
     learned: LearnedMap
     trials: NDArray[np.int64]
     config: str
+
+    def __repr__(self) -> str:
+        trained = self.file.trained_on
+        learned = f"{trained.name!r}, {self.learned.kind.value}, {format_count(trained.throws, 'throw')}"
+        return f"Model({learned}: {', '.join((*self.targets, *self.given))} -> {', '.join(self.parameters)})"
 
     @property
     def parameters(self) -> tuple[str, ...]:
@@ -114,10 +118,10 @@ class Model:
             ConfigError: If a target has another number of values, is no number or beyond 1e6, or the choice is unknown.
         """
         names = (*self.targets, *self.given)
-        rows = np.array([self._check_target(target, names) for target in targets], np.float64).reshape(-1, len(names))
+        rows = _read_places("targets", targets, names)
         ends, values = rows[:, : len(self.targets)], rows[:, len(self.targets) :]
         context = self.learned.scale(Role.CONTEXT, values)
-        found = aim(self.learned, ends, context, _read_word(Choice, "--choose", choose))
+        found = aim(self.learned, ends, context, read_word("choose", choose, Choice))
         chosen = self.learned.unscale(Role.PARAMETER, found.parameters)
         inside = np.all(np.abs(context) <= 1.0, axis=1).tolist()
         return [
@@ -159,9 +163,9 @@ class Model:
             ConfigError: If a number is out of its range.
             WorkerError: If a process of a simulator ends.
         """
-        for name, number, least in (("targets", targets, 1), ("seeds", seeds, 1), ("seed", seed, 0)):
-            if number < least:
-                raise ConfigError(f"--{name}: got {number}", expected=f"{least} or more")
+        for name, number in (("targets", targets), ("seeds", seeds), ("processes", processes)):
+            check_whole_number(name, number, least=1)
+        check_whole_number("seed", seed, least=0)
         _check_scatter(scatter)
         distilled = None if self.file.distilled is None else distil(leave_out_correction(self.learned))
         scores = [
@@ -202,16 +206,17 @@ class Model:
                 there is no such method, or a parameter or context is far outside of the range of the dataset.
         """
         parameters, context = self._inputs(points)
-        measured = np.array([self._check_target(place, self.targets) for place in places], np.float64)
+        measured = _read_places("places", places, self.targets)
         if not len(measured) or len(measured) != len(parameters):
             raise ConfigError(
                 f"{len(parameters)} throws and {len(measured)} places", expected="one place for each throw"
             )
         _check_scatter(scatter)
-        chosen = None if method is None else _read_word(Method, "--method", method)
+        chosen = None if method is None else read_word("method", method, Method)
         if chosen is Method.LATENT and not self.latents:
-            raise ConfigError(
-                "--method latent: the dataset has no latents",
+            raise refuse_argument(
+                "method",
+                "'latent': the dataset has no latents",
                 expected="a dataset whose sweep varies the world",
                 hint="try bias",
             )
@@ -269,34 +274,21 @@ class Model:
             ConfigError: If a key is missing or unknown, or a value is not finite.
         """
         names = (*self.parameters, *self.given)
+        listed = read_list("points", points, "mappings, one for each throw", (Mapping,))
         rows = []
-        for number, point in enumerate(points):
+        for number, point in enumerate(listed):
             if wrong := sorted(set(point) ^ set(names)):
                 state = "is missing" if wrong[0] in names else "is no key of this model"
                 raise ConfigError(f"throw {number}: {wrong[0]} {state}", expected=f"values of {', '.join(names)}")
-            rows.append([float(point[name]) for name in names])
+            rows.append([as_float(point[name]) for name in names])
         values = np.array(rows, np.float64).reshape(-1, len(names))
         if not np.isfinite(values).all():
             number, column = (int(each[0]) for each in np.nonzero(~np.isfinite(values)))
-            raise ConfigError(
-                f"throw {number}: {names[column]} is {values[number, column]}", expected="a finite number"
-            )
+            value = show_value(listed[number][names[column]])
+            raise ConfigError(f"throw {number}: {names[column]} is {value}", expected="a finite number")
         split = len(self.parameters)
         parameters = self.learned.scale(Role.PARAMETER, values[:, :split])
         return parameters, self.learned.scale(Role.CONTEXT, values[:, split:])
-
-    @staticmethod
-    def _check_target(values: Sequence[float], names: Sequence[str]) -> list[float]:
-        """Read the numbers of a target.
-
-        Raises:
-            ConfigError: If there are not as many as names, or one is not finite, or so large that powers of it are not.
-        """
-        row = [float(value) for value in values]
-        if len(row) != len(names) or not (np.abs(row) <= LARGEST_TARGET).all():
-            wanted = f"finite numbers of at most {LARGEST_TARGET:g}: {', '.join(names)}"
-            raise ConfigError(f"got {', '.join(map(str, row))}", expected=wanted)
-        return row
 
 
 def fit(
@@ -324,15 +316,21 @@ def fit(
             or too few throws succeeded.
         DatasetError: If the directory holds no finished dataset, or the dataset is damaged.
     """
+    from throwcollect.dataset.expression import Expression
     from throwcollect.dataset.reader import Dataset
 
-    chosen = _read_word(Kind, "--kind", kind)
+    chosen = read_word("kind", kind, Kind)
+    columns = read_list("targets", targets, "names")
+    keys, known = read_list("parameters", parameters, "keys"), read_list("given", given, "keys")
     if not isinstance(dataset, Dataset):
         dataset = Dataset.open(dataset)
-    throws = dataset if where is None else dataset.select(where)
-    if where is not None and not throws:
-        raise ConfigError(f"--where: no {dataset.config.task.noun} of {dataset.directory} fulfils {where!r}")
-    found = fit_map(throws, kind=chosen, targets=targets, parameters=parameters, context=given)
+    throws = dataset
+    if where is not None:
+        rows = Expression(where, place="where").rows(dataset.throws)
+        if not rows:
+            raise refuse_argument("where", f"no {dataset.config.task.noun} of {dataset.directory} fulfils {where!r}")
+        throws = dataset.select(dataset["trial"][rows])
+    found = fit_map(throws, kind=chosen, targets=columns, parameters=keys, context=known)
     return Model(_describe(found, dataset, where), found.learned, found.trials, dump_yaml(dataset.config))
 
 
@@ -372,16 +370,22 @@ def _describe(found: Fit, dataset: Dataset, where: str | None) -> ModelFile:
     )
 
 
-def _read_word(words: type[_Word], name: str, text: str) -> _Word:
-    """Find the member of an enumeration that a word of the caller stands for.
+def _read_places(argument: str, given: Iterable[Sequence[float]], names: Sequence[str]) -> Array:
+    """Read targets, or places where throws ended, shape ``(n, n_names)``.
 
     Raises:
-        ConfigError: If there is no such member.
+        ConfigError: If there are not as many numbers as names in each, or one is not finite, or so large that powers
+            of it are not.
     """
-    try:
-        return words(text)
-    except ValueError:
-        raise ConfigError(f"{name}: {text!r}", expected=f"one of {', '.join(each.value for each in words)}") from None
+    rows = []
+    for place in read_list(argument, given, f"{argument}, each with {', '.join(names)}", (Iterable,)):
+        numbers = read_list(argument, place, "numbers", (object,))
+        row = [as_float(number) for number in numbers]
+        if len(row) != len(names) or not (np.abs(row) <= LARGEST_TARGET).all():
+            wanted = f"finite numbers of at most {LARGEST_TARGET:g}: {', '.join(names)}"
+            raise ConfigError(f"got {', '.join(map(show_value, numbers))}", expected=wanted)
+        rows.append(row)
+    return np.array(rows, np.float64).reshape(-1, len(names))
 
 
 def _check_scatter(scatter: float) -> None:
@@ -390,5 +394,6 @@ def _check_scatter(scatter: float) -> None:
     Raises:
         ConfigError: If it is negative, no number, or as large as no target is.
     """
-    if not 0.0 <= scatter <= LARGEST_TARGET:
-        raise ConfigError(f"scatter: got {scatter}", expected=f"0 to {LARGEST_TARGET:g}, in the unit of the targets")
+    if not 0.0 <= as_float(scatter) <= LARGEST_TARGET:
+        expected = f"0 to {LARGEST_TARGET:g}, in the unit of the targets"
+        raise refuse_argument("scatter", f"got {show_value(scatter)}", expected=expected)

@@ -97,12 +97,12 @@ class ModelFile(Entry):
     kind: Kind
     axes: tuple[Axis, ...] = Field(min_length=1)
     targets: tuple[str, ...] = Field(min_length=1)
-    forward: Polynomial
-    effort: Polynomial
+    forward: Polynomial = Field(repr=False)
+    effort: Polynomial = Field(repr=False)
     correction: Correction
     trained_on: TrainedOn
     adaptation: AdaptationEntry | None
-    distilled: DistilledMap | None = None
+    distilled: DistilledMap | None = Field(default=None, repr=False)
 
     @model_validator(mode="after")
     def _fits_together(self) -> ModelFile:

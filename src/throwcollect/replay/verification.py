@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 from contextlib import suppress
 from pathlib import Path
 
+from throwcollect.arguments import check_whole_number
 from throwcollect.coordinator.prepare import feasibility_check
 from throwcollect.dataset.findings import Finding
 from throwcollect.dataset.reader import Dataset
@@ -39,11 +40,14 @@ def verify_dataset(
         The problems, file by file; empty if there are none.
 
     Raises:
+        ConfigError: If a number is out of its range.
         DatasetError: If the directory holds no finished dataset.
         MissingExtraError: If throws are to be simulated, and the extra ``collect`` is not installed.
         WorkerError: If the physics engine does not start.
     """
+    check_whole_number("processes", processes, least=1)
     if replay is not None:
+        check_whole_number("replay", replay, least=0)
         # If the dataset cannot be opened, `verify` below reports why.
         with suppress(DatasetError):
             require_simulating(Dataset.open(directory).config.sim.engine)

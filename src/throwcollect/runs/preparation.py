@@ -10,6 +10,7 @@ from datetime import datetime, timezone
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from throwcollect.arguments import check_whole_number
 from throwcollect.config.loader import load_locating_errors
 from throwcollect.config.schema import Config
 from throwcollect.coordinator.onlooker import SILENT, Onlooker
@@ -84,10 +85,11 @@ def prepare(
         onlooker: Is told what goes on.
 
     Raises:
-        ConfigError: If the configuration, the sweep or the output directory cannot be used.
+        ConfigError: If the configuration, the sweep, the output directory or the number of processes cannot be used.
         WorkerError: If the runtime that is asked for cannot be used.
         DatasetError: If the dataset cannot be written.
     """
+    check_whole_number("processes", processes, least=1)
     started = datetime.now(timezone.utc)
     with load_locating_errors(Path(config), overrides) as read:
         directory = _name_directory(read.name) if output is None else Path(output)

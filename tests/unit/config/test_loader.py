@@ -231,3 +231,13 @@ def test_the_number_of_simulations_in_a_file_is_for_other_runtimes(write, asked:
 def test_a_wrong_number_of_simulations_is_told_once(problems_of) -> None:
     (problem,) = problems_of("name: a", "run.runtime=inprocess", "run.simulations=many")
     assert problem.startswith("run.simulations: should be a whole number")
+
+
+def test_overrides_that_are_no_list_of_texts_are_refused_at_once(write) -> None:
+    path = write("name: some")
+    with pytest.raises(ConfigError, match=r"^overrides: 'task\.duration_s=1' is a text") as caught:
+        load(path, "task.duration_s=1")
+    assert caught.value.expected == "a list of texts KEY=VALUE: ['task.duration_s=1']"
+    for wrong in ({"task.duration_s": 1}, [1]):
+        with pytest.raises(ConfigError, match=r"^overrides: .*\n  expected: a list of texts KEY=VALUE$"):
+            load(path, wrong)

@@ -20,7 +20,7 @@ TABLE = pa.table(
 
 
 def rows(text: str) -> list[int]:
-    return Expression(text, place="--where").rows(TABLE)
+    return Expression(text, place="where").rows(TABLE)
 
 
 def test_conditions_are_python_on_columns() -> None:
@@ -45,9 +45,9 @@ def test_arithmetic_is_that_of_real_numbers() -> None:
     assert rows("trial // 2 == 1") == [2, 3]
     assert rows("trial / 2 == 1.5") == [3]
     assert rows("1 / trial > 100") == [0]
-    numbers = Expression("landing_x_m - 2 * landing_y_m", place="--cells").numbers(TABLE)
+    numbers = Expression("landing_x_m - 2 * landing_y_m", place="cells").numbers(TABLE)
     assert numbers == [1.0, 5.0, -5.0, None]
-    assert Expression("2", place="--cells").numbers(TABLE) == [2.0] * 4
+    assert Expression("2", place="cells").numbers(TABLE) == [2.0] * 4
 
 
 def test_what_is_null_fulfils_no_comparison() -> None:
@@ -92,11 +92,11 @@ def test_what_is_null_fulfils_no_comparison() -> None:
     ],
 )
 def test_what_is_wrong_is_said_in_one_message(text: str, message: str) -> None:
-    with pytest.raises(ConfigError, match=f"^--where: .*(?s:{message})") as caught:
+    with pytest.raises(ConfigError, match=f"^where: .*(?s:{message})") as caught:
         rows(text)
     assert max(map(len, str(caught.value).splitlines())) < 200
 
 
 def test_numbers_that_do_not_exist_are_no_errors() -> None:
-    found = Expression("sqrt(0 - trial)", place="--cells").numbers(TABLE)
+    found = Expression("sqrt(0 - trial)", place="cells").numbers(TABLE)
     assert [math.isnan(number) for number in found] == [False, True, True, True]

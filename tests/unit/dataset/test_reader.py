@@ -213,10 +213,10 @@ def test_an_error_names_the_datasets_that_may_be_meant(dataset: Path, tmp_path: 
 
 
 def test_a_text_in_place_of_a_list_of_names_is_refused(loaded: Dataset) -> None:
-    with pytest.raises(ConfigError, match="is a text") as caught:
+    with pytest.raises(ConfigError, match=r"^columns: 'ball\.position' is a text") as caught:
         loaded.trajectories("ball.position")
     assert caught.value.expected == "a list of names: ['ball.position']"
-    with pytest.raises(ConfigError, match="'arm_right_4_joint' is a text"):
+    with pytest.raises(ConfigError, match=r"^joints: 'arm_right_4_joint' is a text"):
         loaded.trajectories(["joints.position"], joints="arm_right_4_joint")
 
 

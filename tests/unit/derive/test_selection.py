@@ -168,3 +168,29 @@ def test_a_list_that_is_not_the_one_of_the_plan_is_found(collected: Path, tmp_pa
     path.unlink()
     fit_manifest(tmp_path / "some")
     assert list(map(str, verify(tmp_path / "some"))) == ["trials.parquet: is missing"]
+
+
+def test_what_is_no_list_of_datasets_is_not_merged(collected: Path, tmp_path: Path) -> None:
+    for one, kind in ((str(collected), "a text"), (collected, "no list")):
+        with pytest.raises(ConfigError, match=f"^directories: .* is {kind}\n  expected: a list of directories"):
+            merge(one, tmp_path / "new")
+    with pytest.raises(ConfigError, match=r"^directories: got none\n  expected: at least one dataset"):
+        merge([], tmp_path / "new")
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("ask", "message"),
+    [
+        (
+            lambda *paths: filter_trials(*paths, where=lambda row: row),
+            "where: got <function .*\n  expected: a text, such as: ",
+        ),
+        (lambda *paths: sample(*paths, count="2"), "count: should be from 1 to 7, .*, got '2'"),
+        (lambda *paths: sample(*paths, count=2, seed=-1), "seed: got -1\n  expected: 0 or more"),
+    ],
+)
+def test_what_is_of_another_kind_is_told_by_its_name(collected: Path, tmp_path: Path, ask, message: str) -> None:
+    with pytest.raises(ConfigError, match=f"^{message}"):
+        ask(collected, tmp_path / "new")
+    assert list(tmp_path.iterdir()) == []

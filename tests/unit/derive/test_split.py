@@ -118,7 +118,7 @@ def test_cells_may_be_of_any_expression(some: Path) -> None:
     ],
 )
 def test_wrong_fractions_are_explained(some: Path, tmp_path: Path, fractions: str, message: str) -> None:
-    with pytest.raises(ConfigError, match=f"--fractions: .*{message}"):
+    with pytest.raises(ConfigError, match=f"^fractions: .*{message}"):
         split(some, tmp_path / "parts", fractions=fractions)
     assert not list(tmp_path.iterdir())
 
@@ -136,5 +136,35 @@ def test_wrong_fractions_are_explained(some: Path, tmp_path: Path, fractions: st
     ],
 )
 def test_wrong_cells_are_explained(some: Path, tmp_path: Path, axis: str, message: str) -> None:
-    with pytest.raises(ConfigError, match=f"--cells: {message}"):
+    with pytest.raises(ConfigError, match=f"^cells: {message}"):
         split(some, tmp_path / "parts", fractions=HALVES, cells=[axis])
+
+
+def test_one_axis_is_no_list_of_axes(some: Path, tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match=r"^cells: 'trial=1' is a text\n .*: \['trial=1'\]"):
+        split(some, tmp_path / "parts", fractions=HALVES, cells="trial=1")
+
+
+def test_shares_may_be_a_mapping(some: Path) -> None:
+    assert train(some, seed=1, fractions={"train": 0.8, "test": 0.2}) == train(
+        some, seed=1, fractions="train=0.8,test=0.2"
+    )
+    thirds = train(some, seed=1, fractions={"train": 1 / 3, "test": 2 / 3})
+    assert thirds == train(some, seed=1, fractions="train=1/3,test=2/3")
+
+
+@pytest.mark.parametrize(
+    ("fractions", "message"),
+    [
+        (
+            0.5,
+            r"got 0\.5\n  expected: a mapping, such as {'train': 0\.8, 'test': 0\.2}, or the text train=0\.8,test=0\.2",
+        ),
+        ({"train": "most", "test": 0.2}, "should be a part and its share, such as train=0.8, got 'train=most'"),
+        ({"train": math.nan, "test": 0.2}, "should be a part and its share, such as train=0.8, got 'train=nan'"),
+        ({"train": 0.4, "test": 0.5}, r"should add up to 1, add up to 0\.9"),
+    ],
+)
+def test_wrong_mappings_of_shares_are_explained(some: Path, tmp_path: Path, fractions: object, message: str) -> None:
+    with pytest.raises(ConfigError, match=f"^fractions: {message}"):
+        split(some, tmp_path / "parts", fractions=fractions)

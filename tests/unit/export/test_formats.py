@@ -132,9 +132,15 @@ def test_an_unknown_format_is_answered_with_those_there_are(source: Path, tmp_pa
 
 @pytest.mark.parametrize("rate_hz", [0, -5, 251])
 def test_a_rate_above_the_recorded_one_is_refused(rate_hz: int, source: Path, tmp_path: Path) -> None:
-    with pytest.raises(ConfigError, match=f"--rate: {rate_hz} samples per second\n  expected: 1 to 250"):
+    with pytest.raises(ConfigError, match=f"^rate_hz: {rate_hz} samples per second\n  expected: 1 to 250"):
         export(source, tmp_path / "out", to="npz", rate_hz=rate_hz)
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("rate_hz", ["50", 50.5])
+def test_a_rate_is_a_whole_number(rate_hz: object, source: Path, tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match=f"^rate_hz: {rate_hz!r} samples.*\n  expected: a whole number, 1 to 250"):
+        export(source, tmp_path / "out", to="npz", rate_hz=rate_hz)
 
 
 @pytest.mark.parametrize("to", FORMATS)

@@ -166,5 +166,5 @@ def test_a_column_whose_name_is_too_long_for_the_format_is_named(source: Path, t
     whole = Source.open(source)
     key = f"task.end.{'j' * 55}"
     longer = replace(whole, table=whole.table.append_column(key, whole.table["landing_x_m"]))
-    with pytest.raises(ConfigError, match=rf"--to: mat has no room for the name of the column {key}"):
+    with pytest.raises(ConfigError, match=rf"^to: mat has no room for the name of the column {key}"):
         mat.write(longer, tmp_path)

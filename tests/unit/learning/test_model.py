@@ -45,6 +45,17 @@ def test_keys_have_the_role_that_they_play(model: Model) -> None:
     assert model.file.trained_on.throws == COUNT
 
 
+def test_a_model_shows_in_a_line_what_it_is(dataset: Dataset, model: Model) -> None:
+    assert (
+        repr(model)
+        == f"Model('{dataset.config.name}', local, {COUNT} throws: {', '.join(TARGETS)} -> {', '.join(KEYS)})"
+    )
+    given = fit(dataset, given=KEYS[2:])
+    assert repr(given).endswith(f"{', '.join((*TARGETS, KEYS[2]))} -> {', '.join(KEYS[:2])})")
+    for part in (model.file, model.learned):
+        assert len(repr(part)) < 1500 > len(str(part))
+
+
 def test_throws_that_all_end_close_together_are_learned_from(dataset: Dataset) -> None:
     near = dataset
     for number, column in enumerate(TARGETS):
@@ -125,11 +136,11 @@ def test_a_score_is_put_into_the_model_and_its_card(model: Model, tmp_path: Path
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"kind": "network"}, "--kind: 'network'"),
+        ({"kind": "network"}, "^kind: 'network'"),
         ({"targets": ["place"]}, "no column of numbers 'place'"),
         ({"parameters": ["task.points_hz"]}, "task.points_hz was not swept"),
         ({"where": "trial < 5"}, "5 throws of 5 landed"),
-        ({"where": "trial >="}, "cannot be understood"),
+        ({"where": "trial >="}, "^where: cannot be understood"),
     ],
 )
 def test_what_cannot_be_learned_is_refused(dataset: Dataset, options: dict[str, object], message: str) -> None:
@@ -190,11 +201,45 @@ def test_points_without_all_parameters_are_refused(model: Model) -> None:
         model.predict([dict.fromkeys(KEYS, float("inf"))])
 
 
+@pytest.mark.parametrize("argument", ["targets", "parameters", "given"])
+def test_one_name_is_no_list_of_names(dataset: Dataset, argument: str) -> None:
+    with pytest.raises(ConfigError, match=rf"^{argument}: 'task\.duration_s' is a text\n .* \['task\.duration_s'\]"):
+        fit(dataset, **{argument: "task.duration_s"})
+
+
+def test_one_throw_is_no_list_of_throws(model: Model) -> None:
+    point, place = dict.fromkeys(KEYS, 0.0), (1.2, -0.1)
+    for ask in (model.predict, lambda points: model.adapt(points, [place])):
+        with pytest.raises(ConfigError, match=r"^points: .* is a mapping\n  expected: a list of mappings"):
+            ask(point)
+    with pytest.raises(
+        ConfigError, match=r"^targets: 1\.2 is in the list\n  expected: a list of targets, each with land"
+    ):
+        model.aim(place)
+    with pytest.raises(ConfigError, match=r"^targets: '12' is a text"):
+        model.aim(["12"])
+    with pytest.raises(ConfigError, match=r"^places: 1\.2 is in the list\n  expected: a list of places"):
+        model.adapt([point], place)
+
+
+@pytest.mark.parametrize("argument", ["targets", "seed", "seeds", "processes", "scatter"])
+def test_a_score_takes_numbers_alone(model: Model, argument: str) -> None:
+    with pytest.raises(ConfigError, match=f"^{argument}: got 'a'"):
+        model.score(None, **{argument: "a"})
+
+
+def test_what_is_no_number_is_shown(model: Model) -> None:
+    with pytest.raises(ConfigError, match="got 'a', 1"):
+        model.aim([("a", 1)])
+    with pytest.raises(ConfigError, match=f"throw 0: {KEYS[1]} is 'a'"):
+        model.predict([dict.fromkeys(KEYS, 0.0) | {KEYS[1]: "a"}])
+
+
 def test_adapting_wants_a_place_for_each_throw(model: Model) -> None:
     point = dict.fromkeys(KEYS, 0.0)
     with pytest.raises(ConfigError, match="1 throws and 0 places"):
         model.adapt([point], [])
-    with pytest.raises(ConfigError, match="--method: 'magic'"):
+    with pytest.raises(ConfigError, match=r"^method: 'magic'"):
         model.adapt([point], [(1.0, 0.0)], method="magic")
     with pytest.raises(ConfigError, match="scatter"):
         model.adapt([point], [(1.0, 0.0)], scatter=-1.0)

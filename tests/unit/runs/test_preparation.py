@@ -1,4 +1,4 @@
-"""Where a dataset goes if nobody says so, and what becomes of one with which nothing can go on."""
+"""Where a dataset goes if nobody says so, what is refused, and what stays as it is where nothing can go on."""
 
 import re
 from pathlib import Path
@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 from tests.e2e.collection import FAST, collect_here, write_config
 
-from throwcollect.errors import ThrowcollectError
-from throwcollect.runs.preparation import _name_directory, resume
+from throwcollect.errors import ConfigError, ThrowcollectError
+from throwcollect.runs.preparation import _name_directory, prepare, resume
 from throwcollect.runs.state_directory import STATE_VARIABLE
 
 
@@ -21,6 +21,17 @@ def test_the_name_alone_and_the_time_where_something_is(tmp_path: Path, monkeypa
     assert re.fullmatch(r"datasets/quick-\d{8}-\d{6}", str(_name_directory("quick")))
     (tmp_path / "datasets/link").symlink_to("nowhere")
     assert _name_directory("link") != Path("datasets/link")
+
+
+def test_wrong_arguments_are_refused_before_anything_is_made(tmp_path: Path) -> None:
+    (tmp_path / "some.yaml").write_text("trials: 1\n")
+    for wrong, message in (
+        ({"processes": -3}, "processes: got -3\n  expected: 1 or more"),
+        ({"overrides": "trials=2"}, "overrides: 'trials=2' is a text"),
+    ):
+        with pytest.raises(ConfigError, match=f"^{message}"):
+            prepare(tmp_path / "some.yaml", output=tmp_path / "new", **wrong)
+    assert not (tmp_path / "new").exists()
 
 
 @pytest.fixture(scope="module")

@@ -1,0 +1,96 @@
+"""What programs are told that call a function with a wrong argument."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+
+import numpy as np
+import pytest
+
+from throwcollect.arguments import (
+    as_float,
+    check_list,
+    check_mapping,
+    check_whole_number,
+    read_list,
+    read_word,
+    refuse_argument,
+)
+from throwcollect.errors import ConfigError, Problem
+from throwcollect.learning.learned_map import Kind
+
+
+def test_an_argument_is_told_by_its_own_name() -> None:
+    error = refuse_argument("where", "got 1", expected="a text", hint="quote it")
+    assert error.problems == [Problem("got 1", "where", argument=True)]
+    assert str(error) == "where: got 1\n  expected: a text\n  try: quote it"
+
+
+def test_a_word_is_read_or_refused_with_those_that_there_are() -> None:
+    assert read_word("kind", "local", Kind) is Kind.LOCAL
+    for given in ("magic", 1, ["local"]):
+        with pytest.raises(ConfigError, match=r"^kind: ") as caught:
+            read_word("kind", given, Kind)
+        assert caught.value.expected == "one of local, polynomial"
+
+
+@pytest.mark.parametrize(
+    ("given", "problem", "expected"),
+    [
+        ("a", "'a' is a text", "a list of names: ['a']"),
+        (b"a", "b'a' is a text", "a list of names"),
+        ({"a": 1}, "{'a': 1} is a mapping", "a list of names"),
+        (1, "1 is no list", "a list of names"),
+        (["a", 1], "1 is in the list", "a list of names"),
+        (["a", ("b" * 200,)], f"('{'b' * 78}… is in the list", "a list of names"),
+    ],
+)
+def test_what_is_no_list_is_refused(given: object, problem: str, expected: str) -> None:
+    with pytest.raises(ConfigError) as caught:
+        read_list("columns", given, "names")
+    assert caught.value.problems == [Problem(problem, "columns", argument=True)]
+    assert caught.value.expected == expected
+
+
+def test_whatever_gives_its_elements_one_by_one_is_a_list() -> None:
+    assert read_list("columns", (name for name in "ab"), "names") == read_list("columns", ["a", "b"], "names")
+    rows = np.eye(2)
+    assert [row.tolist() for row in read_list("targets", rows, "targets", (Iterable,))] == rows.tolist()
+    with pytest.raises(ConfigError) as caught:
+        read_list("targets", "1,0", "targets", (Iterable,))
+    assert caught.value.expected == "a list of targets"
+
+
+def test_to_be_checked_takes_nothing_out_of_a_list() -> None:
+    points = iter([1, 2])
+    check_list("points", points, "points")
+    assert list(points) == [1, 2]
+
+
+def test_what_is_no_number_is_none_that_is_finite() -> None:
+    assert as_float(np.float32(0.5)) == as_float("0.5") == 0.5
+    assert all(math.isnan(as_float(each)) for each in ("a", None, [1], 10**400))
+
+
+def test_whole_numbers_have_bounds() -> None:
+    for given in (1, 3, np.int64(2)):
+        check_whole_number("processes", given, least=1, most=3)
+    for given, expected in (
+        (0, "1 to 3"),
+        (4, "1 to 3"),
+        (1.5, "a whole number, 1 to 3"),
+        (True, "a whole number, 1 to 3"),
+    ):
+        with pytest.raises(ConfigError, match=f"^processes: got {given}") as caught:
+            check_whole_number("processes", given, least=1, most=3)
+        assert caught.value.expected == expected
+    with pytest.raises(ConfigError, match=r"^replay: got '1'\n  expected: a whole number, 0 or more$"):
+        check_whole_number("replay", "1", least=0)
+
+
+@pytest.mark.parametrize("given", [[1], "a", {1: 2}])
+def test_what_maps_no_keys_is_refused(given: object) -> None:
+    check_mapping("values", {"a": 1}, "{'a': 1}")
+    with pytest.raises(ConfigError, match=r"^values: got .*\n  expected: a mapping, such as {'a': 1}$"):
+        check_mapping("values", given, "{'a': 1}")
