@@ -1,0 +1,40 @@
+"""Lists in CSV files: each number is that of its column, and what may mean something else is refused."""
+
+from pathlib import Path
+
+import pytest
+
+from throwcollect.errors import ConfigError
+from throwcollect.learning.lists import read_table
+
+TARGETS = ("landing_x_m", "landing_y_m")
+HEADER = "landing_x_m,landing_y_m"
+POINTS = "if a comma belongs to a number, decimals are written with a point, as in 1.5"
+
+
+@pytest.fixture
+def table(tmp_path: Path) -> Path:
+    return tmp_path / "table.csv"
+
+
+def test_columns_may_stand_in_any_order_among_others(table: Path) -> None:
+    table.write_text("note, landing_y_m, landing_x_m, note\na, -0.29, 1.63, b\n\n, 2, 1,\n")
+    assert read_table(table, TARGETS) == [dict(zip(TARGETS, row, strict=True)) for row in ((1.63, -0.29), (1.0, 2.0))]
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (f"{HEADER}\n1,0\n1,63,-0,29\n", f":3: should have 2 values, got 4; {POINTS}"),
+        (f"{HEADER}\n1.63,-0.29,0.3\n", ":2: should have 2 values, got 3"),
+        (f"{HEADER},note\n1.63,-0.29\n", ":2: should have 3 values, got 2"),
+        (f"{HEADER},landing_x_m\n1,0,2\n", ":1: landing_x_m: the column is here twice"),
+        (f"\n{HEADER}\n1,\n", ":3: landing_y_m: ''"),
+    ],
+)
+def test_a_row_that_may_mean_something_else_is_told_with_its_line(table: Path, text: str, message: str) -> None:
+    table.write_text(text)
+    with pytest.raises(ConfigError) as caught:
+        read_table(table, TARGETS)
+    assert caught.value.message == f"{table}{message}"
+    assert caught.value.expected
