@@ -121,16 +121,16 @@ def aim(
             "no target", expected="--at, or --targets FILE", hint=command("aim", directory, "--at", _example(model))
         )
     aims = model.aim(given, choose=choose)
-    if json:
-        print_json([_aim_as_json(aim) for aim in aims])
-    elif output is None:
-        for aim in aims:
-            typer.echo(" ".join(f"--set {key}={value!r}" for key, value in aim.parameters.items()))
     if output is not None:
         task = load_config(directory / CONFIG).task
         write_aims(output, aims, names, task)
-        if not json:
-            typer.echo(f"{output}: {format_count(len(aims), task.noun)}")
+    if json:
+        print_json([_aim_as_json(aim) for aim in aims])
+    elif output is not None:
+        typer.echo(f"{output}: {format_count(len(aims), task.noun)}")
+    else:
+        for aim in aims:
+            typer.echo(" ".join(f"--set {key}={value!r}" for key, value in aim.parameters.items()))
     for number, aim in enumerate(aims, start=1):
         if not aim.reachable:
             tell(

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import csv
+import io
 import math
 from collections.abc import Sequence
 from pathlib import Path
 
 from throwcollect.config.task import TaskConfig
 from throwcollect.errors import ConfigError
+from throwcollect.files import write_file
 from throwcollect.learning.model import Aim
 from throwcollect.sweep.point_file import explain_wrong_count, read_number
 from throwcollect.wording import join_names
@@ -93,17 +95,18 @@ def write_aims(path: Path, aims: Sequence[Aim], names: Sequence[str], task: Task
     The list has columns for those targets alone that the task declares.
 
     Raises:
-        ConfigError: If the file cannot be written.
+        ConfigError: If the name of the file does not end in ``.csv``.
+        DatasetError: If it cannot be written.
     """
+    if path.suffix != ".csv":
+        raise ConfigError(f"{path}: a list of another kind than CSV is not written", expected="a name with .csv")
     columns = {column.name: names.index(column.of) for column in task.target_columns if column.of in names}
     if task.find_wrong_targets(columns):
         columns = {}
     rows = [{**aim.parameters, **{name: float(aim.target[at]) for name, at in columns.items()}} for aim in aims]
-    try:
-        with path.open("w", encoding="utf-8", newline="") as file:
-            writer = csv.writer(file, lineterminator="\n")
-            writer.writerow(rows[0])
-            # repr writes as many digits as it takes to read the same number again.
-            writer.writerows([map(repr, row.values()) for row in rows])
-    except OSError as error:
-        raise ConfigError(f"{path}: cannot be written: {error.strerror}") from error
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(rows[0])
+    # repr writes as many digits as it takes to read the same number again.
+    writer.writerows([map(repr, row.values()) for row in rows])
+    write_file(path, text.getvalue().encode())

@@ -1,15 +1,35 @@
-"""Lists in CSV files: each number is that of its column, and what may mean something else is refused."""
+"""Lists in CSV files: each number is that of its column, what may mean something else is refused, files are whole."""
 
+import resource
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from throwcollect.errors import ConfigError
-from throwcollect.learning.lists import read_table
+from throwcollect.config.schema import Config
+from throwcollect.errors import ConfigError, DatasetError
+from throwcollect.learning.lists import read_table, write_aims
+from throwcollect.learning.model import Aim
 
 TARGETS = ("landing_x_m", "landing_y_m")
 HEADER = "landing_x_m,landing_y_m"
 POINTS = "if a comma belongs to a number, decimals are written with a point, as in 1.5"
+
+END = np.array([1.4, -0.2])
+AIM = Aim(END, {"task.duration_s": 1.1}, END, True, END)
+
+
+@contextmanager
+def small_disk(most_bytes: int) -> Iterator[None]:
+    """No file of this process may become longer."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (most_bytes, hard))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
 
 
 @pytest.fixture
@@ -38,3 +58,19 @@ def test_a_row_that_may_mean_something_else_is_told_with_its_line(table: Path, t
         read_table(table, TARGETS)
     assert caught.value.message == f"{table}{message}"
     assert caught.value.expected
+
+
+@pytest.mark.parametrize("name", ["aims.parquet", "aims.txt", "aims"])
+def test_a_list_is_not_written_under_the_name_of_another_format(tmp_path: Path, name: str) -> None:
+    with pytest.raises(ConfigError) as caught:
+        write_aims(tmp_path / name, [AIM], TARGETS, Config().task)
+    assert caught.value.expected == "a name with .csv"
+    assert not (tmp_path / name).exists()
+
+
+def test_a_list_that_cannot_be_written_leaves_the_one_that_was_there(table: Path) -> None:
+    table.write_text("earlier")
+    with small_disk(10), pytest.raises(DatasetError, match="cannot be written: File too large") as caught:
+        write_aims(table, [AIM], TARGETS, Config().task)
+    assert caught.value.hint
+    assert [path.read_text() for path in table.parent.iterdir()] == ["earlier"]
