@@ -79,9 +79,13 @@ def fit_map(
         context: Swept keys that are given with a target; those that the task names by default.
 
     Raises:
-        ConfigError: If there is nothing to aim at, a key was not swept, or too few throws succeeded.
+        ConfigError: If there is nothing to aim at, a key was not swept, a name is there twice, or too few throws
+            succeeded.
         DatasetError: If a column is missing, or holds no numbers.
     """
+    for argument, names in (("targets", targets), ("parameters", parameters), ("given", context)):
+        if twice := [name for name in names if names.count(name) > 1]:
+            raise ConfigError(f"{argument}: {twice[0]} is named twice", expected="each name once")
     config = dataset.config
     columns = tuple(targets) or config.task.targets
     if not columns:
