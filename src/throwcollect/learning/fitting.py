@@ -157,8 +157,9 @@ def _find_axes(
         ends = pc.min_max(throws[key]).as_py()
         low, high = ends["min"], ends["max"]
         role = _choose_role(dataset.config, key, parameters, context)
-        # Nothing can be learned of a key with one value, and scaling would divide by zero.
-        if low == high and low is not None:
+        # Nothing can be learned of a key with one value, and scaling would divide by zero. Of a single throw, no key
+        # varies; that is too few throws, however many keys were swept.
+        if low == high and len(throws) > 1:
             if key in (*parameters, *context):
                 raise ConfigError(f"{key} has the value {low:g} in all throws", expected="a key that varies")
             continue

@@ -131,6 +131,11 @@ def test_a_score_is_put_into_the_model_and_its_card(model: Model, tmp_path: Path
         ({"targets": [*TARGETS, TARGETS[0]]}, "targets: landing_x_m is named twice"),
         ({"parameters": KEYS[:1] * 2}, f"parameters: {KEYS[0]} is named twice"),
         ({"given": KEYS[1:2] * 2}, f"given: {KEYS[1]} is named twice"),
+        ({"where": "trial < 1"}, "1 throw of 1 landed\n  expected: at least 12 for 3 parameters"),
+        (
+            {"where": "trial < 1", "parameters": KEYS[:2]},
+            "1 throw of 1 landed\n  expected: at least 9 for 2 parameters",
+        ),
         ({"where": "trial < 5"}, "5 throws of 5 landed"),
         ({"where": "trial >="}, "cannot be understood"),
     ],
