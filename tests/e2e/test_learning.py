@@ -185,7 +185,16 @@ def test_throws_of_another_robot_are_refused(place: Path) -> None:
 def test_a_target_out_of_reach_is_told_with_the_nearest_point(place: Path) -> None:
     said = call_here("aim", place / "model", "--at", "9,0")
     assert said.returncode == 1
-    assert re.search(r"out of reach: 9\.000,0\.000; the nearest point that was reached: \d\.\d+,-?\d\.\d+", said.stderr)
+    told = r"out of reach: 9\.000,0\.000; no throw .*\n  .* that was reached: \d\.\d+,-?\d\.\d+ \(7\d\d\.\d+ cm away\)"
+    assert re.search(told, said.stderr), said.stderr
+
+
+def test_of_very_many_targets_out_of_reach_most_are_counted(place: Path) -> None:
+    (place / "far.csv").write_text("landing_x_m,landing_y_m\n" + "9,0\n" * 30 + middle(place))
+    said = call_here("aim", place / "model", "--targets", place / "far.csv", "-o", place / "far_throws.csv")
+    assert said.returncode == 1
+    assert len(re.findall(r"^target \d+ of 31 is out of reach", said.stderr, re.M)) == 20
+    assert said.stderr.endswith("\nand 10 more; 30 of 31 targets are out of reach\n")
 
 
 def test_each_target_out_of_reach_is_told_with_where_its_parameters_lead(place: Path) -> None:
@@ -193,12 +202,8 @@ def test_each_target_out_of_reach_is_told_with_where_its_parameters_lead(place: 
     found = json.loads(said.stdout)
     assert [each["reachable"] for each in found] == [True, False, False]
     ends = [",".join(f"{value:.3f}" for value in each["predicted"]) for each in found]
-    assert re.findall(
-        r"^target (\d) of 3 is out of reach: .*\n  its parameters .* end at (\S+)$", said.stderr, re.M
-    ) == [
-        ("2", ends[1]),
-        ("3", ends[2]),
-    ]
+    told = re.findall(r"^target (\d) of 3 is out of reach: .*\n  .*; predicted end: (\S+)$", said.stderr, re.M)
+    assert told == [("2", ends[1]), ("3", ends[2])]
 
 
 def test_a_model_is_learned_from_a_directory_as_from_what_was_loaded(place: Path) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json as jsonlib
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -20,6 +20,9 @@ from throwcollect.wording import command, format_count, join_names
 if TYPE_CHECKING:
     from throwcollect.learning.model import Aim, Model
     from throwcollect.learning.score import Errors, Score
+
+_MOST_TOLD = 20
+"""Number of targets out of reach that are told; the others are counted."""
 
 ModelArgument = Annotated[Path, typer.Argument(metavar="MODEL", help="Directory of the model.", readable=False)]
 ModelOption = Annotated[
@@ -131,13 +134,7 @@ def aim(
     else:
         for aim in aims:
             typer.echo(" ".join(f"--set {key}={value!r}" for key, value in aim.parameters.items()))
-    for number, aim in enumerate(aims, start=1):
-        if not aim.reachable:
-            tell(
-                f"target {number} of {len(aims)} is out of reach: {_join_numbers(aim.target)}; the nearest point that "
-                f"was reached: {_join_numbers(aim.nearest)}\n  its parameters cannot be relied on; they are predicted "
-                f"to end at {_join_numbers(aim.predicted)}"
-            )
+    _tell_out_of_reach(model, aims)
     if not all(aim.reachable for aim in aims):
         raise typer.Exit(1)
 
@@ -313,6 +310,17 @@ def _read_dataset(directory: Path, keys: Sequence[str], model: Model) -> list[di
     return rows
 
 
+def _tell_out_of_reach(model: Model, aims: Sequence[Aim]) -> None:
+    """Tell which targets are out of reach, and why; of very many, the others are counted."""
+    from throwcollect.learning.reach import explain_reach
+
+    far = [(number, aim) for number, aim in enumerate(aims, start=1) if not aim.reachable]
+    for number, aim in far[:_MOST_TOLD]:
+        tell(f"target {number} of {len(aims)} is out of reach: {explain_reach(model.learned, aim)}")
+    if len(far) > _MOST_TOLD:
+        tell(f"and {len(far) - _MOST_TOLD} more; {len(far)} of {len(aims)} targets are out of reach")
+
+
 def _aim_as_json(aim: Aim) -> dict[str, object]:
     return {
         "target": aim.target.tolist(),
@@ -321,10 +329,6 @@ def _aim_as_json(aim: Aim) -> dict[str, object]:
         "reachable": aim.reachable,
         "nearest": aim.nearest.tolist(),
     }
-
-
-def _join_numbers(values: Iterable[float]) -> str:
-    return ",".join(f"{value:.3f}" for value in values)
 
 
 def _describe_score(score: Score) -> list[str]:
