@@ -142,7 +142,10 @@ def test_a_score_tells_how_throws_hit_here_and_elsewhere(place: Path) -> None:
         (["aim", "model", "--at", "1.4"], "--at 1.4\n  expected: 2 numbers: landing_x_m,landing_y_m"),
         (["aim", "model", "--at", "1,nan"], "finite numbers"),
         (["aim", "model", "--at", "1,0", "--choose", "best"], "--choose: 'best'"),
-        (["adapt", "model", "data", "-o", "new", "--method", "best"], "--method: 'best'"),
+        (
+            ["adapt", "model", "data", "-o", "new", "--method", "best"],
+            "--method: 'best'\n  expected: one of auto, none, offset, bias, latent",
+        ),
         (["aim", "model", "--targets", "throws.yaml"], "throws.yaml:1: no column landing_x_m and landing_y_m"),
         (["aim", "data", "--at", "1,0"], "model.json"),
         (["fit", "data", "-o", "data"], "exists"),
@@ -171,6 +174,26 @@ def test_a_cell_that_is_no_number_is_told_with_its_line(place: Path) -> None:
     said = call_here("aim", place / "model", "--targets", place / "cells.csv")
     assert said.returncode == 2
     assert "cells.csv:3: landing_y_m: 'nan'\n  expected: a finite number" in said.stderr
+
+
+@pytest.mark.parametrize(
+    ("changed", "message"),
+    [
+        ({"task.duration_s": 90}, "task.duration_s is 90\n  expected: about "),
+        ({"landing_x_m": 2e6}, "landing_x_m: 2e+06\n  expected: a number of at most 1e+06"),
+    ],
+)
+def test_a_measured_throw_that_is_far_from_all_others_is_told_with_its_line(
+    place: Path, changed: dict[str, float], message: str
+) -> None:
+    model = throwcollect.load_model(place / "model")
+    (aim,) = model.aim([[float(number) for number in middle(place).split(",")]])
+    good = aim.parameters | dict(zip(model.targets, aim.target.tolist(), strict=True))
+    rows = [",".join(map(str, row.values())) for row in (good, good | changed)]
+    (place / "slip.csv").write_text("\n".join([",".join(good), "", *rows]))
+    said = call_here("adapt", place / "model", place / "slip.csv", "-o", place / "new")
+    assert said.returncode == 2
+    assert f"slip.csv:4: {message}" in said.stderr
 
 
 def test_throws_of_another_robot_are_refused(place: Path) -> None:

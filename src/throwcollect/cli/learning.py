@@ -18,6 +18,7 @@ from throwcollect.side_by_side import count_cores
 from throwcollect.wording import command, format_count, join_names
 
 if TYPE_CHECKING:
+    from throwcollect.learning.lists import Row
     from throwcollect.learning.model import Aim, Model
     from throwcollect.learning.score import Errors, Score
 
@@ -228,19 +229,27 @@ def adapt(
     json: JsonOption = False,
 ) -> None:
     """Make the model of another world, of a few throws there."""
-    from throwcollect.learning.lists import read_table
+    from throwcollect.learning.adapting import FarThrowError, Method
+    from throwcollect.learning.lists import read_table, refuse_large_targets
     from throwcollect.learning.model import load_model
     from throwcollect.learning.score import tell_length
 
+    methods = ("auto", *(each.value for each in Method))
+    if method not in methods:
+        raise ConfigError(f"--method: {method!r}", expected=f"one of {', '.join(methods)}")
     model = load_model(directory)
     keys = (*model.parameters, *model.given)
     rows = _read_dataset(throws, keys, model) if throws.is_dir() else read_table(throws, (*keys, *model.targets))
-    adapted = model.adapt(
-        [{key: row[key] for key in keys} for row in rows],
-        [[row[target] for target in model.targets] for row in rows],
-        method=None if method == "auto" else method,
-        scatter=scatter,
-    )
+    refuse_large_targets(rows, model.targets)
+    try:
+        adapted = model.adapt(
+            [{key: row.numbers[key] for key in keys} for row in rows],
+            [[row.numbers[target] for target in model.targets] for row in rows],
+            method=None if method == "auto" else method,
+            scatter=scatter,
+        )
+    except FarThrowError as error:
+        raise error.locate_throw(rows[error.number].place) from None
     adapted.save(output)
     entry = adapted.file.adaptation
     if entry is None:
@@ -285,7 +294,7 @@ def _read_target(text: str, names: Sequence[str]) -> list[float]:
     return values
 
 
-def _read_dataset(directory: Path, keys: Sequence[str], model: Model) -> list[dict[str, float]]:
+def _read_dataset(directory: Path, keys: Sequence[str], model: Model) -> list[Row]:
     """Read the throws of a dataset that succeeded: the keys and the targets of each.
 
     Raises:
@@ -293,6 +302,7 @@ def _read_dataset(directory: Path, keys: Sequence[str], model: Model) -> list[di
         DatasetError: If the dataset is damaged.
     """
     from throwcollect.dataset.reader import Dataset
+    from throwcollect.learning.lists import Row
 
     dataset = Dataset.open(directory)
     trained, config = model.file.trained_on, dataset.config
@@ -306,8 +316,10 @@ def _read_dataset(directory: Path, keys: Sequence[str], model: Model) -> list[di
         raise ConfigError(
             f"{directory}: has no {join_names(missing)}", expected="throws with all parameters of the model"
         )
-    rows: list[dict[str, float]] = throws.select([*keys, *model.targets]).to_pylist()
-    return rows
+    rows = throws.select([*keys, *model.targets]).to_pylist()
+    return [
+        Row(f"{directory}: trial {trial}", row) for trial, row in zip(throws["trial"].to_pylist(), rows, strict=True)
+    ]
 
 
 def _tell_out_of_reach(model: Model, aims: Sequence[Aim]) -> None:

@@ -34,6 +34,24 @@ _CLEARLY = 3.0
 """Adapting helps if the sum of squared misses falls by more than the square of so many standard deviations."""
 
 
+class FarThrowError(ConfigError):
+    """A throw is so far from all that a map was learned from that it is taken for a slip.
+
+    Args:
+        number: Which of the throws, counted from 0.
+        problem: What is far, and which value it has.
+    """
+
+    def __init__(self, number: int, problem: str, *, expected: str, hint: str | None = None) -> None:
+        self.number = number
+        self.problem = problem
+        super().__init__(f"throw {number}: {problem}", expected=expected, hint=hint)
+
+    def locate_throw(self, place: str) -> ConfigError:
+        """Make the same error with the place of the throw, for a caller that has read it from a file."""
+        return ConfigError(f"{place}: {self.problem}", expected=self.expected, hint=self.hint)
+
+
 class Method(str, Enum):
     """How a world is taken to differ from the one of the map."""
 
@@ -120,13 +138,14 @@ def refuse_far_inputs(learned: LearnedMap, role: Role, inputs: Array) -> None:
         inputs: Their scaled values, shape ``(n_throws, n_axes of the role)``.
 
     Raises:
-        ConfigError: If a value is outside of the range of the dataset by more than half of that range.
+        FarThrowError: If a value is outside of the range of the dataset by more than half of that range.
     """
     for number, column in np.argwhere(np.abs(inputs) > _FAR).tolist():
         axis = learned.axes_of(role)[column]
         value = learned.unscale(role, inputs)[number, column]
-        raise ConfigError(
-            f"throw {number}: {axis.key} is {value:g}",
+        raise FarThrowError(
+            number,
+            f"{axis.key} is {value:g}",
             expected=f"about {axis.minimum:g} to {axis.maximum:g}, the range that the model was learned from",
         )
 

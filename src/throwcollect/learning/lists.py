@@ -6,8 +6,10 @@ import csv
 import io
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
+from throwcollect.config.target import LARGEST_TARGET
 from throwcollect.config.task import TaskConfig
 from throwcollect.errors import ConfigError
 from throwcollect.files import write_file
@@ -16,7 +18,20 @@ from throwcollect.sweep.point_file import explain_wrong_count, read_number
 from throwcollect.wording import join_names
 
 
-def read_table(path: Path, names: Sequence[str], *, aliases: dict[str, str] | None = None) -> list[dict[str, float]]:
+@dataclass(frozen=True)
+class Row:
+    """Numbers that belong together.
+
+    Attributes:
+        place: Where they were read, such as ``targets.csv:3``.
+        numbers: The numbers by name.
+    """
+
+    place: str
+    numbers: dict[str, float]
+
+
+def read_table(path: Path, names: Sequence[str], *, aliases: dict[str, str] | None = None) -> list[Row]:
     """Read some columns of a CSV file with a header line.
 
     Args:
@@ -58,7 +73,7 @@ def _find_columns(header: list[str], names: Sequence[str], aliases: dict[str, st
     return columns
 
 
-def _read_row(cells: list[str], header: list[str], columns: dict[str, str], place: str) -> dict[str, float]:
+def _read_row(cells: list[str], header: list[str], columns: dict[str, str], place: str) -> Row:
     """Read the numbers of a row by name.
 
     Raises:
@@ -70,7 +85,7 @@ def _read_row(cells: list[str], header: list[str], columns: dict[str, str], plac
     numbers = {name: read_number(row[column]) for name, column in columns.items()}
     if wrong := [columns[name] for name, number in numbers.items() if not math.isfinite(number)]:
         raise ConfigError(f"{place}: {wrong[0]}: {row[wrong[0]]!r}", expected="a finite number")
-    return numbers
+    return Row(place, numbers)
 
 
 def read_targets(path: Path, names: Sequence[str], task: TaskConfig) -> list[list[float]]:
@@ -82,10 +97,26 @@ def read_targets(path: Path, names: Sequence[str], task: TaskConfig) -> list[lis
         task: Declares the columns of targets that stand in such lists.
 
     Raises:
-        ConfigError: As `read_table`.
+        ConfigError: As `read_table`, or if a number is beyond those that targets may have.
     """
     aliases = {column.of: column.name for column in task.target_columns if column.of in names}
-    return [[row[name] for name in names] for row in read_table(path, names, aliases=aliases)]
+    rows = read_table(path, names, aliases=aliases)
+    refuse_large_targets(rows, names)
+    return [[row.numbers[name] for name in names] for row in rows]
+
+
+def refuse_large_targets(rows: Sequence[Row], names: Sequence[str]) -> None:
+    """Refuse rows with numbers of which powers would not be finite.
+
+    Raises:
+        ConfigError: If a number of one of the names is beyond those that targets may have.
+    """
+    for row in rows:
+        for name in names:
+            if abs(row.numbers[name]) > LARGEST_TARGET:
+                raise ConfigError(
+                    f"{row.place}: {name}: {row.numbers[name]:g}", expected=f"a number of at most {LARGEST_TARGET:g}"
+                )
 
 
 def write_aims(path: Path, aims: Sequence[Aim], names: Sequence[str], task: TaskConfig) -> None:

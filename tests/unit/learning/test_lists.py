@@ -10,7 +10,7 @@ import pytest
 
 from throwcollect.config.schema import Config
 from throwcollect.errors import ConfigError, DatasetError
-from throwcollect.learning.lists import read_table, write_aims
+from throwcollect.learning.lists import Row, read_table, read_targets, write_aims
 from throwcollect.learning.model import Aim
 
 TARGETS = ("landing_x_m", "landing_y_m")
@@ -39,7 +39,10 @@ def table(tmp_path: Path) -> Path:
 
 def test_columns_may_stand_in_any_order_among_others(table: Path) -> None:
     table.write_text("note, landing_y_m, landing_x_m, note\na, -0.29, 1.63, b\n\n, 2, 1,\n")
-    assert read_table(table, TARGETS) == [dict(zip(TARGETS, row, strict=True)) for row in ((1.63, -0.29), (1.0, 2.0))]
+    assert read_table(table, TARGETS) == [
+        Row(f"{table}:2", dict(zip(TARGETS, (1.63, -0.29), strict=True))),
+        Row(f"{table}:4", dict(zip(TARGETS, (1.0, 2.0), strict=True))),
+    ]
 
 
 @pytest.mark.parametrize(
@@ -58,6 +61,12 @@ def test_a_row_that_may_mean_something_else_is_told_with_its_line(table: Path, t
         read_table(table, TARGETS)
     assert caught.value.message == f"{table}{message}"
     assert caught.value.expected
+
+
+def test_a_target_that_is_too_large_is_told_with_its_line(table: Path) -> None:
+    table.write_text(f"{HEADER}\n1,0\n1,-2e6\n")
+    with pytest.raises(ConfigError, match=f"{table}:3: landing_y_m: -2e\\+06\n  expected: a number of at most 1e\\+06"):
+        read_targets(table, TARGETS, Config().task)
 
 
 @pytest.mark.parametrize("name", ["aims.parquet", "aims.txt", "aims"])
