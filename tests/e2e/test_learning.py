@@ -180,6 +180,7 @@ def test_a_cell_that_is_no_number_is_told_with_its_line(place: Path) -> None:
     ("changed", "message"),
     [
         ({"task.duration_s": 90}, "task.duration_s is 90\n  expected: about "),
+        ({"landing_x_m": 1500}, "landing_x_m is 1500, landing_y_m is "),
         ({"landing_x_m": 2e6}, "landing_x_m: 2e+06\n  expected: a number of at most 1e+06"),
     ],
 )

@@ -221,6 +221,20 @@ def test_adapting_refuses_throws_of_which_the_model_knows_nothing(model: Model, 
         given.adapt(points, land(draw(2, 8), 0.0).tolist())
 
 
+@pytest.mark.parametrize("factor", [100.0, 1000.0])
+def test_adapting_refuses_places_in_another_unit(model: Model, factor: float) -> None:
+    points = [dict(zip(KEYS, row, strict=True)) for row in draw(2, 8).tolist()]
+    places = land(draw(2, 8), 0.0)
+    places[1] *= factor
+    with pytest.raises(ConfigError) as caught:
+        model.adapt(points, places.tolist())
+    assert caught.value.message == f"throw 1: landing_x_m is {places[1, 0]:g}, landing_y_m is {places[1, 1]:g}"
+    assert re.fullmatch(
+        r"about 0\.\d+ to 1\.\d+, -0\.\d+ to 0\.\d+, where the throws ended .*", caught.value.expected or ""
+    )
+    assert caught.value.hint == "check the unit: m, not cm or mm"
+
+
 @pytest.mark.parametrize(
     ("file", "change", "message"),
     [
