@@ -147,7 +147,7 @@ def test_a_score_tells_how_throws_hit_here_and_elsewhere(place: Path) -> None:
             "--method: 'best'\n  expected: one of auto, none, offset, bias, latent",
         ),
         (["aim", "model", "--targets", "throws.yaml"], "throws.yaml:1: no column landing_x_m and landing_y_m"),
-        (["aim", "data", "--at", "1,0"], "model.json"),
+        (["aim", "data", "--at", "1,0"], "data: holds no model: there is no model.json\n  try: throwcollect fit "),
         (["fit", "data", "-o", "data"], "exists"),
         (["fit", "data", "-o", "new", "--where", "trial < 0"], "--where: no throw of "),
         (["fit", "data", "-o", "new", "--where", "trial < 0"], "fulfils 'trial < 0'"),

@@ -269,6 +269,13 @@ def test_a_target_that_has_a_column_already_is_read_as_it_was_saved(
     assert np.array_equal(again.learned.outputs, model.learned.outputs)
 
 
-def test_another_directory_is_no_model(tmp_path: Path) -> None:
-    with pytest.raises(DatasetError, match=r"model\.json"):
-        load_model(tmp_path)
+def test_where_no_model_is_it_is_told_how_to_make_one(dataset: Dataset, tmp_path: Path) -> None:
+    for directory, meant in (
+        (tmp_path, "DATASET"),
+        (tmp_path / "no", "DATASET"),
+        (dataset.directory, dataset.directory),
+    ):
+        with pytest.raises(DatasetError, match=r"holds no model: there is no model\.json") as caught:
+            load_model(directory)
+        assert caught.value.path == directory
+        assert caught.value.hint == f"throwcollect fit {meant} -o MODEL"
