@@ -142,9 +142,12 @@ def test_a_score_tells_how_throws_hit_here_and_elsewhere(place: Path) -> None:
         (["aim", "model", "--at", "1.4"], "--at 1.4\n  expected: 2 numbers: landing_x_m,landing_y_m"),
         (["aim", "model", "--at", "1,nan"], "finite numbers"),
         (["aim", "model", "--at", "1,0", "--choose", "best"], "--choose: 'best'"),
-        (["adapt", "model", "data", "-o", "new", "--method", "best"], "--method: 'best'"),
+        (
+            ["adapt", "model", "data", "-o", "new", "--method", "best"],
+            "--method: 'best'\n  expected: one of auto, none, offset, bias, latent",
+        ),
         (["aim", "model", "--targets", "throws.yaml"], "throws.yaml:1: no column landing_x_m and landing_y_m"),
-        (["aim", "data", "--at", "1,0"], "model.json"),
+        (["aim", "data", "--at", "1,0"], "data: holds no model: there is no model.json\n  try: throwcollect fit "),
         (["fit", "data", "-o", "data"], "exists"),
         (["fit", "data", "-o", "new", "--where", "trial < 0"], "--where: no throw of "),
         (["fit", "data", "-o", "new", "--where", "trial < 0"], "fulfils 'trial < 0'"),
@@ -173,6 +176,27 @@ def test_a_cell_that_is_no_number_is_told_with_its_line(place: Path) -> None:
     assert "cells.csv:3: landing_y_m: 'nan'\n  expected: a finite number" in said.stderr
 
 
+@pytest.mark.parametrize(
+    ("changed", "message"),
+    [
+        ({"task.duration_s": 90}, "task.duration_s is 90\n  expected: about "),
+        ({"landing_x_m": 1500}, "landing_x_m is 1500, landing_y_m is "),
+        ({"landing_x_m": 2e6}, "landing_x_m: 2e+06\n  expected: a number of at most 1e+06"),
+    ],
+)
+def test_a_measured_throw_that_is_far_from_all_others_is_told_with_its_line(
+    place: Path, changed: dict[str, float], message: str
+) -> None:
+    model = throwcollect.load_model(place / "model")
+    (aim,) = model.aim([[float(number) for number in middle(place).split(",")]])
+    good = aim.parameters | dict(zip(model.targets, aim.target.tolist(), strict=True))
+    rows = [",".join(map(str, row.values())) for row in (good, good | changed)]
+    (place / "slip.csv").write_text("\n".join([",".join(good), "", *rows]))
+    said = call_here("adapt", place / "model", place / "slip.csv", "-o", place / "new")
+    assert said.returncode == 2
+    assert f"slip.csv:4: {message}" in said.stderr
+
+
 def test_throws_of_another_robot_are_refused(place: Path) -> None:
     shutil.copytree(place / "model", place / "other")
     path = place / "other" / "model.json"
@@ -185,7 +209,16 @@ def test_throws_of_another_robot_are_refused(place: Path) -> None:
 def test_a_target_out_of_reach_is_told_with_the_nearest_point(place: Path) -> None:
     said = call_here("aim", place / "model", "--at", "9,0")
     assert said.returncode == 1
-    assert re.search(r"out of reach: 9\.000,0\.000; the nearest point that was reached: \d\.\d+,-?\d\.\d+", said.stderr)
+    told = r"out of reach: 9\.000,0\.000; no throw .*\n  .* that was reached: \d\.\d+,-?\d\.\d+ \(7\d\d\.\d+ cm away\)"
+    assert re.search(told, said.stderr), said.stderr
+
+
+def test_of_very_many_targets_out_of_reach_most_are_counted(place: Path) -> None:
+    (place / "far.csv").write_text("landing_x_m,landing_y_m\n" + "9,0\n" * 30 + middle(place))
+    said = call_here("aim", place / "model", "--targets", place / "far.csv", "-o", place / "far_throws.csv")
+    assert said.returncode == 1
+    assert len(re.findall(r"^target \d+ of 31 is out of reach", said.stderr, re.M)) == 20
+    assert said.stderr.endswith("\nand 10 more; 30 of 31 targets are out of reach\n")
 
 
 def test_each_target_out_of_reach_is_told_with_where_its_parameters_lead(place: Path) -> None:
@@ -193,12 +226,8 @@ def test_each_target_out_of_reach_is_told_with_where_its_parameters_lead(place: 
     found = json.loads(said.stdout)
     assert [each["reachable"] for each in found] == [True, False, False]
     ends = [",".join(f"{value:.3f}" for value in each["predicted"]) for each in found]
-    assert re.findall(
-        r"^target (\d) of 3 is out of reach: .*\n  its parameters .* end at (\S+)$", said.stderr, re.M
-    ) == [
-        ("2", ends[1]),
-        ("3", ends[2]),
-    ]
+    told = re.findall(r"^target (\d) of 3 is out of reach: .*\n  .*; predicted end: (\S+)$", said.stderr, re.M)
+    assert told == [("2", ends[1]), ("3", ends[2])]
 
 
 def test_a_model_is_learned_from_a_directory_as_from_what_was_loaded(place: Path) -> None:

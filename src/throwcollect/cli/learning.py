@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json as jsonlib
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -18,8 +18,12 @@ from throwcollect.side_by_side import count_cores
 from throwcollect.wording import command, format_count, join_names
 
 if TYPE_CHECKING:
+    from throwcollect.learning.lists import Row
     from throwcollect.learning.model import Aim, Model
     from throwcollect.learning.score import Errors, Score
+
+_MOST_TOLD = 20
+"""Number of targets out of reach that are told; the others are counted."""
 
 ModelArgument = Annotated[Path, typer.Argument(metavar="MODEL", help="Directory of the model.", readable=False)]
 ModelOption = Annotated[
@@ -121,23 +125,17 @@ def aim(
             "no target", expected="--at, or --targets FILE", hint=command("aim", directory, "--at", _example(model))
         )
     aims = model.aim(given, choose=choose)
-    if json:
-        print_json([_aim_as_json(aim) for aim in aims])
-    elif output is None:
-        for aim in aims:
-            typer.echo(" ".join(f"--set {key}={value!r}" for key, value in aim.parameters.items()))
     if output is not None:
         task = load_config(directory / CONFIG).task
         write_aims(output, aims, names, task)
-        if not json:
-            typer.echo(f"{output}: {format_count(len(aims), task.noun)}")
-    for number, aim in enumerate(aims, start=1):
-        if not aim.reachable:
-            tell(
-                f"target {number} of {len(aims)} is out of reach: {_join_numbers(aim.target)}; the nearest point that "
-                f"was reached: {_join_numbers(aim.nearest)}\n  its parameters cannot be relied on; they are predicted "
-                f"to end at {_join_numbers(aim.predicted)}"
-            )
+    if json:
+        print_json([_aim_as_json(aim) for aim in aims])
+    elif output is not None:
+        typer.echo(f"{output}: {format_count(len(aims), task.noun)}")
+    else:
+        for aim in aims:
+            typer.echo(" ".join(f"--set {key}={value!r}" for key, value in aim.parameters.items()))
+    _tell_out_of_reach(model, aims)
     if not all(aim.reachable for aim in aims):
         raise typer.Exit(1)
 
@@ -231,19 +229,27 @@ def adapt(
     json: JsonOption = False,
 ) -> None:
     """Make the model of another world, of a few throws there."""
-    from throwcollect.learning.lists import read_table
+    from throwcollect.learning.adapting import FarThrowError, Method
+    from throwcollect.learning.lists import read_table, refuse_large_targets
     from throwcollect.learning.model import load_model
     from throwcollect.learning.score import tell_length
 
+    methods = ("auto", *(each.value for each in Method))
+    if method not in methods:
+        raise ConfigError(f"--method: {method!r}", expected=f"one of {', '.join(methods)}")
     model = load_model(directory)
     keys = (*model.parameters, *model.given)
     rows = _read_dataset(throws, keys, model) if throws.is_dir() else read_table(throws, (*keys, *model.targets))
-    adapted = model.adapt(
-        [{key: row[key] for key in keys} for row in rows],
-        [[row[target] for target in model.targets] for row in rows],
-        method=None if method == "auto" else method,
-        scatter=scatter,
-    )
+    refuse_large_targets(rows, model.targets)
+    try:
+        adapted = model.adapt(
+            [{key: row.numbers[key] for key in keys} for row in rows],
+            [[row.numbers[target] for target in model.targets] for row in rows],
+            method=None if method == "auto" else method,
+            scatter=scatter,
+        )
+    except FarThrowError as error:
+        raise error.locate_throw(rows[error.number].place) from None
     adapted.save(output)
     entry = adapted.file.adaptation
     if entry is None:
@@ -288,7 +294,7 @@ def _read_target(text: str, names: Sequence[str]) -> list[float]:
     return values
 
 
-def _read_dataset(directory: Path, keys: Sequence[str], model: Model) -> list[dict[str, float]]:
+def _read_dataset(directory: Path, keys: Sequence[str], model: Model) -> list[Row]:
     """Read the throws of a dataset that succeeded: the keys and the targets of each.
 
     Raises:
@@ -296,6 +302,7 @@ def _read_dataset(directory: Path, keys: Sequence[str], model: Model) -> list[di
         DatasetError: If the dataset is damaged.
     """
     from throwcollect.dataset.reader import Dataset
+    from throwcollect.learning.lists import Row
 
     dataset = Dataset.open(directory)
     trained, config = model.file.trained_on, dataset.config
@@ -309,8 +316,21 @@ def _read_dataset(directory: Path, keys: Sequence[str], model: Model) -> list[di
         raise ConfigError(
             f"{directory}: has no {join_names(missing)}", expected="throws with all parameters of the model"
         )
-    rows: list[dict[str, float]] = throws.select([*keys, *model.targets]).to_pylist()
-    return rows
+    rows = throws.select([*keys, *model.targets]).to_pylist()
+    return [
+        Row(f"{directory}: trial {trial}", row) for trial, row in zip(throws["trial"].to_pylist(), rows, strict=True)
+    ]
+
+
+def _tell_out_of_reach(model: Model, aims: Sequence[Aim]) -> None:
+    """Tell which targets are out of reach, and why; of very many, the others are counted."""
+    from throwcollect.learning.reach import explain_reach
+
+    far = [(number, aim) for number, aim in enumerate(aims, start=1) if not aim.reachable]
+    for number, aim in far[:_MOST_TOLD]:
+        tell(f"target {number} of {len(aims)} is out of reach: {explain_reach(model.learned, aim)}")
+    if len(far) > _MOST_TOLD:
+        tell(f"and {len(far) - _MOST_TOLD} more; {len(far)} of {len(aims)} targets are out of reach")
 
 
 def _aim_as_json(aim: Aim) -> dict[str, object]:
@@ -321,10 +341,6 @@ def _aim_as_json(aim: Aim) -> dict[str, object]:
         "reachable": aim.reachable,
         "nearest": aim.nearest.tolist(),
     }
-
-
-def _join_numbers(values: Iterable[float]) -> str:
-    return ",".join(f"{value:.3f}" for value in values)
 
 
 def _describe_score(score: Score) -> list[str]:

@@ -11,6 +11,7 @@ from throwcollect.errors import ConfigError
 from throwcollect.learning.arrays import Array
 from throwcollect.learning.learned_map import Correction, LearnedMap, Role
 from throwcollect.reproducible_math import matmul, solve
+from throwcollect.units import unit_of_name
 
 _OFFSET = 0.1
 """Standard deviation that is expected of the offset [m or rad] before any throw."""
@@ -30,8 +31,31 @@ _SMALL_STEP = 1e-5
 _THROWS_FOR_BIAS = 3
 _FAR = 2.0
 """Parameters and context that are farther from the middle of their range [scaled: it ends at 1] are refused."""
+_LEAST_WIDTH = 1.0
+"""Regions where throws ended count as this wide at least [m or rad], as other worlds may shift them by more than their
+width."""
+_NOT_MIXED_UP = {"m": "m, not cm or mm", "rad": "rad, not degrees"}
+"""Units of places, and those that people measure in."""
 _CLEARLY = 3.0
 """Adapting helps if the sum of squared misses falls by more than the square of so many standard deviations."""
+
+
+class FarThrowError(ConfigError):
+    """A throw is so far from all that a map was learned from that it is taken for a slip.
+
+    Args:
+        number: Which of the throws, counted from 0.
+        problem: What is far, and which value it has.
+    """
+
+    def __init__(self, number: int, problem: str, *, expected: str, hint: str | None = None) -> None:
+        self.number = number
+        self.problem = problem
+        super().__init__(f"throw {number}: {problem}", expected=expected, hint=hint)
+
+    def locate_throw(self, place: str) -> ConfigError:
+        """Make the same error with the place of the throw, for a caller that has read it from a file."""
+        return ConfigError(f"{place}: {self.problem}", expected=self.expected, hint=self.hint)
 
 
 class Method(str, Enum):
@@ -120,14 +144,40 @@ def refuse_far_inputs(learned: LearnedMap, role: Role, inputs: Array) -> None:
         inputs: Their scaled values, shape ``(n_throws, n_axes of the role)``.
 
     Raises:
-        ConfigError: If a value is outside of the range of the dataset by more than half of that range.
+        FarThrowError: If a value is outside of the range of the dataset by more than half of that range.
     """
     for number, column in np.argwhere(np.abs(inputs) > _FAR).tolist():
         axis = learned.axes_of(role)[column]
         value = learned.unscale(role, inputs)[number, column]
-        raise ConfigError(
-            f"throw {number}: {axis.key} is {value:g}",
+        raise FarThrowError(
+            number,
+            f"{axis.key} is {value:g}",
             expected=f"about {axis.minimum:g} to {axis.maximum:g}, the range that the model was learned from",
+        )
+
+
+def refuse_far_places(learned: LearnedMap, places: Array) -> None:
+    """Refuse throws that ended where nothing was learned: mostly slips, such as millimetres for metres.
+
+    Args:
+        learned: The map.
+        places: Where they ended, shape ``(n_throws, n_targets)``.
+
+    Raises:
+        FarThrowError: If a throw ended farther from the region where those of the map did than this is wide, and than a
+            metre or radian.
+    """
+    low, high = learned.outputs.min(axis=0), learned.outputs.max(axis=0)
+    away = np.linalg.norm(np.maximum(0.0, np.maximum(low - places, places - high)), axis=1)
+    ranges = ", ".join(f"{least:.3g} to {most:.3g}" for least, most in zip(low.tolist(), high.tolist(), strict=True))
+    units = dict.fromkeys(filter(None, map(unit_of_name, learned.targets)))
+    for number in np.flatnonzero(away > max(_LEAST_WIDTH, float(np.linalg.norm(high - low)))).tolist():
+        ends = zip(learned.targets, places[number].tolist(), strict=True)
+        raise FarThrowError(
+            number,
+            ", ".join(f"{target} is {end:g}" for target, end in ends),
+            expected=f"about {ranges}, where the throws ended that the model was learned from",
+            hint=f"check the unit: {' and '.join(_NOT_MIXED_UP.get(unit, unit) for unit in units)}" if units else None,
         )
 
 

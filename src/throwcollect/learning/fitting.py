@@ -79,9 +79,13 @@ def fit_map(
         context: Swept keys that are given with a target; those that the task names by default.
 
     Raises:
-        ConfigError: If there is nothing to aim at, a key was not swept, or too few throws succeeded.
+        ConfigError: If there is nothing to aim at, a key was not swept, a name is there twice, or too few throws
+            succeeded.
         DatasetError: If a column is missing, or holds no numbers.
     """
+    for argument, names in (("targets", targets), ("parameters", parameters), ("given", context)):
+        if twice := [name for name in names if names.count(name) > 1]:
+            raise ConfigError(f"{argument}: {twice[0]} is named twice", expected="each name once")
     config = dataset.config
     columns = tuple(targets) or config.task.targets
     if not columns:
@@ -153,8 +157,9 @@ def _find_axes(
         ends = pc.min_max(throws[key]).as_py()
         low, high = ends["min"], ends["max"]
         role = _choose_role(dataset.config, key, parameters, context)
-        # Nothing can be learned of a key with one value, and scaling would divide by zero.
-        if low == high and low is not None:
+        # Nothing can be learned of a key with one value, and scaling would divide by zero. Of a single throw, no key
+        # varies; that is too few throws, however many keys were swept.
+        if low == high and len(throws) > 1:
             if key in (*parameters, *context):
                 raise ConfigError(f"{key} has the value {low:g} in all throws", expected="a key that varies")
             continue

@@ -3,18 +3,35 @@
 from __future__ import annotations
 
 import csv
+import io
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
+from throwcollect.config.target import LARGEST_TARGET
 from throwcollect.config.task import TaskConfig
 from throwcollect.errors import ConfigError
+from throwcollect.files import write_file
 from throwcollect.learning.model import Aim
-from throwcollect.sweep.point_file import read_number
+from throwcollect.sweep.point_file import explain_wrong_count, read_number
 from throwcollect.wording import join_names
 
 
-def read_table(path: Path, names: Sequence[str], *, aliases: dict[str, str] | None = None) -> list[dict[str, float]]:
+@dataclass(frozen=True)
+class Row:
+    """Numbers that belong together.
+
+    Attributes:
+        place: Where they were read, such as ``targets.csv:3``.
+        numbers: The numbers by name.
+    """
+
+    place: str
+    numbers: dict[str, float]
+
+
+def read_table(path: Path, names: Sequence[str], *, aliases: dict[str, str] | None = None) -> list[Row]:
     """Read some columns of a CSV file with a header line.
 
     Args:
@@ -23,33 +40,52 @@ def read_table(path: Path, names: Sequence[str], *, aliases: dict[str, str] | No
         aliases: For some of these names, the column that is read instead where the file has none of that name.
 
     Raises:
-        ConfigError: If it cannot be read, a column is missing, or a cell is no finite number.
+        ConfigError: If it cannot be read, a column is missing or there twice, a row has more or fewer values than the
+            header has names, or a cell is no finite number.
     """
     try:
         # Spreadsheets begin a CSV file with a byte order mark, which would belong to the name of the first column.
         with path.open(encoding="utf-8-sig", newline="") as file:
-            reader = csv.DictReader(file)
-            header = reader.fieldnames or []
-            instead = {name: alias for name, alias in (aliases or {}).items() if name not in header}
-            columns = {name: instead.get(name, name) for name in names}
-            if missing := [name for name in names if columns[name] not in header]:
-                other = "".join(f", or {aliases[name]} for {name}" for name in missing if aliases and name in aliases)
-                raise ConfigError(
-                    f"{path}:1: no column {join_names(missing)}", expected=f"columns {', '.join(names)}{other}"
-                )
-            rows = []
-            for row in reader:
-                numbers = {name: read_number(row[column]) for name, column in columns.items()}
-                if wrong := [column for name, column in columns.items() if not math.isfinite(numbers[name])]:
-                    raise ConfigError(
-                        f"{path}:{reader.line_num}: {wrong[0]}: {row[wrong[0]] or ''!r}", expected="a finite number"
-                    )
-                rows.append(numbers)
+            reader = csv.reader(file)
+            # Lines without any cell count nowhere.
+            header = [name.strip() for name in next(filter(None, reader), [])]
+            columns = _find_columns(header, names, aliases or {}, place=f"{path}:{reader.line_num or 1}")
+            rows = [_read_row(cells, header, columns, f"{path}:{reader.line_num}") for cells in reader if cells]
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise ConfigError(f"{path}: cannot be read: {getattr(error, 'strerror', error)}") from error
     if not rows:
         raise ConfigError(f"{path}: has no rows", expected=f"columns {', '.join(names)}")
     return rows
+
+
+def _find_columns(header: list[str], names: Sequence[str], aliases: dict[str, str], place: str) -> dict[str, str]:
+    """Find the column that is read for each name.
+
+    Raises:
+        ConfigError: If there is none, or there are two.
+    """
+    columns = {name: aliases.get(name, name) if name not in header else name for name in names}
+    if missing := [name for name in names if columns[name] not in header]:
+        other = "".join(f", or {aliases[name]} for {name}" for name in missing if name in aliases)
+        raise ConfigError(f"{place}: no column {join_names(missing)}", expected=f"columns {', '.join(names)}{other}")
+    if twice := [column for column in columns.values() if header.count(column) > 1]:
+        raise ConfigError(f"{place}: {twice[0]}: the column is here twice", expected="each column once")
+    return columns
+
+
+def _read_row(cells: list[str], header: list[str], columns: dict[str, str], place: str) -> Row:
+    """Read the numbers of a row by name.
+
+    Raises:
+        ConfigError: If it has more or fewer values than the header has names, or a cell is no finite number.
+    """
+    if problem := explain_wrong_count(cells, len(header)):
+        raise ConfigError(f"{place}: {problem}", expected=f"a value for each of {', '.join(header)}")
+    row = dict(zip(header, cells, strict=True))
+    numbers = {name: read_number(row[column]) for name, column in columns.items()}
+    if wrong := [columns[name] for name, number in numbers.items() if not math.isfinite(number)]:
+        raise ConfigError(f"{place}: {wrong[0]}: {row[wrong[0]]!r}", expected="a finite number")
+    return Row(place, numbers)
 
 
 def read_targets(path: Path, names: Sequence[str], task: TaskConfig) -> list[list[float]]:
@@ -61,10 +97,26 @@ def read_targets(path: Path, names: Sequence[str], task: TaskConfig) -> list[lis
         task: Declares the columns of targets that stand in such lists.
 
     Raises:
-        ConfigError: If it cannot be read, a column is missing, or a cell is no finite number.
+        ConfigError: As `read_table`, or if a number is beyond those that targets may have.
     """
     aliases = {column.of: column.name for column in task.target_columns if column.of in names}
-    return [[row[name] for name in names] for row in read_table(path, names, aliases=aliases)]
+    rows = read_table(path, names, aliases=aliases)
+    refuse_large_targets(rows, names)
+    return [[row.numbers[name] for name in names] for row in rows]
+
+
+def refuse_large_targets(rows: Sequence[Row], names: Sequence[str]) -> None:
+    """Refuse rows with numbers of which powers would not be finite.
+
+    Raises:
+        ConfigError: If a number of one of the names is beyond those that targets may have.
+    """
+    for row in rows:
+        for name in names:
+            if abs(row.numbers[name]) > LARGEST_TARGET:
+                raise ConfigError(
+                    f"{row.place}: {name}: {row.numbers[name]:g}", expected=f"a number of at most {LARGEST_TARGET:g}"
+                )
 
 
 def write_aims(path: Path, aims: Sequence[Aim], names: Sequence[str], task: TaskConfig) -> None:
@@ -74,17 +126,18 @@ def write_aims(path: Path, aims: Sequence[Aim], names: Sequence[str], task: Task
     The list has columns for those targets alone that the task declares.
 
     Raises:
-        ConfigError: If the file cannot be written.
+        ConfigError: If the name of the file does not end in ``.csv``.
+        DatasetError: If it cannot be written.
     """
+    if path.suffix != ".csv":
+        raise ConfigError(f"{path}: a list of another kind than CSV is not written", expected="a name with .csv")
     columns = {column.name: names.index(column.of) for column in task.target_columns if column.of in names}
     if task.find_wrong_targets(columns):
         columns = {}
     rows = [{**aim.parameters, **{name: float(aim.target[at]) for name, at in columns.items()}} for aim in aims]
-    try:
-        with path.open("w", encoding="utf-8", newline="") as file:
-            writer = csv.writer(file, lineterminator="\n")
-            writer.writerow(rows[0])
-            # repr writes as many digits as it takes to read the same number again.
-            writer.writerows([map(repr, row.values()) for row in rows])
-    except OSError as error:
-        raise ConfigError(f"{path}: cannot be written: {error.strerror}") from error
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(rows[0])
+    # repr writes as many digits as it takes to read the same number again.
+    writer.writerows([map(repr, row.values()) for row in rows])
+    write_file(path, text.getvalue().encode())

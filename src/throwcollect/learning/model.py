@@ -16,7 +16,7 @@ from throwcollect.config.target import LARGEST_TARGET
 from throwcollect.errors import ConfigError
 from throwcollect.extras import require
 from throwcollect.files import StrPath
-from throwcollect.learning.adapting import Method, adapt, refuse_far_inputs
+from throwcollect.learning.adapting import Method, adapt, refuse_far_inputs, refuse_far_places
 from throwcollect.learning.aiming import Choice, aim
 from throwcollect.learning.arrays import Array
 from throwcollect.learning.distilling import distil
@@ -203,7 +203,7 @@ class Model:
 
         Raises:
             ConfigError: If there are no throws, or not as many places; a key is missing or unknown, a value not finite,
-                there is no such method, or a parameter or context is far outside of the range of the dataset.
+                there is no such method, or a parameter, context or place is far outside of what the dataset has.
         """
         parameters, context = self._inputs(points)
         measured = _read_places("places", places, self.targets)
@@ -222,6 +222,7 @@ class Model:
             )
         refuse_far_inputs(self.learned, Role.PARAMETER, parameters)
         refuse_far_inputs(self.learned, Role.CONTEXT, context)
+        refuse_far_places(self.learned, measured)
         # A measured place differs from its prediction by the scatter of the throw, and by the error of the model.
         deviation = float(np.hypot(scatter, self.file.trained_on.error))
         adapted = adapt(

@@ -7,6 +7,7 @@ from typing import Literal
 
 from pydantic import Field, FiniteFloat, ValidationError, model_validator
 
+from throwcollect.dataset.directory import has_files
 from throwcollect.errors import DatasetError
 from throwcollect.files import read_text
 from throwcollect.learning.adapting import ROLES, Method
@@ -14,6 +15,7 @@ from throwcollect.learning.arrays import Array, Entry
 from throwcollect.learning.distilling import DistilledMap
 from throwcollect.learning.learned_map import Axis, Correction, Kind, LearnedMap, Role
 from throwcollect.learning.polynomial import Polynomial
+from throwcollect.wording import command
 
 MODEL = "model.json"
 _MOST_BYTES = 100_000_000
@@ -127,11 +129,20 @@ def read_model_file(directory: Path) -> ModelFile:
     """Read ``model.json`` from the directory of a model.
 
     Raises:
-        DatasetError: If it cannot be read, or is no such file.
+        DatasetError: If there is none, it cannot be read, or is no such file.
     """
     path = directory / MODEL
     try:
-        return ModelFile.model_validate_json(read_text(path, most_bytes=_MOST_BYTES))
+        text = read_text(path, most_bytes=_MOST_BYTES)
+    except DatasetError as error:
+        if not isinstance(error.__cause__, FileNotFoundError):
+            raise
+        # A dataset is mistaken for its model easily.
+        dataset = directory if has_files(directory) else "DATASET"
+        hint = command("fit", dataset, "-o", "MODEL")
+        raise DatasetError(f"holds no model: there is no {MODEL}", path=directory, hint=hint) from error
+    try:
+        return ModelFile.model_validate_json(text)
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
         where = ".".join(map(str, first["loc"]))

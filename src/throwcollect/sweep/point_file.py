@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import math
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -19,6 +19,7 @@ from throwcollect.config.values import reason_not_sweepable, with_values
 from throwcollect.errors import ConfigError, Problem
 from throwcollect.sweep.parquet_file import encode_table
 from throwcollect.sweep.points import Points, Targets
+from throwcollect.wording import format_count
 
 _MOST_PROBLEMS = 20
 _UNNAMED_INDEX = re.compile(r"__index_level_\d+__")
@@ -117,8 +118,8 @@ def _read_csv(path: Path, config: Config) -> _Rows:
 
 def _row(names: tuple[str, ...], cells: list[str], path: Path, line: int) -> tuple[list[float], list[Problem]]:
     """Read the numbers of a row, NaN for targets that it leaves out."""
-    if len(cells) != len(names):
-        return [], [Problem(f"should have {len(names)} values, got {len(cells)}", "", path, line)]
+    if problem := explain_wrong_count(cells, len(names)):
+        return [], [Problem(problem, "", path, line)]
     row, problems = [], []
     for name, cell in zip(names, cells, strict=True):
         number = read_number(cell)
@@ -131,10 +132,21 @@ def _row(names: tuple[str, ...], cells: list[str], path: Path, line: int) -> tup
     return row, problems
 
 
-def read_number(cell: str | None) -> float:
+def explain_wrong_count(cells: Sequence[str], columns: int) -> str:
+    """Say that a row of a CSV file has more or fewer values than there are columns; empty if it has as many."""
+    if len(cells) == columns:
+        return ""
+    sentence = f"should have {format_count(columns, 'value')}, got {len(cells)}"
+    # A decimal comma makes two cells of a number, neither of which has a point.
+    if len(cells) > columns and not any("." in cell for cell in cells):
+        sentence += "; if a comma belongs to a number, decimals are written with a point, as in 1.5"
+    return sentence
+
+
+def read_number(cell: str) -> float:
     """Read the number in a cell of a CSV file; NaN if the cell holds none."""
     try:
-        return float(cell or "")
+        return float(cell)
     except ValueError:
         return math.nan
 

@@ -1,11 +1,13 @@
 """Adapting to worlds in closed form that differ from the one that was learned."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from tests.unit.learning.worlds import KEYS, draw, land, learn, learn_with_drag
 
 from throwcollect.errors import ConfigError
-from throwcollect.learning.adapting import Adaptation, Method, adapt
+from throwcollect.learning.adapting import Adaptation, FarThrowError, Method, adapt, refuse_far_places
 from throwcollect.learning.learned_map import LearnedMap, Role
 
 BIAS = np.array([0.02, 0.06, -0.04])
@@ -127,3 +129,11 @@ def test_places_beyond_all_that_a_bias_explains_are_named() -> None:
             scatter=0.002,
             latents_count=False,
         )
+
+
+def test_a_world_may_be_a_metre_away_however_close_together_all_throws_ended() -> None:
+    close = replace(learn(), outputs=np.full((800, 2), [1.4, -0.2]))
+    refuse_far_places(close, np.array([[1.4, -0.2], [1.4, 0.7], [0.5, -0.2]]))
+    with pytest.raises(FarThrowError) as caught:
+        refuse_far_places(close, np.array([[1.4, -0.2], [1.4, 0.9]]))
+    assert caught.value.number == 1

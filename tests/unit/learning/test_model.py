@@ -139,6 +139,14 @@ def test_a_score_is_put_into_the_model_and_its_card(model: Model, tmp_path: Path
         ({"kind": "network"}, "^kind: 'network'"),
         ({"targets": ["place"]}, "no column of numbers 'place'"),
         ({"parameters": ["task.points_hz"]}, "task.points_hz was not swept"),
+        ({"targets": [*TARGETS, TARGETS[0]]}, "targets: landing_x_m is named twice"),
+        ({"parameters": KEYS[:1] * 2}, f"parameters: {KEYS[0]} is named twice"),
+        ({"given": KEYS[1:2] * 2}, f"given: {KEYS[1]} is named twice"),
+        ({"where": "trial < 1"}, "1 throw of 1 landed\n  expected: at least 12 for 3 parameters"),
+        (
+            {"where": "trial < 1", "parameters": KEYS[:2]},
+            "1 throw of 1 landed\n  expected: at least 9 for 2 parameters",
+        ),
         ({"where": "trial < 5"}, "5 throws of 5 landed"),
         ({"where": "trial >="}, "^where: cannot be understood"),
     ],
@@ -258,6 +266,20 @@ def test_adapting_refuses_throws_of_which_the_model_knows_nothing(model: Model, 
         given.adapt(points, land(draw(2, 8), 0.0).tolist())
 
 
+@pytest.mark.parametrize("factor", [100.0, 1000.0])
+def test_adapting_refuses_places_in_another_unit(model: Model, factor: float) -> None:
+    points = [dict(zip(KEYS, row, strict=True)) for row in draw(2, 8).tolist()]
+    places = land(draw(2, 8), 0.0)
+    places[1] *= factor
+    with pytest.raises(ConfigError) as caught:
+        model.adapt(points, places.tolist())
+    assert caught.value.message == f"throw 1: landing_x_m is {places[1, 0]:g}, landing_y_m is {places[1, 1]:g}"
+    assert re.fullmatch(
+        r"about 0\.\d+ to 1\.\d+, -0\.\d+ to 0\.\d+, where the throws ended .*", caught.value.expected or ""
+    )
+    assert caught.value.hint == "check the unit: m, not cm or mm"
+
+
 @pytest.mark.parametrize(
     ("file", "change", "message"),
     [
@@ -281,7 +303,7 @@ def test_a_damaged_model_is_told_in_words(model: Model, tmp_path: Path, file: st
     assert caught.value.path == path
 
 
-@pytest.mark.parametrize("targets", [["landing_x_m", "effort_peak_share"], ["landing_x_m"] * 2, [KEYS[0]]])
+@pytest.mark.parametrize("targets", [["landing_x_m", "effort_peak_share"], [KEYS[0]]])
 def test_a_target_that_has_a_column_already_is_read_as_it_was_saved(
     dataset: Dataset, tmp_path: Path, targets: list[str]
 ) -> None:
@@ -292,6 +314,13 @@ def test_a_target_that_has_a_column_already_is_read_as_it_was_saved(
     assert np.array_equal(again.learned.outputs, model.learned.outputs)
 
 
-def test_another_directory_is_no_model(tmp_path: Path) -> None:
-    with pytest.raises(DatasetError, match=r"model\.json"):
-        load_model(tmp_path)
+def test_where_no_model_is_it_is_told_how_to_make_one(dataset: Dataset, tmp_path: Path) -> None:
+    for directory, meant in (
+        (tmp_path, "DATASET"),
+        (tmp_path / "no", "DATASET"),
+        (dataset.directory, dataset.directory),
+    ):
+        with pytest.raises(DatasetError, match=r"holds no model: there is no model\.json") as caught:
+            load_model(directory)
+        assert caught.value.path == directory
+        assert caught.value.hint == f"throwcollect fit {meant} -o MODEL"

@@ -91,6 +91,14 @@ def test_what_pandas_numbers_rows_by_is_no_key(tmp_path):
             ],
         ),
         (
+            "task.duration_s\n1\n1,2\n1.2,3\n",
+            [
+                "list.csv:3: should have 1 value, got 2; if a comma belongs to a number, decimals are written with a "
+                "point, as in 1.5",
+                "list.csv:4: should have 1 value, got 2",
+            ],
+        ),
+        (
             HEADER + "0.1,1\n\n3,1\n0.1,0\n-1,1\n",
             [
                 "list.csv:4: ball.mass_kg: should be a number above 0 and up to 2 kg, got 3.0",

@@ -1,0 +1,38 @@
+"""Why targets are out of reach, in words."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from throwcollect.learning.aiming import REACH, TOLERANCE
+from throwcollect.learning.learned_map import LearnedMap, Role
+from throwcollect.learning.model import Aim
+from throwcollect.learning.score import tell_length
+
+
+def explain_reach(learned: LearnedMap, aim: Aim) -> str:
+    """Say why a target is out of reach, what was reached nearest to it, and where its parameters lead."""
+    ends, given = np.split(aim.target, [len(learned.targets)])
+    away, missed = (float(np.linalg.norm(place - ends)) for place in (aim.nearest, aim.predicted))
+    reasons = [
+        f"{axis.key} was {axis.minimum:g} to {axis.maximum:g} in all throws"
+        for axis, value in zip(learned.axes_of(Role.CONTEXT), given.tolist(), strict=True)
+        if not axis.minimum <= value <= axis.maximum
+    ]
+    if away > REACH:
+        reasons.append(
+            f"no throw came within {tell_length(REACH, learned.targets)}, so predictions there are uncertain"
+        )
+    if missed > TOLERANCE:
+        reasons.append(f"the best parameters are predicted to miss it by {tell_length(missed, learned.targets)}")
+    return (
+        f"{_join_numbers(aim.target)}; {'; '.join(reasons)}\n"
+        f"  the nearest point that was reached: {_join_numbers(aim.nearest)} "
+        f"({tell_length(away, learned.targets)} away); predicted end: {_join_numbers(aim.predicted)}"
+    )
+
+
+def _join_numbers(values: Iterable[float]) -> str:
+    return ",".join(f"{value:.3f}" for value in values)

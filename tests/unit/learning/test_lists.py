@@ -1,0 +1,85 @@
+"""Lists in CSV files: each number is that of its column, what may mean something else is refused, files are whole."""
+
+import resource
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from throwcollect.config.schema import Config
+from throwcollect.errors import ConfigError, DatasetError
+from throwcollect.learning.lists import Row, read_table, read_targets, write_aims
+from throwcollect.learning.model import Aim
+
+TARGETS = ("landing_x_m", "landing_y_m")
+HEADER = "landing_x_m,landing_y_m"
+POINTS = "if a comma belongs to a number, decimals are written with a point, as in 1.5"
+
+END = np.array([1.4, -0.2])
+AIM = Aim(END, {"task.duration_s": 1.1}, END, True, END)
+
+
+@contextmanager
+def small_disk(most_bytes: int) -> Iterator[None]:
+    """No file of this process may become longer."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (most_bytes, hard))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+
+
+@pytest.fixture
+def table(tmp_path: Path) -> Path:
+    return tmp_path / "table.csv"
+
+
+def test_columns_may_stand_in_any_order_among_others(table: Path) -> None:
+    table.write_text("note, landing_y_m, landing_x_m, note\na, -0.29, 1.63, b\n\n, 2, 1,\n")
+    assert read_table(table, TARGETS) == [
+        Row(f"{table}:2", dict(zip(TARGETS, (1.63, -0.29), strict=True))),
+        Row(f"{table}:4", dict(zip(TARGETS, (1.0, 2.0), strict=True))),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (f"{HEADER}\n1,0\n1,63,-0,29\n", f":3: should have 2 values, got 4; {POINTS}"),
+        (f"{HEADER}\n1.63,-0.29,0.3\n", ":2: should have 2 values, got 3"),
+        (f"{HEADER},note\n1.63,-0.29\n", ":2: should have 3 values, got 2"),
+        (f"{HEADER},landing_x_m\n1,0,2\n", ":1: landing_x_m: the column is here twice"),
+        (f"\n{HEADER}\n1,\n", ":3: landing_y_m: ''"),
+    ],
+)
+def test_a_row_that_may_mean_something_else_is_told_with_its_line(table: Path, text: str, message: str) -> None:
+    table.write_text(text)
+    with pytest.raises(ConfigError) as caught:
+        read_table(table, TARGETS)
+    assert caught.value.message == f"{table}{message}"
+    assert caught.value.expected
+
+
+def test_a_target_that_is_too_large_is_told_with_its_line(table: Path) -> None:
+    table.write_text(f"{HEADER}\n1,0\n1,-2e6\n")
+    with pytest.raises(ConfigError, match=f"{table}:3: landing_y_m: -2e\\+06\n  expected: a number of at most 1e\\+06"):
+        read_targets(table, TARGETS, Config().task)
+
+
+@pytest.mark.parametrize("name", ["aims.parquet", "aims.txt", "aims"])
+def test_a_list_is_not_written_under_the_name_of_another_format(tmp_path: Path, name: str) -> None:
+    with pytest.raises(ConfigError) as caught:
+        write_aims(tmp_path / name, [AIM], TARGETS, Config().task)
+    assert caught.value.expected == "a name with .csv"
+    assert not (tmp_path / name).exists()
+
+
+def test_a_list_that_cannot_be_written_leaves_the_one_that_was_there(table: Path) -> None:
+    table.write_text("earlier")
+    with small_disk(10), pytest.raises(DatasetError, match="cannot be written: File too large") as caught:
+        write_aims(table, [AIM], TARGETS, Config().task)
+    assert caught.value.hint
+    assert [path.read_text() for path in table.parent.iterdir()] == ["earlier"]
