@@ -15,6 +15,7 @@ from throwcollect.dataset.reader import Dataset
 from throwcollect.derive.source import Source
 from throwcollect.errors import ConfigError, Problem
 from throwcollect.sweep.points import Points, Targets
+from throwcollect.wording import command
 
 _ABSENT = object()
 
@@ -46,7 +47,8 @@ def list_of_trials(sources: Sequence[Source]) -> tuple[Config, Points]:
         else:
             problems.append(Problem(f"{_list_differences(sources, values)}; {obstacle}", key))
     if problems:
-        raise ConfigError(problems, expected="datasets that differ only in what a sweep may vary")
+        expected = "datasets that differ only in what a sweep may vary"
+        raise ConfigError(problems, expected=expected, hint=_tell_how_to_compare(sources))
     rows = [
         [source.dataset.plan.trial(number).values.get(key, values[key]) for key in keys]
         for source, values in zip(sources, fixed, strict=True)
@@ -56,6 +58,18 @@ def list_of_trials(sources: Sequence[Source]) -> tuple[Config, Points]:
     sweep = SweepConfig(sampler="list", file=TRIALS)
     config = first.config.without_run().model_copy(update={"sweep": sweep, "trials": None, "until": None})
     return config, points
+
+
+def _tell_how_to_compare(sources: Sequence[Source]) -> str | None:
+    """Name the command that compares two engines; None if all datasets are of one."""
+    first, *others = [source.dataset for source in sources]
+    engine = next(
+        (each.config.sim.engine for each in others if each.config.sim.engine != first.config.sim.engine), None
+    )
+    if engine is None:
+        return None
+    compare = command("dataset", "replay", first.directory, "--all", "--engine", engine)
+    return f"{compare} tells by how much throws of the two engines differ"
 
 
 def _gather_targets(sources: Sequence[Source]) -> Targets | None:

@@ -122,7 +122,18 @@ def test_datasets_of_other_physics_do_not_go_together(
         f"record.rate_hz: 250 {where}, 125 in {tmp_path / 'other'}; cannot vary from trial to trial",
         f"record.topics.2: absent {where}, clock in {tmp_path / 'other'}; not all have this key",
     ]
+    assert caught.value.hint is None
     assert not (tmp_path / "all").exists()
+
+
+def test_of_datasets_of_two_engines_the_command_that_compares_is_told(
+    collected: Path, make_collection: type[Collection], tmp_path: Path
+) -> None:
+    make_collection({"trials": 1, "sim": {"engine": "mujoco"}}).collect(tmp_path / "other")
+    with pytest.raises(ConfigError, match=r"^sim\.engine: ") as caught:
+        merge([collected, tmp_path / "other"], tmp_path / "all")
+    compare = f"throwcollect dataset replay {collected} --all --engine mujoco"
+    assert caught.value.hint == f"{compare} tells by how much throws of the two engines differ"
 
 
 def test_a_dataset_is_never_overwritten(collected: Path, tmp_path: Path) -> None:
