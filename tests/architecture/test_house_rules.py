@@ -66,6 +66,22 @@ def test_modules_of_tests_have_one_subject() -> None:
     assert {str(path): lines for path, lines in lengths.items() if lines > LONGEST_TEST} == {}
 
 
+CLOCK_OF_ALL = re.compile(r"""setattr\((?:\w+\.)*time, ["']|setattr\(["']time\.""")
+"""Setting the clock of the whole process, which stops threads of other tests, instead of that of the tested module."""
+
+
+def test_no_test_sets_the_clock_of_the_whole_process() -> None:
+    sources = sorted((ROOT / "tests").rglob("*.py"))
+    assert [name for name in sources if CLOCK_OF_ALL.search(name.read_text(encoding="utf-8"))] == []
+
+
+def test_the_rule_about_clocks_sees_what_it_should() -> None:
+    setting = "monkeypatch." + "setattr"
+    for wrong in ('time, "monotonic", f)', 'access.time, "monotonic", f)', '"time.monotonic", f)'):
+        assert CLOCK_OF_ALL.search(f"{setting}({wrong}")
+    assert not CLOCK_OF_ALL.search(f'{setting}(access, "time", SimpleNamespace(monotonic=f))')
+
+
 def unfolded(statement: ast.stmt) -> list[ast.stmt]:
     """What stands in both branches of `if TYPE_CHECKING`, or else the statement itself."""
     if isinstance(statement, ast.If) and ast.unparse(statement.test) == "TYPE_CHECKING":
