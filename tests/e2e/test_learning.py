@@ -257,7 +257,7 @@ def test_a_missing_target_column_is_told_with_the_other_name_that_it_may_have(pl
 
 def test_adapting_tells_by_how_much_throws_missed_with_its_unit(place: Path) -> None:
     said = call_here("adapt", place / "model", place / "data", "-o", place / "told")
-    assert re.search(r"^throws were off by [\d.]+ cm before, median", said.stdout, re.M), said.stdout
+    assert re.search(r"^median miss before: [\d.]+ cm", said.stdout, re.M), said.stdout
 
 
 def test_the_program_of_the_documents_runs(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:

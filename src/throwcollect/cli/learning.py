@@ -228,7 +228,7 @@ def adapt(
     scatter: ScatterOption = 0.0,
     json: JsonOption = False,
 ) -> None:
-    """Make the model of another world, of a few throws there."""
+    """Correct a model by a few throws of another robot or simulation."""
     from throwcollect.learning.adapting import FarThrowError, Method
     from throwcollect.learning.lists import read_table, refuse_large_targets
     from throwcollect.learning.model import load_model
@@ -265,7 +265,7 @@ def adapt(
         for misses in (entry.before, entry.after)
     )
     typer.echo(
-        f"throws were off by {before} before, median" + ("" if after is None else f"; {after} by a model of the others")
+        f"median miss before: {before}" + ("" if after is None else f"; after: {after}, each by a model of the others")
     )
 
 

@@ -25,7 +25,8 @@ MOST_EXAMINED = 200
 Location = tuple[str | int, ...]
 """Keys and list indices from the root of a configuration to a value."""
 
-_MEMBERS: tuple[Location, ...] = (("robot", "name"), ("tool", "name"), ("sim", "engine"), ("task", "name"))
+_ENGINE: Location = ("sim", "engine")
+_MEMBERS: tuple[Location, ...] = (("robot", "name"), ("tool", "name"), _ENGINE, ("task", "name"))
 """Keys that name a member of a family, which another package may bring."""
 
 
@@ -132,6 +133,8 @@ def _findings(details: ErrorDetails, values: Any, above: Location, expected: Sha
         yield Finding((*location, tag), _should_be(words, value[tag], choices))
     else:
         strange = "; no package that is installed brings it" if location in _MEMBERS else ""
+        if location == _ENGINE and value == "auto":
+            strange = "; none is chosen by itself, as the same file would give other throws on another machine"
         sentence = _should_be(str(shape), value, shape.choices, strange=strange)
         yield Finding(location, sentence + _radians(kind, shape, value))
 

@@ -187,10 +187,10 @@ class Score(Entry):
     seeds: int = 1
     trained: list[Trained]
     distilled: Errors | None = None
-    throws: list[ThrowAtTarget]
+    throws: list[ThrowAtTarget] = Field(repr=False)
     scatter: FiniteFloat
     adapted: list[Adapted]
-    adapted_throws: list[ThrowAtTarget]
+    adapted_throws: list[ThrowAtTarget] = Field(repr=False)
 
 
 def pool_scores(scores: Sequence[Score]) -> Score:

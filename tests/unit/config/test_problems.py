@@ -88,6 +88,13 @@ JOINT_LIST = "joint names, each with a number from -6.3 to 6.3 rad"
             ],
         ),
         (
+            "sim: {engine: auto}",
+            [
+                "run.yaml:1: sim.engine: should be one of 'bullet', 'mujoco', 'ballistic', got 'auto'; "
+                "none is chosen by itself, as the same file would give other throws on another machine"
+            ],
+        ),
+        (
             "task: {duration_s: 1,5}",
             [
                 "run.yaml:1: task.5: unknown key; "
