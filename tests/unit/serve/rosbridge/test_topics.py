@@ -222,6 +222,7 @@ def heard_by(node: Node, kind: Any, topic: str, qos: Any = 10) -> list[Any]:
 
 def test_messages_are_published_in_json_and_cbor_and_what_is_left_out_has_defaults(party: Party, node: Node) -> None:
     heard = heard_by(node, Image, "/image")
+    wait_for(lambda: "/image" in party.call("rosapi/topics")["topics"])
     party.ask(op="advertise", topic="image", type="sensor_msgs/Image")
     party.ask(op="publish", topic="image", msg={"data": "AQID", "header": {"stamp": {"secs": 7, "nsecs": 8}}})
     array = cbor2.CBORTag(64, b"\4\5")
