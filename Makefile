@@ -84,12 +84,12 @@ test-fast: $(READY_DEV)
 	$(BIN)/python -m pytest -n logical tests/architecture tests/contract tests/unit $(addprefix --ignore=tests/unit/,$(SLOW))
 
 # What waits for others is run beside what computes, and each group begins as soon as it can, so that both cores always have something
-# to do. Tests of containers take longest, one by one, so they begin as soon as there is an image, which continuous integration
-# makes meanwhile: it names the process that does.
+# to do. Tests of containers take longest, one by one, so they begin as soon as there is an image, and those of processes, which
+# need none, right after them. Continuous integration makes the image meanwhile, and names the process that does.
 BESIDE := --no-print-directory --output-sync=target
 test: $(READY_DEV)
 	$(MAKE) $(BESIDE) -j 2 check
-	$(MAKE) $(BESIDE) -j 6 test-containers test-units test-ros test-processes test-cluster
+	$(MAKE) $(BESIDE) -j 5 test-containers test-units test-ros test-processes test-cluster
 
 # The ROS client alone, on the embedded backend: what somebody runs who changes it.
 test-ros-client: $(READY_DEV)
@@ -134,7 +134,7 @@ test-containers: ros wait-for-image
 
 # Two files at a time, in their order: files of few long tests come first, and short ones at the end, so that both workers have
 # something to do until then.
-test-processes:
+test-processes: wait-for-image
 	$(call twice,$(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder tests/e2e tests/integration)
 
 # Slurm with four nodes of this machine, and Apptainer; `.ci/cluster.sh` installs both on Debian.
