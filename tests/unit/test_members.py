@@ -7,6 +7,7 @@ from pathlib import Path
 from unittest.mock import Mock
 
 import pytest
+from tests.with_plugins import run_with_plugins
 
 from throwcollect import members
 from throwcollect.engines.ballistic.ballistic_engine import BallisticEngine
@@ -14,7 +15,6 @@ from throwcollect.engines.bullet.bullet_engine import BulletEngine
 from throwcollect.errors import ConfigError, DatasetError, MemberError
 from throwcollect.members import explain_failure, load_member, names_of
 
-PLUGINS = Path(__file__).parents[1] / "plugins"
 BALLISTIC = "throwcollect.engines.ballistic.ballistic_engine:BallisticEngine"
 ARM = """\
 robot: {name: planar_arm}
@@ -26,15 +26,7 @@ task:
 
 
 def with_plugins(*arguments: str) -> subprocess.CompletedProcess[str]:
-    """Run throwcollect where the package of `tests/plugins` is installed."""
-    path = os.pathsep.join([str(PLUGINS), os.environ.get("PYTHONPATH", "")])
-    return subprocess.run(
-        [sys.executable, "-m", "throwcollect", *arguments],
-        env={**os.environ, "PYTHONPATH": path},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    return run_with_plugins("throwcollect", *arguments)
 
 
 @pytest.mark.parametrize("family", ["robots", "tools", "engines", "tasks", "runtimes", "exporters"])

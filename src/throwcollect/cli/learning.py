@@ -265,7 +265,7 @@ def adapt(
         for misses in (entry.before, entry.after)
     )
     typer.echo(
-        f"median miss before: {before}" + ("" if after is None else f"; after: {after}, each by a model of the others")
+        f"median miss before: {before}" + ("" if after is None else f"; after, each by a model of the others: {after}")
     )
 
 

@@ -29,6 +29,7 @@ Status = Literal["planning", "starting", "running", "ended", "died"]
 _LIVING: tuple[Status, ...] = ("planning", "starting", "running")
 
 
+# Of dataclasses of its own, pydantic makes a schema once; of plain ones, for each route that tells a state.
 @dataclass(frozen=True)
 class ComponentState:
     """A component.

@@ -1,21 +1,13 @@
-import os
 import subprocess
-import sys
 from pathlib import Path
+
+from tests.with_plugins import run_with_plugins
 
 ROOT = Path(__file__).parents[3]
 
 
 def print_reference(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
-    """Print the reference where a robot, a task and a format of other packages are installed."""
-    path = os.pathsep.join([str(ROOT / "tests" / "plugins"), os.environ.get("PYTHONPATH", "")])
-    return subprocess.run(
-        [sys.executable, "-m", "throwcollect.config.reference", *arguments],
-        env={**os.environ, "PYTHONPATH": path},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    return run_with_plugins("throwcollect.config.reference", *arguments)
 
 
 def test_the_page_is_up_to_date_whatever_is_installed() -> None:
