@@ -2,6 +2,7 @@
 
 import gc
 import signal
+from collections.abc import Iterator
 
 import pytest
 from hypothesis import settings
@@ -25,3 +26,12 @@ def pytest_collection_finish() -> None:
 def _unsettled(monkeypatch: pytest.MonkeyPatch) -> None:
     """What carries messages is what the environment says again, whatever a test before has settled on."""
     monkeypatch.setattr("throwcollect.ros.middleware._settled", [])
+
+
+@pytest.fixture(autouse=True)
+def _signal_handlers() -> Iterator[None]:
+    """Commands and nodes set handlers of signals; where a test runs one in this process, they are put back."""
+    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
+    yield
+    for number, handler in before.items():
+        signal.signal(number, handler)

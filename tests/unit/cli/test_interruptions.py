@@ -1,21 +1,11 @@
 import signal
-from collections.abc import Iterator
-
-import pytest
 
 from throwcollect.cli.interruptions import count_interruptions
 
 
-@pytest.fixture
-def heeds_hangups() -> Iterator[None]:
-    """Whatever these tests were started by: `nohup` has it ignored."""
-    before = signal.signal(signal.SIGHUP, signal.SIG_DFL)
-    yield
-    signal.signal(signal.SIGHUP, before)
-
-
-@pytest.mark.usefixtures("heeds_hangups")
 def test_signals_are_counted_and_then_what_they_were() -> None:
+    # Whoever starts the tests by `nohup` has it ignored.
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)
     before = signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)
     with count_interruptions() as interruptions:
         assert interruptions() == 0
@@ -27,10 +17,7 @@ def test_signals_are_counted_and_then_what_they_were() -> None:
 
 
 def test_a_hangup_that_is_ignored_stays_so() -> None:
-    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
-    try:
-        with count_interruptions() as interruptions:
-            signal.raise_signal(signal.SIGHUP)
-            assert interruptions() == 0
-    finally:
-        signal.signal(signal.SIGHUP, before)
+    signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    with count_interruptions() as interruptions:
+        signal.raise_signal(signal.SIGHUP)
+        assert interruptions() == 0

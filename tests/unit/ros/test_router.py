@@ -10,7 +10,6 @@ from rclzenoh.session_config import OVERRIDE_VARIABLE, client_override, is_prote
 from throwcollect import ros
 from throwcollect.errors import ConfigError, ThrowcollectError
 from throwcollect.heartbeat import VARIABLE, is_beating
-from throwcollect.interruption import stop_signals
 from throwcollect.ros.connection import session_key
 from throwcollect.ros.health import check
 from throwcollect.ros.router import router, serve
@@ -122,23 +121,12 @@ def test_the_command_makes_a_key_where_there_is_none_and_keeps_the_one_that_is_t
     assert keys[0] == keys[1]
 
 
-@pytest.fixture
-def signal_handlers():
-    """Whoever serves in this process takes its signals."""
-    before = {number: signal.getsignal(number) for number in stop_signals()}
-    yield
-    for number, handler in before.items():
-        signal.signal(number, handler)
-
-
-@pytest.mark.usefixtures("signal_handlers")
 def test_a_key_that_would_keep_nobody_out_is_refused(tmp_path):
     with pytest.raises(ConfigError, match=r"--key: tcp/127.0.0.1:0 lets anybody in"):
         serve("tcp/127.0.0.1:0", tmp_path / "new")
     assert not (tmp_path / "new").exists()
 
 
-@pytest.mark.usefixtures("signal_handlers")
 def test_the_key_of_the_environment_is_used_and_never_made(monkeypatch, tmp_path):
     monkeypatch.setenv(KEY_VARIABLE, str(tmp_path / "gone"))
     with pytest.raises(ConfigError, match=r"cannot be read: .*gone/key.pem"):

@@ -124,11 +124,7 @@ class Said(NamedTuple):
 
 
 @pytest.fixture
-def say(
-    endpoint: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> Iterator[Callable[..., Said]]:
-    before = signal.getsignal(signal.SIGTERM)
-
+def say(endpoint: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Callable[..., Said]:
     def run(*arguments: str) -> Said:
         monkeypatch.setattr(sys, "argv", ["throwcollect", "ros", *arguments])
         try:
@@ -137,8 +133,7 @@ def say(
             return Said(end.code, *capsys.readouterr())
         raise AssertionError("the command did not exit")
 
-    yield run
-    signal.signal(signal.SIGTERM, before)
+    return run
 
 
 def start(*arguments: str) -> subprocess.Popen[str]:
