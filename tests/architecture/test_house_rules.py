@@ -66,6 +66,32 @@ def test_modules_of_tests_have_one_subject() -> None:
     assert {str(path): lines for path, lines in lengths.items() if lines > LONGEST_TEST} == {}
 
 
+UNITS = ROOT / "tests" / "unit"
+OUTSIDE_SOURCE = {"slimming", "wheels"}
+"""Folders of unit tests of scripts, which lie in `docker` and `packaging`."""
+
+
+def is_named_after_a_module(test: Path) -> bool:
+    """Whether a test such as ``tests/unit/sweep/test_plan.py`` has the place and the name of a module or a package."""
+    place = SOURCE / test.relative_to(UNITS).parent / test.stem.removeprefix("test_")
+    return place.with_suffix(".py").exists() or (place / "__init__.py").exists()
+
+
+def test_a_test_has_the_name_of_its_module_or_says_what_it_is_about() -> None:
+    """What several modules do together, for example, has a name of its own."""
+    tests = sorted(UNITS.rglob("test_*.py"))
+    folders = {test.parent.relative_to(UNITS) for test in tests}
+    assert {str(folder) for folder in folders if not (SOURCE / folder).is_dir()} == OUTSIDE_SOURCE
+    others = [test for test in tests if not is_named_after_a_module(test)]
+    assert [str(test) for test in others if not ast.get_docstring(parse(test.read_text(encoding="utf-8")))] == []
+
+
+def test_the_rule_about_names_of_tests_sees_what_it_should() -> None:
+    assert is_named_after_a_module(UNITS / "sweep" / "test_plan.py")
+    assert is_named_after_a_module(UNITS / "test_simulator.py")
+    assert not is_named_after_a_module(UNITS / "config" / "test_plan.py")
+
+
 CLOCK_OF_ALL = re.compile(r"""setattr\((?:\w+\.)*time, ["']|setattr\(["']time\.""")
 """Setting the clock of the whole process, which stops threads of other tests, instead of that of the tested module."""
 

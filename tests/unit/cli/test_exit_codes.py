@@ -1,3 +1,5 @@
+"""The page on commands tells the exit code of every error."""
+
 import re
 from pathlib import Path
 

@@ -1,3 +1,5 @@
+"""What holds for every format: cards, rates, outputs that are left alone, and messages."""
+
 from __future__ import annotations
 
 import resource

@@ -1,3 +1,5 @@
+"""The pictures of a report, as somebody sees them on a page."""
+
 from __future__ import annotations
 
 from pathlib import Path
