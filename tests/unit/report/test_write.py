@@ -4,6 +4,7 @@ import json
 import re
 import shutil
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,14 @@ from throwcollect.dataset.directory import METADATA
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.extras import MissingExtraError
 from throwcollect.report.write import write_report
+
+
+@pytest.fixture(autouse=True, scope="module")
+def _coarse_pictures() -> Iterator[None]:
+    """Pictures of fewer pixels, which are drawn in less time; `test_pictures.py` draws those that are printed."""
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr("throwcollect.report.painter.DPI", 50)
+        yield
 
 
 @pytest.fixture(scope="module")
@@ -40,7 +49,6 @@ def written(collected: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_datasets_with_little_in_them(
     make_collection: Any,
     tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
     settings: dict[str, Any],
     refused: list[int],
     lost: list[int],
@@ -50,7 +58,6 @@ def test_datasets_with_little_in_them(
         collection.refuse(trial, "too fast")
     trials = [trial.number for trial in collection.plan.trials if trial.number not in refused]
     directory = collection.collect(tmp_path / "dataset", trials, lost=lost)
-    monkeypatch.setattr("throwcollect.report.painter.DPI", 50)
     written = write_report(directory, tmp_path / "page.html", pictures=tmp_path / "pictures")
     page = Page(written.page.read_text(encoding="utf-8"))
     assert [attributes["id"] for attributes in page.named("section")] == SECTIONS
@@ -81,8 +88,7 @@ def test_what_is_there_is_never_overwritten(collected: Path, tmp_path: Path) -> 
     assert not (tmp_path / "other.html").exists()
 
 
-def test_the_page_may_lie_among_the_pictures(collected: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("throwcollect.report.painter.DPI", 50)
+def test_the_page_may_lie_among_the_pictures(collected: Path, tmp_path: Path) -> None:
     together = tmp_path / "together"
     together.mkdir()
     written = write_report(collected, together / "page.html", pictures=together)
