@@ -19,7 +19,7 @@ from throwcollect.cli.main import dataset_app
 from throwcollect.dataset.directory import METADATA
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.extras import MissingExtraError
-from throwcollect.report.write import write_report
+from throwcollect.report.write import Written, write_report
 
 
 @pytest.fixture(autouse=True, scope="module")
@@ -31,10 +31,10 @@ def _coarse_pictures() -> Iterator[None]:
 
 
 @pytest.fixture(scope="module")
-def written(collected: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def together(collected: Path, tmp_path_factory: pytest.TempPathFactory) -> Written:
+    """A report whose page lies among its pictures."""
     directory = tmp_path_factory.mktemp("report")
-    write_report(collected, directory / "page.html", pictures=directory / "pictures")
-    return directory
+    return write_report(collected, directory / "page.html", pictures=directory)
 
 
 @pytest.mark.parametrize(
@@ -88,11 +88,9 @@ def test_what_is_there_is_never_overwritten(collected: Path, tmp_path: Path) -> 
     assert not (tmp_path / "other.html").exists()
 
 
-def test_the_page_may_lie_among_the_pictures(collected: Path, tmp_path: Path) -> None:
-    together = tmp_path / "together"
-    together.mkdir()
-    written = write_report(collected, together / "page.html", pictures=together)
-    assert set(together.iterdir()) == {written.page, *written.pictures}
+def test_the_page_may_lie_among_the_pictures(together: Written) -> None:
+    assert set(together.page.parent.iterdir()) == {together.page, *together.pictures}
+    assert len(together.pictures) == 9
 
 
 def test_without_plotly_the_message_says_how_to_get_it(
@@ -117,7 +115,7 @@ def test_the_command_writes_beside_the_dataset_and_says_what(dataset: Path, tmp_
 
 
 def test_the_documented_command_gives_the_same_report_again_with_or_without_a_display(
-    collected: Path, written: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    collected: Path, together: Written, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     text = (Path(__file__).parents[3] / "docs" / "report.md").read_text(encoding="utf-8")
     (command,) = re.findall(r"^throwcollect dataset (report .*)$", text, flags=re.MULTILINE)
@@ -129,6 +127,7 @@ def test_the_documented_command_gives_the_same_report_again_with_or_without_a_di
     assert printed.exit_code == 0, printed.output
     pictures = {path.name: path for path in tmp_path.rglob("*.png")}
     assert set(re.findall(r"^\| `(\w+\.png)` \|", text, flags=re.MULTILINE)) == set(pictures)
-    assert (tmp_path / "quick.html").read_bytes() == (written / "page.html").read_bytes()
-    for name, path in pictures.items():
-        assert path.read_bytes() == (written / "pictures" / name).read_bytes(), name
+    assert (tmp_path / "quick.html").read_bytes() == together.page.read_bytes()
+    assert set(pictures) == {path.name for path in together.pictures}
+    for path in together.pictures:
+        assert path.read_bytes() == pictures[path.name].read_bytes(), path.name
