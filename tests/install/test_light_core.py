@@ -1,6 +1,9 @@
 """What `pip install throwcollect` without extras can do, in a fresh environment of another Python than the tests'.
 
 One Python is tried in each run; `THROWCOLLECT_TRY_PYTHONS=3.10,3.12,3.13` asks for others.
+
+A few commands start as users start them. The others are forked off a process of that environment which has imported
+what most of them import, because importing takes most of the time of a command.
 """
 
 import filecmp
@@ -9,6 +12,7 @@ import os
 import shutil
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -66,16 +70,77 @@ def dataset(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return Collection({"trials": 6}).collect(tmp_path_factory.mktemp("data") / "dataset")
 
 
+def clean_variables() -> dict[str, str]:
+    """Variables by which Python finds nothing but what is installed."""
+    return {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
+
+
 def run(environment: Path, program: str, *arguments: object) -> subprocess.CompletedProcess[str]:
-    clean = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
     return subprocess.run(
         [environment / program, *map(str, arguments)],
         capture_output=True,
         text=True,
-        env=clean,
+        env=clean_variables(),
         timeout=300,
         check=False,
     )
+
+
+class Forker:
+    """A process of an environment that imports what commands import, and forks them.
+
+    What an extra brings is imported by commands alone, so that it is missing there as it is in one that is started.
+    """
+
+    PROGRAM = """
+import json, os, sys, warnings
+import throwcollect.cli.main, throwcollect.coordinator.prepare, throwcollect.dataset.reader, pyarrow.parquet
+from throwcollect.__main__ import main
+
+warnings.filterwarnings("ignore", "This process .* is multi-threaded", DeprecationWarning)
+for line in sys.stdin:
+    if (command := os.fork()) == 0:
+        sys.argv[1:], streams = json.loads(line)
+        for number, name in enumerate(streams):
+            os.dup2(os.open(name, os.O_RDWR | os.O_CREAT | os.O_TRUNC, 0o600), number)
+        main()
+        break
+    print(os.waitstatus_to_exitcode(os.waitpid(command, 0)[1]), flush=True)
+"""
+
+    def __init__(self, environment: Path, directory: Path) -> None:
+        # The directory of a program is where Python looks first, and this one has nothing else in it.
+        program = directory / "throwcollect"
+        program.write_text(self.PROGRAM)
+        self._streams = [directory.with_name(f"{directory.name}-{name}") for name in ("stdout", "stderr")]
+        self._process = subprocess.Popen(
+            [environment / "python", program],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+            env=clean_variables(),
+        )
+
+    def run(self, *arguments: object) -> subprocess.CompletedProcess[str]:
+        """Run a command to its end."""
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
+        streams = [os.devnull, *map(str, self._streams)]
+        self._process.stdin.write(json.dumps([[*map(str, arguments)], streams]) + "\n")
+        self._process.stdin.flush()
+        code = int(self._process.stdout.readline())
+        return subprocess.CompletedProcess(arguments, code, *(path.read_text() for path in self._streams))
+
+    def close(self) -> None:
+        """Let the process end."""
+        self._process.communicate()
+
+
+@pytest.fixture(scope="module")
+def forker(environment: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Forker]:
+    forker = Forker(environment, tmp_path_factory.mktemp("forker"))
+    yield forker
+    forker.close()
 
 
 def test_nothing_of_the_extras_is_installed(environment: Path) -> None:
@@ -84,7 +149,7 @@ def test_nothing_of_the_extras_is_installed(environment: Path) -> None:
 
 
 def test_datasets_are_read_exported_and_derived_as_with_all_extras(
-    environment: Path, dataset: Path, tmp_path: Path
+    environment: Path, forker: Forker, dataset: Path, tmp_path: Path
 ) -> None:
     for arguments in (
         ("dataset", "info", dataset),
@@ -95,10 +160,10 @@ def test_datasets_are_read_exported_and_derived_as_with_all_extras(
         ("dataset", "merge", dataset, dataset, tmp_path / "merged"),
         ("config", QUICKSTART),
     ):
-        said = run(environment, "throwcollect", *arguments)
+        said = forker.run(*arguments)
         assert (said.returncode, said.stderr) == (0, ""), arguments
         assert said.stdout, arguments
-    told = run(environment, "throwcollect", "dataset", "stats", dataset, "--json").stdout
+    told = forker.run("dataset", "stats", dataset, "--json").stdout
     assert json.loads(told)["samples"] == compute_statistics(dataset).samples
     said = run(environment, "throwcollect", "dataset", "filter", dataset, tmp_path / "few", "--where", "trial < 3")
     assert said.returncode == 0, said.stderr
@@ -156,10 +221,10 @@ except ImportError as error:
     ],
 )
 def test_a_command_without_its_extra_says_which_one_helps(
-    extra: str, arguments: tuple[str, ...], environment: Path, dataset: Path, tmp_path: Path
+    extra: str, arguments: tuple[str, ...], forker: Forker, dataset: Path, tmp_path: Path
 ) -> None:
     names = {"DATASET": str(dataset), "out": str(tmp_path / "out")}
-    said = run(environment, "throwcollect", *(names.get(word, word) for word in arguments))
+    said = forker.run(*(names.get(word, word) for word in arguments))
     assert (said.returncode, said.stdout) == (2, "")
     first, *rest = said.stderr.splitlines()
     assert first.startswith("throwcollect: this needs ")

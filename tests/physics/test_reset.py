@@ -8,7 +8,7 @@ import pytest
 
 from throwcollect.config.schema import Config
 
-TRIALS = 24
+TRIALS = 12
 DEFAULT = Config()
 
 

@@ -1,64 +1,67 @@
 """Arithmetic that does not depend on the processor."""
 
+import hashlib
 import math
 import os
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 from tests import processors
-
-from throwcollect.reproducible_math import add_up, cos, exp, log, matmul, power, sin, solve
-
-ROOT = Path(__file__).parents[2]
-
-COMPUTED = """
-import hashlib
-from pathlib import Path
-
-import numpy as np
 from tests.unit.sweep.thrower import collected, configuration
 
 from throwcollect.config.loader import load
 from throwcollect.episode.frames import MovingFrame
+from throwcollect.reproducible_math import add_up, cos, exp, log, matmul, power, sin, solve
 from throwcollect.robots.quintic_curve import sample_quintic
 from throwcollect.sweep.plan import make_plan
 from throwcollect.tasks.task import task_of
 
+ROOT = Path(__file__).parents[2]
 
-def show(name, *arrays):
-    print(name, *(hashlib.sha256(np.array(array, np.float64).tobytes()).hexdigest()[:16] for array in arrays))
+PRINTED = """
+from tests.unit.test_reproducible_math import compute
 
-
-for path in sorted(Path("configs").glob("*.yaml")):
-    plan = make_plan(load(path), directory=path.parent)
-    show(path.name, *([*trial.values.values()] for trial in plan.trials[:100]))
-    for trial in plan.trials[:20]:
-        trajectory = task_of(plan.config_of(trial)).trajectory()
-        show("sent", trajectory.times, trajectory.positions, trajectory.velocities, trajectory.accelerations)
-        show("desired", *sample_quintic(trajectory, np.linspace(0, 2, 500)))
-show("grown", *([*trial.values.values()] for trial in collected(configuration(trials=384))))
-frame = MovingFrame("a", "b", (0.0, 0.0, 0.0), (0.0, 0.6, 0.0, 0.8), "j", (0.36, 0.48, 0.8))
-show("frame", frame.rotation_at(np.linspace(-7, 7, 5000)))
+print(*compute(), sep="\\n")
 """
 
 
-def computed(**environment: str) -> list[str]:
+def show(name: str, *arrays: object) -> str:
+    """A line with the hash of each array."""
+    hashes = (hashlib.sha256(np.array(array, np.float64).tobytes()).hexdigest()[:16] for array in arrays)
+    return " ".join((name, *hashes))
+
+
+def compute() -> Iterator[str]:
     """Hashes of everything that is computed with numbers before a simulation gets it."""
-    whole = {**os.environ, "PYTHONPATH": f"{ROOT / 'src'}:{ROOT}", **environment}
-    script = [sys.executable, "-c", COMPUTED]
+    for path in sorted((ROOT / "configs").glob("*.yaml")):
+        plan = make_plan(load(path), directory=path.parent)
+        yield show(path.name, *([*trial.values.values()] for trial in plan.trials[:100]))
+        for trial in plan.trials[:20]:
+            trajectory = task_of(plan.config_of(trial)).trajectory()
+            sent = (trajectory.times, trajectory.positions, trajectory.velocities, trajectory.accelerations)
+            yield show("sent", *sent)
+            yield show("desired", *sample_quintic(trajectory, np.linspace(0, 2, 500)))
+    yield show("grown", *([*trial.values.values()] for trial in collected(configuration(trials=384))))
+    frame = MovingFrame("a", "b", (0.0, 0.0, 0.0), (0.0, 0.6, 0.0, 0.8), "j", (0.36, 0.48, 0.8))
+    yield show("frame", frame.rotation_at(np.linspace(-7, 7, 5000)))
+
+
+def computed_on_another_processor() -> list[str]:
+    whole = {**os.environ, "PYTHONPATH": f"{ROOT / 'src'}:{ROOT}", **processors.PLAIN}
+    script = [sys.executable, "-c", PRINTED]
     done = subprocess.run(script, cwd=ROOT, env=whole, capture_output=True, text=True, timeout=120, check=True)
     return done.stdout.splitlines()
 
 
 def test_plans_and_motions_are_the_same_on_another_processor() -> None:
-    here, there = computed(), computed(**processors.PLAIN)
+    here = list(compute())
     assert len(here) > 200
-    assert here == there
+    assert here == computed_on_another_processor()
 
 
 @pytest.mark.parametrize(

@@ -8,18 +8,18 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
+from tests.unit.work_side_by_side import SlowlySent, begin, begin_badly, begin_death, begin_nap
 
 from throwcollect.errors import ConfigError, WorkerError
 from throwcollect.side_by_side import work_side_by_side, working_side_by_side
 
 ASLEEP = """
 import time
-from test_side_by_side import begin_sleep
+from work_side_by_side import begin_sleep
 from throwcollect.side_by_side import work_side_by_side
 
 if __name__ == "__main__":
@@ -30,18 +30,18 @@ FORKED = """
 import os
 import threading
 import time
-import test_side_by_side
+import work_side_by_side as work
 from throwcollect.errors import WorkerError
 from throwcollect.side_by_side import work_side_by_side
 
-test_side_by_side.READ.append("read before")
+work.READ.append("read before")
 for _ in range(2):
-    found = list(work_side_by_side(range(4), test_side_by_side.begin_look, (), processes=2, doing="looks", fork=True))
+    found = list(work_side_by_side(range(4), work.begin_look, (), processes=2, doing="looks", fork=True))
     print([read for read, _ in found], os.getpid() in {process for _, process in found})
     threading.Thread(target=time.sleep, args=[600], daemon=True).start()
 """
 DEAD = """
-from test_side_by_side import begin_death
+from work_side_by_side import begin_death
 from throwcollect.errors import WorkerError
 from throwcollect.side_by_side import work_side_by_side
 
@@ -50,48 +50,6 @@ try:
 except WorkerError as error:
     print(error.message)
 """
-READ: list[str] = []
-"""What a process has read; another one has it only if it is forked off."""
-
-
-def begin(factor: int) -> Callable[[int], tuple[int, int]]:
-    return lambda piece: (factor * piece, os.getpid())
-
-
-def begin_look() -> Callable[[int], tuple[list[str], int]]:
-    return lambda _: (READ, os.getpid())
-
-
-def begin_badly() -> Callable[[int], int]:
-    raise ConfigError("nothing to begin with")
-
-
-def begin_death() -> Callable[[int], None]:
-    return lambda piece: os.kill(os.getpid(), signal.SIGKILL) if piece == 3 else None
-
-
-class SlowlySent(float):
-    """Takes so long to be sent to a process that several threads start theirs at the same time."""
-
-    def __reduce__(self) -> tuple[type[float], tuple[float]]:
-        time.sleep(0.2)
-        return float, (float(self),)
-
-
-def begin_nap(duration_s: float) -> Callable[[int], int]:
-    def nap(piece: int) -> int:
-        time.sleep(duration_s)
-        return piece
-
-    return nap
-
-
-def begin_sleep() -> Callable[[int], int]:
-    def sleep(piece: int) -> int:
-        time.sleep(0.01 if piece < 2 else 600)
-        return os.getpid()
-
-    return sleep
 
 
 def test_results_come_in_order_from_several_processes() -> None:
@@ -194,7 +152,7 @@ def test_a_process_that_was_forked_off_and_is_killed_is_named() -> None:
 
 
 def find_tests() -> dict[str, str]:
-    """The environment of a process that can import this module."""
+    """The environment of a process that can import the module of its work."""
     paths = os.pathsep.join([os.path.dirname(__file__), *filter(None, [os.environ.get("PYTHONPATH")])])
     return {**os.environ, "PYTHONPATH": paths}
 

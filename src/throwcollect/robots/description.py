@@ -139,7 +139,7 @@ def joint_model(robot: Robot) -> pinocchio.Model:
     # These raise our errors for what the files lack; pinocchio's parser would print its own words to the terminal.
     joint_limits(robot)
     _ = robot.rest_posture
-    return _whole(robot, _read_description(robot))
+    return _read_whole(robot)[1]
 
 
 def physics_description(config: Config) -> Description:
@@ -154,8 +154,8 @@ def physics_description(config: Config) -> Description:
     """
     robot, tool = robot_of(config), tool_of(config.tool)
     locked = find_locked_joints(config)
-    source = _read_description(robot)
-    model = lock_joints(_whole(robot, source), locked)
+    source, whole = _read_whole(robot)
+    model = lock_joints(whole, locked)
     joints = {joint.get("name"): joint for joint in source.iter("joint")}
     names = [_root_link(source), *(_child(joints[name]) for name in model.names[1:])]
 
@@ -200,6 +200,19 @@ def _read_description(robot: Robot) -> ElementTree.Element:
             f"{path}: a joint has the name of a link: {', '.join(sorted(shared))}", hint="rename the joint in a copy"
         )
     return description
+
+
+@lru_cache(maxsize=4)
+def _read_whole(robot: Robot) -> tuple[ElementTree.Element, pinocchio.Model]:
+    """Read a robot's URDF, and build a model of all of its joints; both are to be changed by nobody.
+
+    They are kept, as every trial with other locked joints or another tool needs them, and reading takes 15 ms.
+
+    Raises:
+        ConfigError: If the robot's files cannot be read, or lack something.
+    """
+    source = _read_description(robot)
+    return source, _whole(robot, source)
 
 
 def _whole(robot: Robot, source: ElementTree.Element) -> pinocchio.Model:

@@ -5,7 +5,9 @@ from __future__ import annotations
 import hashlib
 import json
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from functools import cache
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -63,7 +65,7 @@ def trial_digests(config: Config, points: Points, seeds: Iterable[int]) -> NDArr
     lines["seed"] = ""
     lines |= dict.fromkeys(points.keys, "")
     lines = dict(sorted(lines.items()))
-    later = {leaf.name: leaf.value for leaf in leaves(Config()) if leaf.key.later and leaf.name in points.keys}
+    later = _later_defaults()
     digests = np.empty((len(points.values), hashlib.sha256().digest_size), np.uint8)
     for digest, seed, row in zip(digests, seeds, points.values, strict=True):
         lines["seed"] = _line("seed", int(seed))
@@ -72,6 +74,12 @@ def trial_digests(config: Config, points: Points, seeds: Iterable[int]) -> NDArr
         text = "\n".join([_FORMAT, *filter(None, lines.values())])
         digest[:] = np.frombuffer(hashlib.sha256(text.encode()).digest(), np.uint8)
     return digests
+
+
+@cache
+def _later_defaults() -> Mapping[str, Any]:
+    """Map each key that came later to its default."""
+    return MappingProxyType({leaf.name: leaf.value for leaf in leaves(Config()) if leaf.key.later})
 
 
 def _line(key: str, value: object) -> str:

@@ -22,8 +22,8 @@ from throwcollect.sweep.parquet_file import encode_pieces, encode_table
 from throwcollect.tasks.measures import BallState
 from throwcollect.tasks.throw.outcome import ThrowOutcome, ThrowResult
 
-TRIALS = 4000
-PER_SHARD = 200
+TRIALS = 2000
+PER_SHARD = 100
 MOST_BYTES = 60
 """Memory that a trial whose shard is finished may take [bytes]; its row alone has 500 in the columns of a table."""
 SCHEMA = pa.schema({"trial": pa.int64(), "reason": pa.string(), "speed": pa.float64(), "digest": pa.string()})
@@ -52,7 +52,8 @@ class ShardWithoutFile:
 def rows(first: int, count: int) -> pa.Table:
     random = np.random.default_rng(first)
     lost = random.random(count) < 0.1
-    digests = [None if none else random.bytes(32).hex() for none in lost]
+    digits = random.bytes(32 * count).hex()
+    digests = [None if none else digits[64 * at : 64 * at + 64] for at, none in enumerate(lost.tolist())]
     columns = [
         pa.array(range(first, first + count)),
         pa.array([f"{number} fell" if number % 7 else None for number in range(count)]),

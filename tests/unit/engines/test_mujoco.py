@@ -64,18 +64,23 @@ def alone(number: int) -> Watcher:
     return seen
 
 
-def test_the_order_of_trials_does_not_matter_whatever_varies() -> None:
+@pytest.fixture(scope="module")
+def each_alone() -> list[Watcher]:
+    return [alone(number) for number in range(len(TRIALS))]
+
+
+def test_the_order_of_trials_does_not_matter_whatever_varies(each_alone: list[Watcher]) -> None:
     engine = MujocoEngine()
     forwards = [trial(engine, *each) for each in TRIALS]
     backwards = [trial(engine, *each) for each in reversed(TRIALS)]
     engine.close()
-    assert forwards == backwards[::-1] == [alone(number) for number in range(len(TRIALS))]
+    assert forwards == backwards[::-1] == each_alone
     assert len({repr(seen.samples[-1]) for seen in forwards}) == len(TRIALS)
 
 
-def test_worlds_of_several_threads_leave_each_other_alone() -> None:
+def test_worlds_of_several_threads_leave_each_other_alone(each_alone: list[Watcher]) -> None:
     with ThreadPoolExecutor(4) as pool:
-        assert list(pool.map(alone, range(len(TRIALS)))) == [alone(number) for number in range(len(TRIALS))]
+        assert list(pool.map(alone, range(len(TRIALS)))) == each_alone
 
 
 def test_steps_may_be_cut_anywhere(engine: MujocoEngine) -> None:

@@ -4,6 +4,7 @@ import json
 import re
 import shutil
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -18,14 +19,22 @@ from throwcollect.cli.main import dataset_app
 from throwcollect.dataset.directory import METADATA
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.extras import MissingExtraError
-from throwcollect.report.write import write_report
+from throwcollect.report.write import Written, write_report
+
+
+@pytest.fixture(autouse=True, scope="module")
+def _coarse_pictures() -> Iterator[None]:
+    """Pictures of fewer pixels, which are drawn in less time; `test_pictures.py` draws those that are printed."""
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr("throwcollect.report.painter.DPI", 50)
+        yield
 
 
 @pytest.fixture(scope="module")
-def written(collected: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def together(collected: Path, tmp_path_factory: pytest.TempPathFactory) -> Written:
+    """A report whose page lies among its pictures."""
     directory = tmp_path_factory.mktemp("report")
-    write_report(collected, directory / "page.html", pictures=directory / "pictures")
-    return directory
+    return write_report(collected, directory / "page.html", pictures=directory)
 
 
 @pytest.mark.parametrize(
@@ -40,7 +49,6 @@ def written(collected: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_datasets_with_little_in_them(
     make_collection: Any,
     tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
     settings: dict[str, Any],
     refused: list[int],
     lost: list[int],
@@ -50,7 +58,6 @@ def test_datasets_with_little_in_them(
         collection.refuse(trial, "too fast")
     trials = [trial.number for trial in collection.plan.trials if trial.number not in refused]
     directory = collection.collect(tmp_path / "dataset", trials, lost=lost)
-    monkeypatch.setattr("throwcollect.report.painter.DPI", 50)
     written = write_report(directory, tmp_path / "page.html", pictures=tmp_path / "pictures")
     page = Page(written.page.read_text(encoding="utf-8"))
     assert [attributes["id"] for attributes in page.named("section")] == SECTIONS
@@ -81,12 +88,9 @@ def test_what_is_there_is_never_overwritten(collected: Path, tmp_path: Path) -> 
     assert not (tmp_path / "other.html").exists()
 
 
-def test_the_page_may_lie_among_the_pictures(collected: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("throwcollect.report.painter.DPI", 50)
-    together = tmp_path / "together"
-    together.mkdir()
-    written = write_report(collected, together / "page.html", pictures=together)
-    assert set(together.iterdir()) == {written.page, *written.pictures}
+def test_the_page_may_lie_among_the_pictures(together: Written) -> None:
+    assert set(together.page.parent.iterdir()) == {together.page, *together.pictures}
+    assert len(together.pictures) == 9
 
 
 def test_without_plotly_the_message_says_how_to_get_it(
@@ -111,7 +115,7 @@ def test_the_command_writes_beside_the_dataset_and_says_what(dataset: Path, tmp_
 
 
 def test_the_documented_command_gives_the_same_report_again_with_or_without_a_display(
-    collected: Path, written: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    collected: Path, together: Written, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     text = (Path(__file__).parents[3] / "docs" / "report.md").read_text(encoding="utf-8")
     (command,) = re.findall(r"^throwcollect dataset (report .*)$", text, flags=re.MULTILINE)
@@ -123,6 +127,7 @@ def test_the_documented_command_gives_the_same_report_again_with_or_without_a_di
     assert printed.exit_code == 0, printed.output
     pictures = {path.name: path for path in tmp_path.rglob("*.png")}
     assert set(re.findall(r"^\| `(\w+\.png)` \|", text, flags=re.MULTILINE)) == set(pictures)
-    assert (tmp_path / "quick.html").read_bytes() == (written / "page.html").read_bytes()
-    for name, path in pictures.items():
-        assert path.read_bytes() == (written / "pictures" / name).read_bytes(), name
+    assert (tmp_path / "quick.html").read_bytes() == together.page.read_bytes()
+    assert set(pictures) == {path.name for path in together.pictures}
+    for path in together.pictures:
+        assert path.read_bytes() == pictures[path.name].read_bytes(), path.name

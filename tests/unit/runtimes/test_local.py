@@ -13,30 +13,59 @@ from throwcollect.config.schema import Config
 from throwcollect.errors import ConfigError, WorkerError
 from throwcollect.ros.middleware import Middleware
 from throwcollect.run_key import RunKey
-from throwcollect.runtimes.local import LocalNodes
+from throwcollect.runtimes.local import LocalNodes, LocalRuntime
 from throwcollect.runtimes.nodes import NodeExit, NodeSpec, Role
 from throwcollect.runtimes.ports import split_address
 from throwcollect.runtimes.runtime import Place
 
 
+def place(directory: Path) -> Place:
+    return Place("run", directory, None, directory / "logs", 1, Middleware(), RunKey(directory / "key"))
+
+
 def nodes(directory: Path, **run: object) -> LocalNodes:
-    place = Place("run", directory, None, directory / "logs", 1, Middleware(), RunKey(directory / "key"))
-    return LocalNodes(place, Config.model_validate({"run": run}))
+    return LocalNodes(place(directory), Config.model_validate({"run": run}))
 
 
 def node(code: str, name: str = "node") -> NodeSpec:
     return NodeSpec(name, (code,), Role.EXPENDABLE)
 
 
-@pytest.fixture
-def runtime(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[LocalNodes]:
-    """A runtime whose nodes are small scripts: the first argument is run instead of a command."""
-    (tmp_path / "sitecustomize.py").write_text(
+@pytest.fixture(scope="module", autouse=True)
+def _scripts(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """Nodes are small scripts: the first argument is run instead of a command."""
+    directory = tmp_path_factory.mktemp("scripts")
+    (directory / "sitecustomize.py").write_text(
         "import runpy, sys\nrunpy.run_module = lambda *_, **__: exec(sys.argv[1], {'sys': sys})\n"
     )
-    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(tmp_path), *sys.path]))
-    monkeypatch.setenv("ANSWER", "42")
-    local = nodes(tmp_path, domain_id=7)
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setenv("PYTHONPATH", os.pathsep.join([str(directory), *sys.path]))
+        patched.setenv("ANSWER", "42")
+        yield
+
+
+@pytest.fixture(scope="module")
+def begun(_scripts: None) -> Iterator[LocalRuntime]:
+    """A runtime that has begun: its process, from which nodes are forked, takes a second to start."""
+    runtime = LocalRuntime()
+    runtime.begin(Config(), Middleware())
+    yield runtime
+    runtime.close()
+
+
+@pytest.fixture
+def runtime(begun: LocalRuntime, tmp_path: Path) -> Iterator[LocalNodes]:
+    """The host of a run of that runtime."""
+    local = begun.host(place(tmp_path), Config.model_validate({"run": {"domain_id": 7}}), warn=pytest.fail)
+    yield local
+    local.stop(local.running(), grace_s=0.0)
+    local.close()
+
+
+@pytest.fixture
+def alone(tmp_path: Path) -> Iterator[LocalNodes]:
+    """A host that starts such a process of its own."""
+    local = nodes(tmp_path / "alone", domain_id=7)
     yield local
     local.stop(local.running(), grace_s=0.0)
     local.close()
@@ -55,15 +84,15 @@ def ended(runtime: LocalNodes) -> NodeExit:
     return found[0]
 
 
-def test_a_node_that_ends_is_reported_once_with_its_code_and_last_lines(runtime: LocalNodes) -> None:
-    runtime.start(
-        node("import os; print(*range(50), os.environ['ANSWER'], os.environ['ROS_DOMAIN_ID'], sep='\\n'); sys.exit(7)")
-    )
-    assert runtime.running() == ("node",)
-    end = ended(runtime)
-    assert (end.name, end.code, end.reason) == ("node", 7, "exit code 7")
-    assert end.log.splitlines() == [*map(str, range(12, 50)), "42", "7"]
-    assert (runtime.exits(), runtime.running()) == ([], ())
+def test_a_node_that_ends_is_reported_once_with_its_code_and_last_lines(runtime: LocalNodes, alone: LocalNodes) -> None:
+    words = "*range(50), os.environ['ANSWER'], os.environ['ROS_DOMAIN_ID']"
+    for host in (runtime, alone):
+        host.start(node(f"import os; print({words}, sep='\\n'); sys.exit(7)"))
+        assert host.running() == ("node",)
+        end = ended(host)
+        assert (end.name, end.code, end.reason) == ("node", 7, "exit code 7")
+        assert end.log.splitlines() == [*map(str, range(12, 50)), "42", "7"]
+        assert (host.exits(), host.running()) == ([], ())
 
 
 def test_a_signal_is_named(runtime: LocalNodes) -> None:

@@ -27,7 +27,7 @@ def lasting() -> Iterator[NodeServer]:
 
 @pytest.fixture
 def server() -> Iterator[NodeServer]:
-    """For what ends or stops it."""
+    """For what ends it."""
     server = NodeServer(ENVIRONMENT)
     yield server
     server.close()
@@ -117,19 +117,11 @@ def test_where_the_server_dies_its_nodes_do_and_the_next_one_has_a_new_server(st
     assert start("--version").wait(WAIT_S) == 0
 
 
-def test_a_server_that_is_stopped_goes_on(start) -> None:
-    node = start(*router())
+def test_a_server_that_is_stopped_goes_on(start_there) -> None:
+    node = start_there(*router())
     psutil.Process(node.pid).parent().suspend()
-    assert start("--version").wait(WAIT_S) == 0
+    assert start_there("--version").wait(WAIT_S) == 0
     assert node.poll() is None
-
-
-def test_closing_ends_everything(server, start) -> None:
-    node = start(*router())
-    forker = psutil.Process(node.pid).parent()
-    server.close()
-    wait_until(lambda: not psutil.pid_exists(node.pid))
-    assert not forker.is_running()
 
 
 def _handles(pid: int, number: signal.Signals) -> bool:
@@ -147,9 +139,13 @@ def begin(server: NodeServer) -> psutil.Process:
     return begun
 
 
-def test_a_server_that_was_begun_forks_the_first_node(server, start) -> None:
+def test_a_server_that_was_begun_forks_the_first_node_and_closing_ends_both(server, start) -> None:
     begun = begin(server)
-    assert psutil.Process(start(*router()).pid).ppid() == begun.pid
+    node = start(*router())
+    assert psutil.Process(node.pid).ppid() == begun.pid
+    server.close()
+    wait_until(lambda: not psutil.pid_exists(node.pid))
+    assert not begun.is_running()
 
 
 def test_where_a_server_that_was_begun_cannot_work_the_first_node_has_another_one(server, start, tmp_path) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import json
 import os
+import shutil
 from pathlib import Path
 
 import pytest
@@ -34,9 +35,27 @@ esac
 """
 
 
+PACKAGE = "throwcollect.runtimes.image_sources._PACKAGE"
+
+
+@pytest.fixture(scope="module")
+def small_clone(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A clone with few sources: to pack and unpack the thousand files of this one takes half a second each time."""
+    here, clone = source_root(), tmp_path_factory.mktemp("clone")
+    sources = (here / name for name in ("pyproject.toml", "configs/quickstart.yaml", "src/throwcollect/__init__.py"))
+    packaged = (path for folder in ("docker", "packaging") for path in (here / folder).iterdir() if path.is_file())
+    for path in (*sources, *packaged):
+        place = clone / path.relative_to(here)
+        place.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(path, place)
+    shutil.copytree(here / "packaging" / "ros_interfaces", clone / "packaging" / "ros_interfaces")
+    return clone
+
+
 @pytest.fixture
-def apptainer(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A directory in which stands what Apptainer was asked for; it only pretends."""
+def apptainer(tmp_path: Path, small_clone: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A directory in which stands what Apptainer was asked for; it only pretends, and is given the small clone."""
+    monkeypatch.setattr(PACKAGE, small_clone / "src" / "throwcollect")
     directory = tmp_path / "apptainer"
     directory.mkdir()
     write_program(directory)
@@ -88,7 +107,10 @@ def test_a_sif_that_is_there_is_replaced_whole_or_not_at_all(
     assert output.read_bytes() == SIF + b" new"
 
 
-def test_without_an_engine_the_clone_itself_is_built(apptainer: Path, tmp_path: Path) -> None:
+def test_without_an_engine_the_clone_itself_is_built(
+    apptainer: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(PACKAGE, Path(throwcollect.__file__).parent)
     said = make(tmp_path / "it.sif", base="lab/python:3.11")
     assert "no Docker engine answers" in said[0]
     asked = (apptainer / "asked").read_text().splitlines()
