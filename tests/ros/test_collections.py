@@ -14,12 +14,23 @@ from typing import Any
 
 import pytest
 
-from tests.e2e.collection import Running, call, collect, fingerprints, journal, start, words_of, write_config
+from tests.e2e.collection import (
+    FAST,
+    INPROCESS,
+    Running,
+    call,
+    collect,
+    fingerprints,
+    journal,
+    start,
+    words_of,
+    write_config,
+)
 from throwcollect.errors import WorkerError
 from throwcollect.runs.records import Records
 from throwcollect.runs.state_directory import STATE_VARIABLE
 
-TRIALS = 12
+TRIALS = 8
 DOMAIN = "83"
 
 LOOK = """
@@ -76,7 +87,8 @@ def going_on(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Running]:
     directory = tmp_path_factory.mktemp("going_on")
     options = ("--set", "sim.real_time_factor=1", "--set", f"run.domain_id={DOMAIN}")
     environment = {STATE_VARIABLE: str(directory / "state"), "THROWCOLLECT_ROS": "rclpy"}
-    running = start(write_config(directory, trials=400), directory / "data", 1, *options, **environment)
+    config = write_config(directory, trials=400, sim=FAST)
+    running = start(config, directory / "data", 1, *options, **environment)
     running.wait_until(lambda: bool(entries(running, "lease")))
     yield running
     if running.process.poll() is None:
@@ -92,14 +104,15 @@ def entries(running: Running, event: str) -> list[dict[str, Any]]:
 @pytest.fixture(scope="module")
 def reference(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     directory = tmp_path_factory.mktemp("reference")
-    collect(write_config(directory, trials=TRIALS), directory / "data", 2, THROWCOLLECT_ROS="embedded")
+    config = write_config(directory, trials=TRIALS)
+    collect(config, directory / "data", 1, *INPROCESS, THROWCOLLECT_ROS="embedded")
     return fingerprints(directory / "data")
 
 
 def test_the_dataset_does_not_depend_on_the_backend(
     reference: dict[str, str], records: Records, tmp_path: Path
 ) -> None:
-    collect(write_config(tmp_path, trials=TRIALS), tmp_path / "data", 2)
+    collect(write_config(tmp_path, trials=TRIALS), tmp_path / "data", 1)
     assert fingerprints(tmp_path / "data") == reference
 
 
@@ -162,7 +175,7 @@ def test_two_runs_at_once_do_not_see_each_other(
     reference: dict[str, str], records: Records, going_on: Running, tmp_path: Path
 ) -> None:
     """In one domain and with the same names, so that nothing but their discovery servers keeps them apart."""
-    collect(write_config(tmp_path, trials=TRIALS), tmp_path / "data", 2, "--set", f"run.domain_id={DOMAIN}")
+    collect(write_config(tmp_path, trials=TRIALS), tmp_path / "data", 1, "--set", f"run.domain_id={DOMAIN}")
     assert fingerprints(tmp_path / "data") == reference
     before = len(entries(going_on, "commit"))
     going_on.wait_until(lambda: len(entries(going_on, "commit")) > before)
@@ -188,7 +201,11 @@ def test_a_coordinator_that_sees_no_simulation_is_told_of_after_a_while(
     (tmp_path / "site" / "sitecustomize.py").write_text(apart)
     path = os.pathsep.join([str(tmp_path / "site"), os.environ.get("PYTHONPATH", "")])
     running = start(
-        write_config(tmp_path, trials=TRIALS), tmp_path / "data", 1, PYTHONPATH=path, THROWCOLLECT_ROS="embedded"
+        write_config(tmp_path, trials=TRIALS, sim=FAST),
+        tmp_path / "data",
+        1,
+        PYTHONPATH=path,
+        THROWCOLLECT_ROS="embedded",
     )
     code, _, err = running.finish()
     assert code == WorkerError.exit_code == 3
