@@ -109,11 +109,17 @@ def reference(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     return fingerprints(directory / "data")
 
 
-def test_the_dataset_does_not_depend_on_the_backend(
-    reference: dict[str, str], records: Records, tmp_path: Path
-) -> None:
-    collect(write_config(tmp_path, trials=TRIALS), tmp_path / "data", 1)
-    assert fingerprints(tmp_path / "data") == reference
+@pytest.fixture(scope="module")
+def beside(going_on: Running, tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
+    """Files of a run beside the one that goes on.
+
+    It is in the same domain and has the same names, so that nothing but their discovery servers keeps them apart.
+    """
+    directory = tmp_path_factory.mktemp("beside")
+    environment = {STATE_VARIABLE: str(directory / "state"), "THROWCOLLECT_ROS": "rclpy"}
+    config = write_config(directory, trials=TRIALS)
+    collect(config, directory / "data", 1, "--set", f"run.domain_id={DOMAIN}", **environment)
+    return fingerprints(directory / "data")
 
 
 def test_the_trial_of_a_simulation_that_was_killed_is_given_to_another_though_the_router_is_killed_too(
@@ -144,41 +150,6 @@ def test_the_trial_of_a_simulation_that_was_killed_is_given_to_another_though_th
     collected = fingerprints(tmp_path / "data")
     for name in ("small_00000.mcap", "throws.parquet"):
         assert collected[name] == reference[name]
-
-
-def test_who_does_not_know_the_port_sees_nothing_and_whoever_evaluates_one_line_takes_part(
-    going_on: Running, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv(STATE_VARIABLE, str(going_on.directory.parent / "state"))
-    plain = {name: value for name, value in os.environ.items() if not name.startswith(("THROWCOLLECT", "FASTRTPS"))}
-    for way in ({}, {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}):
-        assert json.loads(python(LOOK, {**plain, "ROS_DOMAIN_ID": DOMAIN, **way})) == [], way
-    # As docs/ros.md says it.
-    script = f'eval "$({sys.executable} -m throwcollect ros env)"; exec {sys.executable} -c "$PROGRAM"'
-    said = subprocess.run(
-        ["bash", "-c", script],
-        env={**os.environ, "PROGRAM": JOIN},
-        capture_output=True,
-        text=True,
-        timeout=90,
-        check=False,
-    )
-    assert said.returncode == 0, said.stderr
-    # RMWs print there, too, and Zenoh does when it is closed.
-    assert "32" in said.stdout.splitlines()
-    named = call("ros", "node", "list", "--run", going_on.directory).stdout.splitlines()
-    assert {"/coordinator", "/sim_0/sim_0", "/sim_0/arm_right_controller"} <= set(named)
-    assert going_on.process.poll() is None
-
-
-def test_two_runs_at_once_do_not_see_each_other(
-    reference: dict[str, str], records: Records, going_on: Running, tmp_path: Path
-) -> None:
-    """In one domain and with the same names, so that nothing but their discovery servers keeps them apart."""
-    collect(write_config(tmp_path, trials=TRIALS), tmp_path / "data", 1, "--set", f"run.domain_id={DOMAIN}")
-    assert fingerprints(tmp_path / "data") == reference
-    before = len(entries(going_on, "commit"))
-    going_on.wait_until(lambda: len(entries(going_on, "commit")) > before)
 
 
 def test_a_coordinator_that_sees_no_simulation_is_told_of_after_a_while(
@@ -213,6 +184,43 @@ def test_a_coordinator_that_sees_no_simulation_is_told_of_after_a_while(
     assert "simulations have been ready for 12 s, twice, but the coordinator does not see them" in err
     assert "they use rmw_" in err
     assert "a firewall may keep nodes apart" in err
+
+
+def test_the_dataset_does_not_depend_on_the_backend(reference: dict[str, str], beside: dict[str, str]) -> None:
+    assert beside == reference
+
+
+def test_who_does_not_know_the_port_sees_nothing_and_whoever_evaluates_one_line_takes_part(
+    going_on: Running, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv(STATE_VARIABLE, str(going_on.directory.parent / "state"))
+    plain = {name: value for name, value in os.environ.items() if not name.startswith(("THROWCOLLECT", "FASTRTPS"))}
+    for way in ({}, {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}):
+        assert json.loads(python(LOOK, {**plain, "ROS_DOMAIN_ID": DOMAIN, **way})) == [], way
+    # As docs/ros.md says it.
+    script = f'eval "$({sys.executable} -m throwcollect ros env)"; exec {sys.executable} -c "$PROGRAM"'
+    said = subprocess.run(
+        ["bash", "-c", script],
+        env={**os.environ, "PROGRAM": JOIN},
+        capture_output=True,
+        text=True,
+        timeout=90,
+        check=False,
+    )
+    assert said.returncode == 0, said.stderr
+    # RMWs print there, too, and Zenoh does when it is closed.
+    assert "32" in said.stdout.splitlines()
+    named = call("ros", "node", "list", "--run", going_on.directory).stdout.splitlines()
+    assert {"/coordinator", "/sim_0/sim_0", "/sim_0/arm_right_controller"} <= set(named)
+    assert going_on.process.poll() is None
+
+
+def test_two_runs_at_once_do_not_see_each_other(
+    reference: dict[str, str], going_on: Running, beside: dict[str, str]
+) -> None:
+    assert beside == reference
+    before = len(entries(going_on, "commit"))
+    going_on.wait_until(lambda: len(entries(going_on, "commit")) > before)
 
 
 def python(program: str, environment: dict[str, str]) -> str:
