@@ -24,7 +24,7 @@ from throwcollect.runs.state_directory import STATE_VARIABLE
 pytestmark = pytest.mark.cluster
 SLICED = CONFIG + "record: {{trials_per_shard: {per_shard}}}\n"
 TASKS = 3
-SLOW = "sim.real_time_factor=2"
+SLOW = "sim.real_time_factor=1"
 """Tasks of few trials that last, and leave the processor to others; the samples stay the same."""
 
 
@@ -160,7 +160,7 @@ def test_a_node_that_does_not_see_the_directory_is_named(
 
 
 def test_a_run_is_listed_and_can_be_stopped(slurm: Slurm, tmp_path: Path) -> None:
-    config = configure(tmp_path, trials=120)
+    config = configure(tmp_path, trials=60)
     data = tmp_path / "data"
     array = submit(slurm, config, data, SLOW)
     wait_until(lambda: any(state == "RUNNING" for state, _ in states(slurm, array).values()))
@@ -176,7 +176,7 @@ def test_nothing_is_lost_when_nodes_die_and_tasks_are_preempted(
 ) -> None:
     # The runs of tasks that are killed stay remembered; those of the user are not to be found among them.
     monkeypatch.setenv(STATE_VARIABLE, str(tmp_path / "state"))
-    config = configure(tmp_path, trials=120)
+    config = configure(tmp_path, trials=60)
     whole = recordings(collect_whole(config, tmp_path / "whole"))
     data = tmp_path / "data"
     array = submit(slurm, config, data, "cluster.partition=low", "cluster.cores=2", SLOW)

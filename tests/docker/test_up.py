@@ -24,7 +24,7 @@ LABEL = "throwcollect.run"
 @pytest.fixture(scope="module")
 def config(tmp_path_factory: pytest.TempPathFactory) -> Path:
     # So slowly that a collection takes long enough for what is done to it meanwhile, with few trials to compute.
-    return write_config(tmp_path_factory.mktemp("config"), trials=24, sim=f"{FAST}, real_time_factor: 6")
+    return write_config(tmp_path_factory.mktemp("config"), trials=16, sim=f"{FAST}, real_time_factor: 4")
 
 
 @pytest.fixture(scope="module")
@@ -103,7 +103,7 @@ def test_containers_get_nothing_that_they_do_not_need_and_the_files_are_those_of
     config: Path, expected: dict[str, str], engine: docker.DockerClient, tmp_path: Path
 ) -> None:
     directory = tmp_path / "data"
-    # One more than that of the reference: each costs as much to start as 40 trials to simulate.
+    # One more than that of the reference.
     running = start(config, directory, 2, "--runtime", "docker", "--set", "containers.sim.memory=512m")
     running.wait_until(lambda: len(containers_of(engine, directory)) == 4)
     for name, container in containers_of(engine, directory).items():
@@ -128,7 +128,7 @@ def test_containers_get_nothing_that_they_do_not_need_and_the_files_are_those_of
 
 
 def test_ctrl_c_leaves_nothing_behind(config: Path, engine: docker.DockerClient, tmp_path: Path) -> None:
-    running: Running = start(config, tmp_path / "data", 1, "--runtime", "docker", "--trials", "60")
+    running: Running = start(config, tmp_path / "data", 1, "--runtime", "docker", "--trials", "40")
     running.wait_until(lambda: running.written() > 0)
     running.process.send_signal(signal.SIGINT)
     code, _, err = running.finish()
