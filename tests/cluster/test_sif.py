@@ -107,7 +107,7 @@ def test_two_users_on_one_machine_do_not_meet(place: Path, expected: dict[str, s
     for user in (USER, "nobody"):
         (place / user).mkdir()
         shutil.chown(place / user, user)
-        command = f"apptainer run throwcollect.sif up -n 2 throws.yaml --output {user}/dataset"
+        command = f"apptainer run throwcollect.sif up -n 1 throws.yaml --output {user}/dataset"
         processes.append(start(command, place, user))
     for process in processes:
         finish(process)

@@ -24,8 +24,8 @@ from throwcollect.runs.state_directory import STATE_VARIABLE
 pytestmark = pytest.mark.cluster
 SLICED = CONFIG + "record: {{trials_per_shard: {per_shard}}}\n"
 TASKS = 3
-SLOW = "sim.real_time_factor=4"
-"""Tasks that last, and leave the processor to others; the samples stay the same."""
+SLOW = "sim.real_time_factor=1"
+"""Tasks of few trials that last, and leave the processor to others; the samples stay the same."""
 
 
 def call(slurm: Slurm, *arguments: str | Path, expect: int = 0, **environment: str) -> str:
@@ -101,9 +101,9 @@ def limited(slurm: Slurm, tmp_path_factory: pytest.TempPathFactory) -> Iterator[
     Its first task ends before the limit. The last one has twice the work, and cannot.
     """
     directory = tmp_path_factory.mktemp("limited")
-    config = configure(directory, trials=90, shards=3)
+    config = configure(directory, trials=45, shards=3)
     apart = f'cluster.lines=["#SBATCH --nodelist={slurm.nodes[-1]}"]'
-    array = submit(slurm, config, directory / "data", apart, "cluster.time=2", "sim.real_time_factor=1", tasks=2)
+    array = submit(slurm, config, directory / "data", apart, "cluster.time=2", "sim.real_time_factor=0.5", tasks=2)
     yield directory / "data", recordings(collect_whole(config, directory / "whole"))
     slurm.run("scancel", "--quiet", array)
 
@@ -160,7 +160,7 @@ def test_a_node_that_does_not_see_the_directory_is_named(
 
 
 def test_a_run_is_listed_and_can_be_stopped(slurm: Slurm, tmp_path: Path) -> None:
-    config = configure(tmp_path, trials=240)
+    config = configure(tmp_path, trials=60)
     data = tmp_path / "data"
     array = submit(slurm, config, data, SLOW)
     wait_until(lambda: any(state == "RUNNING" for state, _ in states(slurm, array).values()))
@@ -176,7 +176,7 @@ def test_nothing_is_lost_when_nodes_die_and_tasks_are_preempted(
 ) -> None:
     # The runs of tasks that are killed stay remembered; those of the user are not to be found among them.
     monkeypatch.setenv(STATE_VARIABLE, str(tmp_path / "state"))
-    config = configure(tmp_path, trials=240)
+    config = configure(tmp_path, trials=60)
     whole = recordings(collect_whole(config, tmp_path / "whole"))
     data = tmp_path / "data"
     array = submit(slurm, config, data, "cluster.partition=low", "cluster.cores=2", SLOW)
@@ -222,7 +222,8 @@ def test_a_plan_that_grows_is_collected_by_one_run_on_several_nodes(slurm: Slurm
         run.collect()
     data = tmp_path / "with blank" / "data"
     # So slowly that machines which join find something to do, however busy this one is.
-    settings = [word for setting in ("cluster.memory=1G", SLOW, *grows) for word in ("--set", setting)]
+    slowly = "sim.real_time_factor=4"
+    settings = [word for setting in ("cluster.memory=1G", slowly, *grows) for word in ("--set", setting)]
     arguments = ("submit", config, "--output", data, "--tasks", "3", "--mode", "live", *settings)
     said = call(slurm, *arguments, "--wait")
     assert "one run on 3 nodes" in said
@@ -293,6 +294,6 @@ def test_a_task_that_comes_near_its_time_limit_goes_on_and_no_other_is_disturbed
     assert recordings(fingerprints(data)) == whole
     struck = call(slurm, "logs", "1", "--run", data)
     assert (
-        struck.count("slice 1/2: trials 30 to 89") == struck.count("interrupted: finishing the running trials") + 1 > 1
+        struck.count("slice 1/2: trials 15 to 44") == struck.count("interrupted: finishing the running trials") + 1 > 1
     )
     assert "nothing is left to do" not in call(slurm, "logs", "0", "--run", data)

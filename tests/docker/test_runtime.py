@@ -18,8 +18,9 @@ from docker.client import DockerClient
 from docker.errors import NotFound
 from docker.models.containers import Container
 
-from tests.docker.collection import Collection, collecting, config_for, key_in, new_run, place_of
+from tests.docker.collection import TRIALS, Collection, collecting, config_file, config_for, key_in, new_run, place_of
 from tests.docker.cut_line import CutLine
+from tests.e2e.collection import collect_here
 from throwcollect.coordinator.prepare import prepare
 from throwcollect.dataset.inspect import info
 from throwcollect.errors import ConfigError, WorkerError
@@ -28,7 +29,6 @@ from throwcollect.runtimes.docker.containers import DockerNodes
 from throwcollect.runtimes.docker.engine import connect
 from throwcollect.runtimes.docker.held_runs import find_held_runs, remove
 from throwcollect.runtimes.docker.options import KEY_LABEL
-from throwcollect.runtimes.local import LocalNodes
 from throwcollect.runtimes.node_collection import roster
 from throwcollect.runtimes.nodes import COORDINATOR, ROUTER, NodeExit, NodeSpec, Role
 from throwcollect.runtimes.ports import split_address
@@ -48,14 +48,9 @@ hog = bytearray(1 << 30)
 
 @pytest.fixture(scope="module")
 def digest(tmp_path_factory: pytest.TempPathFactory) -> str:
-    """Digest of the dataset, collected in processes."""
-    directory = tmp_path_factory.mktemp("local")
-    config = config_for(directory)
-    prepare(config, directory / "dataset", sweep_directory=directory)
-    runtime = LocalNodes(place_of("local", directory / "dataset", key_in(directory)), config)
-    with Supervisor(runtime, config.run, roster(runtime, 2)) as supervisor:
-        supervisor.start()
-        until(lambda: supervisor.poll()[0] is not None)
+    """Digest of the dataset, collected without containers."""
+    directory = tmp_path_factory.mktemp("here")
+    collect_here(config_file(directory), directory / "dataset")
     return info(directory / "dataset").digest
 
 
@@ -121,7 +116,7 @@ def test_a_collection_in_containers_yields_the_dataset_of_one_in_processes(
     assert left_of(client, f"throwcollect.run={run}") == []
     assert {path.stat().st_uid for path in prepared.iterdir()} == {caller}
     assert "sim_0 is ready" in (prepared / "logs" / "sim_0.log").read_text()
-    assert re.search(r"^40/40 throws", (prepared / "logs" / "coordinator.log").read_text(), re.MULTILINE)
+    assert re.search(rf"^{TRIALS}/{TRIALS} throws", (prepared / "logs" / "coordinator.log").read_text(), re.MULTILINE)
 
 
 def test_simulations_that_are_killed_paused_or_out_of_memory_are_named_and_replaced(
@@ -147,7 +142,7 @@ def test_simulations_that_are_killed_paused_or_out_of_memory_are_named_and_repla
 def test_a_router_that_comes_back_at_another_address_is_found_again(
     client: DockerClient, tmp_path: Path, digest: str
 ) -> None:
-    with collecting(client, tmp_path) as collection:
+    with collecting(client, tmp_path, "run.simulations=1") as collection:
         collection.until_more_is_written()
         endpoint = collection.runtime.endpoint
         router = container(client, collection, ROUTER)

@@ -14,12 +14,23 @@ from typing import Any
 
 import pytest
 
-from tests.e2e.collection import Running, call, collect, fingerprints, journal, start, words_of, write_config
+from tests.e2e.collection import (
+    FAST,
+    INPROCESS,
+    Running,
+    call,
+    collect,
+    fingerprints,
+    journal,
+    start,
+    words_of,
+    write_config,
+)
 from throwcollect.errors import WorkerError
 from throwcollect.runs.records import Records
 from throwcollect.runs.state_directory import STATE_VARIABLE
 
-TRIALS = 12
+TRIALS = 8
 DOMAIN = "83"
 
 LOOK = """
@@ -76,7 +87,8 @@ def going_on(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Running]:
     directory = tmp_path_factory.mktemp("going_on")
     options = ("--set", "sim.real_time_factor=1", "--set", f"run.domain_id={DOMAIN}")
     environment = {STATE_VARIABLE: str(directory / "state"), "THROWCOLLECT_ROS": "rclpy"}
-    running = start(write_config(directory, trials=400), directory / "data", 1, *options, **environment)
+    config = write_config(directory, trials=400, sim=FAST)
+    running = start(config, directory / "data", 1, *options, **environment)
     running.wait_until(lambda: bool(entries(running, "lease")))
     yield running
     if running.process.poll() is None:
@@ -92,15 +104,22 @@ def entries(running: Running, event: str) -> list[dict[str, Any]]:
 @pytest.fixture(scope="module")
 def reference(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     directory = tmp_path_factory.mktemp("reference")
-    collect(write_config(directory, trials=TRIALS), directory / "data", 2, THROWCOLLECT_ROS="embedded")
+    config = write_config(directory, trials=TRIALS)
+    collect(config, directory / "data", 1, *INPROCESS, THROWCOLLECT_ROS="embedded")
     return fingerprints(directory / "data")
 
 
-def test_the_dataset_does_not_depend_on_the_backend(
-    reference: dict[str, str], records: Records, tmp_path: Path
-) -> None:
-    collect(write_config(tmp_path, trials=TRIALS), tmp_path / "data", 2)
-    assert fingerprints(tmp_path / "data") == reference
+@pytest.fixture(scope="module")
+def beside(going_on: Running, tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
+    """Files of a run beside the one that goes on.
+
+    It is in the same domain and has the same names, so that nothing but their discovery servers keeps them apart.
+    """
+    directory = tmp_path_factory.mktemp("beside")
+    environment = {STATE_VARIABLE: str(directory / "state"), "THROWCOLLECT_ROS": "rclpy"}
+    config = write_config(directory, trials=TRIALS)
+    collect(config, directory / "data", 1, "--set", f"run.domain_id={DOMAIN}", **environment)
+    return fingerprints(directory / "data")
 
 
 def test_the_trial_of_a_simulation_that_was_killed_is_given_to_another_though_the_router_is_killed_too(
@@ -133,6 +152,44 @@ def test_the_trial_of_a_simulation_that_was_killed_is_given_to_another_though_th
         assert collected[name] == reference[name]
 
 
+def test_a_coordinator_that_sees_no_simulation_is_told_of_after_a_while(
+    records: Records, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As behind a firewall: every simulation lives in another domain than the rest of its run.
+
+    On the embedded backend: to a discovery server of Fast DDS, domains make no difference.
+    """
+    apart = (
+        "import os, runpy, sys\n"
+        "run = runpy.run_module\n"
+        "def run_apart(*arguments, **options):\n"
+        "    if '--name' in sys.argv:\n"
+        "        os.environ['ROS_DOMAIN_ID'] = '84'\n"
+        "    run(*arguments, **options)\n"
+        "runpy.run_module = run_apart\n"
+    )
+    (tmp_path / "site").mkdir()
+    (tmp_path / "site" / "sitecustomize.py").write_text(apart)
+    path = os.pathsep.join([str(tmp_path / "site"), os.environ.get("PYTHONPATH", "")])
+    running = start(
+        write_config(tmp_path, trials=TRIALS, sim=FAST),
+        tmp_path / "data",
+        1,
+        PYTHONPATH=path,
+        THROWCOLLECT_ROS="embedded",
+    )
+    code, _, err = running.finish()
+    assert code == WorkerError.exit_code == 3
+    assert "the coordinator does not see the simulations; all of them are started again" in err
+    assert "simulations have been ready for 12 s, twice, but the coordinator does not see them" in err
+    assert "they use rmw_" in err
+    assert "a firewall may keep nodes apart" in err
+
+
+def test_the_dataset_does_not_depend_on_the_backend(reference: dict[str, str], beside: dict[str, str]) -> None:
+    assert beside == reference
+
+
 def test_who_does_not_know_the_port_sees_nothing_and_whoever_evaluates_one_line_takes_part(
     going_on: Running, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -159,43 +216,11 @@ def test_who_does_not_know_the_port_sees_nothing_and_whoever_evaluates_one_line_
 
 
 def test_two_runs_at_once_do_not_see_each_other(
-    reference: dict[str, str], records: Records, going_on: Running, tmp_path: Path
+    reference: dict[str, str], going_on: Running, beside: dict[str, str]
 ) -> None:
-    """In one domain and with the same names, so that nothing but their discovery servers keeps them apart."""
-    collect(write_config(tmp_path, trials=TRIALS), tmp_path / "data", 2, "--set", f"run.domain_id={DOMAIN}")
-    assert fingerprints(tmp_path / "data") == reference
+    assert beside == reference
     before = len(entries(going_on, "commit"))
     going_on.wait_until(lambda: len(entries(going_on, "commit")) > before)
-
-
-def test_a_coordinator_that_sees_no_simulation_is_told_of_after_a_while(
-    records: Records, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """As behind a firewall: every simulation lives in another domain than the rest of its run.
-
-    On the embedded backend: to a discovery server of Fast DDS, domains make no difference.
-    """
-    apart = (
-        "import os, runpy, sys\n"
-        "run = runpy.run_module\n"
-        "def run_apart(*arguments, **options):\n"
-        "    if '--name' in sys.argv:\n"
-        "        os.environ['ROS_DOMAIN_ID'] = '84'\n"
-        "    run(*arguments, **options)\n"
-        "runpy.run_module = run_apart\n"
-    )
-    (tmp_path / "site").mkdir()
-    (tmp_path / "site" / "sitecustomize.py").write_text(apart)
-    path = os.pathsep.join([str(tmp_path / "site"), os.environ.get("PYTHONPATH", "")])
-    running = start(
-        write_config(tmp_path, trials=TRIALS), tmp_path / "data", 1, PYTHONPATH=path, THROWCOLLECT_ROS="embedded"
-    )
-    code, _, err = running.finish()
-    assert code == WorkerError.exit_code == 3
-    assert "the coordinator does not see the simulations; all of them are started again" in err
-    assert "simulations have been ready for 12 s, twice, but the coordinator does not see them" in err
-    assert "they use rmw_" in err
-    assert "a firewall may keep nodes apart" in err
 
 
 def python(program: str, environment: dict[str, str]) -> str:

@@ -12,7 +12,7 @@ import pytest
 
 from tests.docker.conftest import client
 from tests.docker.test_up import containers_of, engine
-from tests.e2e.collection import FAST, collect, fingerprints, start, write_config
+from tests.e2e.collection import FAST, INPROCESS, collect, fingerprints, start, write_config
 from throwcollect.heartbeat import SILENT_S
 from throwcollect.runtimes.docker.image import RMW_LABEL, default_tag
 
@@ -21,10 +21,10 @@ __all__ = ["client", "engine"]
 
 
 def test_nodes_that_are_killed_come_back_and_find_each_other(engine: docker.DockerClient, tmp_path: Path) -> None:
-    config, directory = write_config(tmp_path, trials=90, sim=FAST), tmp_path / "data"
-    collect(config, tmp_path / "undisturbed", 2, "--set", "run.ros=embedded")
+    config, directory = write_config(tmp_path, trials=45, sim=FAST), tmp_path / "data"
+    collect(config, tmp_path / "undisturbed", 1, *INPROCESS, "--set", "run.ros=embedded")
     # Slow enough to go on for longer than a router that was killed stays away.
-    slow = ("--set", "sim.real_time_factor=2", "--set", "run.trial_timeout_s=20")
+    slow = ("--set", "sim.real_time_factor=1", "--set", "run.trial_timeout_s=20")
     rclpy = ("--runtime", "docker", "--set", "run.ros=rclpy", *slow)
     running = start(config, directory, 2, *rclpy)
     running.wait_until(lambda: running.written() > 0)

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
+from collections import Counter
+
 import pyarrow as pa
-import pyarrow.compute as pc
 
 from throwcollect.config.schema import Config
 from throwcollect.dataset.bag import to_yaml
@@ -11,6 +13,7 @@ from throwcollect.dataset.directory import TRIALS
 from throwcollect.dataset.misses import summarise_misses
 from throwcollect.dataset.provenance import Provenance
 from throwcollect.robots.description import robot_of
+from throwcollect.sweep.arrow_column import find_range
 from throwcollect.sweep.plan import FIRST_TRIALS
 
 _SIZES = ((1_000, "n<1K"), (10_000, "1K<n<10K"), (100_000, "10K<n<100K"), (1_000_000, "100K<n<1M"))
@@ -19,7 +22,7 @@ _MORE = "1M<n<10M"
 
 def count_outcomes(throws: pa.Table) -> dict[str, int]:
     """Count the trials of each outcome, most frequent first."""
-    counts = {entry["values"]: entry["counts"] for entry in pc.value_counts(throws["outcome"]).to_pylist()}
+    counts = Counter(throws["outcome"].to_pylist())
     return dict(sorted(counts.items(), key=lambda item: (-item[1], item[0])))
 
 
@@ -101,8 +104,8 @@ def _ranges(config: Config, throws: pa.Table) -> list[str]:
     rows = []
     # Only swept keys have dots.
     for name in (name for name in throws.column_names if "." in name):
-        limits = pc.min_max(throws[name]).as_py()
-        rows.append(f"| `{name}` | {limits['min']:g} | {limits['max']:g} |")
+        lowest, highest = find_range(throws[name]) or (math.nan, math.nan)
+        rows.append(f"| `{name}` | {lowest:g} | {highest:g} |")
     return [
         "## What varies",
         "",

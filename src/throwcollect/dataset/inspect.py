@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import pyarrow as pa
-import pyarrow.compute as pc
 
 from throwcollect.dataset.data_card import count_outcomes
 from throwcollect.dataset.digest import combine_digests
@@ -16,6 +15,7 @@ from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.summary import Info
 from throwcollect.errors import DatasetError
 from throwcollect.files import is_there
+from throwcollect.sweep.arrow_column import find_range
 from throwcollect.wording import command, join_names
 
 _MOST_NAMED = 5
@@ -44,7 +44,7 @@ def summary(dataset: Dataset) -> Info:
         sizes = {path.name: path.stat().st_size for path in directory.iterdir() if path.is_file()}
     except OSError as error:
         raise DatasetError(f"cannot be read: {error.strerror}", path=directory) from error
-    episodes = len(dataset.recorded)
+    episodes = len(dataset.throws) - dataset.throws["shard"].null_count
     samples = sum(count for count in dataset.throws["samples"].to_pylist() if count is not None)
     return Info(
         name=dataset.config.name,
@@ -69,11 +69,9 @@ def summary(dataset: Dataset) -> Info:
 
 
 def _find_landing_area(throws: pa.Table) -> Mapping[str, tuple[float, float]] | None:
-    # Not by arrays of NumPy: the launcher asks, and Arrow imports pandas, where it is installed, to make them.
-    limits = {axis: pc.min_max(throws[f"landing_{axis}"]).as_py() for axis in ("x_m", "y_m")}
-    if limits["x_m"]["min"] is None:
-        return None
-    return {axis: (each["min"], each["max"]) for axis, each in limits.items()}
+    ranges = {axis: find_range(throws[f"landing_{axis}"]) for axis in ("x_m", "y_m")}
+    found = {axis: each for axis, each in ranges.items() if each is not None}
+    return found if len(found) == len(ranges) else None
 
 
 def check_recordings_are_there(directory: Path) -> None:

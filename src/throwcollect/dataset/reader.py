@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.compute as pc
 from numpy.typing import NDArray
 
 from throwcollect.arguments import read_list
@@ -21,7 +20,6 @@ from throwcollect.dataset.columns import COLUMNS, StoredThrow
 from throwcollect.dataset.configuration import read_config
 from throwcollect.dataset.data_card import count_outcomes
 from throwcollect.dataset.directory import METADATA, PLAN, THROWS
-from throwcollect.dataset.expression import Expression
 from throwcollect.dataset.guesses import DATASET, refuse_attribute
 from throwcollect.dataset.mcap_reader import open_mcap
 from throwcollect.dataset.named_array import Bounds, NamedArray, read_column, refuse_name
@@ -33,6 +31,7 @@ from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.extras import lazily
 from throwcollect.files import StrPath, is_there
 from throwcollect.robots.description import robot_of
+from throwcollect.sweep.arrow_column import find_range
 from throwcollect.sweep.plan import Plan
 from throwcollect.wording import command, format_count
 
@@ -173,8 +172,8 @@ class Dataset(Sequence[Throw]):
         """
         if not set(_LANDING) <= set(self.throws.column_names):
             raise ConfigError(f"nothing lands in the task {self.config.task.name}", expected="a column of `throws`")
-        limits = [pc.min_max(self.throws[name]).as_py().values() for name in _LANDING]
-        return NamedArray.of(self.throws, _LANDING, [(low, high) for low, high in limits])
+        limits: list[Any] = [find_range(self.throws[name]) or (None, None) for name in _LANDING]
+        return NamedArray.of(self.throws, _LANDING, limits)
 
     def to_pandas(self) -> DataFrame:
         """The table of throws as a DataFrame, one row a throw, with the number of the trial as its index.
@@ -245,7 +244,7 @@ class Dataset(Sequence[Throw]):
     @property
     def recorded(self) -> Dataset:
         """The throws that have a trajectory: all but the refused and the lost."""
-        return self._with(self.throws.filter(pc.is_valid(self.throws["shard"])))
+        return self._with(self.throws.filter(self.throws["shard"].is_valid()))
 
     def episode(self, trial: int) -> Episode:
         """Read the episode of a trial by its number, with everything that was recorded.
@@ -253,7 +252,7 @@ class Dataset(Sequence[Throw]):
         Raises:
             DatasetError: If the trial is not among the throws, has no episode, or it is not where the table says.
         """
-        position = int(pc.index(self.throws["trial"], trial).as_py())
+        position = int(self.throws["trial"].index(trial).as_py())
         if position < 0:
             raise DatasetError(f"no trial {trial}", path=self.directory, expected=f"0 to {len(self.plan.trials) - 1}")
         return self[position].episode.read()
@@ -293,6 +292,11 @@ class Dataset(Sequence[Throw]):
             ConfigError: If it is none of these.
             DatasetError: If a trial is not among the throws.
         """
+        # These imports take long, and most who open a dataset select nothing.
+        import pyarrow.compute as pc
+
+        from throwcollect.dataset.expression import Expression
+
         if isinstance(which, str):
             return self._take(Expression(which, place="select", is_argument=False).rows(self.throws))
         if isinstance(which, pc.Expression):

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pyarrow as pa
 
 from throwcollect.config.schema import Config
@@ -15,7 +16,7 @@ from throwcollect.config.shape import unit_of_key
 from throwcollect.dataset.directory import THROWS, list_shards
 from throwcollect.dataset.misses import Misses
 from throwcollect.errors import ConfigError, DatasetError
-from throwcollect.sweep.arrow_column import make_table
+from throwcollect.sweep.arrow_column import find_range, make_table, read_validity
 from throwcollect.sweep.parquet_file import read_parquet
 from throwcollect.sweep.plan import Plan
 from throwcollect.sweep.trials import Trial
@@ -233,16 +234,13 @@ def _explain_unusable(table: pa.Table, plan: Plan) -> str | None:
         "shard": {None, *list_shards(plan)},
     }
     for name, values in known.items():
-        if strange := set(table[name].unique().to_pylist()) - values:
+        if strange := set(table[name].to_pylist()) - values:
             return f"{name} is {min(map(repr, strange))} in some row, which no row of this plan can have"
-    without = table["shard"].is_null()
-    if not all(table[name].is_null().equals(without) for name in ("chunk_offset", "samples", "digest")):
+    places = ("shard", "chunk_offset", "samples", "digest")
+    shard, *rest = (read_validity(table[name].combine_chunks()) for name in places)
+    if not all(np.array_equal(each, shard) for each in rest):
         return "some row has only a part of the place of an episode"
-    # This import takes long, and who makes a plan needs it only after the nodes are started.
-    import pyarrow.compute as pc
-
-    # To compare with a number, Arrow would import pandas.
-    least = pc.min(table["samples"]).as_py()
-    if least is not None and least < 1:
+    samples = find_range(table["samples"])
+    if samples is not None and samples[0] < 1:
         return "some row has an episode without samples"
     return None

@@ -5,10 +5,11 @@ from typing import Any
 
 import numpy as np
 import pyarrow as pa
+import pyarrow.compute as pc
 import pyarrow.parquet as pq
 import pytest
 
-from throwcollect.sweep.arrow_column import make_column, make_table, read_validity
+from throwcollect.sweep.arrow_column import find_range, make_column, make_table, read_validity
 
 _COLUMNS: list[tuple[pa.DataType, list[Any]]] = [
     (pa.int64(), [3, -(2**63), 2**63 - 1, np.int64(7), 0, 1, 2, 3, 4]),
@@ -60,3 +61,17 @@ def _encode(table: pa.Table) -> bytes:
 def test_validity_is_that_of_arrow(kind: pa.DataType, values: list[Any], cut: int) -> None:
     column = make_column(values, kind).slice(cut)
     assert read_validity(column).tolist() == [value is not None for value in values[cut:]]
+
+
+@pytest.mark.parametrize(("kind", "values"), [each for each in _COLUMNS if each[0] != pa.string()])
+@pytest.mark.parametrize("cut", [0, 1, 3, 9])
+def test_the_range_is_that_of_arrow(kind: pa.DataType, values: list[Any], cut: int) -> None:
+    column = pa.chunked_array([make_column(values, kind).slice(cut)])
+    expected = tuple(pc.min_max(column).as_py().values())
+    assert find_range(column) == (None if expected == (None, None) else expected)
+
+
+def test_the_range_is_that_of_all_pieces_of_a_column_without_nan() -> None:
+    column = pa.chunked_array([make_column(values, pa.float64()) for values in ([2.0, None], [], [float("nan"), -1.0])])
+    assert find_range(column) == tuple(pc.min_max(column).as_py().values()) == (-1.0, 2.0)
+    assert find_range(pa.chunked_array([], pa.int64())) is None
