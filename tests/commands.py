@@ -1,8 +1,9 @@
 """Runs commands as users do, each in a process of its own, without importing their libraries once more for each.
 
 Importing takes most of a second of a processor, and tests run hundreds of commands. So `CommandServer` has one process
-import them, and forks that one for each command. What is forked has its own command line, streams, directory and
-environment, handles signals and ends as a command that was started by itself, and may be killed at any moment.
+import them and compute what a process computes only once, and forks that one for each command. What is forked has its
+own command line, streams, directory and environment, handles signals and ends as a command that was started by itself,
+and may be killed at any moment.
 
 Tests of the start itself, and those whose environment decides what is imported, start commands by themselves.
 """
@@ -32,7 +33,15 @@ from typing import IO, NoReturn, Self
 import setproctitle
 
 import throwcollect
+from throwcollect.build import build_digest
+from throwcollect.config import shape
+from throwcollect.config.schema import Config
+from throwcollect.episode.channels import Channels
 from throwcollect.interruption import die_with_parent
+from throwcollect.own_process import SERIAL_LIBRARIES
+from throwcollect.robots.description import full_description
+from throwcollect.robots.feasibility import Feasibility
+from throwcollect.robots.tool_motion import ToolMotion
 
 _MESSAGE_BYTES = 1 << 17
 _ANSWER_S = 60.0
@@ -40,6 +49,8 @@ _ANSWER_S = 60.0
 _LOOK_S = 0.2
 _DECIDES_IMPORTS = ("PYTHON", "LD_", "THROWCOLLECT_ROS", "RMW_", "ROS_", "OPENBLAS_", "OMP_")
 """Beginnings of the names of variables that only hold for a process if it has started with them."""
+_READ_LATER = ("ROS_DOMAIN_ID",)
+"""Variables that begin so, but are read by each context."""
 _IMPORTED = ("pinocchio", "pybullet", "pyarrow.parquet")
 _RUNS_WHEN_IMPORTED = "throwcollect.__main__"
 
@@ -203,7 +214,7 @@ class CommandServer:
             return subprocess.Popen(
                 [sys.executable, "-m", "tests.commands", str(self._its_socket.fileno()), str(os.getpid())],
                 pass_fds=[self._its_socket.fileno()],
-                env=self._imported_with,
+                env={**SERIAL_LIBRARIES, **self._imported_with},
                 cwd=Path(__file__).parents[1],
                 start_new_session=True,
             )
@@ -251,7 +262,11 @@ def start_command(
 
 
 def _what_decides_imports(environment: Mapping[str, str]) -> dict[str, str]:
-    return {name: value for name, value in environment.items() if name.startswith(_DECIDES_IMPORTS)}
+    return {
+        name: value
+        for name, value in environment.items()
+        if name.startswith(_DECIDES_IMPORTS) and name not in _READ_LATER
+    }
 
 
 def _import_libraries() -> None:
@@ -263,6 +278,21 @@ def _import_libraries() -> None:
             # What needs an extra that is not installed is not needed by the commands of these tests either.
             with contextlib.suppress(ImportError):
                 importlib.import_module(each.name)
+
+
+def _compute_what_all_need() -> None:
+    """Compute what a process keeps once it has it: the shape of a configuration, models of the robot, digests.
+
+    That takes the processes of a small collection a quarter of its time. Commands that have nothing of it are those
+    that tests start by themselves.
+    """
+    config = Config(name="first")
+    shape.root()
+    for engine in ("bullet", "ballistic"):
+        build_digest(engine)
+    Channels(config, full_description(config))
+    ToolMotion(config)
+    Feasibility(config)
 
 
 def _serve(connection: socket.socket) -> list[str]:
@@ -338,6 +368,7 @@ def main() -> None:
     die_with_parent(int(sys.argv[2]))
     connection = socket.socket(fileno=int(sys.argv[1]))
     _import_libraries()
+    _compute_what_all_need()
     # Pages that the garbage collector writes to could not be shared.
     gc.collect()
     gc.freeze()
