@@ -27,12 +27,14 @@ import sys
 import threading
 import time
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import IO, NoReturn, Self
 
 import setproctitle
 
 import throwcollect
+from tests.restrictions import FREE, Restrictions
 from throwcollect.build import build_digest
 from throwcollect.config import shape
 from throwcollect.config.schema import Config
@@ -168,6 +170,7 @@ class CommandServer:
         cwd: Path | None = None,
         stdout: int = subprocess.PIPE,
         stderr: int | None = subprocess.PIPE,
+        restrictions: Restrictions = FREE,
     ) -> ForkedCommand:
         """Start a command; streams are led as `subprocess.Popen` leads them, and nobody types anything."""
         with contextlib.ExitStack() as opened:
@@ -185,7 +188,12 @@ class CommandServer:
                     given.append(inherited)
                 else:
                     given.append({subprocess.DEVNULL: nowhere, subprocess.STDOUT: given[-1]}.get(stream, stream))
-            request = {"arguments": list(arguments), "environment": dict(environment), "cwd": str(cwd or Path.cwd())}
+            request = {
+                "arguments": list(arguments),
+                "environment": dict(environment),
+                "cwd": str(cwd or Path.cwd()),
+                "restrictions": asdict(restrictions),
+            }
             with self._lock:
                 if self._process is None:
                     self._process = self._import()
@@ -249,15 +257,25 @@ def start_command(
     cwd: Path | None = None,
     stdout: int = subprocess.PIPE,
     stderr: int | None = subprocess.PIPE,
+    restrictions: Restrictions = FREE,
     **environment: str,
 ) -> Command:
     """Start a command whose output is text, with further environment variables."""
     whole = {**os.environ, **environment}
     if _servers and _servers[-1].can_start(whole):
         words = [str(each) for each in arguments]
-        return _servers[-1].start(words, environment=whole, cwd=cwd, stdout=stdout, stderr=stderr)
+        return _servers[-1].start(
+            words, environment=whole, cwd=cwd, stdout=stdout, stderr=stderr, restrictions=restrictions
+        )
     return subprocess.Popen(
-        command(*arguments), cwd=cwd, stdin=subprocess.DEVNULL, stdout=stdout, stderr=stderr, env=whole, text=True
+        command(*arguments),
+        cwd=cwd,
+        stdin=subprocess.DEVNULL,
+        stdout=stdout,
+        stderr=stderr,
+        env=whole,
+        text=True,
+        preexec_fn=restrictions.impose,  # noqa: PLW1509 - it takes no lock
     )
 
 
@@ -336,9 +354,11 @@ def _become_command(request: dict[str, object], streams: Sequence[int]) -> list[
     for number, stream in enumerate(streams):
         os.dup2(stream, number)
         os.close(stream)
-    arguments, environment = request["arguments"], request["environment"]
+    arguments, environment, restrictions = (request[name] for name in ("arguments", "environment", "restrictions"))
     assert isinstance(arguments, list)
     assert isinstance(environment, dict)
+    assert isinstance(restrictions, dict)
+    Restrictions(**restrictions).impose()
     # The title is found only as long as the environment is the one that the program was started with.
     setproctitle.setproctitle(" ".join(command(*arguments)))
     os.environ.clear()
