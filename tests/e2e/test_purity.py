@@ -99,7 +99,7 @@ def test_every_file_is_the_same_on_another_processor(tmp_path: Path) -> None:
     config = Path(__file__).parents[2] / "configs" / "dmp.yaml"
     options = (
         "--trials",
-        "3",
+        "2",
         "--set",
         "run.replay=0",
         "--set",
