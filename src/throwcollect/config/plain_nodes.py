@@ -92,16 +92,16 @@ def _value(text: str, line: int, compose: Callable[[str], Node | None]) -> Node:
     whole = compose(f"key: {text}\n")
     if not isinstance(whole, MappingNode) or len(whole.value) != 1:
         raise _Unusual
-    return _placed(whole.value[0][1], line)
+    return _place(whole.value[0][1], line)
 
 
-def _placed(node: Node, line: int) -> Node:
+def _place(node: Node, line: int) -> Node:
     """Copy a node, and all that it holds, to a line."""
     if isinstance(node, MappingNode):
-        pairs = [(_placed(key, line), _placed(value, line)) for key, value in node.value]
+        pairs = [(_place(key, line), _place(value, line)) for key, value in node.value]
         return MappingNode(node.tag, pairs, _mark(line))
     if isinstance(node, SequenceNode):
-        return SequenceNode(node.tag, [_placed(item, line) for item in node.value], _mark(line))
+        return SequenceNode(node.tag, [_place(item, line) for item in node.value], _mark(line))
     return ScalarNode(node.tag, node.value, _mark(line))
 
 
