@@ -27,7 +27,7 @@ from pathlib import Path
 
 import psutil
 
-from tests.e2e.collection import Running, collect, fingerprints, launched, start, words_of, write_config
+from tests.e2e.collection import Running, collect_here, fingerprints, launched, start, words_of, write_config
 from tests.unit.dataset.conftest import Collection
 from tests.unit.dataset.test_forgeries import FORGED, FORGERIES, problems
 from throwcollect.config.loader import load
@@ -155,12 +155,12 @@ def _disturbances(running: Running, source: random.Random) -> Iterator[str]:
         yield f"{number.name} to {'the launcher' if victim == launcher else name}"
 
 
-def run(*, seed: int, flip_count: int, plans: int, kill_count: int, scratch: Path) -> dict[str, Count]:
-    """Collect a dataset, attack it and its like, and count."""
+def run(*, seed: int, flip_count: int, plans: int, kill_count: int, scratch: Path, sim: str = "") -> dict[str, Count]:
+    """Collect a dataset with these keys of ``sim``, attack it and its like, and count."""
     source = random.Random(seed)
-    config = write_config(scratch, trials=TRIALS)
+    config = write_config(scratch, trials=TRIALS, sim=sim)
     reference = scratch / "reference"
-    collect(config, reference, 1)
+    collect_here(config, reference)
     return {
         "flips": flips(reference, flip_count, source),
         "forgeries": forgeries(plans, source),

@@ -1,8 +1,9 @@
 """Runs commands as users do, each in a process of its own, without importing their libraries once more for each.
 
 Importing takes most of a second of a processor, and tests run hundreds of commands. So `CommandServer` has one process
-import them, and forks that one for each command. What is forked has its own command line, streams, directory and
-environment, handles signals and ends as a command that was started by itself, and may be killed at any moment.
+import them and compute what a process computes only once, and forks that one for each command. What is forked has its
+own command line, streams, directory and environment, handles signals and ends as a command that was started by itself,
+and may be killed at any moment.
 
 Tests of the start itself, and those whose environment decides what is imported, start commands by themselves.
 """
@@ -26,13 +27,23 @@ import sys
 import threading
 import time
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import IO, NoReturn, Self
 
 import setproctitle
 
 import throwcollect
+from tests.restrictions import FREE, Restrictions
+from throwcollect.build import build_digest
+from throwcollect.config import shape
+from throwcollect.config.schema import Config
+from throwcollect.episode.channels import Channels
 from throwcollect.interruption import die_with_parent
+from throwcollect.own_process import SERIAL_LIBRARIES
+from throwcollect.robots.description import full_description
+from throwcollect.robots.feasibility import Feasibility
+from throwcollect.robots.tool_motion import ToolMotion
 
 _MESSAGE_BYTES = 1 << 17
 _ANSWER_S = 60.0
@@ -40,6 +51,8 @@ _ANSWER_S = 60.0
 _LOOK_S = 0.2
 _DECIDES_IMPORTS = ("PYTHON", "LD_", "THROWCOLLECT_ROS", "RMW_", "ROS_", "OPENBLAS_", "OMP_")
 """Beginnings of the names of variables that only hold for a process if it has started with them."""
+_READ_LATER = ("ROS_DOMAIN_ID",)
+"""Variables that begin so, but are read by each context."""
 _IMPORTED = ("pinocchio", "pybullet", "pyarrow.parquet")
 _RUNS_WHEN_IMPORTED = "throwcollect.__main__"
 
@@ -157,6 +170,7 @@ class CommandServer:
         cwd: Path | None = None,
         stdout: int = subprocess.PIPE,
         stderr: int | None = subprocess.PIPE,
+        restrictions: Restrictions = FREE,
     ) -> ForkedCommand:
         """Start a command; streams are led as `subprocess.Popen` leads them, and nobody types anything."""
         with contextlib.ExitStack() as opened:
@@ -174,7 +188,12 @@ class CommandServer:
                     given.append(inherited)
                 else:
                     given.append({subprocess.DEVNULL: nowhere, subprocess.STDOUT: given[-1]}.get(stream, stream))
-            request = {"arguments": list(arguments), "environment": dict(environment), "cwd": str(cwd or Path.cwd())}
+            request = {
+                "arguments": list(arguments),
+                "environment": dict(environment),
+                "cwd": str(cwd or Path.cwd()),
+                "restrictions": asdict(restrictions),
+            }
             with self._lock:
                 if self._process is None:
                     self._process = self._import()
@@ -203,7 +222,7 @@ class CommandServer:
             return subprocess.Popen(
                 [sys.executable, "-m", "tests.commands", str(self._its_socket.fileno()), str(os.getpid())],
                 pass_fds=[self._its_socket.fileno()],
-                env=self._imported_with,
+                env={**SERIAL_LIBRARIES, **self._imported_with},
                 cwd=Path(__file__).parents[1],
                 start_new_session=True,
             )
@@ -238,20 +257,34 @@ def start_command(
     cwd: Path | None = None,
     stdout: int = subprocess.PIPE,
     stderr: int | None = subprocess.PIPE,
+    restrictions: Restrictions = FREE,
     **environment: str,
 ) -> Command:
     """Start a command whose output is text, with further environment variables."""
     whole = {**os.environ, **environment}
     if _servers and _servers[-1].can_start(whole):
         words = [str(each) for each in arguments]
-        return _servers[-1].start(words, environment=whole, cwd=cwd, stdout=stdout, stderr=stderr)
+        return _servers[-1].start(
+            words, environment=whole, cwd=cwd, stdout=stdout, stderr=stderr, restrictions=restrictions
+        )
     return subprocess.Popen(
-        command(*arguments), cwd=cwd, stdin=subprocess.DEVNULL, stdout=stdout, stderr=stderr, env=whole, text=True
+        command(*arguments),
+        cwd=cwd,
+        stdin=subprocess.DEVNULL,
+        stdout=stdout,
+        stderr=stderr,
+        env=whole,
+        text=True,
+        preexec_fn=restrictions.impose,  # noqa: PLW1509 - it takes no lock
     )
 
 
 def _what_decides_imports(environment: Mapping[str, str]) -> dict[str, str]:
-    return {name: value for name, value in environment.items() if name.startswith(_DECIDES_IMPORTS)}
+    return {
+        name: value
+        for name, value in environment.items()
+        if name.startswith(_DECIDES_IMPORTS) and name not in _READ_LATER
+    }
 
 
 def _import_libraries() -> None:
@@ -263,6 +296,21 @@ def _import_libraries() -> None:
             # What needs an extra that is not installed is not needed by the commands of these tests either.
             with contextlib.suppress(ImportError):
                 importlib.import_module(each.name)
+
+
+def _compute_what_all_need() -> None:
+    """Compute what a process keeps once it has it: the shape of a configuration, models of the robot, digests.
+
+    That takes the processes of a small collection a quarter of its time. Commands that have nothing of it are those
+    that tests start by themselves.
+    """
+    config = Config(name="first")
+    shape.root()
+    for engine in ("bullet", "ballistic"):
+        build_digest(engine)
+    Channels(config, full_description(config))
+    ToolMotion(config)
+    Feasibility(config)
 
 
 def _serve(connection: socket.socket) -> list[str]:
@@ -306,9 +354,11 @@ def _become_command(request: dict[str, object], streams: Sequence[int]) -> list[
     for number, stream in enumerate(streams):
         os.dup2(stream, number)
         os.close(stream)
-    arguments, environment = request["arguments"], request["environment"]
+    arguments, environment, restrictions = (request[name] for name in ("arguments", "environment", "restrictions"))
     assert isinstance(arguments, list)
     assert isinstance(environment, dict)
+    assert isinstance(restrictions, dict)
+    Restrictions(**restrictions).impose()
     # The title is found only as long as the environment is the one that the program was started with.
     setproctitle.setproctitle(" ".join(command(*arguments)))
     os.environ.clear()
@@ -338,6 +388,7 @@ def main() -> None:
     die_with_parent(int(sys.argv[2]))
     connection = socket.socket(fileno=int(sys.argv[1]))
     _import_libraries()
+    _compute_what_all_need()
     # Pages that the garbage collector writes to could not be shared.
     gc.collect()
     gc.freeze()

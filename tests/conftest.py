@@ -1,11 +1,14 @@
 """What all tests rely on."""
 
 import gc
+import os
 import signal
 from collections.abc import Iterator
 
 import pytest
 from hypothesis import settings
+
+from tests.commands import command_server
 
 # Whoever starts the tests in the background may have SIGINT ignored, which all processes that they start would inherit.
 signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -20,6 +23,18 @@ def pytest_collection_finish() -> None:
     gc.collect()
     gc.freeze()
     gc.set_threshold(20_000, 20, 50)
+
+
+@pytest.fixture(scope="session")
+def commands(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """Commands are forked off one process for all tests of a session, and have what the extras bring alone."""
+    # Arrow imports pandas wherever that is installed, which takes each process a quarter of a second.
+    extras_alone = tmp_path_factory.mktemp("extras")
+    (extras_alone / "pandas.py").write_text("raise ImportError('no extra brings pandas')\n")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("PYTHONPATH", str(extras_alone), prepend=os.pathsep)
+        with command_server():
+            yield
 
 
 @pytest.fixture(autouse=True)

@@ -19,6 +19,7 @@ import psutil
 import pytest
 
 from tests.commands import Command, command, start_command
+from tests.restrictions import FREE, Restrictions
 from throwcollect.cli.main import main
 from throwcollect.interruption import stop_signals
 
@@ -37,8 +38,10 @@ run: {{runtime: local, replay: 0}}
 """Its sampler draws without a library that takes each command a second to import."""
 
 
-def call(*arguments: str | Path, cwd: Path | None = None, **environment: str) -> subprocess.CompletedProcess[str]:
-    process = start_command(*arguments, cwd=cwd, **environment)
+def call(
+    *arguments: str | Path, cwd: Path | None = None, restrictions: Restrictions = FREE, **environment: str
+) -> subprocess.CompletedProcess[str]:
+    process = start_command(*arguments, cwd=cwd, restrictions=restrictions, **environment)
     out, err = process.communicate(timeout=120)
     return subprocess.CompletedProcess(command(*arguments), process.wait(), out, err)
 

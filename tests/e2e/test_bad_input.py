@@ -1,11 +1,9 @@
 """What a clumsy user meets: one clear message, the right exit code, nothing left behind, never a traceback."""
 
 import contextlib
-import ctypes
 import json
 import os
 import pty
-import resource
 import socket
 import subprocess
 from collections.abc import Callable
@@ -15,16 +13,16 @@ from typing import NamedTuple
 
 import pytest
 
-from tests.commands import command
-from tests.e2e.collection import FAST, INPROCESS, call_here, collect_here, write_config
+from tests.commands import command, start_command
+from tests.e2e.collection import FAST, INPROCESS, call, call_here, collect_here, write_config
+from tests.restrictions import Restrictions
 from throwcollect.robots.talos import TALOS
 from throwcollect.runs.records import Records
 
 pytestmark = pytest.mark.e2e
 
-PR_CAPBSET_DROP, CAP_DAC_OVERRIDE, CAP_DAC_READ_SEARCH = 24, 1, 2
-
 TALOS_DATA = "example-robot-data/robots/talos_data"
+OBEYING = Restrictions(obeys_permissions=True)
 LIST = ["--set", "sweep.sampler=list", "--set", "sweep.parameters={}", "--set"]
 
 
@@ -195,24 +193,10 @@ def test_a_sweep_that_the_robot_cannot_do_is_refused(say: Callable[..., Said], s
     assert not (tmp_path / "data").exists()
 
 
-def obey_permissions() -> None:
-    """Take the right to ignore permissions from a process that root starts; others do not have it anyway."""
-    libc = ctypes.CDLL(None)
-    for capability in (CAP_DAC_OVERRIDE, CAP_DAC_READ_SEARCH):
-        libc.prctl(PR_CAPBSET_DROP, capability, 0, 0, 0)
-
-
 @pytest.mark.parametrize("directory", ["locked", "locked/data"])
 def test_no_permission_to_write(directory: str, small: Path, tmp_path: Path) -> None:
     (tmp_path / "locked").mkdir(mode=0o555)
-    said = subprocess.run(
-        command("up", small, "--output", tmp_path / directory),
-        capture_output=True,
-        text=True,
-        timeout=60,
-        preexec_fn=obey_permissions,
-        check=False,
-    )
+    said = call("up", small, "--output", tmp_path / directory, restrictions=OBEYING)
     assert (said.returncode, said.stdout) == (2, "")
     assert said.stderr.startswith(f"throwcollect: {tmp_path / directory}")
     assert "Permission denied" in said.stderr
@@ -221,9 +205,7 @@ def test_no_permission_to_write(directory: str, small: Path, tmp_path: Path) -> 
 
 def test_no_permission_to_read(small: Path) -> None:
     small.chmod(0o000)
-    said = subprocess.run(
-        command("plan", small), capture_output=True, text=True, timeout=60, preexec_fn=obey_permissions, check=False
-    )
+    said = call("plan", small, restrictions=OBEYING)
     assert (said.returncode, said.stdout) == (2, "")
     assert said.stderr == f"throwcollect: {small}: no permission to read the file\n"
 
@@ -262,10 +244,6 @@ def test_a_robot_that_cannot_be_read(urdf: str | None, message: str, small: Path
     assert any(line.startswith("problem robot") and message in line for line in doctor.stdout.splitlines())
 
 
-def limited(size: int) -> Callable[[], None]:
-    return lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
-
-
 @pytest.fixture(scope="module")
 def dataset(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, object]]:
     """A dataset, and the summary that was printed."""
@@ -285,14 +263,7 @@ def test_a_full_disk(moment: str, small: Path, tmp_path: Path, dataset: tuple[Pa
     }[moment]
     # The coordinator, a node of its own, finds it out while it collects.
     runtime = ("-n", "1") if moment == "collection" else INPROCESS
-    said = subprocess.run(
-        command("up", *runtime, small, "--output", tmp_path / "data"),
-        capture_output=True,
-        text=True,
-        timeout=60,
-        preexec_fn=limited(limit),
-        check=False,
-    )
+    said = call("up", *runtime, small, "--output", tmp_path / "data", restrictions=Restrictions(file_bytes=limit))
     assert said.stdout == ""
     assert f"{tmp_path / 'data' / file}: cannot be written: File too large\n" in said.stderr
     assert "Traceback" not in said.stderr
@@ -424,12 +395,9 @@ def test_every_command_has_help(say: Callable[..., Said]) -> None:
 
 def test_progress_is_a_bar_on_a_terminal(small: Path, tmp_path: Path) -> None:
     master, slave = pty.openpty()
-    running = subprocess.Popen(
-        command("up", *INPROCESS, small, "--output", tmp_path / "bar"),
-        stdout=subprocess.DEVNULL,
-        stderr=slave,
-        env={**os.environ, "TERM": "xterm", "COLUMNS": "80", "NO_COLOR": "1"},
-    )
+    words = ("up", *INPROCESS, small, "--output", tmp_path / "bar")
+    screen = {"TERM": "xterm", "COLUMNS": "80", "NO_COLOR": "1"}
+    running = start_command(*words, stdout=subprocess.DEVNULL, stderr=slave, **screen)
     os.close(slave)
     shown = b""
     with contextlib.suppress(OSError):  # the terminal's end is an error on Linux

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.e2e.collection import collect_here
+from tests.e2e.collection import call, collect_here
 from throwcollect.dataset.verify import verify
 
 pytestmark = pytest.mark.e2e
@@ -21,7 +21,11 @@ def test_there_are_configurations() -> None:
 def test_a_configuration_is_collected_and_verified(config: Path, tmp_path: Path) -> None:
     trials = WHOLE.get(config.stem, 3)
     options = [] if config.stem in WHOLE else ["--trials", str(trials)]
-    summary = collect_here(config, tmp_path / "data", *options)
+    summary = collect_here(config, tmp_path / "data", "--set", "run.replay=0", *options)
     assert summary["trials"] == trials
     assert summary["episodes"] > 0
     assert verify(tmp_path / "data") == []
+    # Another process simulates all of them again; `up` would start one that imports everything anew.
+    again = call("dataset", "replay", tmp_path / "data", "--all")
+    assert (again.returncode, again.stderr) == (0, "")
+    assert f": {summary['episodes']} throws replayed, the same bit for bit" in again.stdout

@@ -26,7 +26,7 @@ sweep:
     task.end.arm_right_4_joint: {min: -0.7, max: -0.2}
     task.duration_s: {min: 0.9, max: 1.2}
 record:
-  rate_hz: 125
+  rate_hz: 50
   topics: [joint_states, ball/odometry, controller_state, tf, clock]
   trials_per_shard: 4
 run: {replay: 0}
@@ -43,7 +43,7 @@ sweep:
     task.duration_s: {min: 0.9, max: 1.2}
     task.trajectory.gamma: {min: 1.0, max: 1.2}
 record:
-  rate_hz: 125
+  rate_hz: 50
   topics: [joint_states, ball/odometry, controller_state, tf, clock]
   zstd_level: 3
 run: {replay: 0}

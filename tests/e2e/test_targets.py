@@ -72,11 +72,11 @@ def test_every_file_is_the_same_when_it_is_interrupted_and_goes_on_with_more_sim
     config: Path, undisturbed: tuple[Path, str], tmp_path: Path
 ) -> None:
     directory = tmp_path / "data"
-    running = start(config, directory, 2)
+    running = start(config, directory, 1)
     running.wait_until(lambda: running.written() > 0 and (directory / "plan.rounds.part").exists())
     interrupt(running)
     assert running.finish()[0] == 130
     assert not (directory / "metadata.yaml").exists()
-    resumed = call("resume", directory, "-n", "3")
+    resumed = call("resume", directory, "-n", "2")
     assert resumed.returncode == 0, resumed.stderr
     assert fingerprints(directory) == fingerprints(undisturbed[0])

@@ -5,13 +5,13 @@ Runs of tests are remembered apart from those of the user: each looks at all tha
 Nodes on Fast DDS meet as those of a run do: at a discovery server.
 """
 
-import subprocess
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 from rclzenoh.parameter import parameter_value_to_python
+from tests.commands import Command
 from tests.integration.robot import (
     OWN,
     PLAYING,
@@ -22,7 +22,7 @@ from tests.integration.robot import (
     start_simulation,
 )
 from throwcollect.ros import Context
-from throwcollect.ros.middleware import Middleware
+from throwcollect.ros.middleware import Middleware, uses_rclpy
 from throwcollect.ros.router import router
 from throwcollect.runs.state_directory import STATE_VARIABLE
 
@@ -30,7 +30,10 @@ NAME = "sim_0"
 
 
 @pytest.fixture(scope="session", autouse=True)
-def _state(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+def _state(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    # Whether libraries of genuine ROS 2 can be forked is not what these tests are about.
+    if not uses_rclpy():
+        request.getfixturevalue("commands")
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv(STATE_VARIABLE, str(tmp_path_factory.mktemp("state")))
         yield
@@ -75,9 +78,14 @@ def robot(shared: Robot, defaults: dict[str, object]) -> Robot:
 
 
 @pytest.fixture
-def running(endpoint: str, session: Context, tmp_path: Path) -> Iterator[tuple[subprocess.Popen[str], Robot]]:
-    """The process of a simulation of the test's own, which it may end, and a client."""
-    process = start_simulation(tmp_path, endpoint, OWN)
+def running(
+    request: pytest.FixtureRequest, endpoint: str, session: Context, tmp_path: Path
+) -> Iterator[tuple[Command, Robot]]:
+    """The process of a simulation of the test's own, which it may end, and a client.
+
+    With the parameter "by itself" it is no fork, and ends as an interpreter does.
+    """
+    process = start_simulation(tmp_path, endpoint, OWN, forked=getattr(request, "param", None) != "by itself")
     try:
         robot = Robot(session, OWN)
         robot.wait_until_ready(process)

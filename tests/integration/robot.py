@@ -16,6 +16,7 @@ import pytest
 
 from rclzenoh.interfaces import Message
 from rclzenoh.session_config import CONFIG_FILE_VARIABLE, OVERRIDE_VARIABLE
+from tests.commands import Command, command, start_command
 from throwcollect.config.schema import Config
 from throwcollect.robots.description import robot_of, start_posture
 from throwcollect.ros import (
@@ -71,14 +72,24 @@ def environment(endpoint: str) -> dict[str, str]:
 
 
 def start_simulation(
-    directory: Path, endpoint: str, name: str, config: Config = CONFIG, options: Sequence[str] = ()
-) -> subprocess.Popen[str]:
+    directory: Path,
+    endpoint: str,
+    name: str,
+    config: Config = CONFIG,
+    options: Sequence[str] = (),
+    *,
+    forked: bool = True,
+) -> Command:
+    """Start a simulation; `forked` lets it be forked off a process that has imported its libraries, if there is one."""
     path = directory / "integration.json"
     path.write_text(config.model_dump_json())
     # Simulation and client may be on different backends.
     backend = {VARIABLE: os.environ["SIMULATION_ROS"]} if "SIMULATION_ROS" in os.environ else {}
+    words = ("sim", path, "--name", name, *options)
+    if forked:
+        return start_command(*words, stderr=subprocess.STDOUT, **environment(endpoint), **backend)
     return subprocess.Popen(
-        [sys.executable, "-m", "throwcollect", "sim", str(path), "--name", name, *options],
+        command(*words),
         env={**os.environ, **environment(endpoint), **backend},
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
@@ -89,8 +100,8 @@ def start_simulation(
 @contextmanager
 def discovery_server() -> Iterator[str]:
     """The router of a run on Fast DDS, in a process of its own."""
-    command = [sys.executable, "-m", "throwcollect.ros.router", "--listen", "udp/127.0.0.1:0"]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+    words = [sys.executable, "-m", "throwcollect.ros.router", "--listen", "udp/127.0.0.1:0"]
+    with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None
         listening, _, endpoint = process.stdout.readline().strip().rpartition(" ")
         assert listening == "router listening on"
@@ -189,7 +200,7 @@ class Robot:
             assert time.monotonic() < deadline, f"did not happen: {what}"
             self._executor.spin_once(timeout_sec=0.01)
 
-    def wait_until_ready(self, process: subprocess.Popen[str]) -> None:
+    def wait_until_ready(self, process: Command) -> None:
         def ready() -> bool:
             assert process.poll() is None, process.communicate()[0]
             return self.node.count_publishers(self.topic("episode")) == 1

@@ -1,12 +1,12 @@
 """What a simulation says on /rosout: from where, and how often."""
 
 import signal
-import subprocess
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from tests.commands import Command
 from tests.integration.robot import ALL, ARM, OWN, QUITTING, Robot, goal
 from throwcollect.ros import DurabilityPolicy, Parameter, QoSProfile, get_message
 
@@ -66,7 +66,7 @@ def test_what_cannot_take_effect_is_said_once_for_one_request(robot: Robot) -> N
 
 
 @pytest.mark.parametrize("way", ["a client", "SIGTERM"])
-def test_a_simulation_says_why_it_ends(way: str, running: tuple[subprocess.Popen[str], Robot]) -> None:
+def test_a_simulation_says_why_it_ends(way: str, running: tuple[Command, Robot]) -> None:
     process, robot = running
     heard: list[Any] = []
     robot.node.create_subscription(get_message(Log), "/rosout", heard.append, ALL)

@@ -109,8 +109,14 @@ class PlayMotion:
 
 @pytest.fixture(scope="module")
 def talos(endpoint: str, session: Context, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Robot]:
-    """A simulation of a robot whose joints all move, at no more than the speed that its clients expect."""
-    config = CONFIG.model_copy(update={"robot": CONFIG.robot.model_copy(update={"locked": "none"})})
+    """A simulation of a robot whose joints all move, at no more than the speed that its clients expect.
+
+    Its steps are coarse and its messages few, as nobody counts them: it has to move for half a minute.
+    """
+    changes = {"robot": {"locked": "none"}, "sim": {"physics_hz": 250}, "record": {"rate_hz": 50}}
+    config = CONFIG.model_copy(
+        update={name: getattr(CONFIG, name).model_copy(update=changed) for name, changed in changes.items()}
+    )
     with running_simulation(tmp_path_factory.mktemp("talos"), endpoint, session, "talos", config) as robot:
         yield robot
 

@@ -16,6 +16,7 @@ import zenoh
 from rclzenoh.attachment import Attachment
 from rclzenoh.interfaces import deserialize, message_class, serialize
 from rclzenoh.keys import EntityKind, Token, data_key
+from tests.commands import Command
 from tests.integration.robot import ARM, OWN, PLAYING, Robot, connected, environment, goal, start_simulation, swing
 from throwcollect.ros import DurabilityPolicy, QoSProfile, get_message
 from throwcollect.ros.middleware import uses_rclpy
@@ -101,7 +102,7 @@ def hostile(type_name: str, sample: Any, chance: random.Random) -> Iterator[tupl
 
 
 @embedded_alone
-def test_garbage_on_every_key_is_survived(running: tuple[subprocess.Popen[str], Robot]) -> None:
+def test_garbage_on_every_key_is_survived(running: tuple[Command, Robot]) -> None:
     process, robot = running
     chance = random.Random(SEED)
     session, domain = robot.node.context.session, robot.node.context.get_domain_id()
@@ -176,7 +177,7 @@ def assert_works(robot: Robot) -> None:
 
 
 @embedded_alone
-def test_tokens_of_odd_forms_are_survived(running: tuple[subprocess.Popen[str], Robot], endpoint: str) -> None:
+def test_tokens_of_odd_forms_are_survived(running: tuple[Command, Robot], endpoint: str) -> None:
     process, robot = running
     chance = random.Random(SEED)
     session, domain = robot.node.context.session, robot.node.context.get_domain_id()
@@ -204,7 +205,7 @@ def test_tokens_of_odd_forms_are_survived(running: tuple[subprocess.Popen[str], 
 
 
 def test_a_goal_goes_on_when_its_client_vanishes_and_is_forgotten_in_time(
-    running: tuple[subprocess.Popen[str], Robot], endpoint: str
+    running: tuple[Command, Robot], endpoint: str
 ) -> None:
     process, robot = running
     action = robot.topic(f"{ARM}/follow_joint_trajectory")
@@ -289,9 +290,7 @@ def test_a_simulation_goes_on_while_its_router_is_away_and_is_all_there_when_it_
 
 
 @embedded_alone
-def test_two_simulations_of_one_name_both_work(
-    running: tuple[subprocess.Popen[str], Robot], endpoint: str, tmp_path: Path
-) -> None:
+def test_two_simulations_of_one_name_both_work(running: tuple[Command, Robot], endpoint: str, tmp_path: Path) -> None:
     process, robot = running
     (tmp_path / "twin").mkdir()
     twin = start_simulation(tmp_path / "twin", endpoint, OWN)

@@ -1,6 +1,7 @@
 """A task that only moves, in a package of its own (`tests/plugins/reach`), goes all the way that a throw goes."""
 
 import json
+import shutil
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
@@ -16,7 +17,7 @@ Command = Callable[..., str]
 REACH = """\
 name: reach
 task: {name: reach}
-sim: {engine: ballistic, max_trial_s: 1.6}
+sim: {engine: ballistic, physics_hz: 100, max_trial_s: 1.6}
 until: {reached: 30}
 trials: 200
 sweep: {parameters: {task.duration_s: {min: 0.8, max: 2.4}}}
@@ -88,6 +89,15 @@ def reached(throwcollect: Command, tmp_path_factory: pytest.TempPathFactory) -> 
     (directory / "reach.yaml").write_text(REACH)
     throwcollect("up", directory / "reach.yaml", "--runtime", "inprocess", "--output", directory / "data")
     return directory / "data"
+
+
+@pytest.fixture(scope="module")
+def few(throwcollect: Command, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A configuration of few trials, and beside it what was collected of it, as long as the task had done its work."""
+    directory = tmp_path_factory.mktemp("few")
+    (directory / "reach.yaml").write_text(FEW)
+    throwcollect("up", directory / "reach.yaml", "--runtime", "inprocess", "--output", directory / "data")
+    return directory
 
 
 def test_until_counts_what_the_task_calls_a_success(throwcollect: Command, reached: Path) -> None:
@@ -201,11 +211,10 @@ def test_where_it_fails_one_sentence_names_it(
     said: str,
     process: ProcessPoolExecutor,
     throwcollect: Command,
+    few: Path,
     tmp_path: Path,
 ) -> None:
-    config, data = tmp_path / "reach.yaml", tmp_path / "data"
-    config.write_text(FEW)
-    throwcollect("up", config, "--runtime", "inprocess", "--output", data)
+    config, data = few / "reach.yaml", Path(shutil.copytree(few / "data", tmp_path / "data"))
     process.submit(run_program, FAIL.format(method=method, does=does)).result()
     try:
         for number, (command, code) in enumerate(commands.items()):
