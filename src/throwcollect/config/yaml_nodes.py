@@ -10,8 +10,6 @@ from ruamel.yaml.error import MarkedYAMLError, YAMLError
 from ruamel.yaml.nodes import Node
 from ruamel.yaml.scanner import Scanner, ScannerError
 
-from throwcollect.config.plain_nodes import compose_plain
-
 MOST_LEVELS = 50
 """Most levels of values inside values."""
 MOST_VALUES = 30_000
@@ -48,22 +46,12 @@ class _Scanner(Scanner):
 def compose(text: str) -> Node | None:
     """Parse a text into a node, which nobody may change; None if the text is empty.
 
-    It remembers the last texts, because one command reads the configuration of a dataset several times: for the plan,
-    for its tables, for each file that it verifies.
+    It remembers the last texts, because parsing takes 10 ms, and one command reads the configuration of a dataset
+    several times: for the plan, for its tables, for each file that it verifies.
 
     Raises:
         YAMLError: If the text is no YAML, or too large.
     """
-    plain = compose_plain(text, _compose_value)
-    return _compose(text) if plain is None else plain
-
-
-@lru_cache(maxsize=64)
-def _compose_value(text: str) -> Node | None:
-    return _compose(text)
-
-
-def _compose(text: str) -> Node | None:
     yaml = YAML(typ="safe", pure=True)
     yaml.Scanner = _Scanner
     node: Node | None = yaml.compose(text)

@@ -20,7 +20,6 @@ from ruamel.yaml.events import AliasEvent
 
 from rclzenoh.interfaces import type_hash
 from throwcollect.config.yaml_nodes import line, reason
-from throwcollect.dataset import plain_yaml
 from throwcollect.dataset.directory import METADATA, PLAN, has_files
 from throwcollect.dataset.next_command import find_next_command
 from throwcollect.episode.channels import Channel
@@ -129,8 +128,6 @@ def from_yaml(path: Path) -> Mapping[str, Any]:
 @lru_cache(maxsize=8)
 def _parse(text: str) -> Any:
     """Parse a text; the last ones are remembered, because one command reads the metadata of a dataset several times."""
-    if (document := plain_yaml.read(text)) is not None:
-        return document
     yaml = YAML(typ="safe", pure=True)
     yaml.Composer = _PlainComposer
     return yaml.load(text)
@@ -180,14 +177,11 @@ def to_yaml(data: Mapping[str, Any]) -> str:
 @lru_cache(maxsize=8)
 def _write_yaml(text: str) -> str:
     """Encode what JSON says; the last texts are remembered, because whoever checks a file writes its metadata again."""
-    data = json.loads(text)
-    if (written := plain_yaml.write(data)) is not None:
-        return written
     yaml = YAML()
     # By default, long values would be broken at 80 characters.
     yaml.width = 4096
     stream = io.StringIO()
     # A value that occurs twice, such as an infinite duration, is two values here; else it would become an alias, which
     # `from_yaml` refuses.
-    yaml.dump(data, stream)
+    yaml.dump(json.loads(text), stream)
     return stream.getvalue()
