@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections import Counter
 
 import pyarrow as pa
 
@@ -13,7 +12,7 @@ from throwcollect.dataset.directory import TRIALS
 from throwcollect.dataset.misses import summarise_misses
 from throwcollect.dataset.provenance import Provenance
 from throwcollect.robots.description import robot_of
-from throwcollect.sweep.arrow_column import find_range
+from throwcollect.sweep.arrow_column import count_values, find_range
 from throwcollect.sweep.plan import FIRST_TRIALS
 
 _SIZES = ((1_000, "n<1K"), (10_000, "1K<n<10K"), (100_000, "10K<n<100K"), (1_000_000, "100K<n<1M"))
@@ -22,7 +21,7 @@ _MORE = "1M<n<10M"
 
 def count_outcomes(throws: pa.Table) -> dict[str, int]:
     """Count the trials of each outcome, most frequent first."""
-    counts = Counter(throws["outcome"].to_pylist())
+    counts = count_values(throws["outcome"])
     return dict(sorted(counts.items(), key=lambda item: (-item[1], item[0])))
 
 

@@ -16,7 +16,7 @@ from throwcollect.config.shape import unit_of_key
 from throwcollect.dataset.directory import THROWS, list_shards
 from throwcollect.dataset.misses import Misses
 from throwcollect.errors import ConfigError, DatasetError
-from throwcollect.sweep.arrow_column import find_range, make_table, read_validity
+from throwcollect.sweep.arrow_column import count_values, find_range, make_table, read_validity
 from throwcollect.sweep.parquet_file import read_parquet
 from throwcollect.sweep.plan import Plan
 from throwcollect.sweep.trials import Trial
@@ -234,7 +234,7 @@ def _explain_unusable(table: pa.Table, plan: Plan) -> str | None:
         "shard": {None, *list_shards(plan)},
     }
     for name, values in known.items():
-        if strange := set(table[name].to_pylist()) - values:
+        if strange := count_values(table[name]).keys() - values:
             return f"{name} is {min(map(repr, strange))} in some row, which no row of this plan can have"
     places = ("shard", "chunk_offset", "samples", "digest")
     shard, *rest = (read_validity(table[name].combine_chunks()) for name in places)

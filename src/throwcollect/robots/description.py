@@ -168,7 +168,8 @@ def physics_description(config: Config) -> Description:
         ElementTree.SubElement(joint, "child", link=names[number])
         joint.append(_origin(model.jointPlacements[number]))
         for tag in ("axis", "limit", "dynamics"):
-            joint.extend(joints[model.names[number]].findall(tag))
+            # Copies, as writing the text indents each element of it, also in another thread.
+            joint.extend(copy.deepcopy(joints[model.names[number]].findall(tag)))
     hand = model.frames[model.getFrameId(robot.hand, pinocchio.BODY)]
     description.append(_tool_link(tool, visual=False))
     description.append(_tool_joint(tool, names[hand.parentJoint], hand.placement * tool.mount))

@@ -7,6 +7,7 @@ of columns import `pyarrow.compute`, which takes 0.05 s.
 from __future__ import annotations
 
 from array import array
+from collections import Counter
 from collections.abc import Sequence
 from itertools import accumulate
 from math import isnan
@@ -17,6 +18,7 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 _CODES = {pa.int64(): "q", pa.uint64(): "Q", pa.float64(): "d"}
+_VALUES_AT_ONCE = 1 << 16
 
 
 def make_column(values: Sequence[Any] | NDArray[Any], kind: pa.DataType) -> pa.Array:
@@ -91,6 +93,15 @@ def find_range(column: pa.ChunkedArray) -> tuple[float, float] | None:
     numbers = read_numbers(whole)[read_validity(whole)]
     # As Arrow does, these leave out NaN, which may stand in tables of others.
     return np.fmin.reduce(numbers).item(), np.fmax.reduce(numbers).item()
+
+
+def count_values(column: pa.ChunkedArray) -> Counter[Any]:
+    """Count how often each value of a column occurs; null is None."""
+    counts: Counter[Any] = Counter()
+    # As Python objects, a million values would take 60 MB.
+    for start in range(0, len(column), _VALUES_AT_ONCE):
+        counts.update(column.slice(start, _VALUES_AT_ONCE).to_pylist())
+    return counts
 
 
 def make_table(columns: Sequence[Sequence[Any] | NDArray[Any]], schema: pa.Schema) -> pa.Table:

@@ -65,6 +65,14 @@ def test_descriptions_of_many_tools_are_told_apart():
     assert [full_description(config) for config in configs] == described
 
 
+def test_what_is_read_once_for_all_descriptions_stays_as_it_was():
+    description._read_whole.cache_clear()
+    source, model = description._read_whole(TALOS)
+    before = ElementTree.tostring(source), model.copy()
+    physics_description(Config.model_validate({"robot": {"locked": ["arm_left_1_joint"]}}))
+    assert (ElementTree.tostring(source), model) == before
+
+
 def test_by_default_what_the_task_does_not_move_is_locked():
     made = physics_description(CONFIG)
     assert made.moving == tuple(joint for joint in JOINTS if joint in MOVED)
