@@ -20,7 +20,7 @@ export PYTHONDONTWRITEBYTECODE :=
 
 .PHONY: up ros dist test test-fast \
     test-units test-units-of-data test-units-of-faces test-units-of-nodes test-ros test-ros-client wait-for-image test-containers \
-    test-processes test-cluster \
+    test-image test-processes test-cluster \
     check check-format check-types check-imports check-house docs bench bench-full clean
 
 # Where the Python is too new for pybullet, MuJoCo simulates; `packaging/environment.sh` has said so.
@@ -89,7 +89,7 @@ test-fast: $(READY_DEV)
 BESIDE := --no-print-directory --output-sync=target
 test: $(READY_DEV)
 	$(MAKE) $(BESIDE) -j 2 check
-	$(MAKE) $(BESIDE) -j 5 test-containers test-units test-ros test-processes test-cluster
+	$(MAKE) $(BESIDE) -j 6 test-containers test-image test-units test-ros test-processes test-cluster
 
 # The ROS client alone, on the embedded backend: what somebody runs who changes it.
 test-ros-client: $(READY_DEV)
@@ -127,10 +127,15 @@ WITH_ENGINE := tests/ros/test_containers.py
 test-ros: ros
 	$(call twice,$(ROS_VENV)/bin/python -m pytest -n 2 --dist loadfile tests/contract tests/ros --ignore=$(WITH_ENGINE))
 
-# Tests with an engine look at all that is on it, so one by one; also those of containers on genuine rclpy.
+# Tests of runs in containers look at all runs that are on the engine, so one by one; also those on genuine rclpy.
 test-containers: ros wait-for-image
-	$(call twice,$(BIN)/python -m pytest tests/docker)
+	$(call twice,$(BIN)/python -m pytest tests/docker $(addprefix --ignore=,$(WITHOUT_RUNS)))
 	$(call twice,$(ROS_VENV)/bin/python -m pytest $(WITH_ENGINE))
+
+# What starts no run on the engine need not wait for those tests: the image itself, and Compose, which knows no runs.
+WITHOUT_RUNS := $(addprefix tests/docker/,test_compose.py test_image.py)
+test-image: wait-for-image
+	$(call twice,$(BIN)/python -m pytest $(WITHOUT_RUNS))
 
 # Two files at a time, in their order: files of few long tests come first, and short ones at the end, so that both workers have
 # something to do until then.
