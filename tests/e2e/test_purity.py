@@ -63,7 +63,7 @@ def test_a_simulator_gives_the_throws_of_the_dataset(config: Path, reference: Pa
             assert np.array_equal(throw.joints.effort, stored.joints.effort)
 
 
-@pytest.mark.parametrize("simulations", [1, 2, 3])
+@pytest.mark.parametrize("simulations", [1, 2, 4])
 def test_every_file_is_the_same_for_any_number_of_simulations(
     simulations: int, config: Path, reference: Path, tmp_path: Path
 ) -> None:
@@ -99,7 +99,7 @@ def test_every_file_is_the_same_on_another_processor(tmp_path: Path) -> None:
     config = Path(__file__).parents[2] / "configs" / "dmp.yaml"
     options = (
         "--trials",
-        "2",
+        "3",
         "--set",
         "run.replay=0",
         "--set",

@@ -77,6 +77,17 @@ def test_mixed_trials_in_any_order_equal_the_same_trials_in_a_new_world(trials, 
         assert digest(one, trials[number]) == alone[number], f"trial {number} depends on what was before"
 
 
+def test_throws_of_one_ball_leave_no_order_of_contacts(trials, thrower):
+    """A world that stays the same keeps pairs of shapes that once came close, unless they are forgotten."""
+    bouncy = {"ball": {"restitution": 0.8}, "scene": {"landing_height_m": 1.0}, "sim": {"max_trial_s": 3}}
+    throws = [
+        (Config.model_validate({**bouncy, "task": {"start": config.task.start}}), motion) for config, motion in trials
+    ]
+    alone = [digest(thrower(**config.model_dump()), (config, motion)) for config, motion in throws]
+    one = thrower()
+    assert [digest(one, throws[number]) for number in reversed(range(TRIALS))] == alone[::-1]
+
+
 def test_other_tools_and_locked_joints_in_between_leave_no_trace(trials, thrower):
     one = thrower()
     before = digest(one, trials[0])
