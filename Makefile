@@ -89,7 +89,7 @@ test-fast: $(READY_DEV)
 BESIDE := --no-print-directory --output-sync=target
 test: $(READY_DEV)
 	$(MAKE) $(BESIDE) -j 2 check
-	$(MAKE) $(BESIDE) -j 6 test-containers test-image test-units test-ros test-processes test-cluster
+	$(MAKE) $(BESIDE) -j 5 test-containers test-image test-units test-ros test-processes test-cluster
 
 # The ROS client alone, on the embedded backend: what somebody runs who changes it.
 test-ros-client: $(READY_DEV)
