@@ -84,12 +84,12 @@ test-fast: $(READY_DEV)
 	$(BIN)/python -m pytest -n logical tests/architecture tests/contract tests/unit $(addprefix --ignore=tests/unit/,$(SLOW))
 
 # What waits for others is run beside what computes, and each group begins as soon as it can, so that both cores always have something
-# to do. Tests of containers take longest, one by one, so they begin as soon as there is an image, and those of processes, which
-# need none, right after them. Continuous integration makes the image meanwhile, and names the process that does.
+# to do. Tests of containers take longest, one by one, so they begin as soon as there is an image; next come those of processes, which
+# take nearly as long. Continuous integration makes the image meanwhile, and names the process that does.
 BESIDE := --no-print-directory --output-sync=target
 test: $(READY_DEV)
 	$(MAKE) $(BESIDE) -j 2 check
-	$(MAKE) $(BESIDE) -j 5 test-containers test-image test-units test-ros test-processes test-cluster
+	$(MAKE) $(BESIDE) -j 5 test-containers test-processes test-units test-ros test-image test-cluster
 
 # The ROS client alone, on the embedded backend: what somebody runs who changes it.
 test-ros-client: $(READY_DEV)
