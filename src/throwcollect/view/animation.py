@@ -37,7 +37,8 @@ _LIGHT = (2.0, -5.0, 8.0)
 _ROOM_M = 0.15
 """How far the robot's shapes reach beyond the frames of its links, roughly."""
 _GRID_M = 0.5
-_SKY, _GROUND, _LINE = (247, 249, 251), (233, 237, 241), (210, 216, 223)
+# Multiples of four, as Pillow finds the nearest colour of a GIF by the upper six bits of each component alone.
+_SKY, _GROUND, _LINE = (248, 248, 252), (232, 236, 240), (208, 216, 224)
 _HELD, _FLOWN, _LANDED = (150, 156, 164), (255, 115, 0), (200, 30, 30)
 
 
