@@ -38,7 +38,7 @@ _ROOM_M = 0.15
 """How far the robot's shapes reach beyond the frames of its links, roughly."""
 _GRID_M = 0.5
 # Multiples of four, as Pillow finds the nearest colour of a GIF by the upper six bits of each component alone.
-_SKY, _GROUND, _LINE = (248, 248, 252), (232, 236, 240), (208, 216, 224)
+_SKY, _GROUND, _LINE = (244, 248, 252), (232, 236, 240), (208, 216, 224)
 _HELD, _FLOWN, _LANDED = (150, 156, 164), (255, 115, 0), (200, 30, 30)
 
 
