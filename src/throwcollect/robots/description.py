@@ -207,7 +207,7 @@ def _read_description(robot: Robot) -> ElementTree.Element:
 def _read_whole(robot: Robot) -> tuple[ElementTree.Element, pinocchio.Model]:
     """Read a robot's URDF, and build a model of all of its joints; both are to be changed by nobody.
 
-    They are kept, as every trial with other locked joints or another tool needs them, and reading takes 15 ms.
+    They are kept, as every trial with other locked joints or another tool needs them, and reading takes 7 ms.
 
     Raises:
         ConfigError: If the robot's files cannot be read, or lack something.
