@@ -15,7 +15,7 @@ from throwcollect.coordinator.progress import Progress
 from throwcollect.dataset.creation import create
 from throwcollect.ros.middleware import Middleware
 from throwcollect.run_key import RunKey
-from throwcollect.runtimes.docker.containers import DockerNodes
+from throwcollect.runtimes.docker.docker_nodes import DockerNodes
 from throwcollect.runtimes.local import LocalNodes
 from throwcollect.runtimes.node_collection import roster
 from throwcollect.runtimes.nodes import NodeHost

@@ -18,7 +18,7 @@ from throwcollect.coordinator.acceptance import Acceptance
 from throwcollect.dataset.judging import judge_episode
 from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.writer import DatasetWriter
-from throwcollect.episode.message import Delivery, pack, unpack
+from throwcollect.episode.episode_message import Delivery, pack, unpack
 from throwcollect.run_key import Signer
 from throwcollect.sweep.plan import Plan
 from throwcollect.tasks.task import task_of

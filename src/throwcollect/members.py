@@ -29,16 +29,16 @@ from throwcollect.extras import explain_missing
 _OWN = MappingProxyType(
     {
         "robots": {"talos": "throwcollect.robots.talos:TALOS"},
-        "tools": {"spoon": "throwcollect.tools.spoon.config:SpoonConfig"},
+        "tools": {"spoon": "throwcollect.tools.spoon.spoon_config:SpoonConfig"},
         "engines": {
             "bullet": "throwcollect.engines.bullet.bullet_engine:BulletEngine",
             "mujoco": "throwcollect.engines.mujoco.mujoco_engine:MujocoEngine",
             "ballistic": "throwcollect.engines.ballistic.ballistic_engine:BallisticEngine",
         },
-        "tasks": {"throw": "throwcollect.tasks.throw.config:ThrowConfig"},
+        "tasks": {"throw": "throwcollect.tasks.throw.throw_config:ThrowConfig"},
         "runtimes": {
             "local": "throwcollect.runtimes.local:LocalRuntime",
-            "docker": "throwcollect.runtimes.docker.runtime:DockerRuntime",
+            "docker": "throwcollect.runtimes.docker.docker_runtime:DockerRuntime",
             "inprocess": "throwcollect.runtimes.in_process:InProcessRuntime",
         },
         "exporters": {
@@ -54,9 +54,9 @@ _OWN = MappingProxyType(
 _KINDS = MappingProxyType(
     {
         "robots": "throwcollect.robots.robot:Robot",
-        "tools": "throwcollect.config.tool:ToolConfig",
+        "tools": "throwcollect.config.tool_config:ToolConfig",
         "engines": "throwcollect.engines.engine:Engine",
-        "tasks": "throwcollect.config.task:TaskConfig",
+        "tasks": "throwcollect.config.task_config:TaskConfig",
         "runtimes": "throwcollect.runtimes.runtime:Runtime",
         "exporters": "throwcollect.export.exporter:Exporter",
     }

@@ -14,18 +14,18 @@ from throwcollect.arguments import as_float, check_list, check_mapping, check_wh
 from throwcollect.config.loader import load
 from throwcollect.config.schema import Config
 from throwcollect.config.sweep import MOST_TRIALS
-from throwcollect.config.target import LARGEST_TARGET
+from throwcollect.config.target_columns import LARGEST_TARGET
 from throwcollect.config.values import reason_not_sweepable, with_values
 from throwcollect.coordinator.prepare import feasibility_check
 from throwcollect.dataset.judging import judge_episode
 from throwcollect.dataset.throw import Throw
 from throwcollect.dataset.throws_table import ThrowsTable
-from throwcollect.episode.message import Episode
+from throwcollect.episode.episode_message import Episode
 from throwcollect.episode.trajectory_rows import trajectory_rows
 from throwcollect.errors import ConfigError, ConflictError, PlanError, Problem
 from throwcollect.extras import require
 from throwcollect.files import StrPath
-from throwcollect.replay.throw import Replayer
+from throwcollect.replay.replayer import Replayer
 from throwcollect.side_by_side import work_side_by_side
 from throwcollect.sweep.plan import make_trials, refusal
 from throwcollect.sweep.points import Points, Targets

@@ -60,6 +60,46 @@ def test_the_rules_see_what_they_should() -> None:
     ]
 
 
+KINDS_OF_MEMBERS = (SOURCE / "engines", SOURCE / "tasks", SOURCE / "tools")
+"""Folders whose folders are members of one kind; they may be built alike."""
+
+
+def search_repeated(paths: list[Path]) -> set[str]:
+    """Search for names that several modules have, so that nobody can find one of them by its name alone."""
+    places: dict[str, set[Path]] = {}
+    for path in (path for path in paths if path.name != "__init__.py"):
+        member = path.parent.parent in KINDS_OF_MEMBERS
+        places.setdefault(path.name, set()).add(path.parent.parent if member else path)
+    return {name for name, each in places.items() if len(each) > 1}
+
+
+def search_repeated_classes(trees: dict[str, ast.Module]) -> set[str]:
+    """Search for names that public classes of several modules have."""
+    classes = [
+        node.name
+        for tree in trees.values()
+        for node in tree.body
+        if isinstance(node, ast.ClassDef) and not node.name.startswith("_")
+    ]
+    return {each for each in classes if classes.count(each) > 1}
+
+
+def test_a_module_and_a_class_are_found_by_their_names() -> None:
+    """Those of the ROS client have the names that rclpy gives them, so some of these are ours, too."""
+    paths = sorted(SOURCE.rglob("*.py"))
+    assert search_repeated(paths) == set()
+    assert search_repeated_classes({name(path): parse(path.read_text(encoding="utf-8")) for path in paths}) == set()
+
+
+def test_the_rule_about_names_sees_what_it_should() -> None:
+    engines = SOURCE / "engines"
+    alike = [engines / "bullet" / "bodies.py", engines / "mujoco" / "bodies.py", SOURCE / "__init__.py"]
+    assert search_repeated(alike) == set()
+    assert search_repeated([*alike, SOURCE / "sim" / "bodies.py"]) == {"bodies.py"}
+    classes = {"a": parse("class Found: ...\nclass _Own: ..."), "b": parse("class Found: ...\nclass _Own: ...")}
+    assert search_repeated_classes(classes) == {"Found"}
+
+
 def test_modules_of_tests_have_one_subject() -> None:
     lengths = {path: len(path.read_text(encoding="utf-8").splitlines()) for path in (ROOT / "tests").rglob("*.py")}
     assert lengths

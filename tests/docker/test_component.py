@@ -13,11 +13,11 @@ from throwcollect.config.containers import ContainerSpec, NodeContainerConfig
 from throwcollect.runs import control
 from throwcollect.runs.background import begin_container, begin_run
 from throwcollect.runs.component_container import ContainerOrder
-from throwcollect.runs.record import Origin
 from throwcollect.runs.records import Run
+from throwcollect.runs.run_record import Origin
 from throwcollect.runs.state_directory import STATE_VARIABLE
+from throwcollect.runtimes.docker.container_options import RUN_LABEL
 from throwcollect.runtimes.docker.image import default_tag
-from throwcollect.runtimes.docker.options import RUN_LABEL
 
 pytestmark = pytest.mark.docker
 

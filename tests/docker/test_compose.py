@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from tests.e2e.collection import FAST, collect_here, fingerprints, write_config
-from throwcollect.runtimes.docker.engine import connect
+from throwcollect.runtimes.docker.docker_engine import connect
 
 pytestmark = [pytest.mark.docker, pytest.mark.usefixtures("client")]
 ROOT = Path(__file__).parents[2]

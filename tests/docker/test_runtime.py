@@ -25,12 +25,12 @@ from throwcollect.coordinator.prepare import prepare
 from throwcollect.dataset.inspect import info
 from throwcollect.errors import ConfigError, WorkerError
 from throwcollect.runtimes.docker import watch as docker_watch
-from throwcollect.runtimes.docker.containers import DockerNodes
-from throwcollect.runtimes.docker.engine import connect
+from throwcollect.runtimes.docker.container_options import KEY_LABEL
+from throwcollect.runtimes.docker.docker_engine import connect
+from throwcollect.runtimes.docker.docker_nodes import DockerNodes
 from throwcollect.runtimes.docker.held_runs import find_held_runs, remove
-from throwcollect.runtimes.docker.options import KEY_LABEL
 from throwcollect.runtimes.node_collection import roster
-from throwcollect.runtimes.nodes import COORDINATOR, ROUTER, NodeExit, NodeSpec, Role
+from throwcollect.runtimes.nodes import COORDINATOR, ROUTER, NodeExit, NodeRole, NodeSpec
 from throwcollect.runtimes.ports import split_address
 from throwcollect.runtimes.supervisor import Supervisor
 from throwcollect.version import __version__
@@ -192,7 +192,7 @@ from pathlib import Path
 from throwcollect.config.loader import load
 from throwcollect.ros.middleware import Middleware
 from throwcollect.run_key import RunKey
-from throwcollect.runtimes.docker.containers import DockerNodes
+from throwcollect.runtimes.docker.docker_nodes import DockerNodes
 from throwcollect.runtimes.node_collection import roster
 from throwcollect.runtimes.runtime import Place
 from throwcollect.runtimes.supervisor import Supervisor
@@ -250,31 +250,31 @@ def bare(client: DockerClient, tmp_path: Path) -> Any:
 
 def test_what_the_engine_refuses_is_the_reason_of_an_end(bare: Any) -> None:
     runtime = bare("containers.sim.options.runtime=nowhere", "containers.coordinator.memory=16m")
-    runtime.start(NodeSpec("sim_0", ("--version",), Role.EXPENDABLE))
+    runtime.start(NodeSpec("sim_0", ("--version",), NodeRole.EXPENDABLE))
     end = ended(runtime)
     assert (end.name, end.code) == ("sim_0", None)
     assert "cannot be started" in end.reason
     assert "nowhere" in end.reason
     assert (runtime.running(), runtime.handle("sim_0")) == ((), None)
-    runtime.start(NodeSpec(COORDINATOR, ("config", "/data/small.yaml"), Role.EXPENDABLE))
+    runtime.start(NodeSpec(COORDINATOR, ("config", "/data/small.yaml"), NodeRole.EXPENDABLE))
     assert ended(runtime).reason == "ran out of memory (limit 16m)"
 
 
 def test_a_node_says_how_it_ended_and_what_it_said_last(monkeypatch: pytest.MonkeyPatch, bare: Any) -> None:
     monkeypatch.setattr(docker_watch, "_LOOK_EVERY_S", 3600.0)  # the engine's events are enough
     runtime = bare()
-    runtime.start(NodeSpec("sim_0", ("sim", "/data/nothing.yaml"), Role.EXPENDABLE))
+    runtime.start(NodeSpec("sim_0", ("sim", "/data/nothing.yaml"), NodeRole.EXPENDABLE))
     end = ended(runtime)
     assert (end.code, end.reason) == (2, "exit code 2")
     assert end.log.splitlines()[-1] == "throwcollect: /data/nothing.yaml: no such file"
     assert runtime.exits() == []
-    runtime.start(NodeSpec("sim_0", ("--version",), Role.EXPENDABLE))
+    runtime.start(NodeSpec("sim_0", ("--version",), NodeRole.EXPENDABLE))
     assert ended(runtime).log.splitlines()[-2:] == [*end.log.splitlines()[-1:], f"throwcollect {__version__}"]
 
 
 def test_a_container_that_somebody_removes_has_ended(bare: Any, client: DockerClient) -> None:
     runtime = bare()
-    runtime.start(NodeSpec(ROUTER, ("router", "--listen", runtime.listen), Role.EXPENDABLE))
+    runtime.start(NodeSpec(ROUTER, ("router", "--listen", runtime.listen), NodeRole.EXPENDABLE))
     until(lambda: runtime.handle(ROUTER) is not None)
     client.containers.get(runtime.handle(ROUTER)).remove(force=True)
     assert ended(runtime).reason in ("its container was removed", "ended by SIGKILL")
@@ -286,7 +286,7 @@ def test_a_published_router_is_reached_on_the_loopback_interface_alone(bare: Any
         with pytest.raises(ConfigError, match=f"run.router_port: port {port} of 127.0.0.1 cannot be used"):
             bare(f"run.router_port={port}")
     runtime = bare(f"run.router_port={port}")
-    runtime.start(NodeSpec(ROUTER, ("router", "--listen", runtime.listen), Role.EXPENDABLE))
+    runtime.start(NodeSpec(ROUTER, ("router", "--listen", runtime.listen), NodeRole.EXPENDABLE))
     until(lambda: runtime.log_tail(ROUTER) != "")
     assert runtime.endpoint is not None
     assert split_address(runtime.endpoint) == ("127.0.0.1", port)
@@ -303,7 +303,7 @@ def test_a_node_has_the_key_as_files_of_the_caller_which_the_engine_tells_nobody
     monkeypatch.setattr(os, "getuid", lambda: 4242)
     key = key_in(tmp_path).private_key.read_text()
     runtime = bare()
-    runtime.start(NodeSpec(ROUTER, ("router", "--listen", runtime.listen), Role.EXPENDABLE))
+    runtime.start(NodeSpec(ROUTER, ("router", "--listen", runtime.listen), NodeRole.EXPENDABLE))
     until(lambda: runtime.log_tail(ROUTER) != "")
     assert runtime.log_tail(ROUTER) == "router listening on tls/router:7447"
     router = client.containers.get(runtime.handle(ROUTER))
@@ -352,7 +352,7 @@ def test_mounts_environment_and_networks_of_the_configuration_are_there(
             "containers.router.cpuset='0'",
             "containers.router.options={ulimits: {nofile: 99}, tmpfs: {/tmp: size=1m}}",
         )
-        runtime.start(NodeSpec(ROUTER, ("router", "--listen", runtime.listen), Role.EXPENDABLE))
+        runtime.start(NodeSpec(ROUTER, ("router", "--listen", runtime.listen), NodeRole.EXPENDABLE))
         until(lambda: runtime.log_tail(ROUTER) != "")
         script = (
             "cat /extra; echo $ANSWER; ulimit -n; grep Cpus_allowed_list /proc/self/status; grep ' /tmp ' /proc/mounts"
@@ -377,7 +377,7 @@ def line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> CutLine:
 
 def test_a_broken_line_to_the_engine_is_mended(bare: Any, client: DockerClient, line: CutLine) -> None:
     runtime = bare(through=connect())
-    runtime.start(NodeSpec(ROUTER, ("router", "--listen", runtime.listen), Role.EXPENDABLE))
+    runtime.start(NodeSpec(ROUTER, ("router", "--listen", runtime.listen), NodeRole.EXPENDABLE))
     until(lambda: runtime.log_tail(ROUTER) != "")
     handle = runtime.handle(ROUTER)
     line.interrupt()
@@ -396,9 +396,9 @@ def test_an_engine_that_does_not_answer_any_more_is_said_so_with_what_is_safe(
     trouble: str,
     evidence: str,
 ) -> None:
-    monkeypatch.setattr("throwcollect.runtimes.docker.clock.SILENCE_S", 3.0)
+    monkeypatch.setattr("throwcollect.runtimes.docker.engine_clock.SILENCE_S", 3.0)
     runtime = bare(through=connect())
-    runtime.start(NodeSpec(ROUTER, ("router", "--listen", runtime.listen), Role.EXPENDABLE))
+    runtime.start(NodeSpec(ROUTER, ("router", "--listen", runtime.listen), NodeRole.EXPENDABLE))
     until(lambda: runtime.log_tail(ROUTER) != "")
     handle = runtime.handle(ROUTER)
     getattr(line, trouble)()

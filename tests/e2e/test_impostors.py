@@ -14,8 +14,8 @@ from tests.e2e.collection import FAST, call, write_config
 from throwcollect import ros
 from throwcollect.config.loader import load
 from throwcollect.dataset.reader import Dataset
-from throwcollect.episode.message import pack
-from throwcollect.replay.throw import Replayer
+from throwcollect.episode.episode_message import pack
+from throwcollect.replay.replayer import Replayer
 from throwcollect.ros import SetParametersResult, get_message
 from throwcollect.ros.router import router
 from throwcollect.run_key import Signer

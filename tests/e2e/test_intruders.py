@@ -23,8 +23,8 @@ from rclzenoh.session_config import OVERRIDE_VARIABLE, client_override
 from tests.e2e.collection import FAST, Running, call, journal, start, write_config
 from throwcollect.dataset.directory import CARD
 from throwcollect.run_key import RunKey
-from throwcollect.runs.record import Record
 from throwcollect.runs.records import Records
+from throwcollect.runs.run_record import RunRecord
 from throwcollect.runs.state_directory import STATE_VARIABLE
 
 pytestmark = [
@@ -73,8 +73,8 @@ POSE = f"""
 import os, sys
 import concurrent.futures.process, concurrent.futures.thread, email.parser, mmap, multiprocessing.pool
 import pinocchio, pyarrow.parquet, scipy.stats
-import throwcollect.coordinator.main, throwcollect.coordinator.resume, throwcollect.dataset.reader
-import throwcollect.cli.nodes, throwcollect.engines.bullet.bullet_engine, throwcollect.sim.main
+import throwcollect.coordinator.coordinator_process, throwcollect.coordinator.resume, throwcollect.dataset.reader
+import throwcollect.cli.node_commands, throwcollect.engines.bullet.bullet_engine, throwcollect.sim.simulation_process
 from throwcollect.cli.main import main
 from rclzenoh import session
 session._PATIENCE_S = 0.5
@@ -112,7 +112,7 @@ class Scene:
 
     running: Running
     undisturbed: Running
-    record: Record
+    record: RunRecord
     key: RunKey
     home: Path
     ways: dict[str, str]

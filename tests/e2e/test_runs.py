@@ -26,8 +26,8 @@ from tests.e2e.collection import (
     start,
     write_config,
 )
-from throwcollect.runs.record import Planning, Record
 from throwcollect.runs.records import Records
+from throwcollect.runs.run_record import Planning, RunRecord
 from throwcollect.runs.state_directory import STATE_VARIABLE
 
 pytestmark = pytest.mark.e2e
@@ -381,7 +381,7 @@ def test_among_several_runs_one_must_be_named(records: Records, tmp_path: Path) 
     started = datetime.now(timezone.utc)
     runs = [records.new(name) for name in ("first", "second")]
     for run in runs:
-        run.write(Record(run.run, run.run, "local", "/data", None, "/data/logs", 0, started, os.getpid(), 2))
+        run.write(RunRecord(run.run, run.run, "local", "/data", None, "/data/logs", 0, started, os.getpid(), 2))
     for verb in (["wait"], ["stop"], ["scale", "2"], ["down"], ["logs"], ["events"]):
         code, out, err = say(*verb)
         assert (verb, code, out) == (verb, 2, "")
@@ -403,7 +403,7 @@ def test_without_any_run_every_verb_says_so() -> None:
 
 def test_a_run_whose_plan_is_being_made_tells_how_far_it_is(records: Records) -> None:
     run, started = records.new("large"), datetime.now(timezone.utc)
-    record = Record(run.run, "large", "", "/data", None, "/data/logs", 0, started, os.getpid(), 2)
+    record = RunRecord(run.run, "large", "", "/data", None, "/data/logs", 0, started, os.getpid(), 2)
     run.write(replace(record, planning=Planning(1200, 30000)))
     assert "planning for 0 s, 1200 of 30000 trials checked" in say("ps")[1]
     run.forget()

@@ -16,8 +16,8 @@ from tests.e2e.chromium import browse, chromium
 from tests.e2e.collection import FAST, collect_here, write_config
 from tests.e2e.page import CHANGED, load, press, served, unexpected
 from tests.unit.serve.made_model import make_model
-from throwcollect.runs.record import Record
 from throwcollect.runs.records import Records
+from throwcollect.runs.run_record import RunRecord
 from throwcollect.serve.finding import find_server, make_page_address
 
 pytestmark = pytest.mark.e2e
@@ -92,7 +92,7 @@ def over() -> Iterator[tuple[str, str]]:
     """Two runs that have ended."""
     runs, now = [Records().new(name) for name in ("early", "late")], datetime.now(timezone.utc)
     for run in runs:
-        record = Record(run.run, "small", "local", "/none", None, "/none/logs", 0, now, 1, 1, ended=now, exit_code=0)
+        record = RunRecord(run.run, "small", "local", "/none", None, "/none/logs", 0, now, 1, 1, ended=now, exit_code=0)
         run.write(record)
         run.close()
     yield runs[0].run, runs[1].run
@@ -124,7 +124,7 @@ def died(tmp_path: Path) -> Iterator[tuple[str, str]]:
     for run, name in zip(runs, ("whole", "left"), strict=True):
         directory = tmp_path / name
         collect_here(write_config(tmp_path, trials=2, sim=FAST), directory)
-        run.write(Record(run.run, "small", "local", str(directory), None, str(directory / "logs"), 0, now, 1, 1))
+        run.write(RunRecord(run.run, "small", "local", str(directory), None, str(directory / "logs"), 0, now, 1, 1))
         run.close()
     (tmp_path / "left" / "metadata.yaml").unlink()
     yield runs[0].run, runs[1].run

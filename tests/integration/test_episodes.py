@@ -11,7 +11,7 @@ from zenoh.ext import declare_advanced_subscriber
 from rclzenoh import attachment
 from rclzenoh.interfaces import type_hash
 from tests.integration.robot import ALL, ARM, CONFIG, Robot, goal, signer, swing
-from throwcollect.episode.message import unpack
+from throwcollect.episode.episode_message import unpack
 from throwcollect.ros import get_message
 from throwcollect.ros.middleware import Middleware
 

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from tests.integration.robot import ARM, CONFIG, ELBOW, HEAD, POSTURE, TORSO, Robot, goal, signer, swing, trajectory
-from throwcollect.episode.message import Delivery, unpack
+from throwcollect.episode.episode_message import Delivery, unpack
 from throwcollect.ros import DurabilityPolicy, QoSProfile, get_message
 from throwcollect.run_key import Signer
 from throwcollect.trial.lease import Lease, leases_to_json

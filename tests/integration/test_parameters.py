@@ -10,7 +10,7 @@ from rclzenoh.interfaces import deserialize, message_class
 from tests.integration.robot import ARM, CONFIG, ELBOW, PAUSED, POSTURE, STEP_NS, TORSO, Robot, goal, signer, swing
 from throwcollect.config.key import Effect
 from throwcollect.config.values import sweepable_keys
-from throwcollect.episode.message import unpack
+from throwcollect.episode.episode_message import unpack
 from throwcollect.ros import Parameter
 
 OWN = ["trial.number", "trial.controllers", "trial.leases", "sim.real_time_factor"]

@@ -21,7 +21,7 @@ from throwcollect.dataset.directory import METADATA
 from throwcollect.dataset.join import join
 from throwcollect.dataset.shard import OpenShard
 from throwcollect.dataset.slice_directory import SLICES, find_attempts, find_finished, make_attempt, publish
-from throwcollect.episode.message import Episode
+from throwcollect.episode.episode_message import Episode
 from throwcollect.errors import ConfigError, DatasetError, Interrupted, LossError, ThrowcollectError
 from throwcollect.files import unwritable
 from throwcollect.runs.slices import collect_slice

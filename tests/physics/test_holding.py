@@ -13,7 +13,7 @@ from throwcollect.robots.talos import TALOS
 from throwcollect.robots.tool_motion import ToolMotion
 from throwcollect.sim.world import World
 from throwcollect.tasks.task import task_of
-from throwcollect.tasks.throw.outcome import ThrowOutcome
+from throwcollect.tasks.throw.throw_result import ThrowOutcome
 from throwcollect.tools.tool import tool_of
 
 START = Config().task.start

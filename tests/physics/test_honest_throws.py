@@ -11,7 +11,7 @@ from throwcollect.config.schema import Config
 from throwcollect.coordinator.prepare import draw_plan
 from throwcollect.dataset.verify_episode import EpisodeCheck
 from throwcollect.episode.channels import Channels
-from throwcollect.replay.throw import Replayer
+from throwcollect.replay.replayer import Replayer
 from throwcollect.robots.description import full_description
 
 ALL_TOPICS = ["joint_states", "ball/odometry", "controller_state", "tf", "clock"]

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-import throwcollect.ros.health as health
+import throwcollect.ros.health_check as health
 from rclzenoh.session_config import OVERRIDE_VARIABLE
 from throwcollect.errors import ThrowcollectError
 from throwcollect.heartbeat import SILENT_S, VARIABLE, Heartbeat, is_beating

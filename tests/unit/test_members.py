@@ -109,7 +109,7 @@ def test_with_a_robot_that_there_is_not_its_joints_are_not_complained_of(tmp_pat
 
 
 BROKEN = """
-from throwcollect.config.task import TaskConfig
+from throwcollect.config.task_config import TaskConfig
 from throwcollect.engines.engine import Engine
 
 NUMBER = 3

@@ -6,8 +6,12 @@ import re
 import subprocess
 import sys
 from pathlib import Path
+from types import ModuleType
+
+import pytest
 
 import throwcollect
+from throwcollect import runs
 from throwcollect.runs import prepare, resume
 
 ROOT = Path(__file__).parents[2]
@@ -39,8 +43,9 @@ def test_functions_have_the_parameters_that_are_described() -> None:
     assert described["runs.resume"] == list(inspect.signature(resume).parameters)[:-1]
 
 
-def test_type_checkers_read_what_is_imported() -> None:
-    tree = ast.parse(inspect.getsource(throwcollect))
+@pytest.mark.parametrize("face", [throwcollect, runs], ids=lambda face: face.__name__)
+def test_type_checkers_read_what_is_imported(face: ModuleType) -> None:
+    tree = ast.parse(inspect.getsource(face))
     (block,) = (each for each in tree.body if isinstance(each, ast.If))
     imported = {
         alias.asname or alias.name: f"{statement.module}:{alias.name}".removeprefix("throwcollect.").removeprefix(OWN)
@@ -48,13 +53,15 @@ def test_type_checkers_read_what_is_imported() -> None:
         if isinstance(statement, ast.ImportFrom)
         for alias in statement.names
     }
-    assert imported == throwcollect._PLACES
+    assert imported == face._PLACES
 
 
-def test_everything_that_is_public_can_be_taken_and_says_what_it_does() -> None:
-    for name in throwcollect.__all__:
+@pytest.mark.parametrize("face", [throwcollect, runs], ids=lambda face: face.__name__)
+def test_everything_that_is_public_can_be_taken_and_says_what_it_does(face: ModuleType) -> None:
+    assert len(face.__all__) > 10
+    for name in face.__all__:
         if name != "__version__":
-            taken = getattr(throwcollect, name)
+            taken = getattr(face, name)
             assert inspect.isclass(taken) or inspect.isroutine(taken) or inspect.ismodule(taken), name
             assert taken.__doc__, name
 

@@ -17,7 +17,7 @@ from throwcollect.cli.interruptions import count_interruptions
 from throwcollect.cli.printing import tell
 from throwcollect.cli.streams import has_reader
 from throwcollect.cli.terminal import display
-from throwcollect.cluster.following import ClusterRun, Look, ProgressOfSlices, find_queued, follow
+from throwcollect.cluster.cluster_run import ClusterRun, ProgressOfSlices, SlicesLook, find_queued, follow
 from throwcollect.dataset.inspect import info
 from throwcollect.errors import ConfigError, Interrupted, ThrowcollectError
 from throwcollect.wording import command, format_count
@@ -81,7 +81,7 @@ def end(run: ClusterRun) -> None:
     typer.echo(f"{run.directory}: stopped; the dataset {complete}")
 
 
-def list_queued(describe: Callable[[ClusterRun, Look], _Described]) -> Iterator[_Described]:
+def list_queued(describe: Callable[[ClusterRun, SlicesLook], _Described]) -> Iterator[_Described]:
     """Describe each run in the queue by `make_row` or `make_document`; of one that cannot be read, tell the error."""
     for directory in find_queued():
         try:
@@ -93,7 +93,7 @@ def list_queued(describe: Callable[[ClusterRun, Look], _Described]) -> Iterator[
             yield described
 
 
-def make_row(run: ClusterRun, look: Look) -> tuple[str, ...]:
+def make_row(run: ClusterRun, look: SlicesLook) -> tuple[str, ...]:
     """The row of a run, for the table that `ps` prints."""
     return (
         _number_of(run),
@@ -105,7 +105,7 @@ def make_row(run: ClusterRun, look: Look) -> tuple[str, ...]:
     )
 
 
-def make_document(run: ClusterRun, look: Look) -> dict[str, Any]:
+def make_document(run: ClusterRun, look: SlicesLook) -> dict[str, Any]:
     """A run for the JSON document that `ps` prints."""
     return {
         "run": _number_of(run),
@@ -123,7 +123,7 @@ def _number_of(run: ClusterRun) -> str:
     return run.submission.jobs[-1].array or run.submission.jobs[-1].join
 
 
-def _status(look: Look, run: ClusterRun) -> str:
+def _status(look: SlicesLook, run: ClusterRun) -> str:
     if run.submission.live:
         return f"one run on {format_count(run.submission.tasks, 'node')}, {'running' if look.running else 'waiting'}"
     tasks = format_count(run.submission.tasks, "task")

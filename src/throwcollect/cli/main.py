@@ -9,8 +9,8 @@ from typing import Annotated, Any
 
 import typer
 
-from throwcollect.cli import cluster, collect, image, learning, nodes, runs, serve, show
-from throwcollect.cli.dataset import derive, info, repair, replay, verify, writing
+from throwcollect.cli import cluster_commands, collect, image_commands, learning, node_commands, runs, serve, show
+from throwcollect.cli.dataset import derive, info, repair_commands, replay, verify_command, writing
 from throwcollect.cli.execution import execute
 from throwcollect.cli.ros.commands import ros_app
 from throwcollect.version import __version__
@@ -34,19 +34,25 @@ def _add(*commands: Callable[..., None], panel: str | None = None, hidden: bool 
         app.command(rich_help_panel=panel, hidden=hidden)(command)
 
 
-_add(show.init, collect.up, collect.resume, collect.join_run, cluster.submit, collect.join)
+_add(show.init, collect.up, collect.resume, collect.join_run, cluster_commands.submit, collect.join)
 _add(runs.ps, runs.wait, runs.logs, runs.events, runs.scale, runs.stop, runs.down, panel="Runs")
 _add(serve.serve, serve.view, panel="Runs")
 _add(learning.fit, learning.aim, learning.throw, learning.score, learning.adapt, panel="From a dataset to a throw")
 _add(show.config, show.plan, show.doctor)
-_add(nodes.router, nodes.sim, nodes.coordinator, nodes.health, panel="Nodes, as `up` starts them")
-_add(collect.launch, collect.begin, nodes.simulate, hidden=True)
-image_app.command("build")(image.build)
-image_app.command("sif")(image.sif)
+_add(
+    node_commands.router,
+    node_commands.sim,
+    node_commands.coordinator,
+    node_commands.health,
+    panel="Nodes, as `up` starts them",
+)
+_add(collect.launch, collect.begin, node_commands.simulate, hidden=True)
+image_app.command("build")(image_commands.build)
+image_app.command("sif")(image_commands.sif)
 dataset_app.command("info")(info.show_info)
-dataset_app.command("verify")(verify.verify_dataset)
-dataset_app.command("rebuild")(repair.rebuild_dataset)
-dataset_app.command("repair")(repair.repair_dataset)
+dataset_app.command("verify")(verify_command.verify_dataset)
+dataset_app.command("rebuild")(repair_commands.rebuild_dataset)
+dataset_app.command("repair")(repair_commands.repair_dataset)
 dataset_app.command("digest")(info.show_digest)
 dataset_app.command("export")(writing.export_dataset)
 dataset_app.command("merge")(derive.merge_datasets)

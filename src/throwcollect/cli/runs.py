@@ -19,9 +19,9 @@ from throwcollect.errors import ConfigError, Interrupted
 from throwcollect.wording import command, format_count
 
 if TYPE_CHECKING:
-    from throwcollect.cluster.following import ClusterRun
-    from throwcollect.runs.record import Record
+    from throwcollect.cluster.cluster_run import ClusterRun
     from throwcollect.runs.records import Run
+    from throwcollect.runs.run_record import RunRecord
     from throwcollect.runtimes.runtime import HeldRun, NodeState
 
 _UNITS = (("d", 86400), ("h", 3600), ("min", 60), ("s", 1))
@@ -35,7 +35,7 @@ def ps(
     """List the runs of this machine, with their nodes."""
     from throwcollect.cli import cluster_runs
     from throwcollect.runs.records import Records
-    from throwcollect.runs.selection import find_held_runs
+    from throwcollect.runs.run_selection import find_held_runs
 
     records = Records()
     ids = records.ids()
@@ -73,7 +73,7 @@ def wait(run: RunOption = None, json: JsonOption = False) -> None:
         return
     from throwcollect.cli.dataset.info import print_summary
     from throwcollect.runs.following import follow
-    from throwcollect.runs.selection import describe_death
+    from throwcollect.runs.run_selection import describe_death
 
     found = _find_run(run)
     with display(quiet=json) as shown, count_interruptions() as interruptions:
@@ -134,7 +134,7 @@ def scale(
     """Change the number of simulations of a run."""
     from throwcollect.runs import control
     from throwcollect.runs.records import Records
-    from throwcollect.runs.selection import find_run_to_change
+    from throwcollect.runs.run_selection import find_run_to_change
 
     found = find_run_to_change(Records(), run, command=f"scale {simulations}")
     control.scale(found, simulations)
@@ -150,7 +150,7 @@ def stop(run: RunOption = None) -> None:
         return
     from throwcollect.runs import control
     from throwcollect.runs.records import Records
-    from throwcollect.runs.selection import describe_death, find_run_to_change, require_living
+    from throwcollect.runs.run_selection import describe_death, find_run_to_change, require_living
 
     found = find_run_to_change(Records(), run, command="stop")
     require_living(found)
@@ -198,7 +198,7 @@ def _find_submitted(run: str | None) -> ClusterRun | None:
     # A run of this machine comes first, and then the scheduler need not be asked, which would take time.
     if run is None and any(each.status == "running" for each in Records().all()):
         return None
-    from throwcollect.cluster.following import find_cluster_run
+    from throwcollect.cluster.cluster_run import find_cluster_run
 
     return find_cluster_run(run)
 
@@ -206,13 +206,13 @@ def _find_submitted(run: str | None) -> ClusterRun | None:
 def _find_run(named: str | None) -> Run:
     """The run of this machine that a command is to look at."""
     from throwcollect.runs.records import Records
-    from throwcollect.runs.selection import find_run_to_watch
+    from throwcollect.runs.run_selection import find_run_to_watch
 
     return find_run_to_watch(Records(), named, say=tell)
 
 
 def _make_document(run: Run) -> dict[str, Any]:
-    from throwcollect.runs.selection import has_complete_dataset
+    from throwcollect.runs.run_selection import has_complete_dataset
 
     error = run.record.error if run.record.failure else None
     complete = has_complete_dataset(run)
@@ -227,7 +227,7 @@ def _make_row(run: Run) -> tuple[str, ...]:
     return run.id, record.runtime, simulations, throws, _status(run, record), dataset
 
 
-def _status(run: Run, record: Record) -> str:
+def _status(run: Run, record: RunRecord) -> str:
     if record.ended is not None:
         return f"{run.status} {_age(record.ended)} ago, exit code {record.exit_code}"
     if run.lives and record.planning is not None:
@@ -235,7 +235,7 @@ def _status(run: Run, record: Record) -> str:
         return f"planning for {_age(record.started)}, {plan.checked} of {plan.trials} trials checked"
     if run.lives:
         return f"running for {_age(record.started)}"
-    from throwcollect.runs.selection import has_complete_dataset
+    from throwcollect.runs.run_selection import has_complete_dataset
 
     return f"{run.status}, but the dataset is complete" if has_complete_dataset(run) else run.status
 

@@ -62,8 +62,8 @@ def serve(
     from throwcollect.serve.catalogue import Catalogue
     from throwcollect.serve.instances import Instances
     from throwcollect.serve.models import Models
-    from throwcollect.serve.server import Tls
-    from throwcollect.serve.server import serve as serve_all
+    from throwcollect.serve.server_process import Tls
+    from throwcollect.serve.server_process import serve as serve_all
 
     if (certificate is None) != (key is None):
         raise ConfigError("--tls-cert and --tls-key: should be given together")
@@ -96,7 +96,7 @@ def serve(
 def view(run: RunOption = None, json: JsonOption = False) -> None:
     """Print the address of a page on which runs are seen, and open it where there is a screen."""
     from throwcollect.runs.records import Records
-    from throwcollect.runs.selection import find_run_to_watch
+    from throwcollect.runs.run_selection import find_run_to_watch
     from throwcollect.serve.finding import ensure_server, make_page_address
 
     shown = find_run_to_watch(Records(), run, say=lambda _: None).id if run is not None else None

@@ -41,7 +41,7 @@ _UNREACHED = ("Could not establish a configuration source", "Unable to contact s
 
 
 @dataclass(frozen=True)
-class Task:
+class ArrayTask:
     """One task of an array, or a job that is no array.
 
     Attributes:
@@ -102,7 +102,7 @@ def check(script: Path) -> None:
         raise ConfigError(error.message, hint=hint) from error
 
 
-def find_tasks() -> dict[str, list[Task]]:
+def find_tasks() -> dict[str, list[ArrayTask]]:
     """Find the tasks of this user, by number of the job: those that live, and those that ended some minutes ago.
 
     Raises:
@@ -112,20 +112,20 @@ def find_tasks() -> dict[str, list[Task]]:
     # squeue fails if it is asked for a job that Slurm has forgotten, and not if it is asked for all jobs of this user.
     # Number of the array, index in it, state, node, and reason.
     format_ = "%F|%K|%T|%N|%r"
-    found: dict[str, list[Task]] = {}
+    found: dict[str, list[ArrayTask]] = {}
     for line in _run("squeue", "--noheader", "--array", "--me", "--states=all", f"--format={format_}").splitlines():
         job, index, state, node, reason = line.strip().split("|")
-        found.setdefault(job, []).append(Task(_index(index), state, node, reason))
+        found.setdefault(job, []).append(ArrayTask(_index(index), state, node, reason))
     return found
 
 
-def find_ended(job: str) -> dict[int | None, Task]:
+def find_ended(job: str) -> dict[int | None, ArrayTask]:
     """Find the tasks of a job that have ended, by index, in the accounting or in the memory of the controller.
 
     Raises:
         ConfigError: If there is no Slurm here.
     """
-    ended: dict[int | None, Task] = {}
+    ended: dict[int | None, ArrayTask] = {}
     try:
         text = _run("scontrol", "--oneliner", "show", "job", job)
     except WorkerError:
@@ -133,13 +133,13 @@ def find_ended(job: str) -> dict[int | None, Task]:
     for line in text.splitlines():
         facts = dict(word.split("=", 1) for word in line.split() if "=" in word)
         for index in _indexes(facts.get("ArrayTaskId", "")):
-            task = Task(index, facts["JobState"], facts.get("NodeList", ""), facts["ExitCode"])
+            task = ArrayTask(index, facts["JobState"], facts.get("NodeList", ""), facts["ExitCode"])
             if not task.lives:
                 ended[index] = task
     return ended | _find_accounted(job)
 
 
-def _find_accounted(job: str) -> dict[int | None, Task]:
+def _find_accounted(job: str) -> dict[int | None, ArrayTask]:
     try:
         text = _run(
             "sacct", "--noheader", "--parsable2", "-X", f"--jobs={job}", "--format=JobID,State,NodeList,ExitCode"
@@ -150,7 +150,7 @@ def _find_accounted(job: str) -> dict[int | None, Task]:
     for line in text.splitlines():
         name, state, node, code = line.split("|")
         # A task is called ARRAY_INDEX, and a cancelled one has the state `CANCELLED by UID`.
-        task = Task(_index(name.partition("_")[2]), state.partition(" ")[0], node, code)
+        task = ArrayTask(_index(name.partition("_")[2]), state.partition(" ")[0], node, code)
         if not task.lives:
             found[task.index] = task
     return found

@@ -11,7 +11,7 @@ from datetime import datetime, timezone
 from pathlib import Path
 
 from throwcollect.cluster import slurm
-from throwcollect.cluster.following import ClusterRun
+from throwcollect.cluster.cluster_run import ClusterRun
 from throwcollect.cluster.script import BatchScripts
 from throwcollect.cluster.site import with_site
 from throwcollect.cluster.submission import (
@@ -33,7 +33,7 @@ from throwcollect.errors import ConfigError, Problem
 from throwcollect.files import unwritable, write_file
 from throwcollect.own_process import make_command
 from throwcollect.runs.slices import check_closed, check_sliceable, read_changed_config, read_frozen_config
-from throwcollect.runtimes.apptainer.contents import check_sif
+from throwcollect.runtimes.apptainer.sif_contents import check_sif
 from throwcollect.side_by_side import count_cores
 from throwcollect.sweep.plan import Plan
 from throwcollect.sweep.slice import Slice

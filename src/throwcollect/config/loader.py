@@ -15,7 +15,7 @@ from pydantic import ValidationError
 
 from throwcollect.arguments import read_list
 from throwcollect.config.document import Document, Plain
-from throwcollect.config.problems import MOST_EXAMINED, Finding, Location, findings, join_key
+from throwcollect.config.problems import MOST_EXAMINED, KeyProblem, Location, findings, join_key
 from throwcollect.config.schema import Config, Range
 from throwcollect.config.values import reason_not_sweepable, with_values
 from throwcollect.errors import ConfigError
@@ -114,7 +114,7 @@ def _find_default(values: dict[str, Any], location: Location) -> Mapping[str, Pl
     return holder if isinstance(holder, dict) else {}
 
 
-def _check(values: dict[str, Any]) -> tuple[Config | None, list[Finding], int]:
+def _check(values: dict[str, Any]) -> tuple[Config | None, list[KeyProblem], int]:
     """Validate values; after a problem, put defaults in place of what was wrong, and validate again to find the rest.
 
     Returns:
@@ -123,7 +123,7 @@ def _check(values: dict[str, Any]) -> tuple[Config | None, list[Finding], int]:
     # What is wrong is removed below, and the caller needs the values of the user.
     values = deepcopy(values)
     robot = _robot_of(values)
-    found: list[Finding] = []
+    found: list[KeyProblem] = []
     replaced: set[Location] = set()
     config = None
     more = 0
@@ -152,7 +152,7 @@ def _robot_of(values: dict[str, Any]) -> str | None:
     return Config().robot.name if name is None else name if name in names_of("robots") else None
 
 
-def _about(finding: Finding, location: Location) -> bool:
+def _about(finding: KeyProblem, location: Location) -> bool:
     """Whether a finding may be about the default that was put at a location, and not about a value of the user."""
     if finding.location[: len(location)] == location:
         return True
@@ -172,16 +172,16 @@ def _remove(values: dict[str, Any], location: Location) -> bool:
     return values.pop(str(location[0]), None) is not None
 
 
-def _sweep_findings(config: Config) -> Iterator[Finding]:
+def _sweep_findings(config: Config) -> Iterator[KeyProblem]:
     sampler = config.sweep.sampler
     if config.sweep.parameters and sampler != "grid" and config.trials is None and config.until is None:
         until = f"until how many have {config.task.success}"
         sentence = f"missing; the sampler {sampler} should know how many trials to draw, or {until}"
-        yield Finding(("trials",), sentence)
+        yield KeyProblem(("trials",), sentence)
     for key, parameter in config.sweep.parameters.items():
         location: Location = (*_PARAMETERS, key)
         if reason := reason_not_sweepable(config, key):
-            yield Finding(location, reason, unknown=reason.startswith("unknown key"))
+            yield KeyProblem(location, reason, unknown=reason.startswith("unknown key"))
             continue
         if isinstance(parameter, Range):
             values: dict[Location, float] = {("min",): parameter.min, ("max",): parameter.max}
@@ -191,10 +191,10 @@ def _sweep_findings(config: Config) -> Iterator[Finding]:
             try:
                 with_values(config, {key: value})
             except ConfigError as error:
-                yield Finding((*location, *part), error.problems[0].message)
+                yield KeyProblem((*location, *part), error.problems[0].message)
 
 
-def _simulations_findings(config: Config) -> Iterator[Finding]:
+def _simulations_findings(config: Config) -> Iterator[KeyProblem]:
     """Find a number of simulations that is asked for, and that a runtime cannot have.
 
     The number in a file holds for whichever runtime the file is used with, and every dataset's file has one.
@@ -202,7 +202,7 @@ def _simulations_findings(config: Config) -> Iterator[Finding]:
     run = config.run
     # A wrong value was replaced by the default, which nobody has asked for.
     if run.runtime == "inprocess" and run.simulations > 1 and "simulations" in run.model_fields_set:
-        yield Finding(_SIMULATIONS, f"should be 1 with the runtime inprocess, got {run.simulations}")
+        yield KeyProblem(_SIMULATIONS, f"should be 1 with the runtime inprocess, got {run.simulations}")
 
 
 def _lines(values: dict[str, Any], indent: str) -> Iterator[str]:

@@ -12,7 +12,7 @@ from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
 from throwcollect.config.kinds import ContradictionError, UnknownJointError
-from throwcollect.config.shape import Shape, shape_of
+from throwcollect.config.shape import ValueShape, shape_of
 
 _RANGE_ERRORS = ("greater_than", "greater_than_equal", "less_than", "less_than_equal")
 _LONGEST_QUOTE = 60
@@ -31,7 +31,7 @@ _MEMBERS: tuple[Location, ...] = (("robot", "name"), ("tool", "name"), _ENGINE, 
 
 
 @dataclass(frozen=True)
-class Finding:
+class KeyProblem:
     """Something that is wrong with one key.
 
     Attributes:
@@ -77,7 +77,9 @@ def quote(value: Any) -> str:
     return str(value).lower() if isinstance(value, bool) else str(value)
 
 
-def findings(error: ValidationError, values: Any, *, above: Location = (), shape: Shape | None = None) -> list[Finding]:
+def findings(
+    error: ValidationError, values: Any, *, above: Location = (), shape: ValueShape | None = None
+) -> list[KeyProblem]:
     """Put the first 200 errors of pydantic into words: one finding for each key, unknown keys first.
 
     Args:
@@ -87,7 +89,7 @@ def findings(error: ValidationError, values: Any, *, above: Location = (), shape
         shape: Shape that these values should have; None for the one that a configuration has there.
     """
     expected = shape or shape_of(above)
-    found: dict[Location, Finding] = {}
+    found: dict[Location, KeyProblem] = {}
     for details in error.errors(include_url=False)[:MOST_EXAMINED]:
         for finding in _findings(details, values, above, expected):
             # A union reports an error for each alternative, and the first sentence names all of them.
@@ -102,7 +104,7 @@ def findings(error: ValidationError, values: Any, *, above: Location = (), shape
     return [*unknown, *rest]
 
 
-def _findings(details: ErrorDetails, values: Any, above: Location, expected: Shape) -> Iterator[Finding]:
+def _findings(details: ErrorDetails, values: Any, above: Location, expected: ValueShape) -> Iterator[KeyProblem]:
     location, shape, section = _locate(details, values, above, expected)
     kind, value = details["type"], details["input"]
     cause = details.get("ctx", {}).get("error")
@@ -114,29 +116,29 @@ def _findings(details: ErrorDetails, values: Any, above: Location, expected: Sha
         if name.isdecimal() and value is None:
             # YAML takes what follows a comma for the next key.
             refused = "unknown key; if it is the end of a number, decimals are written with a point, as in 1.5"
-        yield Finding(location, refused or unknown_key(name, known), unknown=True, meant=meant)
+        yield KeyProblem(location, refused or unknown_key(name, known), unknown=True, meant=meant)
     elif isinstance(cause, ContradictionError):
         for key, sentence in cause.sentences.items():
-            yield Finding((*location, *_split(key)), sentence)
+            yield KeyProblem((*location, *_split(key)), sentence)
     elif isinstance(cause, UnknownJointError):
         meant = _find_nearest(cause.name, cause.joints)
         sentence = f"{cause.robot} has no joint {quote(cause.name)}{_did_you_mean(meant)}"
-        yield Finding(location, sentence, unknown=is_key, meant=meant)
+        yield KeyProblem(location, sentence, unknown=is_key, meant=meant)
     elif cause is not None:
-        yield Finding(location, str(cause), unknown=is_key)
+        yield KeyProblem(location, str(cause), unknown=is_key)
     elif kind == "missing":
-        yield Finding(location, f"missing; should be {shape}")
+        yield KeyProblem(location, f"missing; should be {shape}")
     elif kind == "union_tag_not_found" and isinstance(value, Mapping):
         tag = "family" if "family" in value else "name"
         choices = [word for each in shape.alternatives for word in each.child(tag).choices]
         words = " or ".join(f"'{each}'" for each in choices)
-        yield Finding((*location, tag), _should_be(words, value[tag], choices))
+        yield KeyProblem((*location, tag), _should_be(words, value[tag], choices))
     else:
         strange = "; no package that is installed brings it" if location in _MEMBERS else ""
         if location == _ENGINE and value == "auto":
             strange = "; none is chosen by itself, as the same file would give other throws on another machine"
         sentence = _should_be(str(shape), value, shape.choices, strange=strange)
-        yield Finding(location, sentence + _radians(kind, shape, value))
+        yield KeyProblem(location, sentence + _radians(kind, shape, value))
 
 
 def _should_be(words: str, value: Any, choices: list[str], *, strange: str = "") -> str:
@@ -154,13 +156,15 @@ def _did_you_mean(choice: str) -> str:
     return f"; did you mean '{choice}'?" if choice else ""
 
 
-def _radians(kind: str, shape: Shape, value: Any) -> str:
+def _radians(kind: str, shape: ValueShape, value: Any) -> str:
     if kind not in _RANGE_ERRORS or shape.unit != "rad":
         return ""
     return f"; angles are in radians: {value:g} degrees are {math.radians(value):.4f}"
 
 
-def _locate(details: ErrorDetails, values: Any, above: Location, expected: Shape) -> tuple[Location, Shape, Shape]:
+def _locate(
+    details: ErrorDetails, values: Any, above: Location, expected: ValueShape
+) -> tuple[Location, ValueShape, ValueShape]:
     """Find the location of an error, the shape of the value there, and the shape of the section that holds it.
 
     The locations of pydantic also have names of models and of branches of unions, which are left out.

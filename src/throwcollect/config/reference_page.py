@@ -9,7 +9,7 @@ from throwcollect.config.kinds import all_joints
 from throwcollect.config.loader import value_as_yaml
 from throwcollect.config.schema import Config, DynamicMovementPrimitive
 from throwcollect.config.section import Section
-from throwcollect.config.shape import Shape, json_schema, root
+from throwcollect.config.shape import ValueShape, json_schema, root
 from throwcollect.config.values import sweepable_keys
 
 _INTRODUCTION = """\
@@ -60,7 +60,7 @@ def page() -> str:
     return "\n".join([_INTRODUCTION, *_sections(root(), "")])
 
 
-def _sections(shape: Shape, prefix: str) -> Iterator[str]:
+def _sections(shape: ValueShape, prefix: str) -> Iterator[str]:
     yield _table(shape, prefix)
     for name, child in shape.keys.items():
         key = prefix + name
@@ -87,29 +87,29 @@ def _sections(shape: Shape, prefix: str) -> Iterator[str]:
             yield _table(child.child(0), "")
 
 
-def _discriminator(shape: Shape) -> str:
+def _discriminator(shape: ValueShape) -> str:
     """What tells a section from its alternatives: a key with the only word that it takes, or else its first key."""
     words = (f"{name}: {child.node['const']}" for name, child in shape.keys.items() if "const" in child.node)
     return next(words, next(iter(shape.keys)))
 
 
-def _twins(shape: Shape, child: Shape) -> list[str]:
+def _twins(shape: ValueShape, child: ValueShape) -> list[str]:
     """Names of the sections that are of the same model as one of them."""
     title = _title(child)
     return [name for name, each in shape.keys.items() if title is not None and _title(each) == title]
 
 
-def _title(shape: Shape) -> str | None:
+def _title(shape: ValueShape) -> str | None:
     """Name of the model of a section, also of one that may be null; None if the shape is no section."""
     return next((each.node.get("title") for each in shape.alternatives if each.keys), None)
 
 
-def _own_sentence(shape: Shape) -> str:
+def _own_sentence(shape: ValueShape) -> str:
     """The docstring of a section, and not of the key that holds it."""
     return str(json_schema()["$defs"][_title(shape)]["description"])
 
 
-def _table(shape: Shape, prefix: str) -> str:
+def _table(shape: ValueShape, prefix: str) -> str:
     rows = ["| key | holds | default | meaning |", "|---|---|---|---|"]
     for name, child in shape.keys.items():
         if child.keys and "default" in child.node and len(child.alternatives) == 1:
@@ -119,11 +119,11 @@ def _table(shape: Shape, prefix: str) -> str:
     return "\n".join(rows) + "\n"
 
 
-def _sentence(shape: Shape) -> str:
+def _sentence(shape: ValueShape) -> str:
     return re.sub(r"\s+", " ", shape.node["description"])
 
 
-def _default(child: Shape, name: str, holder: Shape) -> str:
+def _default(child: ValueShape, name: str, holder: ValueShape) -> str:
     if any(name in each.node.get("required", []) for each in holder.alternatives):
         return "required"
     if "default" not in child.node:

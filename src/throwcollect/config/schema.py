@@ -21,8 +21,8 @@ from throwcollect.config.motion import DynamicMovementPrimitive, MinimumJerk
 from throwcollect.config.run import RunConfig
 from throwcollect.config.section import Section, any_of
 from throwcollect.config.sweep import MOST_TRIALS, Parameter, Range, SweepConfig, Values
-from throwcollect.config.task import TaskConfig
-from throwcollect.config.tool import ToolConfig
+from throwcollect.config.task_config import TaskConfig
+from throwcollect.config.tool_config import ToolConfig
 from throwcollect.config.until import UntilConfig
 from throwcollect.members import load_member, names_of
 

@@ -23,7 +23,7 @@ def json_schema() -> dict[str, Any]:
 
 
 @dataclass(frozen=True)
-class Shape:
+class ValueShape:
     """What a key may hold.
 
     Attributes:
@@ -35,15 +35,15 @@ class Shape:
     unit: str = ""
 
     @property
-    def alternatives(self) -> list[Shape]:
+    def alternatives(self) -> list[ValueShape]:
         """The shapes that a union allows; only the shape itself when it is no union."""
         nodes = self.node.get("oneOf") or self.node.get("anyOf")
         if not nodes:
             return [self]
-        return [each for node in nodes for each in Shape(_resolve(node), self.unit).alternatives]
+        return [each for node in nodes for each in ValueShape(_resolve(node), self.unit).alternatives]
 
     @property
-    def keys(self) -> dict[str, Shape]:
+    def keys(self) -> dict[str, ValueShape]:
         """The keys of a section and their shapes; empty when it is no section."""
         return {name: self.child(name) for shape in self.alternatives for name in shape.node.get("properties", {})}
 
@@ -57,23 +57,23 @@ class Shape:
         """The words that are allowed, if not any text is."""
         return [word for shape in self.alternatives for word in _list_words(shape.node)]
 
-    def child(self, part: str | int) -> Shape:
+    def child(self, part: str | int) -> ValueShape:
         """The shape of the value under a key or an index; that of any value if there should be none."""
         for shape in self.alternatives:
             rest = shape.node.get("items" if isinstance(part, int) else "additionalProperties")
             if node := shape.node.get("properties", {}).get(part) or rest:
                 # The numbers of a mapping or a list have the unit of the key that holds it, such as angles by joint.
                 inherited = self.unit if node.get("type") in ("number", "array", "object") else ""
-                return Shape(_resolve(node), node.get("unit") or unit_of_name(str(part)) or inherited)
-        return Shape({})
+                return ValueShape(_resolve(node), node.get("unit") or unit_of_name(str(part)) or inherited)
+        return ValueShape({})
 
     def __str__(self) -> str:
         return " or ".join(dict.fromkeys(_in_words(shape) for shape in self.alternatives))
 
 
-def root() -> Shape:
+def root() -> ValueShape:
     """The shape of a whole configuration."""
-    return Shape(json_schema())
+    return ValueShape(json_schema())
 
 
 def unit_of_key(key: str) -> str:
@@ -90,7 +90,7 @@ def index_or_key(part: str) -> int | str:
     return int(part) if part.isdecimal() and len(part) <= _MOST_DIGITS else part
 
 
-def shape_of(parts: Sequence[str | int]) -> Shape:
+def shape_of(parts: Sequence[str | int]) -> ValueShape:
     """The shape of the value of a key of a configuration."""
     shape = root()
     for part in parts:
@@ -110,7 +110,7 @@ def _list_words(node: dict[str, Any]) -> list[str]:
     return [node["const"]] if "const" in node else list(node.get("enum", []))
 
 
-def _in_words(shape: Shape) -> str:
+def _in_words(shape: ValueShape) -> str:
     node = shape.node
     if own := node.get("words"):
         return str(own)

@@ -4,16 +4,16 @@ A `JointTrajectoryController` is driven by a clock and measured states; it knows
 """
 
 from throwcollect.control.controller import REPEATED, JointTrajectoryController
-from throwcollect.control.goal import JointTolerance, Trajectory, TrajectoryGoal, TrajectoryPoint
-from throwcollect.control.outcome import (
+from throwcollect.control.controller_reports import (
     ControllerState,
     ErrorCode,
     GoalResult,
     GoalStatus,
     JointState,
-    Refusal,
+    TrajectoryRefusal,
     TrajectoryState,
 )
+from throwcollect.control.goal import JointTolerance, Trajectory, TrajectoryGoal, TrajectoryPoint
 from throwcollect.control.parameters import Constraints, ControllerParameters, JointConstraints
 
 __all__ = [
@@ -28,9 +28,9 @@ __all__ = [
     "JointState",
     "JointTolerance",
     "JointTrajectoryController",
-    "Refusal",
     "Trajectory",
     "TrajectoryGoal",
     "TrajectoryPoint",
+    "TrajectoryRefusal",
     "TrajectoryState",
 ]

@@ -9,18 +9,18 @@ from collections.abc import Hashable
 import numpy as np
 from numpy.typing import NDArray
 
-from throwcollect.control.decision import CANCELED, Decision, Judge
-from throwcollect.control.goal import Trajectory, TrajectoryGoal, TrajectoryPoint
-from throwcollect.control.interpolation import interpolate
-from throwcollect.control.motion import Motion
-from throwcollect.control.outcome import (
+from throwcollect.control.controller_reports import (
     ControllerState,
     GoalResult,
     GoalStatus,
     JointState,
-    Refusal,
+    TrajectoryRefusal,
     TrajectoryState,
 )
+from throwcollect.control.decision import CANCELED, Decision, Judge
+from throwcollect.control.followed_curve import Motion
+from throwcollect.control.goal import Trajectory, TrajectoryGoal, TrajectoryPoint
+from throwcollect.control.interpolation import interpolate
 from throwcollect.control.parameters import ControllerParameters
 from throwcollect.control.stopping import brake
 from throwcollect.control.tolerances import Tolerances, default_tolerances, goal_tolerances
@@ -128,7 +128,7 @@ class JointTrajectoryController:
         self.command = self._motion.command
         self._holding = True
 
-    def submit(self, goal_id: Hashable, goal: TrajectoryGoal, now_ns: int) -> Refusal | None:
+    def submit(self, goal_id: Hashable, goal: TrajectoryGoal, now_ns: int) -> TrajectoryRefusal | None:
         """Accept a goal, which aborts the one before, or refuse it.
 
         Args:
@@ -147,7 +147,7 @@ class JointTrajectoryController:
         self._follow(goal.trajectory, self._judge_with(tolerances))
         return None
 
-    def replace(self, trajectory: Trajectory, now_ns: int) -> Refusal | None:
+    def replace(self, trajectory: Trajectory, now_ns: int) -> TrajectoryRefusal | None:
         """Follow a trajectory from the topic instead of the present one, or refuse it as `submit` refuses a goal."""
         if reason := self._refusal(trajectory, now_ns):
             return reason
@@ -157,10 +157,10 @@ class JointTrajectoryController:
         self._follow(trajectory, self._judge if self.goal_id is not None else self._judge_with(self._defaults))
         return None
 
-    def refuse(self, reason: Refusal) -> Refusal:
+    def refuse(self, reason: TrajectoryRefusal) -> TrajectoryRefusal:
         """Log a refusal that was decided elsewhere, and name the controller in it."""
         self.logger.error("%s: %s", self.name, reason.text, stacklevel=2)
-        return Refusal(reason.error_code, f"{self.name}: {reason.text}")
+        return TrajectoryRefusal(reason.error_code, f"{self.name}: {reason.text}")
 
     def cancel(self, goal_id: Hashable) -> bool:
         """Cancel a goal and stop, from the state that was measured last (see `observe`).
@@ -326,7 +326,7 @@ class JointTrajectoryController:
     def _judge_with(self, tolerances: Tolerances) -> Judge:
         return Judge(tolerances, self._parameters.timeout_ns, self._parameters.joints)
 
-    def _refusal(self, trajectory: Trajectory, now_ns: int) -> Refusal | None:
+    def _refusal(self, trajectory: Trajectory, now_ns: int) -> TrajectoryRefusal | None:
         if reason := refusal(trajectory, self._parameters, now_ns):
             return self.refuse(reason)
         ahead_ns = (trajectory.stamp_ns or now_ns) - now_ns

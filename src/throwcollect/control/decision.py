@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from throwcollect.control.motion import Motion
-from throwcollect.control.outcome import ErrorCode, GoalStatus, JointState
+from throwcollect.control.controller_reports import ErrorCode, GoalStatus, JointState
+from throwcollect.control.followed_curve import Motion
 from throwcollect.control.tolerances import Limits, Tolerances, violations
 
 

@@ -11,8 +11,8 @@ from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
+from throwcollect.control.controller_reports import ErrorCode, TrajectoryRefusal
 from throwcollect.control.goal import Trajectory, TrajectoryPoint, Values
-from throwcollect.control.outcome import ErrorCode, Refusal
 from throwcollect.control.parameters import ControllerParameters
 
 END_VELOCITY_LIMIT = float(np.finfo(np.float32).eps)
@@ -26,10 +26,10 @@ _FIELDS: tuple[tuple[str, Callable[[TrajectoryPoint], Values]], ...] = (
 )
 
 
-def refusal(trajectory: Trajectory, parameters: ControllerParameters, now_ns: int) -> Refusal | None:
+def refusal(trajectory: Trajectory, parameters: ControllerParameters, now_ns: int) -> TrajectoryRefusal | None:
     """The first rule that a trajectory breaks at the present time [ns]; None if it can be executed."""
     answers = _judge(trajectory, parameters, now_ns)
-    return next((Refusal(code, text) for code, text in answers if text is not None), None)
+    return next((TrajectoryRefusal(code, text) for code, text in answers if text is not None), None)
 
 
 def _judge(

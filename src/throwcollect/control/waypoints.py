@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from throwcollect.control.controller_reports import JointState
 from throwcollect.control.goal import Trajectory, TrajectoryPoint, Values
-from throwcollect.control.outcome import JointState
 
 LINE, CUBIC, QUINTIC = 0, 1, 2
 """Content of a point: positions alone, velocities too, accelerations too."""

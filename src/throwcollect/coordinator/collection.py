@@ -25,7 +25,7 @@ from throwcollect.dataset.directory import find_known_directory
 from throwcollect.dataset.journal import find_lost
 from throwcollect.dataset.summary import explain_loss
 from throwcollect.dataset.writer import DatasetWriter
-from throwcollect.episode.message import Delivery, Episode
+from throwcollect.episode.episode_message import Delivery, Episode
 from throwcollect.errors import DatasetError, Interrupted, WorkerError
 from throwcollect.tasks.result import Result
 from throwcollect.tasks.task import task_of

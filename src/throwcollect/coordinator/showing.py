@@ -5,7 +5,7 @@ Onlookers must not subscribe to the episodes themselves, because a simulation wa
 
 from __future__ import annotations
 
-from throwcollect.coordinator.topics import SHOWN_QOS, make_shown_topic
+from throwcollect.coordinator.shown_topics import SHOWN_QOS, make_shown_topic
 from throwcollect.ros import Node, Publisher
 from throwcollect.ros.msg import UInt8MultiArray
 

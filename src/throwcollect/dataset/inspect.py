@@ -8,7 +8,7 @@ from pathlib import Path
 import pyarrow as pa
 
 from throwcollect.dataset.data_card import count_outcomes
-from throwcollect.dataset.digest import combine_digests
+from throwcollect.dataset.dataset_digest import combine_digests
 from throwcollect.dataset.journal import measure_collected_s
 from throwcollect.dataset.misses import summarise_misses
 from throwcollect.dataset.reader import Dataset

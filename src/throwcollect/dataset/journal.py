@@ -88,7 +88,7 @@ class Journal:
 
 
 @dataclass(frozen=True)
-class Entry:
+class JournalLine:
     """One line of a journal; `wall_s` (real time that collecting took in all) and `outcome` are None if it has none."""
 
     event: Event
@@ -97,13 +97,13 @@ class Entry:
     outcome: str | None = None
 
 
-def read_journal(path: Path) -> Iterator[Entry]:
+def read_journal(path: Path) -> Iterator[JournalLine]:
     """Read the events of a journal, in order; a missing file has none, and damaged lines are left out."""
     for entry in _read_lines(path):
         time_s, outcome = _read_number(entry.get("time")), entry.get("outcome")
         if entry.get("event") in get_args(Event) and time_s is not None:
             wall_s = _read_number(entry.get("wall_s"))
-            yield Entry(entry["event"], time_s, wall_s, outcome if isinstance(outcome, str) else None)
+            yield JournalLine(entry["event"], time_s, wall_s, outcome if isinstance(outcome, str) else None)
 
 
 def _read_lines(path: Path, mark: bytes = b"") -> Iterator[dict[str, Any]]:

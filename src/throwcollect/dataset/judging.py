@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from throwcollect.config.schema import Config
-from throwcollect.episode.message import Episode
+from throwcollect.episode.episode_message import Episode
 from throwcollect.errors import DatasetError
 from throwcollect.members import explain_failure
 from throwcollect.robots.description import robot_of

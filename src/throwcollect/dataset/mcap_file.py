@@ -23,7 +23,7 @@ from rclzenoh.interfaces import message_definition, type_hash
 from throwcollect.dataset.bag import FileSummary, bag_information, to_yaml
 from throwcollect.episode.channels import Channel, Channels
 from throwcollect.episode.chunk import Chunk, count_indexed, encode_message_index, encode_records
-from throwcollect.episode.message import Episode
+from throwcollect.episode.episode_message import Episode
 
 MAGIC = b"\x89MCAP0\r\n"
 EPISODE = "throwcollect.episode"
@@ -59,7 +59,7 @@ def declarations(channels: Sequence[Channel]) -> tuple[list[records.Schema], lis
 
 
 @dataclass(frozen=True)
-class Run:
+class RecordGroup:
     """Records that follow each other without a gap: chunks, each with its message indexes, and maybe a Metadata record.
 
     Attributes:
@@ -84,7 +84,7 @@ class Run:
         return int(self.chunk_indexes[0].message_start_time)
 
     @classmethod
-    def of(cls, chunks: Iterable[tuple[Chunk, Mapping[int, bytes]]], metadata: bytes = b"") -> Run:
+    def of(cls, chunks: Iterable[tuple[Chunk, Mapping[int, bytes]]], metadata: bytes = b"") -> RecordGroup:
         """Make the run of chunks, each with its Message Index records by channel, and of a Metadata record."""
         parts: list[bytes | memoryview] = []
         places: list[records.ChunkIndex] = []
@@ -121,7 +121,7 @@ def _end_of(index: records.ChunkIndex) -> int:
     return int(index.chunk_start_offset + index.chunk_length + index.message_index_length)
 
 
-def episode_run(episode: Episode) -> Run:
+def episode_run(episode: Episode) -> RecordGroup:
     """Encode the records of an episode.
 
     Raises:
@@ -140,7 +140,7 @@ def episode_run(episode: Episode) -> Run:
     }
     if episode.sensors:
         facts[SENSORS_SHA256] = " ".join(sensor.records_sha256 for sensor in episode.sensors)
-    return Run.of(chunks, encode_records(records.Metadata(name=EPISODE, metadata=facts)))
+    return RecordGroup.of(chunks, encode_records(records.Metadata(name=EPISODE, metadata=facts)))
 
 
 class McapFile:
@@ -165,7 +165,7 @@ class McapFile:
         self._put(MAGIC + encode_records(records.Header(PROFILE, LIBRARY), *schemas, *declared))
         self.append(encode_latched_run(channels, start_ns))
 
-    def append(self, run: Run) -> None:
+    def append(self, run: RecordGroup) -> None:
         """Write a run of records, such as that of an episode."""
         for index in run.chunk_indexes:
             offsets = {channel: self.size + offset for channel, offset in index.message_index_offsets.items()}
@@ -235,7 +235,7 @@ class McapFile:
         self.size += len(data)
 
 
-def encode_latched_run(channels: Channels, stamp_ns: int) -> Run:
+def encode_latched_run(channels: Channels, stamp_ns: int) -> RecordGroup:
     """Encode the latched messages: a chunk and its message indexes."""
     messages = [
         encode_records(records.Message(channel.id, stamp_ns, data, stamp_ns, 0))
@@ -249,4 +249,4 @@ def encode_latched_run(channels: Channels, stamp_ns: int) -> Run:
     }
     contents = b"".join(messages)
     data = zstandard.ZstdCompressor(level=_LATCHED_LEVEL).compress(contents)
-    return Run.of([(Chunk.of(contents, data, start_ns=stamp_ns, end_ns=stamp_ns), indexes)])
+    return RecordGroup.of([(Chunk.of(contents, data, start_ns=stamp_ns, end_ns=stamp_ns), indexes)])

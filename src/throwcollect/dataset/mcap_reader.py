@@ -19,10 +19,10 @@ from mcap.exceptions import EndOfFile
 from mcap.opcode import Opcode
 
 from rclzenoh.interfaces import deserialize, get_message
-from throwcollect.dataset.mcap_file import EPISODE, MAGIC, SENSORS_SHA256, Run, episode_run
+from throwcollect.dataset.mcap_file import EPISODE, MAGIC, SENSORS_SHA256, RecordGroup, episode_run
 from throwcollect.episode.channels import ROBOT_DESCRIPTION_ID
 from throwcollect.episode.chunk import CHUNK_HEADER_BYTES, CHUNK_MARK, CHUNK_MARK_OFFSET, Chunk
-from throwcollect.episode.message import Episode, make_episode
+from throwcollect.episode.episode_message import Episode, make_episode
 from throwcollect.episode.message_table import MessageTable
 from throwcollect.errors import DatasetError
 from throwcollect.files import open_regular, unreadable
@@ -39,7 +39,7 @@ class _Kind(Protocol[_R]):
     def read(self, stream: ReadDataStream) -> _R: ...
 
 
-class Record(NamedTuple):
+class McapRecord(NamedTuple):
     """One record: where it begins in the file [bytes], its kind, and its bytes, with opcode and length."""
 
     offset: int
@@ -73,8 +73,8 @@ class Record(NamedTuple):
 class StoredChunk:
     """A chunk of an episode as it lies in a file: its record, and those of its message indexes by channel."""
 
-    record: Record
-    indexes: Mapping[int, Record]
+    record: McapRecord
+    indexes: Mapping[int, McapRecord]
 
 
 @dataclass(frozen=True)
@@ -86,7 +86,7 @@ class StoredEpisode:
 
     episode: Episode
     chunks: tuple[StoredChunk, ...]
-    facts: Record
+    facts: McapRecord
     said_digest: str | None
 
     @property
@@ -100,7 +100,7 @@ class StoredEpisode:
         return self.facts.end
 
     @classmethod
-    def of(cls, chunks: Sequence[StoredChunk], facts: Record, said: Mapping[str, str]) -> StoredEpisode:
+    def of(cls, chunks: Sequence[StoredChunk], facts: McapRecord, said: Mapping[str, str]) -> StoredEpisode:
         """Make the episode of some chunks and of the Metadata record `facts` behind them, whose contents are `said`.
 
         Raises:
@@ -112,7 +112,7 @@ class StoredEpisode:
         return cls(episode, tuple(chunks), facts, said.get("digest"))
 
     @cached_property
-    def intact_run(self) -> Run:
+    def intact_run(self) -> RecordGroup:
         """Its records as the writer makes them for the episode, which may differ from those in the file.
 
         Raises:
@@ -120,11 +120,11 @@ class StoredEpisode:
         """
         return episode_run(self.episode)
 
-    def run(self) -> Run:
+    def run(self) -> RecordGroup:
         """Its records as they lie in the file, whether or not they fit each other."""
         chunks = zip(self.episode.chunks, self.chunks, strict=True)
         runs = [(each.chunk, {channel: index.data for channel, index in at.indexes.items()}) for each, at in chunks]
-        return Run.of(runs, self.facts.data)
+        return RecordGroup.of(runs, self.facts.data)
 
     def check_whole(self) -> None:
         """Compare everything that is hashed with its hashes.
@@ -151,7 +151,7 @@ class McapContents:
         """Bytes of the file from `start` to `end`, not included."""
         return self._data[start:end]
 
-    def record(self, offset: int) -> Record:
+    def record(self, offset: int) -> McapRecord:
         """Read the record that begins at an offset.
 
         Raises:
@@ -164,7 +164,7 @@ class McapContents:
         end = offset + _RECORD_HEADER.size + length
         if end > len(self._data):
             raise DatasetError(f"a record of {length} bytes goes beyond the end of the file", place=f"byte {offset}")
-        return Record(offset, opcode, self._data[offset:end])
+        return McapRecord(offset, opcode, self._data[offset:end])
 
     def find(self, pattern: bytes, start: int) -> int:
         """Find some bytes from `start` on; -1 if they are nowhere."""
@@ -185,7 +185,7 @@ class McapContents:
             mark = self.find(CHUNK_MARK, mark + 1)
         return -1
 
-    def records(self, offset: int = len(MAGIC)) -> Iterator[Record]:
+    def records(self, offset: int = len(MAGIC)) -> Iterator[McapRecord]:
         """Read the records from an offset on, to the footer or the end of the file.
 
         Raises:
@@ -212,13 +212,13 @@ class McapContents:
             raise DatasetError(f"/robot_description is not readable: {error}") from error
         return text
 
-    def message_indexes(self, offset: int) -> tuple[dict[int, Record], Record]:
+    def message_indexes(self, offset: int) -> tuple[dict[int, McapRecord], McapRecord]:
         """Read the Message Index records from an offset on, by channel, and the record that follows them.
 
         Raises:
             DatasetError: If the file ends before that, or a channel has more than one.
         """
-        indexes: dict[int, Record] = {}
+        indexes: dict[int, McapRecord] = {}
         record = self.record(offset)
         while record.opcode == Opcode.MESSAGE_INDEX:
             channel = int.from_bytes(record.data[_RECORD_HEADER.size : _RECORD_HEADER.size + 2], "little")
@@ -253,7 +253,7 @@ class McapContents:
             raise error.locate(place=f"byte {offset}") from error
 
 
-def read_latched_table(record: Record) -> MessageTable:
+def read_latched_table(record: McapRecord) -> MessageTable:
     """Read the messages of the chunk of the latched topics.
 
     Raises:

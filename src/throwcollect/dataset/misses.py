@@ -10,7 +10,7 @@ import numpy as np
 import pyarrow as pa
 
 from throwcollect.config.schema import Config
-from throwcollect.config.target import is_target
+from throwcollect.config.target_columns import is_target
 from throwcollect.config.values import leaves
 from throwcollect.dataset.summary import MissSummary
 from throwcollect.sweep.arrow_column import nan_where_null

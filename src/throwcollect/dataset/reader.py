@@ -16,7 +16,6 @@ from throwcollect.arguments import read_list
 from throwcollect.config.schema import Config
 from throwcollect.config.sweep import Range
 from throwcollect.dataset.bag import read_bag_metadata
-from throwcollect.dataset.columns import COLUMNS, StoredThrow
 from throwcollect.dataset.configuration import read_config
 from throwcollect.dataset.data_card import count_outcomes
 from throwcollect.dataset.directory import METADATA, PLAN, THROWS
@@ -26,7 +25,8 @@ from throwcollect.dataset.named_array import Bounds, NamedArray, read_column, re
 from throwcollect.dataset.throw import Throw
 from throwcollect.dataset.throws_table import name_alias, read_throws
 from throwcollect.dataset.trajectories import Trajectories, read_trajectories
-from throwcollect.episode.message import Episode
+from throwcollect.dataset.trajectory_columns import COLUMNS, StoredThrow
+from throwcollect.episode.episode_message import Episode
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.extras import lazily
 from throwcollect.files import StrPath, is_there

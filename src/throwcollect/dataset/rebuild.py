@@ -14,7 +14,6 @@ from throwcollect.config.schema import Config
 from throwcollect.dataset.bag import FileSummary, refuse_other_directory
 from throwcollect.dataset.configuration import read_config
 from throwcollect.dataset.data_card import data_card, outcome_lines
-from throwcollect.dataset.description import WRITTEN, write_description
 from throwcollect.dataset.directory import CARD, CONFIG, MANIFEST, PLAN, THROWS, list_shards, shard_of
 from throwcollect.dataset.findings import Finding
 from throwcollect.dataset.journal import was_open
@@ -23,6 +22,7 @@ from throwcollect.dataset.manifest import entry_of_file, was_changed
 from throwcollect.dataset.mcap_reader import StoredEpisode
 from throwcollect.dataset.provenance import Provenance, read_provenance, write_provenance
 from throwcollect.dataset.recovery import remove_unfinished
+from throwcollect.dataset.summary_files import WRITTEN, write_description
 from throwcollect.dataset.throws_table import Row, ThrowsTable, read_throws_table
 from throwcollect.dataset.verify_episode import EpisodeCheck
 from throwcollect.dataset.verify_shard import check_shard

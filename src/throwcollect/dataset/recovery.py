@@ -25,11 +25,11 @@ from throwcollect.dataset.directory import (
     path_of_part,
 )
 from throwcollect.dataset.judging import judge_episode
-from throwcollect.dataset.mcap_file import Run
+from throwcollect.dataset.mcap_file import RecordGroup
 from throwcollect.dataset.mcap_reader import map_file
 from throwcollect.dataset.scan import scan_whole
 from throwcollect.dataset.shard import FinishedShard, OpenShard, write_in_order
-from throwcollect.dataset.throws_table import Place
+from throwcollect.dataset.throws_table import EpisodePlace
 from throwcollect.episode.channels import Channels
 from throwcollect.errors import DatasetError
 from throwcollect.files import remove, unwritable
@@ -50,8 +50,8 @@ class RecoveredEpisode:
 
     trial: int
     result: Result
-    place: Place
-    run: Run
+    place: EpisodePlace
+    run: RecordGroup
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ class LeftOfShard:
 
 
 @dataclass(frozen=True)
-class Part:
+class LeftShard:
     """A shard of which something may be left: its final path, its trials, and whether no trial will be added to it.
 
     Then its final file may stay if it has an episode of each.
@@ -94,7 +94,7 @@ def remove_unfinished(directory: Path) -> None:
     remove(directory / f"{PLAN}.part")
 
 
-def find_left(parts: Sequence[Part], channels: Channels, *, processes: int = 1) -> Iterator[LeftOfShard]:
+def find_left(parts: Sequence[LeftShard], channels: Channels, *, processes: int = 1) -> Iterator[LeftOfShard]:
     """Look for what is left of shards, in several of them at a time if there are many episodes. Changes nothing.
 
     More than one process import the program that calls this, as those of `multiprocessing` do.
@@ -113,8 +113,8 @@ def find_left(parts: Sequence[Part], channels: Channels, *, processes: int = 1) 
     )
 
 
-def _look_with(channels: Channels) -> Callable[[Part], LeftOfShard]:
-    def look(part: Part) -> LeftOfShard:
+def _look_with(channels: Channels) -> Callable[[LeftShard], LeftOfShard]:
+    def look(part: LeftShard) -> LeftOfShard:
         final = find_episodes(part.path, part.plan, channels)
         # Only a file with an episode of each trial can be finished, so others are not compared byte by byte.
         if part.settled and final and final.keys() == set(part.plan.trials.numbers_to_run):
@@ -187,7 +187,7 @@ def find_episodes(path: Path, plan: Plan, channels: Channels | None = None) -> d
             continue
         recorded = channels is None or channels.fit(episode.channels())
         if recorded and episode.header.start_ns == plan.config.trial_start_ns(trial):
-            place = Place(path.name, found.stored.offset, episode.header.samples, episode.digest)
+            place = EpisodePlace(path.name, found.stored.offset, episode.header.samples, episode.digest)
             episodes[trial] = RecoveredEpisode(trial, result, place, replace(found.stored.intact_run, data=b""))
     return episodes
 

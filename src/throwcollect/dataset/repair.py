@@ -10,19 +10,19 @@ import numpy as np
 
 from throwcollect.config.loader import load
 from throwcollect.config.schema import Config
-from throwcollect.config.target import is_target
+from throwcollect.config.target_columns import is_target
 from throwcollect.config.values import reason_not_sweepable
 from throwcollect.dataset.bag import refuse_other_directory
 from throwcollect.dataset.directory import CONFIG, PLAN, SHARD_SUFFIX, THROWS, TRIALS, config_path
 from throwcollect.dataset.misses import read_targets
 from throwcollect.dataset.rebuild import read_earlier_rows, reason_lost
-from throwcollect.dataset.scan import Found, scan_whole
+from throwcollect.dataset.scan import FoundEpisode, scan_whole
 from throwcollect.dataset.throws_table import REFUSED, Row, ThrowsTable
 from throwcollect.dataset.verify_episode import EpisodeCheck
 from throwcollect.dataset.verify_tables import find_wrong_trials, read_list
 from throwcollect.dataset.writer import DatasetWriter
 from throwcollect.episode.channels import Channels
-from throwcollect.episode.message import Episode
+from throwcollect.episode.episode_message import Episode
 from throwcollect.errors import ConfigError, DatasetError, ForeignPlanError
 from throwcollect.files import new_directory
 from throwcollect.robots.description import full_description
@@ -227,7 +227,7 @@ class _Sorting:
                 raise
             self.remarks.append(str(error.locate(Path(path.name))))
 
-    def _take(self, name: str, found: Found) -> None:
+    def _take(self, name: str, found: FoundEpisode) -> None:
         episode = found.stored.episode
         trial = episode.header.trial
         place = f"{name}: byte {found.stored.offset}"

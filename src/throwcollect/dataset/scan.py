@@ -16,7 +16,7 @@ from pathlib import Path
 from mcap import records
 
 from throwcollect.dataset.mcap_file import EPISODE, SENSORS_SHA256
-from throwcollect.dataset.mcap_reader import MOST_CHUNKS, McapContents, Record, StoredChunk, StoredEpisode, map_file
+from throwcollect.dataset.mcap_reader import MOST_CHUNKS, McapContents, McapRecord, StoredChunk, StoredEpisode, map_file
 from throwcollect.episode.chunk import MOST_RATIO, RECORD_PREFIX_BYTES, Chunk
 from throwcollect.errors import DatasetError
 
@@ -27,7 +27,7 @@ _EFFORT = 64
 
 
 @dataclass(frozen=True)
-class Found:
+class FoundEpisode:
     """An episode that was found.
 
     Attributes:
@@ -46,7 +46,7 @@ class Found:
     intact: bool
 
 
-def scan(contents: McapContents, start: int = 0) -> Iterator[Found]:
+def scan(contents: McapContents, start: int = 0) -> Iterator[FoundEpisode]:
     """Find all episodes of a file, in the order in which they lie there; one episode at a time is in memory.
 
     They may be of another dataset. Behind an episode that is not whole, the search goes on within its records, as their
@@ -75,7 +75,7 @@ def scan(contents: McapContents, start: int = 0) -> Iterator[Found]:
         offset = contents.next_chunk(found.stored.end if found and whole else offset + 1)
 
 
-def scan_whole(path: Path) -> Iterator[Found]:
+def scan_whole(path: Path) -> Iterator[FoundEpisode]:
     """Find all whole episodes of an MCAP file or of its beginning, in order; a missing file has none.
 
     Raises:
@@ -90,7 +90,7 @@ def scan_whole(path: Path) -> Iterator[Found]:
             raise
 
 
-def _find(contents: McapContents, first: Record, facts: int) -> Found | None:
+def _find(contents: McapContents, first: McapRecord, facts: int) -> FoundEpisode | None:
     """Read the episode whose first chunk a record is; None if it is none.
 
     `facts` is where the next metadata of an episode begin [bytes]; negative if there are none.
@@ -104,16 +104,16 @@ def _find(contents: McapContents, first: Record, facts: int) -> Found | None:
             stored.check_whole()
         except DatasetError:
             return None
-        return Found(stored, readable, None, intact=False)
+        return FoundEpisode(stored, readable, None, intact=False)
     try:
         stored.check_whole()
         intact = contents.slice(stored.offset, stored.end) == stored.intact_run.data
     except DatasetError as error:
-        return Found(stored, readable, error, intact=False)
-    return Found(stored, readable, None, intact)
+        return FoundEpisode(stored, readable, error, intact=False)
+    return FoundEpisode(stored, readable, None, intact)
 
 
-def _gather(contents: McapContents, first: Record, facts: Record) -> StoredEpisode:
+def _gather(contents: McapContents, first: McapRecord, facts: McapRecord) -> StoredEpisode:
     """Make an episode of a chunk and of some metadata, with as many further chunks as the metadata have hashes of.
 
     Raises:

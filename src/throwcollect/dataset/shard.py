@@ -18,15 +18,15 @@ from pathlib import Path
 from throwcollect.dataset.bag import FileSummary
 from throwcollect.dataset.directory import path_of_part
 from throwcollect.dataset.manifest import FileEntry, RunningHash
-from throwcollect.dataset.mcap_file import McapFile, Run, episode_run
+from throwcollect.dataset.mcap_file import McapFile, RecordGroup, episode_run
 from throwcollect.episode.channels import Channels
-from throwcollect.episode.message import Episode
+from throwcollect.episode.episode_message import Episode
 from throwcollect.errors import DatasetError
 from throwcollect.files import open_regular, remove, replacing, unwritable, write_all
 
 Recording = tuple[FileSummary, FileEntry]
 """What bag's metadata and manifest say of an MCAP file."""
-Runs = Mapping[int, tuple[int, Run]]
+Runs = Mapping[int, tuple[int, RecordGroup]]
 """By trial, where the run of its episode begins in a file [bytes], and its records without their bytes."""
 
 
@@ -88,7 +88,7 @@ class OpenShard:
         self._descriptor: int | None = None
         self._size = 0
         self._synced = True
-        self._runs: dict[int, tuple[int, Run]] = {}
+        self._runs: dict[int, tuple[int, RecordGroup]] = {}
 
     def expect(self, trials: Iterable[int]) -> None:
         """Wait for the episodes, or losses, of more trials."""
@@ -171,7 +171,7 @@ class OpenShard:
             os.close(self._descriptor)
             self._descriptor = None
 
-    def _remember(self, trial: int, offset: int, run: Run) -> None:
+    def _remember(self, trial: int, offset: int, run: RecordGroup) -> None:
         # The file has the bytes; with them, whole shards would be in memory.
         self._runs[trial] = (offset, replace(run, data=b""))
         self.missing.discard(trial)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from throwcollect.dataset.directory import path_of_part, shard_name
-from throwcollect.dataset.recovery import Part
+from throwcollect.dataset.recovery import LeftShard
 from throwcollect.files import is_there, remove
 from throwcollect.sweep.plan import Plan
 
@@ -60,11 +60,11 @@ class ShardLayout:
         remove(path)
         remove(path_of_part(path))
 
-    def part(self, number: int) -> Part:
+    def part(self, number: int) -> LeftShard:
         """Describe a shard for `find_left`, without a look into its files."""
         members, first = self.members(number), self.plan.trials.first
         trials = self.plan.trials[members.start - first : members.stop - first]
-        return Part(self.path(number), Plan(self.plan.config, trials), self.is_settled(number))
+        return LeftShard(self.path(number), Plan(self.plan.config, trials), self.is_settled(number))
 
     @property
     def _trials_per_shard(self) -> int:

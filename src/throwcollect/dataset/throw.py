@@ -12,11 +12,19 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from throwcollect.config.target import is_target
-from throwcollect.dataset.columns import COLUMNS, TIMES, Column, Recorded, empty_columns, fill, name_components
+from throwcollect.config.target_columns import is_target
 from throwcollect.dataset.guesses import THROW, refuse_attribute
 from throwcollect.dataset.named_array import refuse_name
 from throwcollect.dataset.throws_table import Row, ball_state
+from throwcollect.dataset.trajectory_columns import (
+    COLUMNS,
+    TIMES,
+    Column,
+    Recorded,
+    empty_columns,
+    fill,
+    name_components,
+)
 from throwcollect.episode.trajectory_rows import STAMPS
 from throwcollect.errors import DatasetError
 from throwcollect.extras import lazily

@@ -20,9 +20,9 @@ from throwcollect.sweep.arrow_column import count_values, find_range, make_table
 from throwcollect.sweep.parquet_file import read_parquet
 from throwcollect.sweep.plan import Plan
 from throwcollect.sweep.trials import Trial
-from throwcollect.tasks.columns import ball_columns, join_ball
 from throwcollect.tasks.measures import BallState
 from throwcollect.tasks.result import LIMIT_VIOLATED, LOST, TRACKING_FAILED, Result
+from throwcollect.tasks.result_columns import ball_columns, join_ball
 from throwcollect.tasks.task import Task, task_of
 from throwcollect.units import unit_of_name
 
@@ -39,7 +39,7 @@ _ROWS_A_PIECE = 500
 
 
 @dataclass(frozen=True)
-class Place:
+class EpisodePlace:
     """The place of an episode in a dataset: its MCAP file and the offset of its first chunk there [bytes].
 
     Number of samples and digest say which episode it is.
@@ -138,7 +138,7 @@ class ThrowsTable:
         """The table of a plan's trials."""
         return cls(plan.keys, plan.config, plan.trials.target_names)
 
-    def row(self, trial: Trial, result: Result, place: Place | None) -> Row:
+    def row(self, trial: Trial, result: Result, place: EpisodePlace | None) -> Row:
         """Make the row of a trial that was run; `place` is None if it has no episode."""
         row = self._start_row(trial, result.outcome.value, result.reason)
         row.update(self._columns.write(result))

@@ -12,7 +12,7 @@ from typing import overload
 import numpy as np
 from numpy.typing import NDArray
 
-from throwcollect.dataset.columns import COLUMNS, Column, StoredThrow, empty_columns, fill, read_stored_rows
+from throwcollect.dataset.trajectory_columns import COLUMNS, Column, StoredThrow, empty_columns, fill, read_stored_rows
 from throwcollect.errors import ConfigError
 from throwcollect.wording import format_count
 

@@ -14,7 +14,7 @@ from typing import Any
 
 from throwcollect.config.schema import Config
 from throwcollect.dataset.bag import FileSummary, bag_information, read_bag_metadata
-from throwcollect.dataset.digest import combine_digests
+from throwcollect.dataset.dataset_digest import combine_digests
 from throwcollect.dataset.directory import (
     CARD,
     CONFIG,

@@ -13,11 +13,11 @@ from throwcollect.config.schema import Config
 from throwcollect.dataset.judging import judge_episode
 from throwcollect.dataset.mcap_reader import StoredEpisode
 from throwcollect.dataset.recorded_trial import RecordedTrial
-from throwcollect.dataset.throws_table import Place, Row, ThrowsTable
+from throwcollect.dataset.throws_table import EpisodePlace, Row, ThrowsTable
 from throwcollect.dataset.verify_header import find_header_problems
 from throwcollect.dataset.verify_motion import find_ball_problems, find_joint_problems
 from throwcollect.episode.channels import Channels
-from throwcollect.episode.message import Episode
+from throwcollect.episode.episode_message import Episode
 from throwcollect.episode.record import Samples, find_infinite_columns
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.robots.description import robot_of, touchable_bodies
@@ -158,8 +158,8 @@ class EpisodeCheck:
         yield from problems
 
 
-def _place_of(stored: StoredEpisode, shard: str) -> Place:
-    return Place(shard, stored.offset, stored.episode.header.samples, stored.episode.digest)
+def _place_of(stored: StoredEpisode, shard: str) -> EpisodePlace:
+    return EpisodePlace(shard, stored.offset, stored.episode.header.samples, stored.episode.digest)
 
 
 def _find_row_problems(expected: Mapping[str, Any], row: Mapping[str, Any]) -> Iterator[str]:

@@ -19,7 +19,7 @@ from throwcollect.dataset.bag import FileSummary
 from throwcollect.dataset.directory import THROWS
 from throwcollect.dataset.findings import Finding
 from throwcollect.dataset.mcap_file import BAG, LIBRARY, MAGIC, PROFILE, McapFile
-from throwcollect.dataset.mcap_reader import McapContents, Record, StoredEpisode, map_file, read_latched_table
+from throwcollect.dataset.mcap_reader import McapContents, McapRecord, StoredEpisode, map_file, read_latched_table
 from throwcollect.dataset.scan import scan
 from throwcollect.episode.channels import Channels
 from throwcollect.episode.chunk import encode_records
@@ -195,7 +195,7 @@ class _ShardCheck:
             offset = actual.end
         return offset
 
-    def _report_difference(self, actual: Record, wanted: Record) -> None:
+    def _report_difference(self, actual: McapRecord, wanted: McapRecord) -> None:
         place = f"byte {actual.offset}"
         if wanted.opcode == Opcode.SCHEMA:
             self._report("schemas", f"that of {wanted.parse(records.Schema).name} is another one")
@@ -207,7 +207,7 @@ class _ShardCheck:
             other = f"summary: the {actual.kind} does not fit the file"
             self._report(place, _PROBLEMS.get(Opcode(wanted.opcode), other))
 
-    def _report_latched(self, actual: Record, wanted: Record) -> None:
+    def _report_latched(self, actual: McapRecord, wanted: McapRecord) -> None:
         """Report how the chunk of the latched topics differs from the one that should be there."""
         place = f"byte {actual.offset}"
         try:

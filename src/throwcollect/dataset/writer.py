@@ -20,7 +20,6 @@ from throwcollect.config.schema import Config
 from throwcollect.dataset.configuration import read_config
 from throwcollect.dataset.creation import create
 from throwcollect.dataset.data_card import count_outcomes, data_card
-from throwcollect.dataset.description import write_description
 from throwcollect.dataset.directory import CARD, CONFIG, MANIFEST, METADATA, PLAN, THROWS
 from throwcollect.dataset.journal import Event, Journal, was_open
 from throwcollect.dataset.lock import hold_lock
@@ -29,9 +28,10 @@ from throwcollect.dataset.recovery import LeftOfShard, RecoveredEpisode, find_le
 from throwcollect.dataset.row_store import Digests, RowStore
 from throwcollect.dataset.shard import FinishedShard, OpenShard, Recording
 from throwcollect.dataset.shard_layout import ShardLayout
-from throwcollect.dataset.throws_table import Place, Row, ThrowsTable
+from throwcollect.dataset.summary_files import write_description
+from throwcollect.dataset.throws_table import EpisodePlace, Row, ThrowsTable
 from throwcollect.episode.channels import Channels
-from throwcollect.episode.message import Episode
+from throwcollect.episode.episode_message import Episode
 from throwcollect.errors import DatasetError
 from throwcollect.files import remove, write_file
 from throwcollect.robots.description import full_description
@@ -231,7 +231,7 @@ class DatasetWriter:
         shard = self._shard(number)
         shard.append(episode)
         # The offset is not known before the shard is written in order of trials; `_close_shard` puts it in.
-        place = Place(shard.path.name, -1, episode.header.samples, episode.digest)
+        place = EpisodePlace(shard.path.name, -1, episode.header.samples, episode.digest)
         row = self._rows[number][trial] = self._row(trial, result, place)
         ends = {name: row[name] for name in self._config.task.targets if row.get(name) is not None}
         self.note("commit", trial=trial, outcome=result.outcome.value, digest=episode.digest, **ends)
@@ -365,7 +365,7 @@ class DatasetWriter:
             self._shards[number], self._rows[number] = shard, {}
         return self._shards[number]
 
-    def _row(self, trial: int, result: Result, place: Place | None) -> Row:
+    def _row(self, trial: int, result: Result, place: EpisodePlace | None) -> Row:
         return self._table.row(self.plan.trial(trial), result, place)
 
     def _waiting_shard(self, trial: int) -> int:

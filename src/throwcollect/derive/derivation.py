@@ -24,7 +24,7 @@ from throwcollect.derive.origins import encode_sources, sources_section
 from throwcollect.derive.source import Source
 from throwcollect.derive.trial_list import list_of_trials
 from throwcollect.episode.channels import Channels
-from throwcollect.episode.message import Episode
+from throwcollect.episode.episode_message import Episode
 from throwcollect.episode.restamp import Restamper
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.files import new_directory, write_file

@@ -44,7 +44,7 @@ Cell = tuple[int, ...]
 
 
 @dataclass(frozen=True)
-class Part:
+class SplitPart:
     """One part of a split.
 
     Attributes:
@@ -67,7 +67,7 @@ class Split:
         without_episode: Number of trials that have no episode, by outcome; they are in no part.
     """
 
-    parts: Mapping[str, Part]
+    parts: Mapping[str, SplitPart]
     without_episode: Mapping[str, int]
 
     def as_dict(self) -> dict[str, Any]:
@@ -105,7 +105,7 @@ def split(
         for name, places in members.items():
             derived = derive([source(dataset, places)], beside / name, name=_part_name(dataset.config.name, name))
             held = list(places.values())
-            parts[name] = Part(derived, len({cell for cell in held if cell is not None}), held.count(None))
+            parts[name] = SplitPart(derived, len({cell for cell in held if cell is not None}), held.count(None))
     return Split(parts, everything.without_episode)
 
 

@@ -44,7 +44,7 @@ _STAMP_OFFSET = 4
 """Place of the stamp in a message that begins with its std_msgs/Header: behind the CDR encapsulation [bytes]."""
 
 
-class Place(NamedTuple):
+class RecordPlace(NamedTuple):
     """Place of a record in a chunk; that in the first row is the place of the records of its channel in each row."""
 
     offset: int
@@ -53,7 +53,7 @@ class Place(NamedTuple):
 
 def _find_records(
     contents: bytes | bytearray | memoryview, *, shortest: int, wrong: str
-) -> Iterator[tuple[int, Place]]:
+) -> Iterator[tuple[int, RecordPlace]]:
     """Find the places of Message records that follow each other, with their channels; none is below `shortest` bytes.
 
     Raises:
@@ -67,7 +67,7 @@ def _find_records(
         size = RECORD_PREFIX_BYTES + length
         if opcode != Opcode.MESSAGE or size < shortest or offset + size > len(contents):
             raise DatasetError(f"chunk: {wrong} at byte {offset}")
-        yield channel, Place(offset, size)
+        yield channel, RecordPlace(offset, size)
         offset += size
 
 
@@ -85,7 +85,7 @@ class RowLayout:
         if samples < 1 or len(contents) % samples or not contents:
             raise DatasetError(f"chunk: {len(contents)} bytes are not the records of {samples} samples")
         self._row = bytes(contents[: len(contents) // samples])
-        self.columns: dict[int, Place] = {}
+        self.columns: dict[int, RecordPlace] = {}
         wrong = "not one message per channel and sample"
         for channel, column in _find_records(self._row, shortest=MESSAGE_HEADER.size, wrong=wrong):
             if channel in self.columns:

@@ -14,7 +14,7 @@ import zstandard
 from throwcollect.config.schema import Config
 from throwcollect.episode.channels import Channels
 from throwcollect.episode.chunk import Chunk
-from throwcollect.episode.message import Episode
+from throwcollect.episode.episode_message import Episode
 from throwcollect.episode.message_table import MessageList, MessageTable
 from throwcollect.episode.record import EpisodeHeader
 from throwcollect.episode.recorded_chunk import RecordedChunk

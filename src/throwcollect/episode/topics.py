@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from rclzenoh.interfaces import deserialize, get_message
 from throwcollect.episode.frames import WORLD, MovingFrame
-from throwcollect.episode.layout import MessageLayout
+from throwcollect.episode.message_layout import MessageLayout
 from throwcollect.episode.record import ControllerSamples, Samples
 from throwcollect.errors import DatasetError
 from throwcollect.robots.robot import Robot

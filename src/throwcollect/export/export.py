@@ -10,7 +10,7 @@ from throwcollect.arguments import refuse_argument
 from throwcollect.dataset.directory import CARD, CONFIG
 from throwcollect.export.exporter import Exporter
 from throwcollect.export.readme import render_card
-from throwcollect.export.throw_source import Source
+from throwcollect.export.throw_source import ExportSource
 from throwcollect.extras import require
 from throwcollect.files import StrPath, new_directory
 from throwcollect.members import explain_failure, load_member, names_of
@@ -51,7 +51,7 @@ def export(directory: StrPath, output: StrPath, *, to: str, rate_hz: int | None 
     chosen: Exporter = load_member("exporters", to)
     require(*chosen.packages, extra="export")
     directory, output = Path(directory), Path(output)
-    source = Source.open(directory, rate_hz=rate_hz)
+    source = ExportSource.open(directory, rate_hz=rate_hz)
     with new_directory(output) as beside:
         with explain_failure("exporters", to, f"write {output}", passing=(OSError,)):
             chosen.write(source, beside)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from throwcollect.export.readme import Layout
-from throwcollect.export.throw_source import Source
+from throwcollect.export.throw_source import ExportSource
 
 
 @dataclass(frozen=True)
@@ -22,6 +22,6 @@ class Exporter:
         packages: Packages of the extra ``export`` that the format needs, by their names in imports.
     """
 
-    describe: Callable[[Source], Layout]
-    write: Callable[[Source, Path], None]
+    describe: Callable[[ExportSource], Layout]
+    write: Callable[[ExportSource, Path], None]
     packages: tuple[str, ...] = ()

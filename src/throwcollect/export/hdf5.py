@@ -13,7 +13,7 @@ import pyarrow as pa
 from throwcollect.export.exporter import Exporter
 from throwcollect.export.npz import to_array
 from throwcollect.export.readme import Layout, tabulate_signals
-from throwcollect.export.throw_source import Source, Throw, read_metadata
+from throwcollect.export.throw_source import ExportSource, ThrowSeries, read_metadata
 from throwcollect.extras import lazily
 from throwcollect.files import write_all
 
@@ -27,7 +27,7 @@ _GYM = 2
 """robomimic's number for environments that are not of robosuite."""
 
 
-def describe(source: Source) -> Layout:
+def describe(source: ExportSource) -> Layout:
     """Say how `write` lays a source out."""
     task = source.dataset.config.task
     success, measure = task.success, "landing_x_m" if task.throws else "outcome"
@@ -56,7 +56,7 @@ ball_position_m = file["data/demo_{source.entries[0].trial}/obs/ball_position_m"
     )
 
 
-def write(source: Source, directory: Path) -> None:
+def write(source: ExportSource, directory: Path) -> None:
     """Write a dataset as one HDF5 file; see `Exporter.write`."""
     config = source.dataset.config
     with _Output(directory / "throws.hdf5") as output, h5py.File(output, "w") as file:
@@ -114,7 +114,7 @@ class _Output(io.FileIO):
         self.check()
 
 
-def _add_throw(group: Any, throw: Throw, source: Source) -> None:
+def _add_throw(group: Any, throw: ThrowSeries, source: ExportSource) -> None:
     group.attrs["num_samples"] = len(throw)
     group.attrs["trial"] = throw.trial
     group.attrs[source.dataset.config.task.success] = throw.succeeded

@@ -14,7 +14,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from throwcollect.config.target import TargetColumn
+from throwcollect.config.target_columns import TargetColumn
 from throwcollect.dataset.directory import THROWS
 from throwcollect.dataset.moments import Moments
 from throwcollect.export.exporter import Exporter
@@ -22,7 +22,7 @@ from throwcollect.export.lerobot_statistics import Frames, summarise_all, summar
 from throwcollect.export.parquet_series import FILES_PER_CHUNK, MEGABYTES_PER_FILE, PATH, ParquetSeries
 from throwcollect.export.readme import Layout, list_joints
 from throwcollect.export.signals import unit_of
-from throwcollect.export.throw_source import Source, Throw
+from throwcollect.export.throw_source import ExportSource, ThrowSeries
 from throwcollect.sweep.parquet_file import encode_table
 
 _VERSION = "v3.0"
@@ -76,7 +76,7 @@ def list_features(moving: Sequence[str], targets: Sequence[TargetColumn]) -> dic
     }
 
 
-def describe(source: Source) -> Layout:
+def describe(source: ExportSource) -> Layout:
     """Say how `write` lays a source out."""
     success = source.dataset.config.task.success
     return Layout(
@@ -119,7 +119,7 @@ dataset = LeRobotDataset("me/throws", root=".")
     )
 
 
-def write(source: Source, directory: Path) -> None:
+def write(source: ExportSource, directory: Path) -> None:
     """Write a dataset in LeRobot's format; see `Exporter.write`."""
     features = list_features(source.dataset.moving_joints, source.targets)
     tasks: dict[str, int] = {}
@@ -154,7 +154,7 @@ def write(source: Source, directory: Path) -> None:
     pq.write_table(_tabulate_tasks(tasks), directory / "meta" / "tasks.parquet")
 
 
-def _number_episodes(source: Source) -> pa.Table:
+def _number_episodes(source: ExportSource) -> pa.Table:
     """Add the number of each trial's episode to the table of throws, behind the number of the trial."""
     numbers = {entry.trial: number for number, entry in enumerate(source.entries)}
     field = pa.field(
@@ -166,7 +166,7 @@ def _number_episodes(source: Source) -> pa.Table:
 
 
 def _compute_frames(
-    throw: Throw, source: Source, features: dict[str, Feature], *, episode: int, first: int, task: int
+    throw: ThrowSeries, source: ExportSource, features: dict[str, Feature], *, episode: int, first: int, task: int
 ) -> dict[str, Frames]:
     """Compute the values of each feature, as the file stores them, of shape ``(n_frames, n_components)``."""
     count, signals, done = len(throw), throw.signals, throw.done
@@ -196,7 +196,7 @@ def _compute_frames(
     }
 
 
-def _tabulate_frames(frames: dict[str, Frames], features: dict[str, Feature], source: Source) -> pa.Table:
+def _tabulate_frames(frames: dict[str, Frames], features: dict[str, Feature], source: ExportSource) -> pa.Table:
     columns = []
     for name, feature in features.items():
         flat = pa.array(frames[name].astype(feature.dtype).ravel())
@@ -242,7 +242,9 @@ def _read_feature(paths: Sequence[Path], name: str) -> Iterator[Frames]:
                 yield column.cast(pa.float64()).to_numpy(zero_copy_only=False).reshape(len(batch), -1)
 
 
-def _describe_dataset(source: Source, features: dict[str, Feature], *, frames: int, tasks: int) -> dict[str, object]:
+def _describe_dataset(
+    source: ExportSource, features: dict[str, Feature], *, frames: int, tasks: int
+) -> dict[str, object]:
     episodes = len(source.entries)
     return {
         "codebase_version": _VERSION,
@@ -261,7 +263,7 @@ def _describe_dataset(source: Source, features: dict[str, Feature], *, frames: i
     }
 
 
-def _say_task(source: Source, target: Mapping[str, float]) -> str:
+def _say_task(source: ExportSource, target: Mapping[str, float]) -> str:
     """Say in words what the robot is to do, such as ``Throw the ball to x 1.40 m, y -0.20 m``."""
     task = source.dataset.config.task
     said = "Throw the ball" if task.throws else task.name.replace("_", " ").capitalize()
@@ -269,7 +271,7 @@ def _say_task(source: Source, target: Mapping[str, float]) -> str:
     return f"{said} to {', '.join(goal)}." if goal else f"{said}."
 
 
-def _tell_goal(source: Source) -> str:
+def _tell_goal(source: ExportSource) -> str:
     """Name the targets that follow the ball in the state of the environment, as the end of a sentence."""
     goal = [f"{each.word} [{unit_of(each.name)}]" for each in source.targets]
     return f"; then where it should end: {', '.join(goal)}, also in the text of the task" if goal else ""

@@ -15,12 +15,12 @@ from numpy.typing import NDArray
 
 from throwcollect.arguments import refuse_argument
 from throwcollect.config.schema import Config, DynamicMovementPrimitive
-from throwcollect.config.task import TaskConfig
+from throwcollect.config.task_config import TaskConfig
 from throwcollect.errors import DatasetError
 from throwcollect.export.exporter import Exporter
 from throwcollect.export.npz import to_array
 from throwcollect.export.readme import Layout, list_joints
-from throwcollect.export.throw_source import Entry, Source, Throw, read_metadata
+from throwcollect.export.throw_source import ExportableThrow, ExportSource, ThrowSeries, read_metadata
 from throwcollect.extras import lazily
 from throwcollect.robots.quintic_curve import sample_quintic
 from throwcollect.robots.trajectory import JointTrajectory
@@ -37,7 +37,7 @@ _LARGEST = 2**31 - 1
 """Size that a variable may have in a file of version 5 [bytes]."""
 
 
-def describe(source: Source) -> Layout:
+def describe(source: ExportSource) -> Layout:
     """Say how `write` lays a source out."""
     return Layout(
         files={
@@ -82,7 +82,7 @@ _FIELDS = (
 )
 
 
-def write(source: Source, directory: Path) -> None:
+def write(source: ExportSource, directory: Path) -> None:
     """Write a dataset as MATLAB files of version 5; see `Exporter.write`.
 
     Raises:
@@ -149,7 +149,7 @@ def _to_cell(values: Sequence[Any]) -> NDArray[np.object_]:
 
 
 def _gather_throws(
-    source: Source, entries: Sequence[Entry], landings: Mapping[int, tuple[float | None, ...]]
+    source: ExportSource, entries: Sequence[ExportableThrow], landings: Mapping[int, tuple[float | None, ...]]
 ) -> dict[str, Any]:
     plan = source.dataset.plan
     moving = [source.dataset.joints.index(joint) for joint in source.dataset.moving_joints]
@@ -181,7 +181,7 @@ def _gather_throws(
     }
 
 
-def _list_goals(source: Source, goals: Sequence[Mapping[str, float]]) -> dict[str, Any]:
+def _list_goals(source: ExportSource, goals: Sequence[Mapping[str, float]]) -> dict[str, Any]:
     """List the fields with the targets that throws were aimed at; none if they were aimed at none."""
     if not source.targets:
         return {}
@@ -195,7 +195,7 @@ def _sample_path(trajectory: JointTrajectory, rate_hz: int) -> NDArray[np.float6
     return np.column_stack([times, *sample_quintic(trajectory, times)])
 
 
-def _stack_signals(throw: Throw, *names: str, of: Sequence[int]) -> NDArray[np.float64]:
+def _stack_signals(throw: ThrowSeries, *names: str, of: Sequence[int]) -> NDArray[np.float64]:
     return np.column_stack([throw.signals["time_s"], *(throw.signals[name][:, of] for name in names)])
 
 

@@ -15,13 +15,13 @@ from numpy.typing import NDArray
 
 from throwcollect.export.exporter import Exporter
 from throwcollect.export.readme import Layout, tabulate_signals
-from throwcollect.export.throw_source import Entry, Source
+from throwcollect.export.throw_source import ExportableThrow, ExportSource
 
 _EPOCH = (1980, 1, 1, 0, 0, 0)
 """A fixed date for the members of archives, so that the same data give the same bytes."""
 
 
-def describe(source: Source) -> Layout:
+def describe(source: ExportSource) -> Layout:
     """Say how `write` lays a source out."""
     shard, trial = next(iter(source.shards)), source.entries[0].trial
     return Layout(
@@ -43,7 +43,7 @@ time_s, ball_position_m = archive["time_s"][rows], archive["ball_position_m"][ro
     )
 
 
-def write(source: Source, directory: Path) -> None:
+def write(source: ExportSource, directory: Path) -> None:
     """Write a dataset as NumPy archives; see `Exporter.write`."""
     columns = {field.name: to_array(source.table[field.name]) for field in source.table.schema}
     with zipfile.ZipFile(directory / "throws.npz", "w") as archive:
@@ -63,7 +63,7 @@ def to_array(column: pa.ChunkedArray) -> NDArray[Any]:
     return array
 
 
-def _write_shard(source: Source, entries: tuple[Entry, ...], path: Path) -> None:
+def _write_shard(source: ExportSource, entries: tuple[ExportableThrow, ...], path: Path) -> None:
     offsets = np.concatenate([[0], np.cumsum([entry.samples for entry in entries])])
     names: Mapping[str, NDArray[Any]] = {
         "trial": np.array([entry.trial for entry in entries]),

@@ -11,7 +11,7 @@ import pyarrow.parquet as pq
 from throwcollect.dataset.directory import THROWS
 from throwcollect.export.exporter import Exporter
 from throwcollect.export.readme import Layout, tabulate_signals
-from throwcollect.export.throw_source import Source, Throw
+from throwcollect.export.throw_source import ExportSource, ThrowSeries
 from throwcollect.sweep.parquet_file import encode_table
 
 _TRAJECTORIES = "trajectories"
@@ -19,7 +19,7 @@ _ROWS_PER_GROUP = 30_000
 """Rows of a row group: enough for columns to compress, few enough to be read for one throw and held in memory."""
 
 
-def describe(source: Source) -> Layout:
+def describe(source: ExportSource) -> Layout:
     """Say how `write` lays a source out."""
     measures = "release, apex, landing" if source.dataset.config.task.throws else "measures"
     return Layout(
@@ -48,7 +48,7 @@ samples = pd.read_parquet("{_TRAJECTORIES}", filters=[("trial", "==", {source.en
     )
 
 
-def write(source: Source, directory: Path) -> None:
+def write(source: ExportSource, directory: Path) -> None:
     """Write a dataset as Parquet; see `Exporter.write`."""
     facts = {"throwcollect.digest": source.dataset.digest}
     table = source.table.replace_schema_metadata(facts)
@@ -68,7 +68,7 @@ def write(source: Source, directory: Path) -> None:
                 writer.write_table(pa.Table.from_batches(group))
 
 
-def _make_schema(source: Source) -> pa.Schema:
+def _make_schema(source: ExportSource) -> pa.Schema:
     fields = [pa.field("trial", pa.int64(), nullable=False, metadata={"description": "Number of the trial."})]
     for signal in source.signals:
         metadata = {"description": signal.description, "unit": signal.unit}
@@ -76,7 +76,7 @@ def _make_schema(source: Source) -> pa.Schema:
     return pa.schema(fields)
 
 
-def _make_batch(throw: Throw, source: Source, schema: pa.Schema) -> pa.RecordBatch:
+def _make_batch(throw: ThrowSeries, source: ExportSource, schema: pa.Schema) -> pa.RecordBatch:
     columns = [np.full(len(throw), throw.trial)]
     for signal in source.signals:
         # One transposed copy is faster than columns one by one, whose numbers lie far apart in the recorded messages.

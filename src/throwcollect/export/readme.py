@@ -9,11 +9,11 @@ from typing import Any
 import pyarrow as pa
 
 from throwcollect.config.schema import Config
-from throwcollect.config.target import is_target
+from throwcollect.config.target_columns import is_target
 from throwcollect.dataset.bag import to_yaml
 from throwcollect.dataset.data_card import outcome_lines
 from throwcollect.dataset.directory import CONFIG
-from throwcollect.export.throw_source import Source, read_metadata
+from throwcollect.export.throw_source import ExportSource, read_metadata
 from throwcollect.robots.description import robot_of
 from throwcollect.version import __version__
 
@@ -39,7 +39,7 @@ class Layout:
     language: str = "python"
 
 
-def render_card(source: Source, layout: Layout) -> str:
+def render_card(source: ExportSource, layout: Layout) -> str:
     """Write the text of the README.md of an export."""
     config = source.dataset.config
     lines = [
@@ -86,7 +86,7 @@ def _render_front_matter(config: Config, hub: Mapping[str, Any]) -> list[str]:
     return ["---", to_yaml(header) + "---", ""]
 
 
-def _explain_rate(source: Source) -> str:
+def _explain_rate(source: ExportSource) -> str:
     recorded_hz = source.dataset.config.record.rate_hz
     if source.rate_hz == recorded_hz:
         return f"The samples are those that were recorded, at {recorded_hz} Hz."
@@ -103,7 +103,7 @@ def _explain_rate(source: Source) -> str:
     )
 
 
-def _explain_targets(source: Source) -> list[str]:
+def _explain_targets(source: ExportSource) -> list[str]:
     """Say which throws have targets, if the dataset has some."""
     if not any(is_target(name) for name in source.table.column_names):
         return []
@@ -113,7 +113,7 @@ def _explain_targets(source: Source) -> list[str]:
     return [f"Every throw has a target, {names}, which is the same in all its samples, for policies to condition on."]
 
 
-def tabulate_signals(source: Source, *, columns: bool = False) -> list[str]:
+def tabulate_signals(source: ExportSource, *, columns: bool = False) -> list[str]:
     """List the signals of a source in a Markdown table, by the names of their arrays or of their columns."""
     return [
         f"| {'columns' if columns else 'array'} | unit | of | |",
@@ -128,7 +128,7 @@ def tabulate_signals(source: Source, *, columns: bool = False) -> list[str]:
     ]
 
 
-def list_joints(source: Source, *, everything: bool = False) -> str:
+def list_joints(source: ExportSource, *, everything: bool = False) -> str:
     """List the joints in the order of the data, in one line."""
     said = f"The joints that move are {_quote(source.dataset.moving_joints)}, in this order"
     return f"{said}; all joints are {_quote(source.dataset.joints)}." if everything else f"{said}."

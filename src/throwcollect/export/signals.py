@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from throwcollect.config.shape import unit_of_key
-from throwcollect.config.target import TargetColumn
-from throwcollect.dataset.columns import name_components
+from throwcollect.config.target_columns import TargetColumn
+from throwcollect.dataset.trajectory_columns import name_components
 
 _ASCII = str.maketrans({"²": "^2", "³": "^3"})
 

@@ -11,7 +11,7 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from throwcollect.arguments import is_whole, refuse_argument, show_value
-from throwcollect.config.target import TargetColumn
+from throwcollect.config.target_columns import TargetColumn
 from throwcollect.dataset.damage import locating_damage
 from throwcollect.dataset.reader import Dataset
 from throwcollect.episode.record import Samples
@@ -30,7 +30,7 @@ Signals = Mapping[str, NDArray[np.float64]]
 
 
 @dataclass(frozen=True)
-class Entry:
+class ExportableThrow:
     """A throw that can be exported, before it is read; its samples are as many as the export will have."""
 
     trial: int
@@ -39,7 +39,7 @@ class Entry:
 
 
 @dataclass(frozen=True)
-class Throw:
+class ThrowSeries:
     """One throw with its time series.
 
     Attributes:
@@ -68,7 +68,7 @@ class Throw:
 
 
 @dataclass(frozen=True)
-class Source:
+class ExportSource:
     """A dataset to export.
 
     Attributes:
@@ -85,11 +85,11 @@ class Source:
     rate_hz: int
     targets: tuple[TargetColumn, ...]
     signals: tuple[Signal, ...]
-    shards: Mapping[str, tuple[Entry, ...]]
+    shards: Mapping[str, tuple[ExportableThrow, ...]]
     table: pa.Table
 
     @classmethod
-    def open(cls, directory: Path, *, rate_hz: int | None = None) -> Source:
+    def open(cls, directory: Path, *, rate_hz: int | None = None) -> ExportSource:
         """Open a dataset to export it, with so many samples per second, or else as many as were recorded.
 
         Raises:
@@ -119,11 +119,11 @@ class Source:
         )
 
     @property
-    def entries(self) -> tuple[Entry, ...]:
+    def entries(self) -> tuple[ExportableThrow, ...]:
         """All throws."""
         return tuple(entry for entries in self.shards.values() for entry in entries)
 
-    def throws(self, entries: Iterable[Entry]) -> Iterator[Throw]:
+    def throws(self, entries: Iterable[ExportableThrow]) -> Iterator[ThrowSeries]:
         """Read throws with their time series, one at a time, as all of them may not fit into memory.
 
         Raises:
@@ -140,15 +140,15 @@ class Source:
             signals = _compute_signals(samples, trajectory, episode.header.start_ns)
             target = {column.name: planned.target[column.name] for column in self.targets}
             signals |= {name: np.full((len(samples), 1), value) for name, value in target.items()}
-            yield Throw(entry.trial, entry.succeeded, signals, trajectory, target)
+            yield ThrowSeries(entry.trial, entry.succeeded, signals, trajectory, target)
 
 
-def _list_entries(dataset: Dataset, rate_hz: int) -> dict[str, tuple[Entry, ...]]:
-    shards: dict[str, list[Entry]] = {}
+def _list_entries(dataset: Dataset, rate_hz: int) -> dict[str, tuple[ExportableThrow, ...]]:
+    shards: dict[str, list[ExportableThrow]] = {}
     for row in dataset.throws.select(["trial", "outcome", "shard", "samples"]).to_pylist():
         if row["shard"] is not None:
             count = count_resampled(row["samples"], recorded_hz=dataset.config.record.rate_hz, rate_hz=rate_hz)
-            entry = Entry(row["trial"], count, row["outcome"] == dataset.config.task.success)
+            entry = ExportableThrow(row["trial"], count, row["outcome"] == dataset.config.task.success)
             # The name becomes that of a file of the export, so it must lead nowhere else.
             shards.setdefault(Path(row["shard"]).stem, []).append(entry)
     return {shard: tuple(entries) for shard, entries in shards.items()}

@@ -9,7 +9,7 @@ import numpy as np
 
 from throwcollect.errors import ConfigError
 from throwcollect.learning.arrays import Array
-from throwcollect.learning.learned_map import Correction, LearnedMap, Role
+from throwcollect.learning.learned_map import Correction, KeyRole, LearnedMap
 from throwcollect.reproducible_math import matmul, solve
 from throwcollect.units import unit_of_name
 
@@ -71,7 +71,7 @@ class Method(str, Enum):
     """The latents, which the dataset varied from trial to trial, have other values, and ends an offset."""
 
 
-ROLES = {Method.BIAS: Role.PARAMETER, Method.LATENT: Role.LATENT}
+ROLES = {Method.BIAS: KeyRole.PARAMETER, Method.LATENT: KeyRole.LATENT}
 """Inputs that differ, apart from the offset."""
 
 
@@ -135,7 +135,7 @@ def adapt(
     return Adaptation(chosen, _shift(learned.correction, chosen, found), deviations, before, after)
 
 
-def refuse_far_inputs(learned: LearnedMap, role: Role, inputs: Array) -> None:
+def refuse_far_inputs(learned: LearnedMap, role: KeyRole, inputs: Array) -> None:
     """Refuse throws where the polynomials say nothing: mostly slips, such as degrees for radians.
 
     Args:

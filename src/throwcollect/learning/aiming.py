@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from throwcollect.learning.arrays import Array
-from throwcollect.learning.learned_map import LearnedMap, Role
+from throwcollect.learning.learned_map import KeyRole, LearnedMap
 from throwcollect.reproducible_math import matmul, solve
 
 REACH = 0.05
@@ -73,7 +73,7 @@ def aim(learned: LearnedMap, targets: Array, context: Array, choice: Choice = Ch
     """
     if not len(targets):
         places = np.empty_like(targets)
-        return Aims(np.empty((0, len(learned.axes_of(Role.PARAMETER)))), places, places, np.empty(0, np.bool_))
+        return Aims(np.empty((0, len(learned.axes_of(KeyRole.PARAMETER)))), places, places, np.empty(0, np.bool_))
     blocks = [slice(first, first + _TOGETHER) for first in range(0, len(targets), _TOGETHER)]
     found = [_aim_at_once(learned, targets[block], context[block], choice) for block in blocks]
     parameters, predicted, nearest = (np.concatenate(column) for column in zip(*found, strict=True))
@@ -87,7 +87,7 @@ def _aim_at_once(learned: LearnedMap, targets: Array, context: Array, choice: Ch
     landings = _carry_over(learned, context)
     squares = ((landings - targets[:, np.newaxis]) ** 2).sum(axis=2)
     starts = np.argsort(squares, axis=1, kind="stable")[:, : _STARTS if choice is Choice.NEAREST else _MANY_STARTS]
-    begun = np.clip(learned.inputs[starts][..., learned.columns_of(Role.PARAMETER)], -1.0, 1.0)
+    begun = np.clip(learned.inputs[starts][..., learned.columns_of(KeyRole.PARAMETER)], -1.0, 1.0)
     given = np.repeat(context[:, np.newaxis], starts.shape[1], axis=1)
     # On its way, a candidate keeps the residual of the throw at which it begins, so only the polynomial has to be
     # inverted.
@@ -122,7 +122,7 @@ def _walk(learned: LearnedMap, parameters: Array, context: Array, goals: Array) 
     All arrays have the shape ``(n, n_candidates, n_columns)``. The candidates of a target stand still together, so that
     where they end does not depend on the other targets.
     """
-    columns = learned.columns_of(Role.PARAMETER)
+    columns = learned.columns_of(KeyRole.PARAMETER)
     parameters = parameters.copy()
     walking = np.arange(len(parameters))
     for _ in range(_STEPS):
@@ -156,7 +156,7 @@ def _weigh(learned: LearnedMap, choice: Choice, inputs: Array, steps: Array) -> 
     if choice is Choice.LEAST_EFFORT:
         return learned.effort.predict(inputs)[:, 0]
     if choice is Choice.LEAST_SENSITIVE:
-        slopes = learned.forward.slopes(inputs, learned.columns_of(Role.PARAMETER))
+        slopes = learned.forward.slopes(inputs, learned.columns_of(KeyRole.PARAMETER))
         steps = slopes.reshape(len(slopes), -1)
     squares: Array = (steps**2).sum(axis=1)
     return squares

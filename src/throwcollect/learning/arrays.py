@@ -12,7 +12,7 @@ from pydantic_core import core_schema
 Array = NDArray[np.float64]
 
 
-class Entry(BaseModel):
+class ModelEntry(BaseModel):
     """Base of all objects in these files: unknown keys are errors."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)

@@ -8,7 +8,7 @@ import numpy as np
 
 from throwcollect.errors import ConfigError
 from throwcollect.learning.arrays import Array, Vector
-from throwcollect.learning.learned_map import LearnedMap, Role
+from throwcollect.learning.learned_map import KeyRole, LearnedMap
 from throwcollect.learning.polynomial import SAMPLES_PER_TERM, Polynomial, fit_polynomial, list_exponents, list_terms
 from throwcollect.reproducible_math import matmul, solve
 
@@ -69,7 +69,7 @@ def distil(learned: LearnedMap) -> DistilledMap:
         if ends.min() == ends.max():
             raise ConfigError(f"{name} has the value {ends[0]:g} in all throws", expected="targets that vary")
     parameters, context = (
-        learned.inputs[:_MOST_THROWS, learned.columns_of(role)] for role in (Role.PARAMETER, Role.CONTEXT)
+        learned.inputs[:_MOST_THROWS, learned.columns_of(role)] for role in (KeyRole.PARAMETER, KeyRole.CONTEXT)
     )
     targets = learned.predict(parameters, context)
     low, high = targets.min(axis=0), targets.max(axis=0)
@@ -98,7 +98,7 @@ def distil(learned: LearnedMap) -> DistilledMap:
 def _step(learned: LearnedMap, terms: Array, squares: Array, raw: Array, context: Array, missing: Array) -> Array:
     """The Gauss-Newton step of the coefficients, shape ``(n_terms, n_parameters)``."""
     clipped = np.clip(raw, -1.0, 1.0)
-    slopes = learned.forward.slopes(learned.in_world(clipped, context), learned.columns_of(Role.PARAMETER))
+    slopes = learned.forward.slopes(learned.in_world(clipped, context), learned.columns_of(KeyRole.PARAMETER))
     # A parameter beyond its range is clipped, so no coefficient moves it.
     slopes = slopes * (clipped == raw)[:, np.newaxis]
     wide = (slopes[:, :, np.newaxis, :] * terms[:, np.newaxis, :, np.newaxis]).reshape(missing.size, -1)

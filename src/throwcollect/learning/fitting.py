@@ -16,7 +16,7 @@ from throwcollect.config.values import leaves
 from throwcollect.dataset.reader import Dataset
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.learning.arrays import Array
-from throwcollect.learning.learned_map import Axis, Kind, LearnedMap, Role, no_correction, scale_values
+from throwcollect.learning.learned_map import Axis, KeyRole, Kind, LearnedMap, no_correction, scale_values
 from throwcollect.learning.polynomial import Validation, cross_validate, fit_polynomial
 from throwcollect.wording import format_count, join_names
 
@@ -117,9 +117,9 @@ def fit_throws(
     """
     inputs, folds = scale_values(axes, values), _folds(outputs)
     # Latents come last. Products of two latents have little effect, so such terms are left out.
-    minor = sum(axis.role is Role.LATENT for axis in axes)
+    minor = sum(axis.role is KeyRole.LATENT for axis in axes)
     validation = cross_validate(inputs, outputs, folds, minor=minor)
-    known = [axis.role is not Role.LATENT for axis in axes]
+    known = [axis.role is not KeyRole.LATENT for axis in axes]
     # The error without latents tells whether they are worth knowing.
     blind = None if all(known) else float(np.median(cross_validate(inputs[:, known], outputs, folds).best))
     forward = fit_polynomial(inputs, outputs, validation.degree, minor=minor)
@@ -165,14 +165,14 @@ def _find_axes(
             continue
         axes.append(Axis(key, role, low, high, float(nominal[key])))
     # The axes of a role stand side by side, on which `LearnedMap.columns_of` relies.
-    return tuple(sorted(axes, key=lambda axis: list(Role).index(axis.role)))
+    return tuple(sorted(axes, key=lambda axis: list(KeyRole).index(axis.role)))
 
 
-def _choose_role(config: Config, key: str, parameters: Sequence[str], context: Sequence[str]) -> Role:
+def _choose_role(config: Config, key: str, parameters: Sequence[str], context: Sequence[str]) -> KeyRole:
     if key in context or (not context and key in config.task.given):
-        return Role.CONTEXT
+        return KeyRole.CONTEXT
     chosen = key in parameters if parameters else key.startswith("task.")
-    return Role.PARAMETER if chosen else Role.LATENT
+    return KeyRole.PARAMETER if chosen else KeyRole.LATENT
 
 
 def _check_amount(dataset: Dataset, throws: pa.Table, axes: tuple[Axis, ...]) -> None:
@@ -181,7 +181,7 @@ def _check_amount(dataset: Dataset, throws: pa.Table, axes: tuple[Axis, ...]) ->
     Raises:
         ConfigError: If no parameter varies, too many do, or too few throws succeeded.
     """
-    chosen = [axis.key for axis in axes if axis.role is Role.PARAMETER]
+    chosen = [axis.key for axis in axes if axis.role is KeyRole.PARAMETER]
     if not chosen:
         raise ConfigError(
             f"{dataset.directory}: no parameter of the task varies",

@@ -26,7 +26,7 @@ class Kind(str, Enum):
     """By the polynomial alone, which can be written down as a formula."""
 
 
-class Role(str, Enum):
+class KeyRole(str, Enum):
     """How aiming treats a swept key."""
 
     PARAMETER = "parameter"
@@ -50,7 +50,7 @@ class Axis:
     """
 
     key: str
-    role: Role
+    role: KeyRole
     minimum: FiniteFloat
     maximum: FiniteFloat
     nominal: FiniteFloat
@@ -116,20 +116,20 @@ class LearnedMap:
             return np.zeros_like(self.outputs)
         return self.outputs - self.forward.predict(self.inputs)
 
-    def axes_of(self, role: Role) -> tuple[Axis, ...]:
+    def axes_of(self, role: KeyRole) -> tuple[Axis, ...]:
         """The axes of a role."""
         return tuple(axis for axis in self.axes if axis.role is role)
 
-    def columns_of(self, role: Role) -> slice:
+    def columns_of(self, role: KeyRole) -> slice:
         """The columns of inputs that belong to a role; an empty slice if none does."""
         columns = [number for number, axis in enumerate(self.axes) if axis.role is role]
         return slice(columns[0], columns[-1] + 1) if columns else slice(0, 0)
 
-    def scale(self, role: Role, values: Array) -> Array:
+    def scale(self, role: KeyRole, values: Array) -> Array:
         """Scale values of the axes of a role, shape ``(n, n_axes of the role)``."""
         return scale_values(self.axes_of(role), values)
 
-    def unscale(self, role: Role, inputs: Array) -> Array:
+    def unscale(self, role: KeyRole, inputs: Array) -> Array:
         """Values of scaled inputs of a role, in the units of their keys."""
         low, high = _bounds(self.axes_of(role))
         return low + (inputs + 1.0) / 2.0 * (high - low)
@@ -160,7 +160,7 @@ class LearnedMap:
 
         The context is scaled and the same for all throws, shape ``(n_context,)``.
         """
-        parameters = self.inputs[:, self.columns_of(Role.PARAMETER)]
+        parameters = self.inputs[:, self.columns_of(KeyRole.PARAMETER)]
         moved = self.in_world(parameters, np.tile(context, (len(parameters), 1)))
         # Each throw keeps its own residual, as only the world around it changes.
         return self.residuals + self.forward.predict(moved) + self.correction.offset
@@ -195,10 +195,10 @@ class LearnedMap:
 
 def no_correction(axes: tuple[Axis, ...], targets: tuple[str, ...]) -> Correction:
     """Make the correction of the dataset's own world, whose latents are those of its configuration."""
-    latents = tuple(axis for axis in axes if axis.role is Role.LATENT)
+    latents = tuple(axis for axis in axes if axis.role is KeyRole.LATENT)
     nominal = np.array([axis.nominal for axis in latents], np.float64)
     scaled = np.clip(scale_values(latents, nominal), -1.0, 1.0)
-    parameters = sum(axis.role is Role.PARAMETER for axis in axes)
+    parameters = sum(axis.role is KeyRole.PARAMETER for axis in axes)
     return Correction(np.zeros(parameters), scaled, np.zeros(len(targets)))
 
 

@@ -9,8 +9,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from throwcollect.config.target import LARGEST_TARGET
-from throwcollect.config.task import TaskConfig
+from throwcollect.config.target_columns import LARGEST_TARGET
+from throwcollect.config.task_config import TaskConfig
 from throwcollect.errors import ConfigError
 from throwcollect.files import write_file
 from throwcollect.learning.model import Aim

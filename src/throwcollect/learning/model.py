@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from throwcollect.arguments import as_float, check_whole_number, read_list, read_word, refuse_argument, show_value
 from throwcollect.config.loader import dump_yaml
-from throwcollect.config.target import LARGEST_TARGET
+from throwcollect.config.target_columns import LARGEST_TARGET
 from throwcollect.errors import ConfigError
 from throwcollect.extras import require
 from throwcollect.files import StrPath
@@ -21,7 +21,7 @@ from throwcollect.learning.aiming import Choice, aim
 from throwcollect.learning.arrays import Array
 from throwcollect.learning.distilling import distil
 from throwcollect.learning.fitting import Fit, fit_map
-from throwcollect.learning.learned_map import Kind, LearnedMap, Role
+from throwcollect.learning.learned_map import KeyRole, Kind, LearnedMap
 from throwcollect.learning.model_directory import read_model, write_model
 from throwcollect.learning.model_file import AdaptationEntry, ModelFile, TrainedOn, list_found
 from throwcollect.learning.score import Score, pool_scores
@@ -78,17 +78,17 @@ class Model:
     @property
     def parameters(self) -> tuple[str, ...]:
         """Keys that aiming chooses."""
-        return tuple(axis.key for axis in self.learned.axes_of(Role.PARAMETER))
+        return tuple(axis.key for axis in self.learned.axes_of(KeyRole.PARAMETER))
 
     @property
     def given(self) -> tuple[str, ...]:
         """Keys whose values are given behind a target."""
-        return tuple(axis.key for axis in self.learned.axes_of(Role.CONTEXT))
+        return tuple(axis.key for axis in self.learned.axes_of(KeyRole.CONTEXT))
 
     @property
     def latents(self) -> tuple[str, ...]:
         """Keys of the world, whose values only throws tell."""
-        return tuple(axis.key for axis in self.learned.axes_of(Role.LATENT))
+        return tuple(axis.key for axis in self.learned.axes_of(KeyRole.LATENT))
 
     @property
     def targets(self) -> tuple[str, ...]:
@@ -120,9 +120,9 @@ class Model:
         names = (*self.targets, *self.given)
         rows = _read_places("targets", targets, names)
         ends, values = rows[:, : len(self.targets)], rows[:, len(self.targets) :]
-        context = self.learned.scale(Role.CONTEXT, values)
+        context = self.learned.scale(KeyRole.CONTEXT, values)
         found = aim(self.learned, ends, context, read_word("choose", choose, Choice))
-        chosen = self.learned.unscale(Role.PARAMETER, found.parameters)
+        chosen = self.learned.unscale(KeyRole.PARAMETER, found.parameters)
         inside = np.all(np.abs(context) <= 1.0, axis=1).tolist()
         return [
             Aim(
@@ -220,8 +220,8 @@ class Model:
                 expected="a dataset whose sweep varies the world",
                 hint="try bias",
             )
-        refuse_far_inputs(self.learned, Role.PARAMETER, parameters)
-        refuse_far_inputs(self.learned, Role.CONTEXT, context)
+        refuse_far_inputs(self.learned, KeyRole.PARAMETER, parameters)
+        refuse_far_inputs(self.learned, KeyRole.CONTEXT, context)
         refuse_far_places(self.learned, measured)
         # A measured place differs from its prediction by the scatter of the throw, and by the error of the model.
         deviation = float(np.hypot(scatter, self.file.trained_on.error))
@@ -288,8 +288,8 @@ class Model:
             value = show_value(listed[number][names[column]])
             raise ConfigError(f"throw {number}: {names[column]} is {value}", expected="a finite number")
         split = len(self.parameters)
-        parameters = self.learned.scale(Role.PARAMETER, values[:, :split])
-        return parameters, self.learned.scale(Role.CONTEXT, values[:, split:])
+        parameters = self.learned.scale(KeyRole.PARAMETER, values[:, :split])
+        return parameters, self.learned.scale(KeyRole.CONTEXT, values[:, split:])
 
 
 def fit(

@@ -11,9 +11,9 @@ from throwcollect.dataset.directory import has_files
 from throwcollect.errors import DatasetError
 from throwcollect.files import read_text
 from throwcollect.learning.adapting import ROLES, Method
-from throwcollect.learning.arrays import Array, Entry
+from throwcollect.learning.arrays import Array, ModelEntry
 from throwcollect.learning.distilling import DistilledMap
-from throwcollect.learning.learned_map import Axis, Correction, Kind, LearnedMap, Role
+from throwcollect.learning.learned_map import Axis, Correction, KeyRole, Kind, LearnedMap
 from throwcollect.learning.polynomial import Polynomial
 from throwcollect.wording import command
 
@@ -21,7 +21,7 @@ MODEL = "model.json"
 _MOST_BYTES = 100_000_000
 
 
-class Found(Entry):
+class AdaptedNumber(ModelEntry):
     """A number that adaptation found.
 
     Attributes:
@@ -35,7 +35,7 @@ class Found(Entry):
     deviation: FiniteFloat
 
 
-class AdaptationEntry(Entry):
+class AdaptationEntry(ModelEntry):
     """How the model was adapted.
 
     Attributes:
@@ -53,10 +53,10 @@ class AdaptationEntry(Entry):
     scatter: FiniteFloat
     before: list[FiniteFloat]
     after: list[FiniteFloat]
-    found: list[Found]
+    found: list[AdaptedNumber]
 
 
-class TrainedOn(Entry):
+class TrainedOn(ModelEntry):
     """The dataset and the throws that the model was learned from.
 
     Attributes:
@@ -91,7 +91,7 @@ class TrainedOn(Entry):
         return min(self.folds_error.values())
 
 
-class ModelFile(Entry):
+class ModelFile(ModelEntry):
     """The whole file: a pure function of the dataset and of the arguments of `fit`, `adapt` and `distil`."""
 
     format: Literal["1"] = "1"
@@ -110,14 +110,14 @@ class ModelFile(Entry):
     def _fits_together(self) -> ModelFile:
         inputs, targets = len(self.axes), len(self.targets)
         roles = [axis.role for axis in self.axes]
-        parameters, context, latents = (roles.count(role) for role in Role)
+        parameters, context, latents = (roles.count(role) for role in KeyRole)
         if not (
             self.forward.has_shape(inputs, targets)
             and self.effort.has_shape(inputs, 1)
             and len(self.correction.bias) == parameters > 0
             and len(self.correction.latents) == latents
             and len(self.correction.offset) == targets
-            and roles == sorted(roles, key=list(Role).index)
+            and roles == sorted(roles, key=list(KeyRole).index)
             and all(axis.minimum < axis.maximum for axis in self.axes)
             and (self.distilled is None or self.distilled.has_shape(targets, context, parameters))
         ):
@@ -151,7 +151,7 @@ def read_model_file(directory: Path) -> ModelFile:
         ) from error
 
 
-def list_found(learned: LearnedMap, method: Method, deviations: Array) -> list[Found]:
+def list_found(learned: LearnedMap, method: Method, deviations: Array) -> list[AdaptedNumber]:
     """List the numbers that adaptation found, in their units: of the adapted map and of an `Adaptation`."""
     if method is Method.NONE:
         return []
@@ -160,10 +160,10 @@ def list_found(learned: LearnedMap, method: Method, deviations: Array) -> list[F
     found = []
     for number, axis in enumerate(axes):
         half = (axis.maximum - axis.minimum) / 2
-        if role is Role.LATENT:
+        if role is KeyRole.LATENT:
             value = axis.minimum + (float(learned.correction.latents[number]) + 1) * half
         else:
             value = float(learned.correction.bias[number]) * half
-        found.append(Found(name=axis.key, value=value, deviation=float(deviations[number]) * half))
+        found.append(AdaptedNumber(name=axis.key, value=value, deviation=float(deviations[number]) * half))
     offsets = zip(learned.targets, learned.correction.offset.tolist(), deviations[len(axes) :].tolist(), strict=True)
-    return [*found, *(Found(name=name, value=value, deviation=spread) for name, value, spread in offsets)]
+    return [*found, *(AdaptedNumber(name=name, value=value, deviation=spread) for name, value, spread in offsets)]

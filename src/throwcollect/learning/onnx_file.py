@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from throwcollect.extras import lazily
 from throwcollect.learning.distilling import DistilledMap
-from throwcollect.learning.learned_map import LearnedMap, Role
+from throwcollect.learning.learned_map import KeyRole, LearnedMap
 
 ONNX = "model.onnx"
 _OPERATORS, _FORMAT = 13, 8
@@ -26,7 +26,7 @@ def encode_onnx(learned: LearnedMap, distilled: DistilledMap) -> bytes:
     Raises:
         MissingExtraError: If the package ``onnx`` is not installed.
     """
-    chosen, given = learned.axes_of(Role.PARAMETER), learned.axes_of(Role.CONTEXT)
+    chosen, given = learned.axes_of(KeyRole.PARAMETER), learned.axes_of(KeyRole.CONTEXT)
     low = np.array([*distilled.low.tolist(), *(axis.minimum for axis in given)])
     high = np.array([*distilled.high.tolist(), *(axis.maximum for axis in given)])
     least, most = (np.array([getattr(axis, end) for axis in chosen]) for end in ("minimum", "maximum"))

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from throwcollect.learning.aiming import REACH, TOLERANCE
-from throwcollect.learning.learned_map import LearnedMap, Role
+from throwcollect.learning.learned_map import KeyRole, LearnedMap
 from throwcollect.learning.model import Aim
 from throwcollect.learning.score import tell_length
 
@@ -18,7 +18,7 @@ def explain_reach(learned: LearnedMap, aim: Aim) -> str:
     away, missed = (float(np.linalg.norm(place - ends)) for place in (aim.nearest, aim.predicted))
     reasons = [
         f"{axis.key} was {axis.minimum:g} to {axis.maximum:g} in all throws"
-        for axis, value in zip(learned.axes_of(Role.CONTEXT), given.tolist(), strict=True)
+        for axis, value in zip(learned.axes_of(KeyRole.CONTEXT), given.tolist(), strict=True)
         if not axis.minimum <= value <= axis.maximum
     ]
     if away > REACH:

@@ -9,14 +9,14 @@ import numpy as np
 from pydantic import Field, FiniteFloat
 
 from throwcollect.learning.adapting import Method
-from throwcollect.learning.arrays import Array, Entry
+from throwcollect.learning.arrays import Array, ModelEntry
 from throwcollect.units import unit_of_name
 
 SHOWN_AS = {"m": (100.0, " cm"), "rad": (180.0 / np.pi, "°")}
 """By unit of targets: the factor and the unit by which people read their misses."""
 
 
-class Misses(Entry):
+class MissStatistics(ModelEntry):
     """How far throws ended from their targets, over the targets of one unit: a distance [m], an angle [rad].
 
     Attributes:
@@ -32,8 +32,8 @@ class Misses(Entry):
     largest: FiniteFloat | None
 
 
-class Errors(Misses):
-    """Misses over all targets; the fields of `Misses` are those of the first unit, metres if a target has them.
+class Errors(MissStatistics):
+    """Misses over all targets; the fields of `MissStatistics` are those of the first unit, metres if a target has them.
 
     Attributes:
         throws: Number of throws.
@@ -43,10 +43,10 @@ class Errors(Misses):
 
     throws: int
     missed: int
-    others: list[Misses] = Field(default=[])
+    others: list[MissStatistics] = Field(default=[])
 
     @property
-    def by_unit(self) -> tuple[Misses, ...]:
+    def by_unit(self) -> tuple[MissStatistics, ...]:
         """Misses over the targets of each unit."""
         return self, *self.others
 
@@ -105,21 +105,21 @@ def tell_scatter(scatter: float, targets: Sequence[str]) -> str:
     return " and ".join(tell_miss(scatter, unit) for unit in list_units(targets))
 
 
-def _sum_up(away: Array, unit: str) -> Misses:
+def _sum_up(away: Array, unit: str) -> MissStatistics:
     distances = np.linalg.norm(away, axis=1)
     # A throw that did not succeed counts as farther away than all others, and has no number.
     ordered = np.sort(np.where(np.isfinite(distances), distances, np.inf))
     # The places of the lower median, of the least distance that 9 of 10 do not exceed, and of the largest.
     places = (len(ordered) - 1) // 2, int(np.ceil(0.9 * len(ordered))) - 1, len(ordered) - 1
     median, share90, largest = (float(ordered[place]) if np.isfinite(ordered[place]) else None for place in places)
-    return Misses(unit=unit, median=median, share90=share90, largest=largest)
+    return MissStatistics(unit=unit, median=median, share90=share90, largest=largest)
 
 
-def _take_middle(some: Sequence[Misses]) -> Misses:
+def _take_middle(some: Sequence[MissStatistics]) -> MissStatistics:
     median, share90, largest = (
         _find_median([getattr(each, name) for each in some]) for name in ("median", "share90", "largest")
     )
-    return Misses(unit=some[0].unit, median=median, share90=share90, largest=largest)
+    return MissStatistics(unit=some[0].unit, median=median, share90=share90, largest=largest)
 
 
 def _find_median(values: Sequence[float | None]) -> float | None:
@@ -128,7 +128,7 @@ def _find_median(values: Sequence[float | None]) -> float | None:
     return median if np.isfinite(median) else None
 
 
-class Trained(Entry):
+class Trained(ModelEntry):
     """How a model of some throws of the dataset hits.
 
     Attributes:
@@ -140,7 +140,7 @@ class Trained(Entry):
     errors: Errors
 
 
-class Adapted(Entry):
+class Adapted(ModelEntry):
     """How a model hits in another world after some throws there.
 
     Attributes:
@@ -154,7 +154,7 @@ class Adapted(Entry):
     errors: Errors
 
 
-class ThrowAtTarget(Entry):
+class ThrowAtTarget(ModelEntry):
     """A throw at a target.
 
     Attributes:
@@ -166,7 +166,7 @@ class ThrowAtTarget(Entry):
     place: list[FiniteFloat] | None
 
 
-class Score(Entry):
+class Score(ModelEntry):
     """All results of a model; every number is one "in simulation".
 
     Attributes:

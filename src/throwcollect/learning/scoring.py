@@ -14,7 +14,7 @@ from throwcollect.learning.aiming import aim
 from throwcollect.learning.arrays import Array
 from throwcollect.learning.distilling import DistilledMap
 from throwcollect.learning.fitting import count_needed_throws, fit_throws, number_cells
-from throwcollect.learning.learned_map import LearnedMap, Role, no_correction
+from throwcollect.learning.learned_map import KeyRole, LearnedMap, no_correction
 from throwcollect.learning.score import Adapted, Errors, Score, ThrowAtTarget, Trained
 from throwcollect.side_by_side import THROWS_A_START
 
@@ -72,7 +72,7 @@ def score_model(
     plain = leave_out_correction(learned)
     targets = draw_targets(plain.carry_over(context), count, seed)
     given = np.tile(context, (count, 1))
-    needed = count_needed_throws(len(learned.axes_of(Role.PARAMETER)))
+    needed = count_needed_throws(len(learned.axes_of(KeyRole.PARAMETER)))
     maps = {size: _learn_from(plain, size, seed) for size in SIZES if needed <= size < len(learned.values)}
     maps[len(learned.values)] = plain
     lists = [aim(each, targets, given).parameters for each in maps.values()]
@@ -204,8 +204,8 @@ def spread_first(targets: Array) -> Array:
 
 def _nominal_context(learned: LearnedMap) -> Array:
     """Scaled context that the configuration has, shape ``(n_context,)``."""
-    nominal = np.array([[axis.nominal for axis in learned.axes_of(Role.CONTEXT)]], np.float64)
-    inside: Array = np.clip(learned.scale(Role.CONTEXT, nominal)[0], -1.0, 1.0)
+    nominal = np.array([[axis.nominal for axis in learned.axes_of(KeyRole.CONTEXT)]], np.float64)
+    inside: Array = np.clip(learned.scale(KeyRole.CONTEXT, nominal)[0], -1.0, 1.0)
     return inside
 
 
@@ -236,9 +236,9 @@ def _throw(learned: LearnedMap, lists: Sequence[Array], given: Array, world: Sim
     Returns:
         For each list, where the throws ended, shape ``(n, n_targets)``, with NaN where one did not succeed.
     """
-    keys = [axis.key for axis in (*learned.axes_of(Role.PARAMETER), *learned.axes_of(Role.CONTEXT))]
-    parameters = learned.unscale(Role.PARAMETER, np.concatenate(lists))
-    values = np.hstack([parameters, np.tile(learned.unscale(Role.CONTEXT, given), (len(lists), 1))])
+    keys = [axis.key for axis in (*learned.axes_of(KeyRole.PARAMETER), *learned.axes_of(KeyRole.CONTEXT))]
+    parameters = learned.unscale(KeyRole.PARAMETER, np.concatenate(lists))
+    values = np.hstack([parameters, np.tile(learned.unscale(KeyRole.CONTEXT, given), (len(lists), 1))])
     points = [dict(zip(keys, row, strict=True)) for row in values.tolist()]
     thrown = [number for number, point in enumerate(points) if world.find_refusal(point) is None]
     places = np.full((len(points), len(learned.targets)), np.nan)

@@ -67,7 +67,7 @@ def require_simulating(engine: str) -> None:
 def _begin(directory: Path) -> Callable[[int], Comparison]:
     """Open dataset and simulation in a process, which keeps both from one trial to the next."""
     # Datasets are verified without the extra `collect`, too, which this import takes.
-    from throwcollect.replay.throw import Replayer
+    from throwcollect.replay.replayer import Replayer
 
     dataset = Dataset.open(directory)
     replayer = Replayer(dataset.config)

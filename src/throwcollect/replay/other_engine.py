@@ -15,7 +15,7 @@ from throwcollect.dataset.throws_table import ThrowsTable
 from throwcollect.errors import ConfigError
 from throwcollect.members import names_of
 from throwcollect.replay.audit import simulate_side_by_side
-from throwcollect.replay.throw import Replayer
+from throwcollect.replay.replayer import Replayer
 
 LANDING = ("landing_x_m", "landing_y_m")
 """Columns with the place where a throw landed."""

@@ -61,7 +61,7 @@ Row = tuple[Panel, ...]
 
 
 @dataclass(frozen=True)
-class Section:
+class ReportSection:
     """A part of the page.
 
     Attributes:
@@ -105,5 +105,5 @@ class TaskReport:
 
     subject: str
     tiles: tuple[Tile, ...]
-    results: tuple[Section, ...]
-    episodes: tuple[Section, ...]
+    results: tuple[ReportSection, ...]
+    episodes: tuple[ReportSection, ...]

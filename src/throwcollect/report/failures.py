@@ -11,7 +11,7 @@ _EXAMPLES = 5
 
 
 @dataclass(frozen=True)
-class Failure:
+class FailureGroup:
     """A group of trials with the same outcome and, but for numbers, the same reason.
 
     Attributes:
@@ -25,7 +25,7 @@ class Failure:
     examples: tuple[int, ...]
 
 
-def group_failures(rows: Iterable[tuple[int, str, str | None]]) -> tuple[Failure, ...]:
+def group_failures(rows: Iterable[tuple[int, str, str | None]]) -> tuple[FailureGroup, ...]:
     """Group trial, outcome and reason of each row, most frequent groups first; trials without a reason did not fail."""
     groups: dict[tuple[str, str], list[tuple[int, str]]] = {}
     for trial, outcome, reason in rows:
@@ -35,5 +35,5 @@ def group_failures(rows: Iterable[tuple[int, str, str | None]]) -> tuple[Failure
     for (outcome, pattern), members in groups.items():
         trials, reasons = zip(*members, strict=True)
         reason = pattern if len(set(reasons)) > 1 else reasons[0]
-        failures.append(Failure(outcome, reason, len(trials), trials[:_EXAMPLES]))
+        failures.append(FailureGroup(outcome, reason, len(trials), trials[:_EXAMPLES]))
     return tuple(sorted(failures, key=lambda failure: (-failure.count, failure.outcome, failure.pattern)))

@@ -12,10 +12,10 @@ import numpy as np
 import plotly.graph_objects as go
 from numpy.typing import NDArray
 
-from throwcollect.report.limits import JointPeaks
+from throwcollect.report.joint_peaks import JointPeaks
 from throwcollect.report.outcomes import LANDED, Outcomes, in_words, style_of
-from throwcollect.report.points import choose_points
-from throwcollect.report.swept_keys import Parameter
+from throwcollect.report.plotted_points import choose_points
+from throwcollect.report.swept_keys import SweptKey
 from throwcollect.report.throughput import Throughput
 
 BLUE = style_of(LANDED).colour
@@ -32,7 +32,7 @@ _CELL_PX = 128
 _CELL_GAP = 0.012
 
 
-def draw_parameter_matrix(parameters: Sequence[Parameter], outcomes: Outcomes) -> go.Figure:
+def draw_parameter_matrix(parameters: Sequence[SweptKey], outcomes: Outcomes) -> go.Figure:
     """Draw each pair of at most `MOST_KEYS` swept keys below the diagonal, and on it how often each value occurs."""
     count = len(parameters)
     chosen = choose_points(len(outcomes.codes), count_matrix_points(parameters))
@@ -71,12 +71,12 @@ def draw_parameter_matrix(parameters: Sequence[Parameter], outcomes: Outcomes) -
     return figure.update_layout(height=90 + _CELL_PX * max(count, 2), bargap=0, legend=legend)
 
 
-def count_matrix_points(parameters: Sequence[Parameter]) -> int:
+def count_matrix_points(parameters: Sequence[SweptKey]) -> int:
     """Count the trials that each panel of the matrix shows at most."""
     return _MOST_MATRIX_POINTS // max(len(parameters) * (len(parameters) - 1) // 2, 4)
 
 
-def _matrix_axes(parameters: Sequence[Parameter]) -> dict[str, object]:
+def _matrix_axes(parameters: Sequence[SweptKey]) -> dict[str, object]:
     """Axes of the matrix: x and y of parameter i, and behind all of these the y axes of the counts."""
     count = len(parameters)
     axes: dict[str, object] = {}
@@ -97,7 +97,7 @@ def _matrix_axes(parameters: Sequence[Parameter]) -> dict[str, object]:
     return axes
 
 
-def _matrix_range(parameter: Parameter) -> list[float]:
+def _matrix_range(parameter: SweptKey) -> list[float]:
     ends = parameter.edges[[0, -1]]
     low, high = np.log10(ends) if parameter.logarithmic else ends
     room = 0.04 * (high - low)
@@ -125,7 +125,7 @@ def draw_outcome_bars(outcomes: Outcomes) -> go.Figure:
     return figure.update_layout(height=72 + 41 * len(rows))
 
 
-def draw_outcome_shares(parameter: Parameter, outcomes: Outcomes) -> go.Figure:
+def draw_outcome_shares(parameter: SweptKey, outcomes: Outcomes) -> go.Figure:
     """Draw the share of each outcome in each bin of a parameter."""
     totals = parameter.counts.sum(axis=1)
     shares = parameter.counts / np.maximum(totals, 1)[:, np.newaxis]

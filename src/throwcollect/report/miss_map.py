@@ -8,7 +8,7 @@ import numpy as np
 import plotly.graph_objects as go
 from numpy.typing import NDArray
 
-from throwcollect.config.task import TaskConfig
+from throwcollect.config.task_config import TaskConfig
 from throwcollect.report.figures import BLUE, LEGEND_ABOVE, LIMIT_LINE, NEUTRAL
 from throwcollect.units import unit_of_name
 

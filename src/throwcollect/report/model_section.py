@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 import plotly.graph_objects as go
 
-from throwcollect.config.task import TaskConfig
+from throwcollect.config.task_config import TaskConfig
 from throwcollect.dataset.reader import Dataset
 from throwcollect.errors import ConfigError
 from throwcollect.learning.model import Model, load_model
 from throwcollect.learning.model_directory import read_score
-from throwcollect.learning.score import SHOWN_AS, Errors, Misses, Score, ThrowAtTarget, tell_length, tell_misses
-from throwcollect.report.contents import Panel, Row, Section, Table
+from throwcollect.learning.score import SHOWN_AS, Errors, MissStatistics, Score, ThrowAtTarget, tell_length, tell_misses
+from throwcollect.report.contents import Panel, ReportSection, Row, Table
 from throwcollect.report.figures import BLUE, LEGEND_ABOVE
 from throwcollect.report.miss_map import choose_scale, draw_miss_map, title_column, title_misses
 from throwcollect.wording import command, format_count
@@ -24,7 +24,7 @@ _NOUNS = {"m": "distance", "rad": "angle"}
 """Words for the difference between a throw and its target, by unit."""
 
 
-def show_model(directory: Path, dataset: Dataset) -> Section:
+def show_model(directory: Path, dataset: Dataset) -> ReportSection:
     """Show how a model of a dataset hits targets, from the directory of the model.
 
     Raises:
@@ -46,7 +46,9 @@ def show_model(directory: Path, dataset: Dataset) -> Section:
     )
     if score is None:
         hint = command("score", directory)
-        return Section("model", "Model", _TITLE, f"{text} Nobody has thrown with it yet; {hint} does, in simulation.")
+        return ReportSection(
+            "model", "Model", _TITLE, f"{text} Nobody has thrown with it yet; {hint} does, in simulation."
+        )
     seeds = format_count(score.seeds, "seed")
     text += f" Misses are medians of {seeds}, of {score.targets} targets each, in simulation."
     panels = [
@@ -71,7 +73,7 @@ def show_model(directory: Path, dataset: Dataset) -> Section:
             y={"rangemode": "tozero"},
         )
         rows.append((*errors, there))
-    return Section("model", "Model", _TITLE, text, tuple(rows))
+    return ReportSection("model", "Model", _TITLE, text, tuple(rows))
 
 
 def _show_misses(
@@ -97,7 +99,7 @@ def _show_errors(
         yield Panel(f"{key}-{misses[0].unit}" if number else key, title, figure, picture=key)
 
 
-def _draw_errors(numbers: Sequence[int], misses: Sequence[Misses]) -> go.Figure:
+def _draw_errors(numbers: Sequence[int], misses: Sequence[MissStatistics]) -> go.Figure:
     """Draw median and ninth decile of misses of one unit over a number of throws."""
     factor, unit = SHOWN_AS.get(misses[0].unit, (1.0, misses[0].unit))
     figure = go.Figure()

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from throwcollect.dataset.throws_table import REFUSED
 from throwcollect.tasks.result import LIMIT_VIOLATED, LOST, TRACKING_FAILED
-from throwcollect.tasks.throw.outcome import ThrowOutcome
+from throwcollect.tasks.throw.throw_result import ThrowOutcome
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.ticker import AutoLocator, FuncFormatter, LogLocator, MaxNLocator, NullLocator
 
-from throwcollect.report.contents import Panel, Section
+from throwcollect.report.contents import Panel, ReportSection
 
 _COLUMN_IN, _BOTH_COLUMNS_IN = 3.5, 7.16
 """Widths of pictures [in]: one column of a paper in two columns, and both."""
@@ -80,7 +80,7 @@ _STYLE: dict[Any, Any] = {
 }
 
 
-def write_pictures(sections: Iterable[Section], directory: Path) -> tuple[Path, ...]:
+def write_pictures(sections: Iterable[ReportSection], directory: Path) -> tuple[Path, ...]:
     """Paint the panels that have the name of a picture, a PNG file in the directory for each name.
 
     Raises:

@@ -17,12 +17,12 @@ from throwcollect.files import read_text
 from throwcollect.members import load_object
 from throwcollect.report import figures
 from throwcollect.report.amounts import format_duration, format_share, format_size
-from throwcollect.report.contents import Listing, Panel, Row, Section, Table, TaskReport, Tile
-from throwcollect.report.failures import Failure, group_failures
-from throwcollect.report.limits import KINDS, JointPeaks, summarise_peaks
+from throwcollect.report.contents import Listing, Panel, ReportSection, Row, Table, TaskReport, Tile
+from throwcollect.report.failures import FailureGroup, group_failures
+from throwcollect.report.joint_peaks import KINDS, JointPeaks, summarise_peaks
 from throwcollect.report.model_section import show_model
 from throwcollect.report.outcomes import LANDED, Outcomes, in_words
-from throwcollect.report.swept_keys import Parameter, read_parameters
+from throwcollect.report.swept_keys import SweptKey, read_parameters
 from throwcollect.report.targets_section import show_targets
 from throwcollect.report.throughput import Throughput, measure_throughput
 from throwcollect.robots.description import robot_of
@@ -49,7 +49,7 @@ class Report:
     lead: str
     tiles: tuple[Tile, ...]
     outcomes: Outcomes
-    sections: tuple[Section, ...]
+    sections: tuple[ReportSection, ...]
     noun: str = "throw"
 
 
@@ -117,10 +117,10 @@ def _report_task(dataset: Dataset, outcomes: Outcomes) -> TaskReport:
     return TaskReport(f"simulated {dataset.config.task.subject} by {by}", tiles, results=(), episodes=())
 
 
-def _show_parameters(parameters: tuple[Parameter, ...], outcomes: Outcomes) -> Section:
+def _show_parameters(parameters: tuple[SweptKey, ...], outcomes: Outcomes) -> ReportSection:
     title, trials = "How the parameter space is covered", len(outcomes.codes)
     if not parameters:
-        return Section("parameters", "Parameters", title, "Nothing was swept.")
+        return ReportSection("parameters", "Parameters", title, "Nothing was swept.")
     shown = parameters[: figures.MOST_KEYS]
     notes = []
     if len(shown) < len(parameters):
@@ -144,12 +144,12 @@ def _show_parameters(parameters: tuple[Parameter, ...], outcomes: Outcomes) -> S
         number_columns=(1, 2),
     )
     text = f"{len(parameters)} key{'s' if len(parameters) > 1 else ''} varied from trial to trial."
-    return Section("parameters", "Parameters", title, text, ((panel,), table))
+    return ReportSection("parameters", "Parameters", title, text, ((panel,), table))
 
 
 def _show_outcomes(
-    outcomes: Outcomes, parameters: tuple[Parameter, ...], failures: tuple[Failure, ...], noun: str
-) -> Section:
+    outcomes: Outcomes, parameters: tuple[SweptKey, ...], failures: tuple[FailureGroup, ...], noun: str
+) -> ReportSection:
     title, trials = f"How {noun}s end, and where failures lie", len(outcomes.codes)
     # The page shows the same numbers in a bar at its head.
     bars = Panel("all", title, figures.draw_outcome_bars(outcomes), picture="outcomes", on_page=False)
@@ -169,10 +169,10 @@ def _show_outcomes(
                 for number, each in enumerate(parameters)
             )
         )
-    return Section("outcomes", "Outcomes", title, text, tuple(blocks))
+    return ReportSection("outcomes", "Outcomes", title, text, tuple(blocks))
 
 
-def _tabulate(failures: tuple[Failure, ...]) -> Table:
+def _tabulate(failures: tuple[FailureGroup, ...]) -> Table:
     rows = [
         (in_words(each.outcome), each.pattern, f"{each.count:,}", ", ".join(map(str, each.examples)))
         for each in failures[:_MOST_FAILURES]
@@ -183,7 +183,7 @@ def _tabulate(failures: tuple[Failure, ...]) -> Table:
     return Table(head=head, rows=tuple(rows), number_columns=(2,))
 
 
-def _show_limits(peaks: dict[str, tuple[JointPeaks, ...]], noun: str) -> Section:
+def _show_limits(peaks: dict[str, tuple[JointPeaks, ...]], noun: str) -> ReportSection:
     title = "How close the joints come to their limits"
     panels = tuple(
         Panel(
@@ -197,22 +197,22 @@ def _show_limits(peaks: dict[str, tuple[JointPeaks, ...]], noun: str) -> Section
         if joints
     )
     if not panels:
-        return Section("limits", "Limits", title, f"No {noun} was measured.")
+        return ReportSection("limits", "Limits", title, f"No {noun} was measured.")
     reached = (f"{sum(each.reached for each in joints):,} of {kind}" for kind, joints in peaks.items())
     text = (
         f"Of each {noun}, the joint that came closest; 1 is at the limit. Boxes span the quartiles, whiskers all "
         f"{noun}s. {noun.capitalize()}s that reached a limit: {', '.join(reached)}."
     )
-    return Section("limits", "Limits", title, text, (panels,))
+    return ReportSection("limits", "Limits", title, text, (panels,))
 
 
-def _show_throughput(throughput: Throughput | None, info: Info) -> Section:
+def _show_throughput(throughput: Throughput | None, info: Info) -> ReportSection:
     title = "How fast it was collected"
     if throughput is None:
         no_journal = Markup(
             "This dataset has no journal of its collection (<code>logs/journal.jsonl</code>) with {}s in it."
         ).format(info.noun)
-        return Section("throughput", "Throughput", title, no_journal)
+        return ReportSection("throughput", "Throughput", title, no_journal)
     wall_s = info.wall_s or float(throughput.edges_s[-1])
     mean = throughput.commits / wall_s
     text = (
@@ -222,10 +222,12 @@ def _show_throughput(throughput: Throughput | None, info: Info) -> Section:
     if resumed := len(throughput.resumed_s):
         text += f" It was resumed {f'{resumed} times' if resumed > 1 else 'once'} (dotted); the pauses are left out."
     panel = Panel("rate", f"{info.noun.capitalize()}s a second", figures.draw_throughput(throughput, info.noun))
-    return Section("throughput", "Throughput", title, text, ((panel,),))
+    return ReportSection("throughput", "Throughput", title, text, ((panel,),))
 
 
-def _show_provenance(facts: dict[str, str], config: str) -> Section:
+def _show_provenance(facts: dict[str, str], config: str) -> ReportSection:
     text = Markup("<code>throwcollect dataset verify</code> checks the recordings against the digest of the dataset.")
     table = Table(tuple((name, _CODE.format(value)) for name, value in facts.items()))
-    return Section("provenance", "Provenance", "Where it comes from", text, (table, Listing("config.yaml", config)))
+    return ReportSection(
+        "provenance", "Provenance", "Where it comes from", text, (table, Listing("config.yaml", config))
+    )

@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 from throwcollect.config.schema import Config, Range
 from throwcollect.config.shape import unit_of_key
 from throwcollect.report.outcomes import Outcomes
-from throwcollect.report.points import read_numbers
+from throwcollect.report.plotted_points import read_numbers
 
 _BINS = 12
 
 
 @dataclass(frozen=True)
-class Parameter:
+class SweptKey:
     """One swept key.
 
     Attributes:
@@ -52,7 +52,7 @@ class Parameter:
         return last, f"{above} [{self.unit or '-'}]".strip()
 
 
-def read_parameters(config: Config, throws: pa.Table, outcomes: Outcomes) -> tuple[Parameter, ...]:
+def read_parameters(config: Config, throws: pa.Table, outcomes: Outcomes) -> tuple[SweptKey, ...]:
     """Read all swept keys of a table of throws, in its order."""
     # Of all columns, those of swept keys alone have dots in their names.
     return tuple(
@@ -60,7 +60,7 @@ def read_parameters(config: Config, throws: pa.Table, outcomes: Outcomes) -> tup
     )
 
 
-def _read_parameter(config: Config, key: str, values: NDArray[np.float64], outcomes: Outcomes) -> Parameter:
+def _read_parameter(config: Config, key: str, values: NDArray[np.float64], outcomes: Outcomes) -> SweptKey:
     swept = config.sweep.parameters.get(key)
     logarithmic = isinstance(swept, Range) and swept.scale == "log"
     distinct = np.unique(values)
@@ -77,7 +77,7 @@ def _read_parameter(config: Config, key: str, values: NDArray[np.float64], outco
         bins = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, _BINS - 1)
     counts = np.zeros((len(edges) - 1, len(outcomes.names)), dtype=np.intp)
     np.add.at(counts, (bins, outcomes.codes), 1)
-    return Parameter(key, unit_of_key(key), logarithmic, values, edges, counts, steps)
+    return SweptKey(key, unit_of_key(key), logarithmic, values, edges, counts, steps)
 
 
 def _surround(steps: NDArray[np.float64]) -> NDArray[np.float64]:

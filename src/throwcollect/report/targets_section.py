@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 from throwcollect.dataset.misses import read_targets, summarise_misses
 from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.summary import MissSummary
-from throwcollect.report.contents import Panel, Section, Table
+from throwcollect.report.contents import Panel, ReportSection, Table
 from throwcollect.report.figures import BLUE
 from throwcollect.report.miss_map import choose_scale, draw_miss_map, title_misses
-from throwcollect.report.points import choose_points, read_numbers
+from throwcollect.report.plotted_points import choose_points, read_numbers
 from throwcollect.sweep.points import Targets
 from throwcollect.units import unit_of_name
 from throwcollect.wording import format_count
@@ -22,7 +22,7 @@ _LEAST_TOLD = 0.01
 """What is smaller has two significant digits instead of two decimals, which would be zeros."""
 
 
-def show_targets(dataset: Dataset) -> tuple[Section, ...]:
+def show_targets(dataset: Dataset) -> tuple[ReportSection, ...]:
     """Show the targets of trials; nothing if they have none."""
     targets = read_targets(dataset.throws)
     if targets is None:
@@ -44,7 +44,7 @@ def show_targets(dataset: Dataset) -> tuple[Section, ...]:
             if each.measured
         ),
     ]
-    return (Section("misses", "Targets", _TITLE, text, (tuple(panels), _tabulate(misses))),)
+    return (ReportSection("misses", "Targets", _TITLE, text, (tuple(panels), _tabulate(misses))),)
 
 
 def _show_map(dataset: Dataset, targets: Targets) -> Panel:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from throwcollect.dataset.journal import Entry
+from throwcollect.dataset.journal import JournalLine
 
 _BINS = 40
 
@@ -34,7 +34,7 @@ class Throughput:
     lost_s: tuple[float, ...]
 
 
-def measure_throughput(events: Iterable[Entry]) -> Throughput | None:
+def measure_throughput(events: Iterable[JournalLine]) -> Throughput | None:
     """Measure throughput from the entries of a journal, in order; None if no episode came in, or all at one instant."""
     times: dict[str, list[float]] = {kind: [] for kind in ("commit", "opened", "fail", "lost")}
     elapsed = 0.0

@@ -19,8 +19,8 @@ from typing import IO
 
 from throwcollect.errors import ConfigError, WorkerError
 from throwcollect.interruption import die_with_parent
-from throwcollect.ros.endpoint import split_address
 from throwcollect.ros.fast_dds import server_profile, write_temporarily
+from throwcollect.ros.router_endpoint import split_address
 from throwcollect.ros_installation import how_to_install
 
 _PROGRAM = "fast-discovery-server"

@@ -19,7 +19,7 @@ import tempfile
 from pathlib import Path
 
 from throwcollect.errors import ConfigError
-from throwcollect.ros.endpoint import split_address
+from throwcollect.ros.router_endpoint import split_address
 
 PROFILE_VARIABLE = "FASTRTPS_DEFAULT_PROFILES_FILE"
 """Environment variable that names the file with the profile of a process."""

@@ -16,24 +16,24 @@ if TYPE_CHECKING:
     from throwcollect.runs.preparation import prepare as prepare
     from throwcollect.runs.preparation import resume as resume
     from throwcollect.runs.prepared_run import PreparedRun as PreparedRun
-    from throwcollect.runs.record import Summary as Summary
     from throwcollect.runs.records import Run as Run
-    from throwcollect.runs.selection import find as find
+    from throwcollect.runs.run_record import Summary as Summary
+    from throwcollect.runs.run_selection import find as find
 else:
     _PLACES = {
-        "Look": "runs.following",
-        "Onlooker": "coordinator.onlooker",
-        "PreparedRun": "runs.prepared_run",
-        "Run": "runs.records",
-        "Summary": "runs.record",
-        "down": "runs.control",
-        "find": "runs.selection",
-        "follow": "runs.following",
-        "prepare": "runs.preparation",
-        "resume": "runs.preparation",
-        "scale": "runs.control",
-        "stop": "runs.control",
-        "wait": "runs.following",
+        "Look": "runs.following:Look",
+        "Onlooker": "coordinator.onlooker:Onlooker",
+        "PreparedRun": "runs.prepared_run:PreparedRun",
+        "Run": "runs.records:Run",
+        "Summary": "runs.run_record:Summary",
+        "down": "runs.control:down",
+        "find": "runs.run_selection:find",
+        "follow": "runs.following:follow",
+        "prepare": "runs.preparation:prepare",
+        "resume": "runs.preparation:resume",
+        "scale": "runs.control:scale",
+        "stop": "runs.control:stop",
+        "wait": "runs.following:wait",
     }
     __all__ = list(_PLACES)
 
@@ -42,7 +42,8 @@ else:
 
         if name not in _PLACES:
             raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-        return getattr(import_module(f"throwcollect.{_PLACES[name]}"), name)
+        module, name = _PLACES[name].split(":")
+        return getattr(import_module(f"throwcollect.{module}"), name)
 
     def __dir__() -> list[str]:
         return sorted({*globals(), *__all__})

@@ -27,7 +27,6 @@ from throwcollect.dataset.directory import config_path
 from throwcollect.errors import ConfigError, Interrupted, Problem, ThrowcollectError, WorkerError
 from throwcollect.files import open_log, write_file
 from throwcollect.interruption import stop_signals
-from throwcollect.runs.choice import choose
 from throwcollect.runs.component_container import (
     CONTAINER_ORDERS,
     DESCRIPTION,
@@ -35,10 +34,11 @@ from throwcollect.runs.component_container import (
     check_order,
     launch_container,
 )
-from throwcollect.runs.preparation import MANY_TRIALS, Request, prepare_run, resume
+from throwcollect.runs.preparation import MANY_TRIALS, RunRequest, prepare_run, resume
 from throwcollect.runs.prepared_run import PreparedRun
-from throwcollect.runs.record import Failure, Kind, Origin, Planning, Record
 from throwcollect.runs.records import OpenRun, Records, Run
+from throwcollect.runs.run_record import Kind, Origin, Planning, RunFailure, RunRecord
+from throwcollect.runs.runtime_choice import choose
 from throwcollect.runtimes.node_logs import NodeLogs
 from throwcollect.runtimes.nodes import LAUNCHER
 from throwcollect.runtimes.registry import get_runtime
@@ -123,8 +123,8 @@ def begin_container(order: ContainerOrder, *, run: str, origin: Origin, urdf: Pa
     return _begin(opened, replace(record, runtime="docker"), CONTAINER_ORDERS.dump_json(order), lay_out)
 
 
-def _make_record(opened: OpenRun, name: str, directory: Path, kind: Kind, origin: Origin | None) -> Record:
-    return Record(
+def _make_record(opened: OpenRun, name: str, directory: Path, kind: Kind, origin: Origin | None) -> RunRecord:
+    return RunRecord(
         run=opened.run,
         name=name,
         runtime="",
@@ -142,7 +142,7 @@ def _make_record(opened: OpenRun, name: str, directory: Path, kind: Kind, origin
     )
 
 
-def _begin(opened: OpenRun, record: Record, order: bytes, lay_out: Callable[[], None] = lambda: None) -> Run:
+def _begin(opened: OpenRun, record: RunRecord, order: bytes, lay_out: Callable[[], None] = lambda: None) -> Run:
     """Start the process of a run, write the record with its id, and send it the order; `lay_out` makes further files.
 
     Raises:
@@ -209,7 +209,7 @@ def carry_out(run: str, lock: int, order: bytes, *, onlooker: Onlooker, interrup
             planner.end_if_asked()
         except ThrowcollectError as error:
             end = datetime.now(timezone.utc)
-            opened.update(ended=end, exit_code=error.exit_code, failure=Failure.of(error), planning=None)
+            opened.update(ended=end, exit_code=error.exit_code, failure=RunFailure.of(error), planning=None)
             raise
         if prepared.record.run != opened.run:
             # `resume` has taken over a run whose containers outlived their launcher; that run keeps its own id.
@@ -291,7 +291,7 @@ def _prepare_collection(records: Records, run: OpenRun, order: Order, onlooker: 
             run=run,
         )
     with load_locating_errors(order.config, order.overrides) as config:
-        request = Request(
+        request = RunRequest(
             config,
             order.config.parent,
             order.output,

@@ -15,7 +15,7 @@ from throwcollect.coordinator.onlooker import Onlooker
 from throwcollect.errors import ConfigError, ConflictError, Interrupted
 from throwcollect.extras import explain_missing
 from throwcollect.runs.records import OpenRun, Records, Run
-from throwcollect.runs.selection import require_living
+from throwcollect.runs.run_selection import require_living
 from throwcollect.runtimes.runtime import Host, Place
 
 if TYPE_CHECKING:
@@ -52,7 +52,7 @@ def check_order(order: ContainerOrder) -> None:
     """
     with explain_missing():
         from throwcollect.runtimes.docker.checks import check_container
-        from throwcollect.runtimes.docker.engine import connect
+        from throwcollect.runtimes.docker.docker_engine import connect
     if order.joins is not None:
         _find_way(Records().get(order.joins), order.spec)
     with closing(connect(timeout_s=_ANSWER_S)) as client:

@@ -10,11 +10,11 @@ from contextlib import ExitStack, contextmanager, suppress
 from typing import TYPE_CHECKING
 
 from throwcollect.errors import ConfigError, ThrowcollectError, WorkerError
-from throwcollect.ros.endpoint import answers
-from throwcollect.ros.names import make_own_name
-from throwcollect.runs.record import Record
+from throwcollect.ros.graph_names import make_own_name
+from throwcollect.ros.router_endpoint import answers
 from throwcollect.runs.records import Records, Run
-from throwcollect.runs.selection import find_held_runs, find_run_to_change, id_of, require_living
+from throwcollect.runs.run_record import RunRecord
+from throwcollect.runs.run_selection import find_held_runs, find_run_to_change, id_of, require_living
 from throwcollect.runtimes.nodes import LAUNCHER
 from throwcollect.runtimes.registry import get_runtime
 from throwcollect.wording import command
@@ -76,7 +76,7 @@ def down(named: str | Run | None, *, volumes: bool = False) -> tuple[str, list[s
         run = named.id
     else:
         run = named if named in held else id_of(records, named)
-    record: Record | None = None
+    record: RunRecord | None = None
     # A run whose record is damaged can be removed, too; only its launcher's process id is not known then.
     with suppress(ConfigError):
         record = records.get(run).record
@@ -171,7 +171,7 @@ def _silent(run: Run, node: str) -> WorkerError:
     )
 
 
-def _end_launcher(records: Records, record: Record) -> None:
+def _end_launcher(records: Records, record: RunRecord) -> None:
     """End a launcher, and with it its processes: ask it to drain, then to end at once, then kill it."""
     for number, patience_s in ((signal.SIGTERM, _GRACE_S), (signal.SIGTERM, _FORCE_S), (signal.SIGKILL, _FORCE_S)):
         _signal(records, record, number)
@@ -180,7 +180,7 @@ def _end_launcher(records: Records, record: Record) -> None:
             time.sleep(_POLL_S)
 
 
-def _signal(records: Records, record: Record, number: signal.Signals) -> None:
+def _signal(records: Records, record: RunRecord, number: signal.Signals) -> None:
     """Send a signal to a launcher, but never to another process that has got its process id later."""
     with suppress(ProcessLookupError):
         # The order counts: if the run lives after the descriptor was opened, the descriptor names its launcher.

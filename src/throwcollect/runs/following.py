@@ -10,9 +10,9 @@ from pathlib import Path
 from throwcollect.coordinator.progress import Progress
 from throwcollect.errors import ConfigError
 from throwcollect.runs.events import EVENTS, Event, parse
-from throwcollect.runs.record import Summary
 from throwcollect.runs.records import Run
-from throwcollect.runs.selection import describe_death
+from throwcollect.runs.run_record import Summary
+from throwcollect.runs.run_selection import describe_death
 from throwcollect.runtimes.node_logs import NodeLogs, Tail
 
 _POLL_S = 0.05

@@ -14,8 +14,8 @@ from throwcollect.coordinator.progress import Progress
 from throwcollect.errors import WorkerError
 from throwcollect.files import write_file
 from throwcollect.ros.connection import Connection
-from throwcollect.ros.endpoint import answers
 from throwcollect.ros.middleware import Middleware
+from throwcollect.ros.router_endpoint import answers
 from throwcollect.run_key import RunKey
 from throwcollect.runs.control import join_for_a_moment
 from throwcollect.runs.own_directory import make_own_directory

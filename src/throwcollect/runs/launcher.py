@@ -19,8 +19,8 @@ from throwcollect.dataset.lock import hold_lock
 from throwcollect.dataset.summary import explain_loss
 from throwcollect.errors import ConfigError, Interrupted, LossError, ThrowcollectError, WorkerError
 from throwcollect.runs.events import EventLog
-from throwcollect.runs.record import Failure, Summary
 from throwcollect.runs.records import OpenRun, Records, Run
+from throwcollect.runs.run_record import RunFailure, Summary
 from throwcollect.runtimes.node_logs import NodeLogs
 from throwcollect.runtimes.nodes import LAUNCHER
 from throwcollect.runtimes.registry import get_runtime
@@ -83,7 +83,7 @@ def launch_host(
     place = run.place
     # Errors that are no `ThrowcollectError` leave these values, so that the record tells an end in any case.
     code, summary = 1, None
-    failure: Failure | None = Failure("internal error")
+    failure: RunFailure | None = RunFailure("internal error")
     host: Host | None = None
     try:
         host = make_host(place)
@@ -93,10 +93,10 @@ def launch_host(
             info = host.collect(session)
             summary = None if info is None else Summary(**vars(info), open=is_open)
         lost = None if summary is None else explain_loss(summary.outcomes, hint=place.way_on)
-        code, failure = (0, None) if lost is None else (lost.exit_code, Failure.of(lost))
+        code, failure = (0, None) if lost is None else (lost.exit_code, RunFailure.of(lost))
         return summary
     except ThrowcollectError as error:
-        code, failure = error.exit_code, Failure.of(error)
+        code, failure = error.exit_code, RunFailure.of(error)
         raise
     finally:
         if end is not None:
@@ -150,7 +150,7 @@ class _Session:
             lambda: self._run.update(nodes=tuple(states), endpoint=endpoint, simulations=simulations, progress=progress)
         )
 
-    def end(self, code: int, failure: Failure | None, summary: Summary | None, *, left: bool) -> None:
+    def end(self, code: int, failure: RunFailure | None, summary: Summary | None, *, left: bool) -> None:
         """Write the end of the run; `left` tells whether its containers may still exist."""
         event: RunEvent = "failed"
         if code in (0, LossError.exit_code):

@@ -19,11 +19,11 @@ from throwcollect.dataset.directory import CONFIG, PLAN, TRIALS, config_path
 from throwcollect.dataset.lock import hold_lock
 from throwcollect.errors import ConfigError, Problem
 from throwcollect.ros.middleware import Middleware
-from throwcollect.runs.choice import Choice, begin, choose
 from throwcollect.runs.prepared_run import PreparedRun
-from throwcollect.runs.record import Origin, Record
 from throwcollect.runs.records import OpenRun, Records
-from throwcollect.runs.selection import busy_error, find_left_in
+from throwcollect.runs.run_record import Origin, RunRecord
+from throwcollect.runs.run_selection import busy_error, find_left_in
+from throwcollect.runs.runtime_choice import RuntimeChoice, begin, choose
 from throwcollect.runtimes.ports import reserve_port
 from throwcollect.wording import command, format_count
 
@@ -36,7 +36,7 @@ MANY_TRIALS = 1000
 
 
 @dataclass(frozen=True)
-class Request:
+class RunRequest:
     """The run that a user or a client asks for.
 
     Attributes:
@@ -59,8 +59,8 @@ class Request:
     processes: int = 1
     ahead: bool = False
     origin: Origin | None = None
-    begun: Choice | None = None
-    choice: Choice | None = None
+    begun: RuntimeChoice | None = None
+    choice: RuntimeChoice | None = None
 
 
 def prepare(
@@ -96,7 +96,7 @@ def prepare(
         records = Records()
         if (run := _take_over(records, directory, read, onlooker)) is not None:
             return run
-        request = Request(read, Path(config).parent, directory, started, processes=processes, ahead=ahead)
+        request = RunRequest(read, Path(config).parent, directory, started, processes=processes, ahead=ahead)
         return prepare_run(records, request, onlooker)
 
 
@@ -151,7 +151,7 @@ def resume(
         own = None if run is None else run.run
         if (left := _take_over(records, directory, read, onlooker, own=own)) is not None:
             return left
-        request = Request(
+        request = RunRequest(
             read,
             directory if config is None else Path(config).parent,
             directory,
@@ -184,7 +184,7 @@ def _read_stored(
         raise ConfigError(error.problems, hint=hint) from error
 
 
-def _plan_again(request: Request, onlooker: Onlooker, *, check: bool) -> Request | None:
+def _plan_again(request: RunRequest, onlooker: Onlooker, *, check: bool) -> RunRequest | None:
     """Make the plan to go on with, and choose the runtime; None if every trial has ended.
 
     Raises:
@@ -214,7 +214,7 @@ def _plan_again(request: Request, onlooker: Onlooker, *, check: bool) -> Request
     return replace(request, plan=plan)
 
 
-def _choose_runtime(request: Request, onlooker: Onlooker) -> Request:
+def _choose_runtime(request: RunRequest, onlooker: Onlooker) -> RunRequest:
     """Choose the runtime of a run that goes on with a dataset.
 
     Raises:
@@ -266,7 +266,9 @@ def _take_over(
     return PreparedRun(records, run, kept, directory, onlooker=onlooker)
 
 
-def prepare_run(records: Records, request: Request, onlooker: Onlooker, *, run: OpenRun | None = None) -> PreparedRun:
+def prepare_run(
+    records: Records, request: RunRequest, onlooker: Onlooker, *, run: OpenRun | None = None
+) -> PreparedRun:
     """Prepare a run, a new one if None is given; if that fails, all files that were made here are removed.
 
     Raises:
@@ -318,7 +320,7 @@ def prepare_run(records: Records, request: Request, onlooker: Onlooker, *, run: 
         )
 
 
-def _make_plan(request: Request, directory: Path, onlooker: Onlooker) -> Plan:
+def _make_plan(request: RunRequest, directory: Path, onlooker: Onlooker) -> Plan:
     from throwcollect.coordinator.prepare import prepare as prepare_plan
 
     config = request.config
@@ -341,8 +343,8 @@ def _in_words(plan: Plan) -> str:
     return f"{format_count(len(plan.trials), 'trial')}{note}{more_trials(plan)}"
 
 
-def _record(run: OpenRun, request: Request, choice: Choice, directory: Path, volume: str | None) -> Record:
-    return Record(
+def _record(run: OpenRun, request: RunRequest, choice: RuntimeChoice, directory: Path, volume: str | None) -> RunRecord:
+    return RunRecord(
         run=run.run,
         name=request.config.name,
         runtime=choice.name,

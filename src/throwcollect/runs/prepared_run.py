@@ -11,9 +11,9 @@ from typing import cast
 from throwcollect.config.schema import Config
 from throwcollect.coordinator.onlooker import Onlooker
 from throwcollect.errors import ConfigError, ConflictError
-from throwcollect.ros.endpoint import split_address
-from throwcollect.runs.record import Record, Summary
+from throwcollect.ros.router_endpoint import split_address
 from throwcollect.runs.records import OpenRun, Records, Run
+from throwcollect.runs.run_record import RunRecord, Summary
 from throwcollect.runs.token import JoinToken
 from throwcollect.runtimes.ports import format_endpoint, reach_from_elsewhere
 from throwcollect.runtimes.runtime import Place, Runtime
@@ -68,7 +68,7 @@ class PreparedRun:
             self._run.close()
 
     @property
-    def record(self) -> Record:
+    def record(self) -> RunRecord:
         """The record of the run."""
         return self._run.record
 

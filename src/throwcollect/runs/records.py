@@ -34,7 +34,7 @@ from throwcollect.files import beside, open_log, write_all
 from throwcollect.own_process import make_command
 from throwcollect.ros.connection import Connection
 from throwcollect.run_key import RunKey
-from throwcollect.runs.record import VERSION, Record
+from throwcollect.runs.run_record import VERSION, RunRecord
 from throwcollect.runs.state_directory import is_locked, state_directory, unusable
 from throwcollect.runtimes.node_logs import NodeLogs
 from throwcollect.runtimes.nodes import LAUNCHER
@@ -59,7 +59,7 @@ class Run:
         key: The key that the router asks for.
     """
 
-    record: Record
+    record: RunRecord
     lives: bool
     key: RunKey
     records: Records = field(repr=False, compare=False)
@@ -103,7 +103,7 @@ class Run:
         return "running" if self.lives else "died"
 
 
-_ADAPTER = TypeAdapter(Record)
+_ADAPTER = TypeAdapter(RunRecord)
 
 
 class OpenRun:
@@ -120,7 +120,7 @@ class OpenRun:
         self.key = _key(runs, run)
         self.lock = lock
         self._runs = runs
-        self._record: Record | None = None
+        self._record: RunRecord | None = None
 
     @property
     def place(self) -> Place:
@@ -128,7 +128,7 @@ class OpenRun:
         return self.record.place(self.key)
 
     @property
-    def record(self) -> Record:
+    def record(self) -> RunRecord:
         """The record of the run.
 
         Raises:
@@ -138,7 +138,7 @@ class OpenRun:
             self._record = _read(self._runs / f"{self.run}.json")
         return self._record
 
-    def write(self, record: Record) -> None:
+    def write(self, record: RunRecord) -> None:
         """Write the record.
 
         Raises:
@@ -346,7 +346,7 @@ class Records:
                     opened.forget()
 
 
-def _may_outlive(record: Record) -> bool:
+def _may_outlive(record: RunRecord) -> bool:
     """Whether nodes of a run may outlive its launcher; assumed of a runtime that is not installed here."""
     try:
         return bool(record.runtime) and get_runtime(record.runtime).outlives_launcher
@@ -366,7 +366,7 @@ def _read_bytes(path: Path) -> bytes:
         return b""
 
 
-def _read(path: Path) -> Record:
+def _read(path: Path) -> RunRecord:
     hint = f"{command('down', '--run', path.stem)} ends what is left of it, and forgets it"
     try:
         content = json.loads(path.read_bytes())

@@ -27,7 +27,7 @@ from throwcollect.dataset.slice_directory import (
 )
 from throwcollect.dataset.summary import explain_loss
 from throwcollect.errors import ConfigError, Interrupted, Problem
-from throwcollect.runs.preparation import Request, prepare_run
+from throwcollect.runs.preparation import RunRequest, prepare_run
 from throwcollect.runs.records import Records
 from throwcollect.sweep.plan import Plan
 from throwcollect.sweep.slice import Slice
@@ -80,7 +80,7 @@ def collect_slice(
     if scratch is None:
         remove_stopped(earlier)
     onlooker.say(f"slice {slice}: trials {plan.trials.first} to {plan.trials.numbers[-1]}")
-    request = Request(config, directory, attempt, started, plan, ahead=True)
+    request = RunRequest(config, directory, attempt, started, plan, ahead=True)
     with ExitStack() as unpublished:
         if scratch is not None:
             unpublished.callback(_keep_recordings, attempt, earlier, directory, slice)

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from throwcollect.config.schema import Config
     from throwcollect.coordinator.collection import TrialCollection
     from throwcollect.dataset.summary import Info
-    from throwcollect.replay.throw import Replayer
+    from throwcollect.replay.replayer import Replayer
 
 _TELL_EVERY_S = 0.2
 _IDLE_S = 0.05
@@ -67,7 +67,7 @@ class InProcess:
         # These import messages of ROS, so they have to wait until the backend is chosen.
         from throwcollect.coordinator.collection import TrialCollection
         from throwcollect.dataset.inspect import info
-        from throwcollect.replay.throw import Replayer
+        from throwcollect.replay.replayer import Replayer
 
         directory = self._place.directory
         session.event("started", simulations=1)

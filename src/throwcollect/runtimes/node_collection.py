@@ -26,8 +26,8 @@ from throwcollect.runtimes.nodes import (
     ROUTER,
     NodeExit,
     NodeHost,
+    NodeRole,
     NodeSpec,
-    Role,
     simulation_name,
     simulation_nodes,
 )
@@ -52,9 +52,9 @@ def roster(host: NodeHost, simulations: int) -> list[NodeSpec]:
     """List the nodes of a run: a router, simulations, and a coordinator if the run collects a dataset."""
     rest_s = SERVER_REST_S if host.place.middleware.is_fast_dds else 0.0
     return [
-        NodeSpec(ROUTER, ("router", "--listen", host.listen), Role.VITAL, rest_s=rest_s),
+        NodeSpec(ROUTER, ("router", "--listen", host.listen), NodeRole.VITAL, rest_s=rest_s),
         *simulation_nodes([*map(simulation_name, range(simulations))], host.data),
-        *([NodeSpec(COORDINATOR, ("coordinator", host.data), Role.MAIN)] if host.place.collects else []),
+        *([NodeSpec(COORDINATOR, ("coordinator", host.data), NodeRole.MAIN)] if host.place.collects else []),
     ]
 
 

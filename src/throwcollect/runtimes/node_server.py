@@ -42,8 +42,8 @@ _LOOK_S = 0.5
 _LIBRARIES = (
     "throwcollect.cli.main",
     "throwcollect.ros.router",
-    "throwcollect.sim.main",
-    "throwcollect.coordinator.main",
+    "throwcollect.sim.simulation_process",
+    "throwcollect.coordinator.coordinator_process",
     "pinocchio",
     "pyarrow.parquet",
 )
@@ -365,7 +365,7 @@ def _prepare_for(values: Mapping[str, Any]) -> None:
     from throwcollect.episode.channels import Channels
     from throwcollect.robots.description import full_description
     from throwcollect.robots.tool_motion import ToolMotion
-    from throwcollect.sim.main import make_ahead
+    from throwcollect.sim.simulation_process import make_ahead
     from throwcollect.tasks.task import task_of
 
     with contextlib.suppress(ImportError, ValueError, ThrowcollectError):

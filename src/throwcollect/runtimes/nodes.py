@@ -39,7 +39,7 @@ def simulation_name_of(host: str) -> str:
     return "sim_" + re.sub(r"[^a-z0-9_]", "_", host.lower())
 
 
-class Role(Enum):
+class NodeRole(Enum):
     """The consequence that the end of a node has for the run."""
 
     VITAL = "the run ends if the node cannot be kept alive"
@@ -59,7 +59,7 @@ class NodeSpec:
 
     name: str
     arguments: tuple[str, ...]
-    role: Role
+    role: NodeRole
     core: int | None = None
     rest_s: float = 0.0
 
@@ -73,7 +73,7 @@ def simulation_nodes(names: Sequence[str], data: str) -> list[NodeSpec]:
         NodeSpec(
             name,
             ("sim", f"{data}/config.yaml", "--name", name),
-            Role.EXPENDABLE,
+            NodeRole.EXPENDABLE,
             core=cores[index % len(cores)] if bound else None,
         )
         for index, name in enumerate(names)

@@ -7,7 +7,7 @@ from ipaddress import ip_address
 
 from throwcollect.config.run import RunConfig
 from throwcollect.errors import ConfigError, Problem
-from throwcollect.ros.endpoint import split_address
+from throwcollect.ros.router_endpoint import split_address
 
 LOOPBACK = "127.0.0.1"
 _ELSEWHERE = ("192.0.2.1", 9)

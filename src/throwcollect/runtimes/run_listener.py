@@ -9,12 +9,12 @@ from types import TracebackType
 
 from throwcollect import ros
 from throwcollect.coordinator.progress import Progress
-from throwcollect.coordinator.topics import PROGRESS_QOS, PROGRESS_TOPIC
+from throwcollect.coordinator.shown_topics import PROGRESS_QOS, PROGRESS_TOPIC
 from throwcollect.errors import ConfigError, ThrowcollectError
 from throwcollect.ros.connection import Connection
-from throwcollect.ros.endpoint import answers
+from throwcollect.ros.graph_names import make_own_name
 from throwcollect.ros.msg import String
-from throwcollect.ros.names import make_own_name
+from throwcollect.ros.router_endpoint import answers
 
 _SILENT_S = 8.0
 """Reports come several times a second; after this silence the connection may be broken, so it is made anew."""

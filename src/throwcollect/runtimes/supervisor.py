@@ -10,7 +10,7 @@ from types import TracebackType
 
 from throwcollect.config.run import RunConfig
 from throwcollect.errors import Interrupted, WorkerError
-from throwcollect.runtimes.nodes import NodeExit, NodeHost, NodeSpec, Role
+from throwcollect.runtimes.nodes import NodeExit, NodeHost, NodeRole, NodeSpec
 from throwcollect.runtimes.runtime import NodeState, Status
 from throwcollect.wording import format_count
 
@@ -105,7 +105,7 @@ class Supervisor:
                 # An earlier launcher, from which the node was taken over, had already removed it from the roster.
                 continue
             self._last_end[node.name] = node.reason
-            is_main = self._roster[node.name].role is Role.MAIN
+            is_main = self._roster[node.name].role is NodeRole.MAIN
             if is_main and not (_killed(node) and self._schedule_restart(node)):
                 end = node
             elif is_main:
@@ -138,7 +138,7 @@ class Supervisor:
         Returns:
             How the main node ended; None if it had to be ended by force, or was about to be started again.
         """
-        (main,) = self._list_names(Role.MAIN)
+        (main,) = self._list_names(NodeRole.MAIN)
         if main in self._due:
             return None
         self.host.signal(main, signal.SIGINT)
@@ -158,9 +158,9 @@ class Supervisor:
 
     @property
     def _expendables(self) -> list[str]:
-        return self._list_names(Role.EXPENDABLE)
+        return self._list_names(NodeRole.EXPENDABLE)
 
-    def _list_names(self, role: Role) -> list[str]:
+    def _list_names(self, role: NodeRole) -> list[str]:
         return [node.name for node in self._roster.values() if node.role is role]
 
     def _start(self, name: str) -> None:
@@ -175,7 +175,7 @@ class Supervisor:
             status = "restarting"
         elif name in self._frozen_since:
             status = "frozen"
-        elif handle is None or (self._roster[name].role is Role.EXPENDABLE and name not in self._ready):
+        elif handle is None or (self._roster[name].role is NodeRole.EXPENDABLE and name not in self._ready):
             status = "starting"
         return NodeState(name, status, self._restarts.get(name, 0), handle, self._last_end.get(name))
 
@@ -196,7 +196,7 @@ class Supervisor:
     def _schedule_restart(self, node: NodeExit) -> bool:
         """Plan the next start of a node that ended, or give the node up; whether it will be started again."""
         count = self._restarts.get(node.name, 0)
-        worked = self._roster[node.name].role is not Role.EXPENDABLE or node.name in self._ready
+        worked = self._roster[node.name].role is not NodeRole.EXPENDABLE or node.name in self._ready
         if count >= (self._run.restarts if worked else min(_RESTARTS_BEFORE_READY, self._run.restarts)):
             self._given_up[node.name] = node
             return False
@@ -213,7 +213,9 @@ class Supervisor:
         """
         hint = "throwcollect logs shows what the nodes said"
         names = self._expendables
-        vital = next((self._given_up[name] for name in self._list_names(Role.VITAL) if name in self._given_up), None)
+        vital = next(
+            (self._given_up[name] for name in self._list_names(NodeRole.VITAL) if name in self._given_up), None
+        )
         lost = [name for name in names if name in self._given_up]
         if vital is not None or (lost and len(lost) == len(names)):
             last = vital or self._given_up[lost[-1]]

@@ -20,10 +20,10 @@ from throwcollect.serve.instances import Instances
 from throwcollect.serve.live import keep_letting_go
 from throwcollect.serve.model_routes import make_model_routes
 from throwcollect.serve.models import Models
-from throwcollect.serve.problems import add_handlers, describe_problems, problem
+from throwcollect.serve.problem_responses import add_handlers, describe_problems, problem
 from throwcollect.serve.rosbridge_routes import make_rosbridge_routes
 from throwcollect.serve.sockets import keep_telling
-from throwcollect.serve.state import Lookout, State
+from throwcollect.serve.state import Lookout, WholeState
 from throwcollect.serve.view_routes import make_description_routes, make_view_routes
 from throwcollect.serve.watching import StateWatch
 from throwcollect.version import __version__
@@ -40,7 +40,7 @@ class Code(BaseModel):
     code: str
 
 
-class Token(BaseModel):
+class TokenAnswer(BaseModel):
     """A token."""
 
     token: str
@@ -94,13 +94,13 @@ def _public(keys: Keys) -> APIRouter:
         """Whether it serves; for anybody."""
         return {"status": "ok", "version": __version__}
 
-    @router.post("/exchange", response_model=Token, responses=describe_problems(422))
+    @router.post("/exchange", response_model=TokenAnswer, responses=describe_problems(422))
     def exchange(code: Code) -> Any:
         """The token for a code that nobody has exchanged yet; for anybody who has one."""
         token = keys.exchange(code.code)
         if token is None:
             return problem(403, "this code has been exchanged already, or is too old", hint="throwcollect view")
-        return Token(token=token)
+        return TokenAnswer(token=token)
 
     return router
 
@@ -114,7 +114,7 @@ def _general(watch: StateWatch, keys: Keys) -> APIRouter:
         return Code(code=keys.new_code())
 
     @router.get("/state")
-    async def state() -> State:
+    async def state() -> WholeState:
         """The state of everything."""
         return await watch.current()
 

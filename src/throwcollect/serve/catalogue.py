@@ -26,10 +26,10 @@ from throwcollect.config.kinds import ContradictionError
 from throwcollect.config.loader import load
 from throwcollect.config.problems import findings
 from throwcollect.config.section import Section
-from throwcollect.config.shape import Shape
+from throwcollect.config.shape import ValueShape
 from throwcollect.errors import ConfigError, NotFoundError, Problem
 from throwcollect.robots.appearance import read_urdf
-from throwcollect.runs.record import Kind
+from throwcollect.runs.run_record import Kind
 
 LONGEST_NAME = 63
 NAME = rf"[a-z0-9][a-z0-9_-]{{0,{LONGEST_NAME - 1}}}"
@@ -206,5 +206,5 @@ def _read_component(name: str, section: ComponentSection, document: Document, di
 def _find_problems(error: ValidationError, document: Document) -> list[Problem]:
     """Errors of a catalogue, with their lines."""
     components = {"type": "object", "additionalProperties": ComponentSection.model_json_schema()}
-    shape = Shape({"type": "object", "properties": {"components": components}})
+    shape = ValueShape({"type": "object", "properties": {"components": components}})
     return [document.problem(each.location, each.sentence) for each in findings(error, document.values, shape=shape)]

@@ -43,7 +43,7 @@ class DatasetFile(BaseModel):
     sha256: str
 
 
-class Landings(BaseModel):
+class LandingPoints(BaseModel):
     """Where throws came down.
 
     Attributes:
@@ -111,7 +111,7 @@ def make_dataset_routes(instances: Instances) -> APIRouter:
         return FileResponse(page, filename=page.name, background=BackgroundTask(scratch.cleanup))
 
     @router.get("/landings")
-    def landings(instance: str, first: Annotated[int, Query(ge=0, le=_MOST_FIRST)] = 0) -> Landings:
+    def landings(instance: str, first: Annotated[int, Query(ge=0, le=_MOST_FIRST)] = 0) -> LandingPoints:
         """Where throws came down, of a finished dataset or of one that grows; none for other tasks."""
         directory = _get_collection(instances, instance).place.directory
         if _is_finished(directory):
@@ -169,7 +169,7 @@ def _list_names(directory: Path) -> list[str]:
     ]
 
 
-def _read_landings(directory: Path) -> Landings:
+def _read_landings(directory: Path) -> LandingPoints:
     """Read the landings of a finished dataset."""
     table = read_parquet(directory / THROWS)
     recorded = table.filter(table["digest"].is_valid())
@@ -182,13 +182,13 @@ def _read_landings(directory: Path) -> Landings:
         # The step is rounded up, so that there are never more landings than allowed.
         some = landed.take([*range(0, total, max(1, -(-total // _MOST_LANDINGS)))])
         rows = list(zip(*(column.to_pylist() for column in some.columns), strict=True))
-    return Landings(landings=rows, total=total, outcomes=outcomes, following=0, is_finished=True, has_more=False)
+    return LandingPoints(landings=rows, total=total, outcomes=outcomes, following=0, is_finished=True, has_more=False)
 
 
-def _read_landings_so_far(directory: Path, first: int) -> Landings:
+def _read_landings_so_far(directory: Path, first: int) -> LandingPoints:
     """Read the landings of a dataset that grows, from a byte of its journal on."""
     rows, following, has_more = read_commits(directory / JOURNAL, _LANDING, first=first, most_bytes=_JOURNAL_BYTES)
-    return Landings(
+    return LandingPoints(
         landings=rows, total=len(rows), outcomes={}, following=following, is_finished=False, has_more=has_more
     )
 

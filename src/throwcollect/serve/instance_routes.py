@@ -16,16 +16,16 @@ from pydantic import BaseModel, ConfigDict, Field, JsonValue, field_validator
 
 from throwcollect.files import open_log
 from throwcollect.runs.events import EVENTS, parse
-from throwcollect.runs.record import Origin
+from throwcollect.runs.run_record import Origin
 from throwcollect.runtimes.node_logs import NodeLogs
 from throwcollect.serve.catalogue import LONGEST_NAME
 from throwcollect.serve.instances import Instances
-from throwcollect.serve.problems import describe_bytes, problem
+from throwcollect.serve.problem_responses import describe_bytes, problem
 from throwcollect.serve.state import ComponentState, InstanceState, Lookout, describe
 from throwcollect.serve.watching import StateWatch
 
 
-class Wish(BaseModel):
+class InstanceRequest(BaseModel):
     """What a client asks for: an instance of a component."""
 
     model_config = ConfigDict(extra="forbid")
@@ -96,7 +96,7 @@ def make_instance_routes(instances: Instances, lookout: Lookout) -> APIRouter:
     @router.put(
         "/{instance}", status_code=202, responses={200: {"model": InstanceState, "description": "It was begun before"}}
     )
-    def put(instance: str, wish: Wish, response: Response) -> InstanceState:
+    def put(instance: str, wish: InstanceRequest, response: Response) -> InstanceState:
         """Begin an instance of a component; the same request again changes nothing."""
         run, new = instances.put(instance, wish.origin)
         if not new:
@@ -104,7 +104,7 @@ def make_instance_routes(instances: Instances, lookout: Lookout) -> APIRouter:
         return describe(run)
 
     @router.post("", status_code=202)
-    def post(wish: Wish, response: Response) -> InstanceState:
+    def post(wish: InstanceRequest, response: Response) -> InstanceState:
         """Begin an instance of a component, with an id that is chosen here."""
         run, _ = instances.put(make_id(wish.component), wish.origin)
         response.headers["Location"] = f"/api/v1/instances/{run.id}"

@@ -23,9 +23,9 @@ from throwcollect.robots.appearance import check_appearance
 from throwcollect.runs import control
 from throwcollect.runs.background import begin_container, begin_run
 from throwcollect.runs.component_container import ContainerOrder
-from throwcollect.runs.record import Origin
 from throwcollect.runs.records import Records, Run
-from throwcollect.runs.selection import require_living
+from throwcollect.runs.run_record import Origin
+from throwcollect.runs.run_selection import require_living
 from throwcollect.runs.state_directory import state_directory
 from throwcollect.serve.catalogue import NAME, Catalogue, Component
 from throwcollect.serve.live import name_node

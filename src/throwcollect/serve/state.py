@@ -17,8 +17,8 @@ from throwcollect.config.sweep import LANDING_HEIGHT, TargetConfig
 from throwcollect.coordinator.progress import Progress
 from throwcollect.dataset.summary import Info
 from throwcollect.errors import ConfigError
-from throwcollect.runs.record import Kind, Planning
 from throwcollect.runs.records import Records, Run
+from throwcollect.runs.run_record import Kind, Planning
 from throwcollect.runtimes.runtime import NodeState
 from throwcollect.serve.catalogue import Catalogue, Component
 from throwcollect.serve.resumption import can_be_resumed
@@ -100,7 +100,7 @@ class InstanceState:
 
 
 @dataclass(frozen=True)
-class State:
+class WholeState:
     """The state of everything.
 
     Attributes:
@@ -116,7 +116,7 @@ class State:
     version: Literal[1] = 1
 
 
-STATES: TypeAdapter[State] = TypeAdapter(State)
+STATES: TypeAdapter[WholeState] = TypeAdapter(WholeState)
 
 
 class Lookout:
@@ -126,7 +126,7 @@ class Lookout:
         self._catalogue = catalogue
         self._ended: dict[tuple[str, int | None], tuple[Run, InstanceState]] = {}
 
-    def look(self) -> State:
+    def look(self) -> WholeState:
         """Read the state: all runs that live, and the latest of those that are over."""
         instances = self.list_instances()
         living = [each for each in instances if each.status in _LIVING]
@@ -142,7 +142,7 @@ class Lookout:
             )
             for each in self._catalogue.components.values()
         ]
-        return State(components, [*living, *over[:_MOST_OVER]])
+        return WholeState(components, [*living, *over[:_MOST_OVER]])
 
     def list_instances(self) -> list[InstanceState]:
         """All runs that this machine remembers, the latest first."""

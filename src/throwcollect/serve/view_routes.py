@@ -12,7 +12,7 @@ from throwcollect.errors import NotFoundError, ThrowcollectError
 from throwcollect.serve.access import MAY_ONLY_LOOK
 from throwcollect.serve.instances import Instances
 from throwcollect.serve.live import take
-from throwcollect.serve.problems import describe_bytes
+from throwcollect.serve.problem_responses import describe_bytes
 from throwcollect.serve.robot_files import (
     MeshFile,
     SceneFacts,

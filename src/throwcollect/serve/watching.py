@@ -8,7 +8,7 @@ from contextlib import asynccontextmanager, suppress
 from dataclasses import replace
 
 from throwcollect.errors import ThrowcollectError
-from throwcollect.serve.state import STATES, State
+from throwcollect.serve.state import STATES, WholeState
 
 _LOOK_S = 0.2
 
@@ -20,16 +20,16 @@ class StateWatch:
         look: Reads the state; called in another thread.
     """
 
-    def __init__(self, look: Callable[[], State]) -> None:
+    def __init__(self, look: Callable[[], WholeState]) -> None:
         self._look = look
-        self._state: State | None = None
+        self._state: WholeState | None = None
         self._revision = 0
         self._changed = asyncio.Condition()
         self._one_look = asyncio.Lock()
         self._listeners = 0
         self._looking: asyncio.Task[None] | None = None
 
-    async def current(self) -> State:
+    async def current(self) -> WholeState:
         """Read the state.
 
         Raises:

@@ -10,7 +10,7 @@ import re
 import sys
 from typing import Any
 
-from throwcollect.config.shape import Shape, shape_of
+from throwcollect.config.shape import ValueShape, shape_of
 from throwcollect.ros import FloatingPointRange, IntegerRange, ParameterDescriptor
 
 _LARGEST = sys.float_info.max
@@ -61,7 +61,7 @@ def _meaning(parts: list[str | int]) -> str:
     return ""
 
 
-def _bounds(number: Shape, *, whole: bool) -> tuple[Any, Any]:
+def _bounds(number: ValueShape, *, whole: bool) -> tuple[Any, Any]:
     """Least and largest value, or the bound that neither reaches; None where there is no bound."""
     node, step = number.node, int(whole)
     low, above = node.get("minimum"), node.get("exclusiveMinimum")

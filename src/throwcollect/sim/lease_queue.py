@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterable
 
-from throwcollect.episode.message import Delivery, Refusal
+from throwcollect.episode.episode_message import Delivery, TrialRefusal
 from throwcollect.errors import ThrowcollectError
 from throwcollect.sim.trial_runner import TrialRunner
 from throwcollect.trial.lease import Lease
@@ -38,7 +38,7 @@ class LeaseQueue:
         self._waiting.clear()
         self._runner.release_lease()
 
-    def begin_next(self) -> Refusal | None:
+    def begin_next(self) -> TrialRefusal | None:
         """Begin the next trial if none runs; return the refusal of one that cannot begin."""
         if self._running is not None or not self._waiting:
             return None
@@ -51,7 +51,7 @@ class LeaseQueue:
         self._running = lease
         return None
 
-    def hand_over(self) -> Delivery | Refusal | None:
+    def hand_over(self) -> Delivery | TrialRefusal | None:
         """The episode of the trial that has just ended, or its refusal; None if no trial has ended."""
         try:
             delivery = self._runner.hand_over()
@@ -65,6 +65,6 @@ class LeaseQueue:
             self._running = None
         return delivery
 
-    def _refuse(self, lease: Lease, error: ThrowcollectError) -> Refusal:
+    def _refuse(self, lease: Lease, error: ThrowcollectError) -> TrialRefusal:
         self._done.append(lease.token)
-        return Refusal(lease.token, str(error))
+        return TrialRefusal(lease.token, str(error))

@@ -17,9 +17,9 @@ from throwcollect.control import (
     JointConstraints,
     JointState,
     JointTrajectoryController,
-    Refusal,
     Trajectory,
     TrajectoryPoint,
+    TrajectoryRefusal,
 )
 from throwcollect.episode.record import ControllerSamples
 from throwcollect.robots.robot import Robot
@@ -107,7 +107,7 @@ class LimbController:
         states, self._states = self._states, []
         return states
 
-    def refuse_locked(self, trajectory: Trajectory) -> Refusal | None:
+    def refuse_locked(self, trajectory: Trajectory) -> TrajectoryRefusal | None:
         """Refuse a trajectory that would move joints which are locked."""
         for column, joint in enumerate(trajectory.joint_names):
             if joint not in self._joints or self._joints.index(joint) in self._own:
@@ -116,7 +116,7 @@ class LimbController:
             for point in trajectory.points:
                 if wish := _tell_motion(point, column, held):
                     text = f"{joint} is locked at {held:.6g} rad (robot.locked) and cannot {wish}"
-                    return self._controller.refuse(Refusal(ErrorCode.INVALID_GOAL, text))
+                    return self._controller.refuse(TrajectoryRefusal(ErrorCode.INVALID_GOAL, text))
         return None
 
     def measure(self, positions: Sequence[float], velocities: Sequence[float]) -> JointState:

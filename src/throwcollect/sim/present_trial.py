@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from throwcollect.config.schema import Config
-from throwcollect.control import ErrorCode, GoalResult, Refusal
+from throwcollect.control import ErrorCode, GoalResult, TrajectoryRefusal
 from throwcollect.episode.record import GoalOutcome
 from throwcollect.errors import RequestError
 
@@ -77,9 +77,9 @@ class PresentTrial:
         return f"the simulation is leased for trial {self.setup.number}, until its episode is handed over"
 
     @property
-    def refusal(self) -> Refusal | None:
+    def refusal(self) -> TrajectoryRefusal | None:
         """Refusal of goals and trajectories while the simulation is leased; otherwise None."""
-        return Refusal(ErrorCode.INVALID_GOAL, self.lease_in_words) if self.leased else None
+        return TrajectoryRefusal(ErrorCode.INVALID_GOAL, self.lease_in_words) if self.leased else None
 
     def note_goal(self, controller: str) -> None:
         """Note that a controller has accepted a goal."""

@@ -14,7 +14,7 @@ from enum import IntEnum, IntFlag
 import numpy as np
 
 from throwcollect.config.schema import Config
-from throwcollect.control import GoalResult, JointTrajectoryController, Refusal, Trajectory, TrajectoryGoal
+from throwcollect.control import GoalResult, JointTrajectoryController, Trajectory, TrajectoryGoal, TrajectoryRefusal
 from throwcollect.episode.record import ControllerSamples, EpisodeHeader, Samples
 from throwcollect.errors import RequestError, ThrowcollectError
 from throwcollect.robots.description import robot_of, start_posture
@@ -31,7 +31,7 @@ _WATCHED_SLICE_S = 0.05
 """Simulated time of such a slice while a client watches, and outside of trials: ros2_controllers' feedback period."""
 
 
-class State(IntEnum):
+class StateCode(IntEnum):
     """States of simulation_interfaces/msg/SimulationState that are used here."""
 
     STOPPED = 0
@@ -80,7 +80,7 @@ class Simulation:
     def __init__(self, config: Config) -> None:
         self.config = config
         self.trial = PresentTrial(config)
-        self.state = State.PLAYING
+        self.state = StateCode.PLAYING
         self.world = World(config)
         self.entities = Entities(self.world, config.robot.name)
         self._steps: StepRequest | None = None
@@ -108,7 +108,7 @@ class Simulation:
     @property
     def running(self) -> bool:
         """Whether there is something to `advance`: the clock runs, or steps are left to be taken."""
-        return self._steps is not None or (self._running and self._has_start and self.state == State.PLAYING)
+        return self._steps is not None or (self._running and self._has_start and self.state == StateCode.PLAYING)
 
     def lease(self, number: int, config: Config, goals: Mapping[str, TrajectoryGoal]) -> None:
         """Begin a trial for a coordinator, with controllers as they are configured, which no other client may touch.
@@ -136,18 +136,18 @@ class Simulation:
         self.trial.set_up_nothing()
         self.reset()
 
-    def set_state(self, state: State) -> None:
+    def set_state(self, state: StateCode) -> None:
         """Play, pause, stop or quit; stopping resets everything.
 
         Raises:
             ConfigError: If there is no start state to go back to; the state is set all the same.
             RequestError: ``RESULT_INCORRECT_STATE`` if it is to be stopped while it is leased.
         """
-        if state == State.STOPPED:
+        if state == StateCode.STOPPED:
             self.trial.require_free()
         self.state = state
         self._interrupt_steps(f"the simulation is {state.name} now")
-        if state == State.STOPPED:
+        if state == StateCode.STOPPED:
             self.reset()
 
     def reset(self, scope: Scope = Scope.ALL) -> None:
@@ -193,7 +193,7 @@ class Simulation:
         self._in_trial = setup.number >= 0 and of_time and of_state
         self._published = 0
 
-    def submit(self, controller: str, goal_id: Hashable, goal: TrajectoryGoal) -> Refusal | None:
+    def submit(self, controller: str, goal_id: Hashable, goal: TrajectoryGoal) -> TrajectoryRefusal | None:
         """Give a goal to a controller, or refuse it; the run begins when the last awaited controller has its goal."""
         if (leased := self.trial.refusal) is not None:
             return leased
@@ -213,7 +213,7 @@ class Simulation:
         self._collect_results()
         return cancelled
 
-    def follow(self, controller: str, trajectory: Trajectory) -> Refusal | None:
+    def follow(self, controller: str, trajectory: Trajectory) -> TrajectoryRefusal | None:
         """Let a controller follow a trajectory that is no goal, or refuse it; a run begins unless goals are awaited."""
         if (leased := self.trial.refusal) is not None:
             return leased
@@ -256,7 +256,7 @@ class Simulation:
     @property
     def feedback_ns(self) -> int:
         """Simulated time that passes between two messages of feedback where slices are shorter than that [ns]."""
-        if not self.real_time_factor or self.state != State.PLAYING:
+        if not self.real_time_factor or self.state != StateCode.PLAYING:
             return 0
         return longest_steps(self.real_time_factor, self.config.sim.physics_hz) * self._period_ns
 
@@ -269,7 +269,7 @@ class Simulation:
             RequestError: ``RESULT_OPERATION_FAILED`` if the simulation is not paused, ``RESULT_INCORRECT_STATE`` if the
                 steps of another request are still being taken, or the last reset has failed.
         """
-        if self.state != State.PAUSED:
+        if self.state != StateCode.PAUSED:
             message = f"steps are taken while the simulation is paused only; it is {self.state.name}"
             raise RequestError("RESULT_OPERATION_FAILED", message)
         if not self._has_start:

@@ -8,7 +8,7 @@ from throwcollect.ros.msg import SimulatorFeatures as Features
 from throwcollect.ros.srv import GetSimulationState, GetSimulatorFeatures, ResetSimulation, SetSimulationState
 from throwcollect.sim.entity_services import EntityServices
 from throwcollect.sim.service_results import answering
-from throwcollect.sim.simulation import Scope, Simulation, State
+from throwcollect.sim.simulation import Scope, Simulation, StateCode
 from throwcollect.sim.spawn_services import SpawnServices
 from throwcollect.version import __version__
 
@@ -78,12 +78,12 @@ class SimulationControl:
 
     def _set_state(self, request: SetSimulationState.Request, _response: SetSimulationState.Response) -> None:
         target = request.state.state
-        if target not in list(State):
+        if target not in list(StateCode):
             raise RequestError("INCORRECT_TRANSITION", f"state {target} cannot be set")
         if target == self._simulation.state:
-            raise RequestError("ALREADY_IN_TARGET_STATE", f"the simulation is {State(target).name} already")
+            raise RequestError("ALREADY_IN_TARGET_STATE", f"the simulation is {StateCode(target).name} already")
         try:
-            self._simulation.set_state(State(target))
+            self._simulation.set_state(StateCode(target))
         except ConfigError as error:
             raise RequestError("STATE_TRANSITION_ERROR", str(error)) from error
 

@@ -10,8 +10,8 @@ from throwcollect.build import build_digest
 from throwcollect.config.schema import Config
 from throwcollect.config.values import with_values
 from throwcollect.episode.channels import Channels
-from throwcollect.episode.encoder import ChunkEncoder
-from throwcollect.episode.message import Delivery, Episode
+from throwcollect.episode.chunk_encoder import ChunkEncoder
+from throwcollect.episode.episode_message import Delivery, Episode
 from throwcollect.episode.record import EpisodeHeader, Samples, find_infinite_columns
 from throwcollect.episode.recorded_chunk import RecordedChunk
 from throwcollect.errors import ThrowcollectError

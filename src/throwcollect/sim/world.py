@@ -21,7 +21,7 @@ from throwcollect.robots.description import (
     robot_of,
     start_posture,
 )
-from throwcollect.sim.contacts import ContactLog
+from throwcollect.sim.contact_log import ContactLog
 from throwcollect.sim.motors import Motors
 from throwcollect.sim.recording import BALL_HEIGHT, BALL_LINEAR_VELOCITY, to_samples
 from throwcollect.sim.scene import drag_of, physics_of, scene_of

@@ -22,7 +22,7 @@ from throwcollect.sweep.trials import Trials
 from throwcollect.tasks.result import Result
 
 if TYPE_CHECKING:
-    from throwcollect.sweep.target import TargetSampler
+    from throwcollect.sweep.target_sampler import TargetSampler
 
 _FIRST_ROUNDS = FIRST_TRIALS // ROUND_TRIALS
 _TOLERANCE = 1e-9
@@ -131,6 +131,6 @@ def _target_sampler(config: Config) -> TargetSampler | None:
     if config.sweep.target is None:
         return None
     # Importing scipy.spatial takes about a second: only plans that need it do so, and before the collection begins.
-    from throwcollect.sweep.target import TargetSampler
+    from throwcollect.sweep.target_sampler import TargetSampler
 
     return TargetSampler(config, config.sweep.target, first=_FIRST_ROUNDS)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from throwcollect.config.sweep import LANDING_HEIGHT, TargetConfig
-from throwcollect.tasks.throw.outcome import ThrowResult
+from throwcollect.tasks.throw.throw_result import ThrowResult
 
 NOWHERE = -1
 """Number of no cell."""

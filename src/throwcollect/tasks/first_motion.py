@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from throwcollect.config.schema import Config
-from throwcollect.config.task import TaskConfig
+from throwcollect.config.task_config import TaskConfig
 from throwcollect.errors import ConfigError
 from throwcollect.members import load_member
 from throwcollect.robots.limits import joint_limits

@@ -9,8 +9,8 @@ from enum import Enum
 from typing import Any, Generic, TypeVar
 
 from throwcollect.errors import DatasetError
-from throwcollect.tasks.columns import Columns, JointColumns, Number, PeakColumns, columns_of, measured
 from throwcollect.tasks.measures import Peak
+from throwcollect.tasks.result_columns import Columns, JointColumns, Number, PeakColumns, columns_of, measured
 
 LIMIT_VIOLATED, TRACKING_FAILED, LOST = "limit_violated", "tracking_failed", "lost"
 """Outcomes that every task has: the trial succeeded, but a joint violated a limit; a controller did not carry out its
@@ -25,8 +25,8 @@ class Outcome(str, Enum):
 class Result:
     """Outcome and measures of a trial; a measure is None where there is nothing to measure.
 
-    Tasks derive their own results from it and declare the fields that they add with their columns, see `tasks.columns`;
-    the columns say what each measure is.
+    Tasks derive their own results from it and declare the fields that they add with their columns, which say what each
+    measure is (`tasks.result_columns`).
 
     Attributes:
         outcome: How the trial ended.

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from throwcollect.config.tool import ToolConfig
+from throwcollect.config.tool_config import ToolConfig
 from throwcollect.members import load_object
 from throwcollect.pinocchio_library import pinocchio
 

@@ -21,7 +21,7 @@ from throwcollect.extras import lazily, require
 from throwcollect.files import write_file
 from throwcollect.units import NS_PER_S
 from throwcollect.view.camera import Camera, camera_on
-from throwcollect.view.robot import BALL_RGBA, draw_robot_of
+from throwcollect.view.drawn_robot import BALL_RGBA, draw_robot_of
 from throwcollect.view.shown_throws import choose_rows
 
 images = lazily("PIL.Image")

@@ -15,7 +15,7 @@ from throwcollect.dataset.throws_table import Row, ball_state
 from throwcollect.episode.frames import WORLD
 from throwcollect.episode.topics import BALL, make_header
 from throwcollect.errors import ConfigError
-from throwcollect.view.robot import BALL_RGBA, DrawnRobot, Rgba
+from throwcollect.view.drawn_robot import BALL_RGBA, DrawnRobot, Rgba
 from throwcollect.view.shown_throws import ShownThrow
 
 _HELD: Rgba = (0.6, 0.6, 0.6, 0.8)

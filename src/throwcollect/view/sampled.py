@@ -7,7 +7,7 @@ from functools import cache
 import numpy as np
 
 from rclzenoh.interfaces import get_message
-from throwcollect.episode.layout import MessageLayout
+from throwcollect.episode.message_layout import MessageLayout
 from throwcollect.episode.topics import Recording, Rows, Topic, put_stamps
 from throwcollect.robots.limits import joint_limits
 from throwcollect.robots.robot import Robot

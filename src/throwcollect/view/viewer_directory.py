@@ -14,8 +14,8 @@ from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.throws_table import Row
 from throwcollect.episode.record import Samples
 from throwcollect.files import new_directory
+from throwcollect.view.drawn_robot import draw_robot_of
 from throwcollect.view.foxglove import layout
-from throwcollect.view.robot import draw_robot_of
 from throwcollect.view.shown_throws import ShownThrow, choose_rows
 from throwcollect.view.viewer_recording import ViewRecording
 

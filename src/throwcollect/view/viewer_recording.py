@@ -18,8 +18,8 @@ from throwcollect.episode.frames import read_frames
 from throwcollect.episode.record import Samples
 from throwcollect.episode.topics import Recording, ball_odometry, joint_states, transform_message, transforms
 from throwcollect.robots.description import full_description, robot_of
+from throwcollect.view.drawn_robot import DrawnRobot, ball_urdf
 from throwcollect.view.markers import all_markers, path_cloud, robot_markers, throw_markers
-from throwcollect.view.robot import DrawnRobot, ball_urdf
 from throwcollect.view.sampled import ball_speed, range_shares
 from throwcollect.view.shown_throws import ShownThrow
 from throwcollect.view.throw_status import throw_facts

@@ -9,10 +9,10 @@ from pyarrow.csv import write_csv
 
 from throwcollect.export.exporter import Exporter
 from throwcollect.export.readme import Layout, tabulate_signals
-from throwcollect.export.throw_source import Source
+from throwcollect.export.throw_source import ExportSource
 
 
-def describe(source: Source) -> Layout:
+def describe(source: ExportSource) -> Layout:
     """Say how `write` lays a source out."""
     return Layout(
         files={"throws.csv": "one row a trial.", "trial_N.csv": "the time series of trial N."},
@@ -21,7 +21,7 @@ def describe(source: Source) -> Layout:
     )
 
 
-def write(source: Source, directory: Path) -> None:
+def write(source: ExportSource, directory: Path) -> None:
     """Write a dataset as text; see `Exporter.write`."""
     write_csv(source.table, directory / "throws.csv")
     for throw in source.throws(source.entries):

@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 
 from throwcollect.episode.record import EpisodeHeader, Samples
 from throwcollect.robots.description import robot_of
-from throwcollect.tasks.columns import JointColumns, measured
 from throwcollect.tasks.result import Outcome, Result
+from throwcollect.tasks.result_columns import JointColumns, measured
 from throwcollect.tasks.task import Failure, Task
 
 

@@ -11,20 +11,20 @@ import pytest
 
 from throwcollect.cli import cluster_runs
 from throwcollect.cluster import slurm
-from throwcollect.cluster.following import Look
-from throwcollect.cluster.slurm import Task
+from throwcollect.cluster.cluster_run import SlicesLook
+from throwcollect.cluster.slurm import ArrayTask
 from throwcollect.errors import ConfigError
 
 RUN: Any = SimpleNamespace()
 
 
-def look(*tasks: Task, complete: bool = False) -> Look:
-    return Look(frozenset(), tasks, None, complete)
+def look(*tasks: ArrayTask, complete: bool = False) -> SlicesLook:
+    return SlicesLook(frozenset(), tasks, None, complete)
 
 
 @pytest.fixture
 def looks(monkeypatch: pytest.MonkeyPatch) -> None:
-    seen = [look(Task(0, "RUNNING", "n1", "")), look(Task(0, "COMPLETED", "n1", "0:0"), complete=True)]
+    seen = [look(ArrayTask(0, "RUNNING", "n1", "")), look(ArrayTask(0, "COMPLETED", "n1", "0:0"), complete=True)]
     monkeypatch.setattr(cluster_runs, "follow", lambda _run, **_: iter(seen))
 
 
@@ -73,7 +73,7 @@ def test_a_task_that_there_is_not_is_refused(named: str) -> None:
 def test_one_run_on_several_nodes_is_told_without_a_number(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    seen = [look(Task(None, "COMPLETED", "n[1-2]", "0:0"), complete=True)]
+    seen = [look(ArrayTask(None, "COMPLETED", "n[1-2]", "0:0"), complete=True)]
     monkeypatch.setattr(cluster_runs, "follow", lambda _run, **_: iter(seen))
     cluster_runs.print_events(RUN, as_json=False)
     assert capsys.readouterr().out.splitlines() == ["all tasks: completed on n[1-2]", "finished"]

@@ -18,7 +18,7 @@ from throwcollect.config.schema import (
     Values,
 )
 from throwcollect.errors import ConfigError
-from throwcollect.tasks.throw.config import ThrowConfig
+from throwcollect.tasks.throw.throw_config import ThrowConfig
 
 CONFIGS = Path(__file__).parents[3] / "configs"
 

@@ -9,7 +9,7 @@ from throwcollect.config.schema import Config, Range, SweepConfig, Values
 from throwcollect.config.section import any_of
 from throwcollect.config.sweep import Bins
 from throwcollect.config.until import UntilConfig, Wanted
-from throwcollect.tasks.throw.config import ThrowConfig, UntilLanded
+from throwcollect.tasks.throw.throw_config import ThrowConfig, UntilLanded
 
 
 def test_every_key_has_a_default_so_that_an_empty_configuration_is_one():

@@ -7,7 +7,7 @@ from throwcollect.config.loader import dump_yaml, load
 from throwcollect.config.schema import Config, DynamicMovementPrimitive
 from throwcollect.config.values import reason_not_sweepable, sweepable_keys, values_by_key, with_values
 from throwcollect.errors import ConfigError
-from throwcollect.tasks.throw.config import ThrowConfig
+from throwcollect.tasks.throw.throw_config import ThrowConfig
 
 LEARNED = Config(
     task=ThrowConfig(

@@ -18,10 +18,10 @@ from throwcollect.control import (
     JointState,
     JointTolerance,
     JointTrajectoryController,
-    Refusal,
     Trajectory,
     TrajectoryGoal,
     TrajectoryPoint,
+    TrajectoryRefusal,
 )
 from throwcollect.control.parameters import Constraints
 
@@ -108,7 +108,7 @@ class Bench:
         self.commands: dict[int, np.ndarray] = {}
         self.results: list[tuple[int, GoalResult]] = []
 
-    def send(self, request: TrajectoryGoal, goal_id="A") -> Refusal | None:
+    def send(self, request: TrajectoryGoal, goal_id="A") -> TrajectoryRefusal | None:
         refusal = self.controller.submit(goal_id, request, self.now_ns)
         self.collect()
         if refusal is None:

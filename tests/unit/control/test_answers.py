@@ -12,8 +12,8 @@ from throwcollect.control import (
     ControllerParameters,
     ErrorCode,
     GoalStatus,
-    Refusal,
     TrajectoryGoal,
+    TrajectoryRefusal,
 )
 
 from .bench import (
@@ -114,7 +114,7 @@ REFUSED = {
 )
 def test_refusals_have_the_codes_of_the_action(code: ErrorCode, request_: TrajectoryGoal) -> None:
     refusal = Bench().send(request_)
-    assert isinstance(refusal, Refusal)
+    assert isinstance(refusal, TrajectoryRefusal)
     assert refusal.error_code == code
 
 

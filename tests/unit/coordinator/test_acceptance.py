@@ -6,8 +6,8 @@ import pytest
 
 from throwcollect.config.schema import Config
 from throwcollect.coordinator.acceptance import Acceptance
-from throwcollect.episode.message import Delivery
-from throwcollect.replay.throw import Replayer
+from throwcollect.episode.episode_message import Delivery
+from throwcollect.replay.replayer import Replayer
 from throwcollect.sweep.plan import Plan, make_plan
 
 CONFIG = Config.model_validate(

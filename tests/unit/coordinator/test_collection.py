@@ -12,9 +12,9 @@ from throwcollect.coordinator.collection import TrialCollection
 from throwcollect.coordinator.lookahead import Lookahead
 from throwcollect.dataset.creation import create
 from throwcollect.dataset.provenance import read_provenance
-from throwcollect.episode.message import Delivery
+from throwcollect.episode.episode_message import Delivery
 from throwcollect.errors import LossError
-from throwcollect.replay.throw import Replayer
+from throwcollect.replay.replayer import Replayer
 from throwcollect.sweep.plan import Plan, make_plan
 
 PLAN: Plan = make_plan(

@@ -12,7 +12,7 @@ from throwcollect.coordinator.growth import Growth
 from throwcollect.coordinator.prepare import draw_plan, more_trials
 from throwcollect.sweep.plan import Plan, make_plan
 from throwcollect.sweep.trials import Trial, Trials
-from throwcollect.tasks.throw.outcome import ThrowOutcome, ThrowResult
+from throwcollect.tasks.throw.throw_result import ThrowOutcome, ThrowResult
 
 FAST = {"task.duration_s": {"min": 0.4, "max": 1.2}, "task.trajectory.gamma": {"min": 1.0, "max": 1.4}}
 

@@ -15,10 +15,10 @@ from throwcollect.coordinator.resume import resume
 from throwcollect.dataset.repair import repair
 from throwcollect.dataset.verify import verify
 from throwcollect.dataset.writer import DatasetWriter
-from throwcollect.episode.message import Delivery
+from throwcollect.episode.episode_message import Delivery
 from throwcollect.errors import LossError
-from throwcollect.replay.throw import Replayer
-from throwcollect.sweep.target import TargetSampler
+from throwcollect.replay.replayer import Replayer
+from throwcollect.sweep.target_sampler import TargetSampler
 from throwcollect.sweep.trials import Trial
 
 LANDED = 64

@@ -9,9 +9,9 @@ import pytest
 
 from throwcollect import ros
 from throwcollect.config.loader import load
-from throwcollect.coordinator import node as coordinator_node
+from throwcollect.coordinator import coordinator_node as coordinator_node
 from throwcollect.coordinator.collection import TrialCollection
-from throwcollect.coordinator.node import Coordinator
+from throwcollect.coordinator.coordinator_node import Coordinator
 from throwcollect.dataset.creation import create
 from throwcollect.dataset.writer import DatasetWriter
 from throwcollect.ros import get_message

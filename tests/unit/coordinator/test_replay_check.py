@@ -14,7 +14,7 @@ from throwcollect.coordinator import replay_check
 from throwcollect.coordinator.replay_check import ReplayCheck
 from throwcollect.dataset.creation import create
 from throwcollect.errors import DatasetError, WorkerError
-from throwcollect.replay.throw import Replayer
+from throwcollect.replay.replayer import Replayer
 from throwcollect.sweep.plan import Plan, make_plan
 from throwcollect.trial.choice import choose_trials
 

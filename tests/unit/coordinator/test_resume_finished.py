@@ -15,7 +15,7 @@ from throwcollect.dataset.creation import create
 from throwcollect.dataset.manifest import entry_of_file, list_promised_names, manifest_text
 from throwcollect.dataset.writer import DatasetWriter
 from throwcollect.errors import DatasetError
-from throwcollect.tasks.throw.outcome import ThrowResult
+from throwcollect.tasks.throw.throw_result import ThrowResult
 
 TRIALS = 4
 SHARD = "quick_00001.mcap"

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from throwcollect.config.schema import Config
 from throwcollect.dataset.writer import DatasetWriter
 from throwcollect.episode.channels import Channels
-from throwcollect.episode.encoder import ChunkEncoder
-from throwcollect.episode.message import Episode
+from throwcollect.episode.chunk_encoder import ChunkEncoder
+from throwcollect.episode.episode_message import Episode
 from throwcollect.episode.record import Contact, ControllerSamples, EpisodeHeader, GoalOutcome, Samples
 from throwcollect.episode.recorded_chunk import RecordedChunk
 from throwcollect.robots.description import full_description, start_posture
@@ -25,7 +25,7 @@ from throwcollect.robots.talos import TALOS
 from throwcollect.sweep.plan import Plan, make_plan
 from throwcollect.tasks.free_flight import ballistic_positions
 from throwcollect.tasks.task import task_of
-from throwcollect.tasks.throw.outcome import ThrowResult
+from throwcollect.tasks.throw.throw_result import ThrowResult
 
 SETTINGS: dict[str, Any] = {
     "name": "quick",

@@ -8,7 +8,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from mcap.opcode import Opcode
 
-from throwcollect.dataset.mcap_reader import Record, StoredEpisode, open_mcap
+from throwcollect.dataset.mcap_reader import McapRecord, StoredEpisode, open_mcap
 
 SHARD = "quick_00001.mcap"
 
@@ -23,7 +23,7 @@ def stored(path: Path, trial: int) -> StoredEpisode:
         return contents.episode(offset)
 
 
-def record_of(path: Path, opcode: Opcode, *, holding: bytes = b"", last: bool = False) -> Record:
+def record_of(path: Path, opcode: Opcode, *, holding: bytes = b"", last: bool = False) -> McapRecord:
     with open_mcap(path) as contents:
         found = [record for record in contents.records() if record.opcode == opcode and holding in record.data]
     return found[-1] if last else found[0]

@@ -16,7 +16,7 @@ from tests.unit.dataset.damage import SHARD, flip, record_of, stored
 from throwcollect.config.loader import load
 from throwcollect.dataset.mcap_file import McapFile, episode_run
 from throwcollect.episode.channels import Channels
-from throwcollect.episode.message import Episode
+from throwcollect.episode.episode_message import Episode
 from throwcollect.episode.recorded_chunk import RecordedChunk
 from throwcollect.episode.topics import joint_states
 from throwcollect.robots.description import full_description

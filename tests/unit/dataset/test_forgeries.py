@@ -32,7 +32,7 @@ from throwcollect.sweep.points import Points
 from throwcollect.sweep.samplers import draw_points
 from throwcollect.sweep.trials import Trials
 from throwcollect.tasks.task import trajectory_of
-from throwcollect.tasks.throw.outcome import ThrowOutcome, ThrowResult
+from throwcollect.tasks.throw.throw_result import ThrowOutcome, ThrowResult
 
 FORGED = 2
 """The trial that is forged."""

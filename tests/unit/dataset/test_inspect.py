@@ -11,7 +11,7 @@ import pytest
 from throwcollect.cli.dataset.info import show_info
 from throwcollect.dataset.creation import create
 from throwcollect.dataset.inspect import digest, info
-from throwcollect.episode.message import header_to_json
+from throwcollect.episode.episode_message import header_to_json
 from throwcollect.errors import DatasetError
 
 

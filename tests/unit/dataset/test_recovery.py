@@ -20,7 +20,7 @@ from throwcollect.errors import DatasetError
 from throwcollect.side_by_side import work_side_by_side
 from throwcollect.sweep.plan import Plan
 from throwcollect.sweep.round_file import append_round
-from throwcollect.tasks.throw.outcome import ThrowResult
+from throwcollect.tasks.throw.throw_result import ThrowResult
 
 from .conftest import Collection
 from .kills import KilledAt, KilledEverywhere

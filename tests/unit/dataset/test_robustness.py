@@ -31,7 +31,7 @@ from throwcollect.dataset.verify import verify
 from throwcollect.dataset.verify_episode import EpisodeCheck
 from throwcollect.dataset.verify_shard import check_shard
 from throwcollect.episode.chunk import Chunk
-from throwcollect.episode.message import header_from_json
+from throwcollect.episode.episode_message import header_from_json
 from throwcollect.errors import DatasetError, ThrowcollectError
 from throwcollect.sweep.plan import Plan
 

@@ -20,7 +20,7 @@ from throwcollect.dataset.shard import FinishedShard
 from throwcollect.errors import DatasetError
 from throwcollect.sweep.parquet_file import encode_pieces, encode_table
 from throwcollect.tasks.measures import BallState
-from throwcollect.tasks.throw.outcome import ThrowOutcome, ThrowResult
+from throwcollect.tasks.throw.throw_result import ThrowOutcome, ThrowResult
 
 TRIALS = 2000
 PER_SHARD = 100

@@ -13,7 +13,7 @@ import zstandard
 
 from throwcollect.dataset.mcap_file import MAGIC
 from throwcollect.dataset.mcap_reader import open_mcap
-from throwcollect.dataset.scan import Found, scan_whole
+from throwcollect.dataset.scan import FoundEpisode, scan_whole
 from throwcollect.episode.chunk import Chunk
 from throwcollect.errors import DatasetError
 
@@ -26,7 +26,7 @@ def whole(collected: Path) -> bytes:
 
 
 @pytest.fixture(scope="module")
-def runs(collected: Path) -> list[Found]:
+def runs(collected: Path) -> list[FoundEpisode]:
     """The three episodes of an undamaged file."""
     return list(scan_whole(collected / SHARD))
 
@@ -41,7 +41,7 @@ def path(tmp_path: Path) -> Path:
     return tmp_path / "damaged.mcap.part"
 
 
-def test_all_episodes_of_a_sound_file_are_found_where_they_lie(collected: Path, runs: list[Found]) -> None:
+def test_all_episodes_of_a_sound_file_are_found_where_they_lie(collected: Path, runs: list[FoundEpisode]) -> None:
     assert [(each.stored.episode.header.trial, each.intact) for each in runs] == [(3, True), (4, True), (5, True)]
     assert [each.stored.offset for each in runs[1:]] == [each.stored.end for each in runs[:-1]]
     with open_mcap(collected / SHARD) as contents:
@@ -51,20 +51,24 @@ def test_all_episodes_of_a_sound_file_are_found_where_they_lie(collected: Path, 
 
 
 @pytest.mark.parametrize("wrong", [0, 1, 2])
-def test_any_damaged_chunk_costs_its_own_episode_alone(path: Path, whole: bytes, runs: list[Found], wrong: int) -> None:
+def test_any_damaged_chunk_costs_its_own_episode_alone(
+    path: Path, whole: bytes, runs: list[FoundEpisode], wrong: int
+) -> None:
     data = bytearray(whole)
     data[runs[wrong].stored.offset + 3000] ^= 1
     assert find_in(path, bytes(data)) == [(trial, True) for trial in (3, 4, 5) if trial != 3 + wrong]
 
 
-def test_lengths_that_lead_nowhere_are_not_followed(path: Path, whole: bytes, runs: list[Found]) -> None:
+def test_lengths_that_lead_nowhere_are_not_followed(path: Path, whole: bytes, runs: list[FoundEpisode]) -> None:
     for length in (0, 1, 2**32 - 1, 2**63, 2**64 - 1):
         data = bytearray(whole)
         struct.pack_into("<Q", data, runs[1].stored.offset + 1, length)
         assert find_in(path, bytes(data)) == [(3, True), (5, True)]
 
 
-def test_a_missing_or_an_inserted_stretch_hides_nothing_behind_it(path: Path, whole: bytes, runs: list[Found]) -> None:
+def test_a_missing_or_an_inserted_stretch_hides_nothing_behind_it(
+    path: Path, whole: bytes, runs: list[FoundEpisode]
+) -> None:
     place = runs[1].stored.offset + 5000
     assert find_in(path, whole[:place] + whole[place + 512 :]) == [(3, True), (5, True)]
     assert find_in(path, whole[:place] + bytes(512) + whole[place:]) == [(3, True), (5, True)]
@@ -75,7 +79,9 @@ def test_a_missing_or_an_inserted_stretch_hides_nothing_behind_it(path: Path, wh
     assert find_in(path, whole[: runs[1].stored.end - 50] + whole[runs[2].stored.offset + 50 :]) == [(3, True)]
 
 
-def test_an_episode_with_damaged_indexes_is_whole_but_not_intact(path: Path, whole: bytes, runs: list[Found]) -> None:
+def test_an_episode_with_damaged_indexes_is_whole_but_not_intact(
+    path: Path, whole: bytes, runs: list[FoundEpisode]
+) -> None:
     indexes = runs[1].stored.chunks[0].indexes
     for place in (indexes[3].offset, indexes[4].offset + 1, indexes[4].offset + 300):
         data = bytearray(whole)
@@ -83,13 +89,15 @@ def test_an_episode_with_damaged_indexes_is_whole_but_not_intact(path: Path, who
         assert find_in(path, bytes(data)) == [(3, True), (4, False), (5, True)]
 
 
-def test_a_header_that_was_changed_is_not_believed(path: Path, whole: bytes, runs: list[Found]) -> None:
+def test_a_header_that_was_changed_is_not_believed(path: Path, whole: bytes, runs: list[FoundEpisode]) -> None:
     facts = runs[1].stored.facts
     place = facts.offset + facts.data.index(b"landed")
     assert find_in(path, whole[:place] + b"rested" + whole[place + 6 :]) == [(3, True), (5, True)]
 
 
-def test_a_file_cut_anywhere_has_the_episodes_before_the_cut(path: Path, whole: bytes, runs: list[Found]) -> None:
+def test_a_file_cut_anywhere_has_the_episodes_before_the_cut(
+    path: Path, whole: bytes, runs: list[FoundEpisode]
+) -> None:
     ends = [run.stored.end for run in runs]
     cuts = {0, 3, *range(100, len(whole), 9973), *ends, *(end - 1 for end in ends)}
     for size in sorted(cuts):
@@ -101,7 +109,7 @@ def test_a_file_of_noise_has_no_episode(path: Path) -> None:
     assert find_in(path, b"") == []
 
 
-def test_contents_that_are_announced_too_large_are_not_decompressed(path: Path, runs: list[Found]) -> None:
+def test_contents_that_are_announced_too_large_are_not_decompressed(path: Path, runs: list[FoundEpisode]) -> None:
     """Zeros compress so well that a small file could fill any memory."""
     zeros = zstandard.ZstdCompressor(level=1).compress(bytes(50_000_000))
     bomb = Chunk(zeros, 50_000_000, 0, 0, 0)
@@ -125,7 +133,7 @@ def test_chunks_within_chunks_do_not_take_forever(path: Path, monkeypatch: pytes
 
 
 def test_samples_that_were_changed_are_not_believed_even_if_the_crc_was_made_to_fit(
-    path: Path, whole: bytes, runs: list[Found]
+    path: Path, whole: bytes, runs: list[FoundEpisode]
 ) -> None:
     stored = runs[1].stored
     contents = bytearray(stored.episode.chunk.decompress())

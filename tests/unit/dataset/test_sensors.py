@@ -33,7 +33,7 @@ from throwcollect.derive.selection import sample
 from throwcollect.episode import channels as declared
 from throwcollect.episode.channels import Channel, Qos
 from throwcollect.episode.chunk import Chunk, encode_records
-from throwcollect.episode.message import Delivery, Episode, pack, unpack
+from throwcollect.episode.episode_message import Delivery, Episode, pack, unpack
 from throwcollect.episode.recorded_chunk import RecordedChunk
 from throwcollect.run_key import Signer
 

@@ -18,7 +18,7 @@ from tests.unit.dataset.targeted import LIST, WITHOUT_TARGETS, collect_targeted,
 
 from throwcollect.cli.dataset.info import describe
 from throwcollect.config.schema import Config
-from throwcollect.config.target import TargetColumn
+from throwcollect.config.target_columns import TargetColumn
 from throwcollect.dataset.inspect import digest, info
 from throwcollect.dataset.misses import Misses
 from throwcollect.dataset.reader import Dataset
@@ -30,10 +30,10 @@ from throwcollect.dataset.writer import DatasetWriter
 from throwcollect.derive.selection import filter_trials, merge
 from throwcollect.episode.record import EpisodeHeader, Samples
 from throwcollect.errors import ConfigError
-from throwcollect.export.throw_source import Source
+from throwcollect.export.throw_source import ExportSource
 from throwcollect.sweep.parquet_file import encode_table
 from throwcollect.sweep.plan import Plan
-from throwcollect.tasks.throw.config import ThrowConfig
+from throwcollect.tasks.throw.throw_config import ThrowConfig
 
 
 @pytest.fixture(scope="module")
@@ -224,9 +224,9 @@ def test_merged_throws_keep_the_targets_that_they_have(targeted: Path, tmp_path:
     assert [throw.target for throw in merged] == [{}] * 7 + before
     assert [throw.miss_m for throw in merged][7:] == [throw.miss_m for throw in Dataset.open(targeted)]
     assert merged.throws["target_x_m"].null_count == 8
-    assert Source.open(tmp_path / "both").targets == ()
+    assert ExportSource.open(tmp_path / "both").targets == ()
     filter_trials(tmp_path / "both", tmp_path / "some", where="miss_m >= 0")
-    some = Source.open(tmp_path / "some")
+    some = ExportSource.open(tmp_path / "some")
     assert [each.name for each in some.targets] == ["target_x_m", "target_y_m"]
     assert verify(tmp_path / "some") == []
     filter_trials(tmp_path / "both", tmp_path / "none", where="trial < 7")

@@ -8,14 +8,14 @@ from tests.unit.dataset.conftest import Collection
 
 from throwcollect.config.schema import Config
 from throwcollect.dataset import throws_table
-from throwcollect.dataset.throws_table import Place, RowsByTrial, ThrowsTable, read_throws
+from throwcollect.dataset.throws_table import EpisodePlace, RowsByTrial, ThrowsTable, read_throws
 from throwcollect.dataset.verify import verify
 from throwcollect.derive.selection import merge
 from throwcollect.episode.record import Contact, EpisodeHeader, Samples
 from throwcollect.errors import ConfigError, DatasetError
-from throwcollect.tasks.columns import Number, measured
 from throwcollect.tasks.result import Outcome
-from throwcollect.tasks.throw.outcome import ThrowOutcome, ThrowResult
+from throwcollect.tasks.result_columns import Number, measured
+from throwcollect.tasks.throw.throw_result import ThrowOutcome, ThrowResult
 from throwcollect.tasks.throw.throw_task import ThrowTask
 
 
@@ -32,7 +32,7 @@ def test_results_come_back_from_the_table(collection: Collection) -> None:
     outcomes = set()
     for change in (None, held, not_finite):
         result = collection.result(collection.episode(2, change))
-        row = table.row(collection.plan.trials[2], result, Place("a.mcap", 7, 9, "d"))
+        row = table.row(collection.plan.trials[2], result, EpisodePlace("a.mcap", 7, 9, "d"))
         (stored,) = table.table([row]).to_pylist()
         assert table.result(stored) == result
         outcomes.add(result.outcome)

@@ -9,8 +9,8 @@ import pyarrow as pa
 import pytest
 
 import throwcollect
-from throwcollect.dataset.columns import COLUMNS
 from throwcollect.dataset.reader import Dataset
+from throwcollect.dataset.trajectory_columns import COLUMNS
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.robots.talos import TALOS
 
@@ -54,7 +54,7 @@ def test_a_column_does_not_depend_on_the_others(loaded: Dataset, name: str) -> N
 
 def test_large_arrays_are_no_different(loaded: Dataset, monkeypatch: pytest.MonkeyPatch) -> None:
     small = loaded.trajectories()
-    monkeypatch.setattr("throwcollect.dataset.columns._LARGE_BYTES", 1)
+    monkeypatch.setattr("throwcollect.dataset.trajectory_columns._LARGE_BYTES", 1)
     large = loaded.trajectories()
     for name in COLUMNS:
         assert np.array_equal(large[name], small[name])

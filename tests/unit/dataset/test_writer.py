@@ -15,7 +15,7 @@ from throwcollect.config.loader import load
 from throwcollect.dataset.creation import create
 from throwcollect.dataset.verify import verify
 from throwcollect.dataset.writer import DatasetWriter
-from throwcollect.episode.message import Episode
+from throwcollect.episode.episode_message import Episode
 from throwcollect.episode.recorded_chunk import RecordedChunk
 from throwcollect.errors import ConfigError, DatasetError
 

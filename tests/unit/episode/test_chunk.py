@@ -16,8 +16,8 @@ from mcap.records import Message, MessageIndex
 from throwcollect.config.schema import Config
 from throwcollect.episode.channels import BALL_ODOMETRY_ID, JOINT_STATES_ID, Channels
 from throwcollect.episode.chunk import Chunk
-from throwcollect.episode.encoder import ChunkEncoder
-from throwcollect.episode.message import Episode
+from throwcollect.episode.chunk_encoder import ChunkEncoder
+from throwcollect.episode.episode_message import Episode
 from throwcollect.episode.message_table import MessageTable
 from throwcollect.episode.record import EpisodeHeader, Samples
 from throwcollect.episode.recorded_chunk import RecordedChunk

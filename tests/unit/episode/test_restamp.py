@@ -5,7 +5,7 @@ import pytest
 from tests.unit.dataset.conftest import Collection, throw
 
 from throwcollect.episode.channels import Channels
-from throwcollect.episode.message import Episode
+from throwcollect.episode.episode_message import Episode
 from throwcollect.episode.record import Contact, ControllerSamples
 from throwcollect.episode.recorded_chunk import RecordedChunk
 from throwcollect.episode.restamp import Restamper

@@ -15,7 +15,7 @@ from throwcollect.dataset.reader import Dataset
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.export import mat
 from throwcollect.export.export import export
-from throwcollect.export.throw_source import Source
+from throwcollect.export.throw_source import ExportSource
 
 FIELDS = ["N", "dt", "a_z", "a_x", "c", "sigma_2", "w", "tau", "goal", "y0", "fitted", "error"]
 WEIGHTS = [-758.2, -994.1, -1122.1, -1231.2, -1231.1, -1114.2, -858.3, -508.7, -155.7, 74.0, 57.6, -56.9]
@@ -163,7 +163,7 @@ def test_what_is_too_large_for_the_format_is_refused(
 
 
 def test_a_column_whose_name_is_too_long_for_the_format_is_named(source: Path, tmp_path: Path) -> None:
-    whole = Source.open(source)
+    whole = ExportSource.open(source)
     key = f"task.end.{'j' * 55}"
     longer = replace(whole, table=whole.table.append_column(key, whole.table["landing_x_m"]))
     with pytest.raises(ConfigError, match=rf"^to: mat has no room for the name of the column {key}"):

@@ -8,7 +8,7 @@ from tests.unit.learning.worlds import KEYS, draw, land, learn, learn_with_drag
 
 from throwcollect.errors import ConfigError
 from throwcollect.learning.adapting import Adaptation, FarThrowError, Method, adapt, refuse_far_places
-from throwcollect.learning.learned_map import LearnedMap, Role
+from throwcollect.learning.learned_map import KeyRole, LearnedMap
 
 BIAS = np.array([0.02, 0.06, -0.04])
 OFFSET = np.array([0.08, -0.05])
@@ -19,13 +19,13 @@ def elsewhere(learned: LearnedMap, count: int, world, *, noise_m: float = 0.0, s
     values = draw(count, seed)
     places = world(values) + noise_m * np.random.default_rng(seed).standard_normal((count, 2))
     options = {"latents_count": False, "scatter": float(np.hypot(noise_m, 0.002)), **options}
-    return adapt(learned, learned.scale(Role.PARAMETER, values), np.zeros((count, 0)), places, **options)
+    return adapt(learned, learned.scale(KeyRole.PARAMETER, values), np.zeros((count, 0)), places, **options)
 
 
 def off(learned: LearnedMap, found: Adaptation, world) -> float:
     """Median distance of new throws from where the adapted map has them."""
     values = draw(50, seed=11)
-    predicted = learned.correct(found.correction).predict(learned.scale(Role.PARAMETER, values), np.zeros((50, 0)))
+    predicted = learned.correct(found.correction).predict(learned.scale(KeyRole.PARAMETER, values), np.zeros((50, 0)))
     return float(np.median(np.linalg.norm(predicted - world(values), axis=1)))
 
 
@@ -64,7 +64,7 @@ def test_latents_that_count_are_found() -> None:
     learned = learn_with_drag()
     found = elsewhere(learned, 4, heavy_drag, latents_count=True)
     assert found.method is Method.LATENT
-    assert learned.unscale(Role.LATENT, found.correction.latents) == pytest.approx([0.8], abs=0.1)
+    assert learned.unscale(KeyRole.LATENT, found.correction.latents) == pytest.approx([0.8], abs=0.1)
     assert off(learned, found, heavy_drag) < 0.01
 
 
@@ -118,7 +118,7 @@ def test_scatter_is_not_taken_for_a_difference(count: int) -> None:
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")
 def test_places_beyond_all_that_a_bias_explains_are_named() -> None:
     learned = learn()
-    values = learned.scale(Role.PARAMETER, draw(1, 8))
+    values = learned.scale(KeyRole.PARAMETER, draw(1, 8))
     with pytest.raises(ConfigError, match="the throws ended too far from where the model has them"):
         adapt(
             learned,

@@ -5,13 +5,13 @@ import pytest
 from tests.unit.learning.worlds import HIGH, KEYS, LOW, draw, effort, land, learn, learn_with_drag
 
 from throwcollect.learning.aiming import Choice, aim
-from throwcollect.learning.learned_map import Correction, Kind, LearnedMap, Role
+from throwcollect.learning.learned_map import Correction, KeyRole, Kind, LearnedMap
 
 
 def throw(learned: LearnedMap, targets: np.ndarray, choice: Choice = Choice.NEAREST):
     """Aim, and throw; returns the values and how far each throw was off."""
     found = aim(learned, targets, np.zeros((len(targets), 0)), choice)
-    values = learned.unscale(Role.PARAMETER, found.parameters)
+    values = learned.unscale(KeyRole.PARAMETER, found.parameters)
     return found, values, np.linalg.norm(land(values) - targets, axis=1)
 
 
@@ -41,7 +41,7 @@ def test_where_a_throw_ends_does_not_depend_on_the_other_targets(choice: Choice,
 
 
 def test_each_target_has_a_context_of_its_own(targets: np.ndarray) -> None:
-    learned = learn_with_drag(role=Role.CONTEXT)
+    learned = learn_with_drag(role=KeyRole.CONTEXT)
     context = np.linspace(-1.0, 1.0, len(targets))[:, np.newaxis]
     together = aim(learned, targets, context)
     for number in (0, 20, 39):
@@ -83,7 +83,7 @@ def test_in_another_world_aiming_makes_up_for_what_differs(targets: np.ndarray) 
     shifted = learned.correct(Correction(np.array([0.1, -0.2, 0.05]), np.zeros(0), np.array([0.03, -0.02])))
     found = aim(shifted, targets, np.zeros((len(targets), 0)))
     bias = np.array([0.1, -0.2, 0.05]) * (HIGH - LOW) / 2
-    values = learned.unscale(Role.PARAMETER, found.parameters) + bias
+    values = learned.unscale(KeyRole.PARAMETER, found.parameters) + bias
     off = np.linalg.norm(land(values) + np.array([0.03, -0.02]) - targets, axis=1)
     assert len(KEYS) == values.shape[1]
     assert off[found.reachable].max() < 0.004

@@ -14,7 +14,7 @@ from tests.unit.learning.worlds import KEYS, draw, land, learn, make_dataset
 
 from throwcollect import ConfigError, DatasetError, MissingExtraError, fit, load_model
 from throwcollect.learning.distilling import distil
-from throwcollect.learning.learned_map import LearnedMap, Role
+from throwcollect.learning.learned_map import KeyRole, LearnedMap
 from throwcollect.learning.model_card import ONNX_PROGRAM
 
 SHIFT = np.array([0.1, 0.12])
@@ -23,7 +23,7 @@ SHIFT = np.array([0.1, 0.12])
 def off(learned: LearnedMap, shift=(0.0, 0.0)) -> np.ndarray:
     """How far throws by the distilled map are off, in a world that is shifted."""
     targets = land(draw(60, seed=5, inside=0.8)) + shift
-    values = learned.unscale(Role.PARAMETER, distil(learned).aim(targets, np.zeros((60, 0))))
+    values = learned.unscale(KeyRole.PARAMETER, distil(learned).aim(targets, np.zeros((60, 0))))
     return np.linalg.norm(land(values) + shift - targets, axis=1)
 
 
@@ -60,9 +60,9 @@ def test_the_file_is_the_same_bytes_each_time_and_gives_what_the_map_gives(tmp_p
         assert {path.name: path.read_bytes() for path in (tmp_path / name).iterdir()} == files
     model = load_model(tmp_path / "one")
     assert model.file.distilled is not None
-    context = model.learned.scale(Role.CONTEXT, np.array([[0.1]]))
+    context = model.learned.scale(KeyRole.CONTEXT, np.array([[0.1]]))
     scaled = model.file.distilled.aim(np.array([[1.2, -0.2]]), context)
-    wanted = model.learned.unscale(Role.PARAMETER, scaled)[0]
+    wanted = model.learned.unscale(KeyRole.PARAMETER, scaled)[0]
     assert ONNX_PROGRAM.rstrip() in (tmp_path / "one" / "README.md").read_text()
     script = f"target = [1.2, -0.2, 0.1]\n{ONNX_PROGRAM}\nprint(json.dumps(parameters))"
     said = subprocess.run(

@@ -18,7 +18,7 @@ from throwcollect import ConfigError, DatasetError, Model, fit, load_model
 from throwcollect.dataset.reader import Dataset
 from throwcollect.learning.model_card import PROGRAM
 from throwcollect.learning.model_directory import read_score, write_score
-from throwcollect.learning.score import Adapted, Errors, Misses, Score, ThrowAtTarget, Trained
+from throwcollect.learning.score import Adapted, Errors, MissStatistics, Score, ThrowAtTarget, Trained
 
 COUNT = 120
 
@@ -112,7 +112,7 @@ def test_adapting_is_kept_in_the_file_and_in_the_card(model: Model, tmp_path: Pa
 
 def test_a_score_is_put_into_the_model_and_its_card(model: Model, tmp_path: Path) -> None:
     errors = Errors(throws=2, missed=1, median=0.0012, share90=None, largest=None)
-    angles = Misses(unit="rad", median=0.01, share90=0.02, largest=None)
+    angles = MissStatistics(unit="rad", median=0.01, share90=0.02, largest=None)
     score = Score(
         targets=2,
         seed=0,

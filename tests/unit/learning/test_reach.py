@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from tests.unit.learning.worlds import DRAG, KEYS, learn_with_drag
 
-from throwcollect.learning.learned_map import Role
+from throwcollect.learning.learned_map import KeyRole
 from throwcollect.learning.model import Aim
 from throwcollect.learning.reach import explain_reach
 
@@ -25,7 +25,7 @@ OUTSIDE = f"{DRAG.key} was 0 to 1 in all throws"
 def test_each_reason_is_told_when_it_holds(drag: float, predicted_x: float, nearest_x: float, reason: str) -> None:
     predicted, nearest = np.array([predicted_x, -0.2]), np.array([nearest_x, -0.2])
     aim = Aim(np.array([1.4, -0.2, drag]), dict.fromkeys(KEYS, 0.0), predicted, False, nearest)
-    assert explain_reach(learn_with_drag(role=Role.CONTEXT), aim) == (
+    assert explain_reach(learn_with_drag(role=KeyRole.CONTEXT), aim) == (
         f"1.400,-0.200,{drag:.3f}; {reason}\n  the nearest point that was reached: {nearest_x:.3f},-0.200 "
         f"({(1.4 - nearest_x) * 100:.2f} cm away); predicted end: {predicted_x:.3f},-0.200"
     )

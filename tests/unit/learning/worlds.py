@@ -13,14 +13,14 @@ from tests.unit.dataset.conftest import Collection
 
 from throwcollect.dataset.reader import Dataset
 from throwcollect.learning.fitting import fit_throws
-from throwcollect.learning.learned_map import Axis, Kind, LearnedMap, Role
+from throwcollect.learning.learned_map import Axis, KeyRole, Kind, LearnedMap
 
 Array = NDArray[np.float64]
 
 KEYS = ("task.duration_s", "task.end.arm_right_4_joint", "task.end.torso_1_joint")
 TARGETS = ("landing_x_m", "landing_y_m")
 LOW, HIGH = np.array([0.9, -1.0, -0.3]), np.array([1.3, -0.2, 0.3])
-DRAG = Axis("ball.drag_coefficient", Role.LATENT, 0.0, 1.0, 0.2)
+DRAG = Axis("ball.drag_coefficient", KeyRole.LATENT, 0.0, 1.0, 0.2)
 
 
 def land(values: Array, drag: Array | float = 0.2) -> Array:
@@ -40,7 +40,7 @@ def parameter_axes() -> tuple[Axis, ...]:
     """The axes of `KEYS`."""
     middle = (LOW + HIGH) / 2
     rows = zip(KEYS, LOW.tolist(), HIGH.tolist(), middle.tolist(), strict=True)
-    return tuple(Axis(key, Role.PARAMETER, low, high, nominal) for key, low, high, nominal in rows)
+    return tuple(Axis(key, KeyRole.PARAMETER, low, high, nominal) for key, low, high, nominal in rows)
 
 
 def effort(values: Array) -> Array:
@@ -56,7 +56,7 @@ def learn(count: int = 800, kind: Kind = Kind.LOCAL) -> LearnedMap:
 
 
 @cache
-def learn_with_drag(count: int = 600, role: Role = Role.LATENT) -> LearnedMap:
+def learn_with_drag(count: int = 600, role: KeyRole = KeyRole.LATENT) -> LearnedMap:
     """A map of worlds that differ in the ball's drag, which has this role."""
     values = draw(count)
     drag = np.random.default_rng(9).random(count)

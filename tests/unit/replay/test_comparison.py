@@ -7,8 +7,8 @@ import pytest
 
 from throwcollect.config.schema import Config
 from throwcollect.episode.channels import Channels
-from throwcollect.episode.encoder import ChunkEncoder
-from throwcollect.episode.message import Episode
+from throwcollect.episode.chunk_encoder import ChunkEncoder
+from throwcollect.episode.episode_message import Episode
 from throwcollect.episode.record import Contact, EpisodeHeader, Samples
 from throwcollect.episode.recorded_chunk import RecordedChunk
 from throwcollect.errors import DatasetError

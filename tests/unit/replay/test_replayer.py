@@ -8,7 +8,7 @@ import pytest
 
 from throwcollect.config.schema import Config
 from throwcollect.replay.audit import replay_throws
-from throwcollect.replay.throw import Replayer
+from throwcollect.replay.replayer import Replayer
 from throwcollect.sim.world import World
 
 

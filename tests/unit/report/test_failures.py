@@ -1,6 +1,6 @@
 from __future__ import annotations
 
-from throwcollect.report.failures import Failure, group_failures
+from throwcollect.report.failures import FailureGroup, group_failures
 
 
 def test_reasons_that_differ_in_numbers_are_one() -> None:
@@ -11,6 +11,6 @@ def test_reasons_that_differ_in_numbers_are_one() -> None:
         (3, "refused", "arm_right_4_joint needs 14 Nm at -1e-3 s"),
     ]
     assert group_failures(rows) == (
-        Failure("refused", "arm_right_4_joint needs # Nm at # s", 2, (1, 3)),
-        Failure("self_hit", "the ball touched arm_right_7_link at 0.812 s", 1, (2,)),
+        FailureGroup("refused", "arm_right_4_joint needs # Nm at # s", 2, (1, 3)),
+        FailureGroup("self_hit", "the ball touched arm_right_7_link at 0.812 s", 1, (2,)),
     )

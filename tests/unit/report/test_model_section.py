@@ -8,7 +8,7 @@ from tests.unit.learning.worlds import make_dataset
 from throwcollect import ConfigError, DatasetError, fit
 from throwcollect.dataset.reader import Dataset
 from throwcollect.learning.model_directory import write_score
-from throwcollect.learning.score import Adapted, Errors, Misses, Score, ThrowAtTarget, Trained
+from throwcollect.learning.score import Adapted, Errors, MissStatistics, Score, ThrowAtTarget, Trained
 from throwcollect.report.model_section import show_model
 from throwcollect.report.painter import write_pictures
 
@@ -79,7 +79,7 @@ def test_curves_show_centimetres_over_numbers_of_throws(dataset: Dataset, model:
 
 
 def test_each_unit_has_curves_of_its_own_and_the_distilled_map_a_row(dataset: Dataset, model: Path) -> None:
-    angles = Misses(unit="rad", median=0.01, share90=0.02, largest=0.02)
+    angles = MissStatistics(unit="rad", median=0.01, share90=0.02, largest=0.02)
     found = score()
     mixed = found.trained[-1].errors.model_copy(update={"others": [angles]})
     trained = [each.model_copy(update={"errors": mixed}) for each in found.trained]

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 from throwcollect.dataset.throws_table import REFUSED
 from throwcollect.report.outcomes import Outcomes, style_of
-from throwcollect.tasks.throw.outcome import ThrowOutcome
+from throwcollect.tasks.throw.throw_result import ThrowOutcome
 
 
 def test_outcomes_come_in_one_order_and_unknown_ones_last() -> None:

@@ -14,7 +14,7 @@ from tests.unit.report.page_parser import Page
 from throwcollect.dataset.directory import PROVENANCE
 from throwcollect.dataset.provenance import read_provenance, write_provenance
 from throwcollect.dataset.reader import Dataset
-from throwcollect.report.contents import Panel, Section, Table
+from throwcollect.report.contents import Panel, ReportSection, Table
 from throwcollect.report.outcomes import Outcomes
 from throwcollect.report.page import render_page
 from throwcollect.report.sections import Report, report_dataset
@@ -113,7 +113,7 @@ def test_what_a_report_says_does_not_end_the_script_or_the_attribute_that_holds_
     table = Table(rows=((hostile, hostile),))
     blocks = ((Panel("key", hostile, figure, hostile),), table, hostile)
     text = render_page(
-        Report(hostile, hostile, (), Outcomes.of([hostile]), (Section("one", hostile, hostile, hostile, blocks),))
+        Report(hostile, hostile, (), Outcomes.of([hostile]), (ReportSection("one", hostile, hostile, hostile, blocks),))
     )
     assert "</script " not in text
     page = Page(text)

@@ -11,7 +11,7 @@ from throwcollect.dataset.throws_table import REFUSED
 from throwcollect.report.contents import Panel
 from throwcollect.report.outcomes import style_of
 from throwcollect.report.painter import MARKERS, paint
-from throwcollect.tasks.throw.outcome import ThrowOutcome
+from throwcollect.tasks.throw.throw_result import ThrowOutcome
 
 RED = (1.0, 0.0, 0.0)
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from throwcollect.report.throw.episodes import Residuals
-from throwcollect.report.throw.sections import _show_physics
+from throwcollect.report.throw.throw_sections import _show_physics
 
 
 def test_page_says_where_exact_flights_are_drawn():

@@ -8,10 +8,10 @@ import pytest
 
 from throwcollect.dataset.reader import Dataset
 from throwcollect.report.outcomes import Outcomes
-from throwcollect.report.swept_keys import Parameter, read_parameters
+from throwcollect.report.swept_keys import SweptKey, read_parameters
 
 
-def parameters_of(directory: Path) -> tuple[Parameter, ...]:
+def parameters_of(directory: Path) -> tuple[SweptKey, ...]:
     dataset = Dataset.open(directory)
     outcomes = Outcomes.of(dataset.throws["outcome"].to_pylist())
     return read_parameters(dataset.config, dataset.throws, outcomes)

@@ -11,7 +11,7 @@ import pytest
 from tests.unit.dataset.conftest import Collection
 from tests.unit.dataset.targeted import collect_targeted
 
-from throwcollect.config.task import TaskConfig
+from throwcollect.config.task_config import TaskConfig
 from throwcollect.config.until import UntilConfig, Wanted
 from throwcollect.dataset.reader import Dataset
 from throwcollect.episode.record import EpisodeHeader, Samples

@@ -11,7 +11,7 @@ from throwcollect import ros
 from throwcollect.errors import ConfigError, ThrowcollectError
 from throwcollect.heartbeat import VARIABLE, is_beating
 from throwcollect.ros.connection import session_key
-from throwcollect.ros.health import check
+from throwcollect.ros.health_check import check
 from throwcollect.ros.router import router, serve
 from throwcollect.run_key import KEY_VARIABLE, RunKey
 

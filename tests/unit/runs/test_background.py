@@ -15,8 +15,8 @@ from throwcollect.coordinator.onlooker import SILENT
 from throwcollect.errors import ConfigError, ConflictError, Interrupted, WorkerError
 from throwcollect.runs import background
 from throwcollect.runs.background import begin_run, carry_out
-from throwcollect.runs.record import Origin, Planning
 from throwcollect.runs.records import OpenRun, Records
+from throwcollect.runs.run_record import Origin, Planning
 from throwcollect.runs.state_directory import STATE_VARIABLE
 
 ORIGIN = Origin("throws", 1, {"trials": 2})

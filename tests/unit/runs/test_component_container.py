@@ -19,13 +19,13 @@ from throwcollect.ros.middleware import Middleware
 from throwcollect.run_key import RunKey
 from throwcollect.runs.component_container import ContainerOrder, check_order, launch_container
 from throwcollect.runs.control import down
-from throwcollect.runs.record import Kind, Origin, Record
 from throwcollect.runs.records import OpenRun, Records
+from throwcollect.runs.run_record import Kind, Origin, RunRecord
 from throwcollect.runs.state_directory import STATE_VARIABLE
 from throwcollect.runtimes.docker import component
 from throwcollect.runtimes.docker import watch as docker_watch
 from throwcollect.runtimes.docker.component import find_way
-from throwcollect.runtimes.docker.options import JOINED_LABEL, NODE_LABEL, RUN_LABEL
+from throwcollect.runtimes.docker.container_options import JOINED_LABEL, NODE_LABEL, RUN_LABEL
 
 SPEC = ContainerSpec("nodes", ("listen",), NodeContainerConfig())
 ORDER = ContainerOrder("ear", SPEC)
@@ -46,7 +46,7 @@ def remember(name: str, kind: Kind, runtime: str, *, joins: str | None = None) -
     directory = run.directory / "data"
     directory.mkdir()
     logs = str(run.directory / "logs")
-    record = Record(name, name, runtime, str(directory), None, logs, 0, datetime.now(timezone.utc), 1, 0, kind=kind)
+    record = RunRecord(name, name, runtime, str(directory), None, logs, 0, datetime.now(timezone.utc), 1, 0, kind=kind)
     run.write(replace(record, origin=Origin(name, joins=joins), endpoint="tls/127.0.0.1:7447"))
     return run
 
@@ -59,7 +59,7 @@ def session() -> Iterator[OpenRun]:
     run.close()
 
 
-def launch(engine: Engine, each_look: Callable[[], bool], order: ContainerOrder = ORDER) -> Record:
+def launch(engine: Engine, each_look: Callable[[], bool], order: ContainerOrder = ORDER) -> RunRecord:
     """The record of a container that runs until it is told to end."""
     run = remember("ear-1", "container", "docker", joins=order.joins)
     with suppress(WorkerError):

@@ -12,8 +12,8 @@ from throwcollect.ros.router import router
 from throwcollect.run_key import RunKey
 from throwcollect.runs import control
 from throwcollect.runs.control import scale
-from throwcollect.runs.record import Record
 from throwcollect.runs.records import Records, Run
+from throwcollect.runs.run_record import RunRecord
 from throwcollect.runs.state_directory import STATE_VARIABLE
 from throwcollect.runtimes.node_collection import MOST_SIMULATIONS, offer_scaling
 from throwcollect.runtimes.nodes import LAUNCHER
@@ -26,7 +26,7 @@ def state(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 def living(endpoint: str | None, runtime: str = "local") -> Run:
     started = datetime.now(timezone.utc)
-    record = Record("a-0123", "a", runtime, "/a", None, "/a/logs", 0, started, 1, 2, endpoint=endpoint)
+    record = RunRecord("a-0123", "a", runtime, "/a", None, "/a/logs", 0, started, 1, 2, endpoint=endpoint)
     return Run(record, lives=True, key=RunKey(Path("/a/key")), records=Records())
 
 

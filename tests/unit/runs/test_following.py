@@ -9,8 +9,8 @@ import pytest
 
 from throwcollect.runs.events import EventLog
 from throwcollect.runs.following import follow, read_events, read_logs
-from throwcollect.runs.record import Record
 from throwcollect.runs.records import Records, Run
+from throwcollect.runs.run_record import RunRecord
 from throwcollect.runs.state_directory import STATE_VARIABLE
 
 
@@ -22,7 +22,7 @@ def test_what_follows_a_run_ends_with_its_reader_even_if_nothing_happens_any_mor
     logs = tmp_path / "logs"
     run = Records().new("small")
     started = datetime.now(timezone.utc)
-    run.write(Record(run.run, "small", "local", str(tmp_path), None, str(logs), 0, started, os.getpid(), 1))
+    run.write(RunRecord(run.run, "small", "local", str(tmp_path), None, str(logs), 0, started, os.getpid(), 1))
     EventLog(logs, run.run).run_event("started", simulations=1)
     (logs / "sim_0.log").write_text("ready\n")
     process = subprocess.Popen(
@@ -52,7 +52,7 @@ def planned(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[Run, Calla
     first, later = tmp_path / "first", tmp_path / "data" / "logs"
     now = datetime.now(timezone.utc)
     run = Records().new("small")
-    run.write(Record(run.run, "small", "", str(tmp_path / "data"), None, str(first), 0, now, os.getpid(), 1))
+    run.write(RunRecord(run.run, "small", "", str(tmp_path / "data"), None, str(first), 0, now, os.getpid(), 1))
     first.mkdir()
     (first / "launcher.log").write_text("plan: 3 trials\n")
     EventLog(later, "of-an-earlier-run").run_event("started", simulations=1)

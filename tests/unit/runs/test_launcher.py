@@ -16,12 +16,12 @@ from throwcollect.config.schema import Config
 from throwcollect.coordinator.progress import Progress
 from throwcollect.errors import DatasetError, WorkerError
 from throwcollect.runs.launcher import launch
-from throwcollect.runs.record import Record
 from throwcollect.runs.records import OpenRun, Records
+from throwcollect.runs.run_record import RunRecord
 from throwcollect.runs.state_directory import STATE_VARIABLE
-from throwcollect.runtimes.docker import clock as docker_clock
+from throwcollect.runtimes.docker import engine_clock as docker_clock
 from throwcollect.runtimes.docker import watch as docker_watch
-from throwcollect.runtimes.docker.options import NODE_LABEL, RUN_LABEL
+from throwcollect.runtimes.docker.container_options import NODE_LABEL, RUN_LABEL
 from throwcollect.runtimes.nodes import COORDINATOR
 
 CONFIG = Config.model_validate({"containers": {"image": "image"}, "run": {"simulations": 1}})
@@ -58,7 +58,7 @@ def run(engine: Engine, tmp_path: Path) -> OpenRun:
     for name in ("logs", "data"):
         (tmp_path / name).mkdir()
     run = Records().new("throws")
-    record = Record(
+    record = RunRecord(
         run=run.run,
         name="throws",
         runtime="docker",

@@ -15,8 +15,8 @@ import pytest
 from throwcollect.coordinator.progress import Progress
 from throwcollect.errors import ConfigError
 from throwcollect.run_key import RunKey
-from throwcollect.runs.record import Failure, Record, Summary
 from throwcollect.runs.records import OpenRun, Records
+from throwcollect.runs.run_record import RunFailure, RunRecord, Summary
 from throwcollect.runs.state_directory import STATE_VARIABLE
 from throwcollect.runtimes.runtime import NodeState
 
@@ -38,7 +38,7 @@ def mode(path: Path) -> int:
     return stat.S_IMODE(path.stat(follow_symlinks=False).st_mode)
 
 
-def record(run: OpenRun, **fields: object) -> Record:
+def record(run: OpenRun, **fields: object) -> RunRecord:
     values = {
         "name": "small",
         "runtime": "local",
@@ -50,7 +50,7 @@ def record(run: OpenRun, **fields: object) -> Record:
         "launcher": 1,
         "simulations": 2,
     }
-    return Record(run=run.run, **{**values, **fields})  # type: ignore[arg-type]
+    return RunRecord(run=run.run, **{**values, **fields})  # type: ignore[arg-type]
 
 
 def remember(records: Records, **fields: object) -> str:
@@ -66,8 +66,10 @@ def test_what_is_written_is_read_by_others(state: Path) -> None:
     written = record(run, nodes=(NODE,), progress=PROGRESS, endpoint="tcp/127.0.0.1:1", summary=SUMMARY)
     run.write(written)
     assert Records().get(run.run).record == written
-    run.update(progress=replace(PROGRESS, ended=5), failure=Failure("ä"))
-    assert Records().get(run.run).record == replace(written, progress=replace(PROGRESS, ended=5), failure=Failure("ä"))
+    run.update(progress=replace(PROGRESS, ended=5), failure=RunFailure("ä"))
+    assert Records().get(run.run).record == replace(
+        written, progress=replace(PROGRESS, ended=5), failure=RunFailure("ä")
+    )
     assert Records().ids() == [run.run]
 
 
@@ -102,7 +104,7 @@ def test_a_run_without_a_record_is_none(state: Path) -> None:
 def test_a_record_is_written_only_when_something_has_changed(state: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     run = Records().new("small")
     run.write(record(run))
-    written: list[Record] = []
+    written: list[RunRecord] = []
     monkeypatch.setattr(run, "write", written.append)
     run.update(simulations=2, nodes=())
     assert written == []

@@ -15,7 +15,7 @@ from throwcollect.coordinator import replay_check
 from throwcollect.coordinator.progress import Progress
 from throwcollect.dataset.inspect import digest, info
 from throwcollect.errors import ConfigError, Interrupted, WorkerError
-from throwcollect.replay.throw import Replayer
+from throwcollect.replay.replayer import Replayer
 from throwcollect.runs.records import Records
 from throwcollect.runs.state_directory import STATE_VARIABLE
 from throwcollect.simulator import Simulator

@@ -14,7 +14,7 @@ from throwcollect.errors import ConfigError, WorkerError
 from throwcollect.ros.middleware import Middleware
 from throwcollect.run_key import RunKey
 from throwcollect.runtimes.local import LocalNodes, LocalRuntime
-from throwcollect.runtimes.nodes import NodeExit, NodeSpec, Role
+from throwcollect.runtimes.nodes import NodeExit, NodeRole, NodeSpec
 from throwcollect.runtimes.ports import split_address
 from throwcollect.runtimes.runtime import Place
 
@@ -28,7 +28,7 @@ def nodes(directory: Path, **run: object) -> LocalNodes:
 
 
 def node(code: str, name: str = "node") -> NodeSpec:
-    return NodeSpec(name, (code,), Role.EXPENDABLE)
+    return NodeSpec(name, (code,), NodeRole.EXPENDABLE)
 
 
 @pytest.fixture(scope="module", autouse=True)

@@ -8,7 +8,7 @@ import pytest
 
 from throwcollect.config.run import RunConfig
 from throwcollect.errors import ConfigError
-from throwcollect.ros.endpoint import split_address
+from throwcollect.ros.router_endpoint import split_address
 from throwcollect.runtimes.ports import format_endpoint, reach_from_elsewhere, reach_from_here, reserve_port
 
 

@@ -19,7 +19,7 @@ from throwcollect.extras import MissingExtraError
 from throwcollect.members import names_of
 from throwcollect.ros.middleware import Middleware
 from throwcollect.run_key import RunKey
-from throwcollect.runs.choice import choose
+from throwcollect.runs.runtime_choice import choose
 from throwcollect.runtimes.registry import AUTOMATIC, get_runtime
 from throwcollect.runtimes.runtime import Host, Place, Runtime
 

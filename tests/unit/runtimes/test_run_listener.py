@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from throwcollect.coordinator.progress import Progress
-from throwcollect.coordinator.topics import PROGRESS_QOS, PROGRESS_TOPIC
+from throwcollect.coordinator.shown_topics import PROGRESS_QOS, PROGRESS_TOPIC
 from throwcollect.ros import Context, Node, init, shutdown
 from throwcollect.ros.connection import Connection
 from throwcollect.ros.msg import String

@@ -12,8 +12,8 @@ import pytest
 from starlette.testclient import TestClient, WebSocketTestSession
 from tests.e2e.collection import FAST, collect_here, write_config
 
-from throwcollect.runs.record import Record
 from throwcollect.runs.records import OpenRun, Records, Run
+from throwcollect.runs.run_record import RunRecord
 from throwcollect.runs.state_directory import STATE_VARIABLE
 from throwcollect.serve import instances as instances_module
 from throwcollect.serve.access import Access, Keys
@@ -104,7 +104,7 @@ def remember(tmp_path: Path) -> Iterator[Remember]:
             "launcher": 2**22,
             "simulations": 2,
         }
-        run.write(Record(run=run.run, **{**values, **fields}))
+        run.write(RunRecord(run=run.run, **{**values, **fields}))
         if lives:
             opened.append(run)
         else:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from throwcollect.learning.learned_map import Axis, Correction, Kind, LearnedMap, Role
+from throwcollect.learning.learned_map import Axis, Correction, KeyRole, Kind, LearnedMap
 from throwcollect.learning.model_directory import write_model
 from throwcollect.learning.model_file import ModelFile, TrainedOn
 from throwcollect.learning.polynomial import Polynomial
@@ -18,7 +18,7 @@ TARGETS = ("landing_x_m", "landing_y_m")
 
 def make_model(directory: Path, throws: int = 400) -> None:
     """A model of a world in which a throw ends where its parameters say."""
-    axes = tuple(Axis(key, Role.PARAMETER, -1.0, 1.0, 0.0) for key in KEYS)
+    axes = tuple(Axis(key, KeyRole.PARAMETER, -1.0, 1.0, 0.0) for key in KEYS)
     values = np.random.default_rng(0).uniform(-1, 1, (throws, 2))
     straight = Polynomial(np.array([[0, 0], [1, 0], [0, 1]]), np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]))
     flat = Polynomial(np.array([[0, 0]]), np.array([[0.5]]))

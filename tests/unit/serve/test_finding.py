@@ -142,9 +142,9 @@ def test_what_keeps_a_server_from_starting_is_told(
 
 LINES = """
 import logging, os, sys
-from throwcollect.serve import server
-server._LOG_BYTES = 10_000
-server._write_lines()
+from throwcollect.serve import server_process
+server_process._LOG_BYTES = 10_000
+server_process._write_lines()
 for number in range(1_000):
     logging.getLogger("throwcollect.serve").info("GET /api/v1/state %d", number)
 print("an error", file=sys.stderr)

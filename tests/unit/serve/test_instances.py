@@ -13,8 +13,8 @@ from starlette.testclient import TestClient
 from tests.unit.serve.conftest import Remember, Served, ended
 
 from throwcollect.runs.component_container import ContainerOrder
-from throwcollect.runs.record import Failure, Origin, Planning
 from throwcollect.runs.records import Records, Run
+from throwcollect.runs.run_record import Origin, Planning, RunFailure
 from throwcollect.runtimes.runtime import NodeState
 from throwcollect.serve import instances as instances_module
 from throwcollect.serve.catalogue import Catalogue
@@ -272,7 +272,7 @@ def test_the_state_tells_of_all_that_live_and_the_latest_that_are_over(client: T
     remember("living", origin=Origin("throws"), nodes=nodes)
     remember("lost", lives=False, nodes=(NodeState("sim_0", "running", 0, "2", ""),))
     remember("left", lives=False, runtime="docker", nodes=(NodeState("sim_0", "running", 0, "2", ""),))
-    remember("failed", **ended(exit_code=2, failure=Failure("no plan", hint="mend it")))
+    remember("failed", **ended(exit_code=2, failure=RunFailure("no plan", hint="mend it")))
     found = client.get("/api/v1/state").json()
     assert [each["status"] for each in found["instances"]][:3] == ["running", "ended", "died"]
     assert len(found["instances"]) == 101

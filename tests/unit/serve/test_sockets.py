@@ -15,7 +15,7 @@ from starlette.routing import WebSocketRoute
 from starlette.websockets import WebSocket
 from websockets.sync.client import connect
 
-from throwcollect.serve.server import WEBSOCKETS
+from throwcollect.serve.server_process import WEBSOCKETS
 from throwcollect.serve.sockets import keep_telling
 
 FRAME = bytes(2**20)

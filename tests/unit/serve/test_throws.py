@@ -15,7 +15,7 @@ import pytest
 from tests.unit.serve.conftest import Remember
 
 from throwcollect.dataset.reader import Dataset
-from throwcollect.episode.message import Delivery
+from throwcollect.episode.episode_message import Delivery
 from throwcollect.ros.connection import Connection
 from throwcollect.runs.records import Records, Run
 from throwcollect.serve import throws

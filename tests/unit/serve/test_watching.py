@@ -10,7 +10,7 @@ import pytest
 
 from throwcollect.errors import ConfigError
 from throwcollect.serve import watching
-from throwcollect.serve.state import ComponentState, State
+from throwcollect.serve.state import ComponentState, WholeState
 from throwcollect.serve.watching import StateWatch
 
 
@@ -22,11 +22,11 @@ class World:
         self.looks = 0
         self.fails = False
 
-    def look(self) -> State:
+    def look(self) -> WholeState:
         self.looks += 1
         if self.fails:
             raise ConfigError("the disk is full")
-        return State([ComponentState("a", "A", "session", 1, [str(self.instances)], [])], [])
+        return WholeState([ComponentState("a", "A", "session", 1, [str(self.instances)], [])], [])
 
 
 @pytest.fixture(autouse=True)

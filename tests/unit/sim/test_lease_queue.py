@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
-from throwcollect.episode.message import Refusal
+from throwcollect.episode.episode_message import TrialRefusal
 from throwcollect.errors import ThrowcollectError
 from throwcollect.run_key import Signer
 from throwcollect.sim.lease_queue import LeaseQueue
@@ -97,7 +97,7 @@ def test_a_trial_that_cannot_be_begun_is_refused_and_the_next_one_begins() -> No
     runner = Runner()
     queue = LeaseQueue(runner)  # type: ignore[arg-type]
     queue.replace([BAD, A])
-    assert queue.begin_next() == Refusal(BAD.token, "out of reach")
+    assert queue.begin_next() == TrialRefusal(BAD.token, "out of reach")
     assert queue.begin_next() is None
     assert (runner.begun, runner.dropped) == ([0], 1)
 
@@ -105,7 +105,7 @@ def test_a_trial_that_cannot_be_begun_is_refused_and_the_next_one_begins() -> No
 def test_a_trial_whose_yield_is_worthless_is_refused() -> None:
     queue, runner = queue_of(A, B)
     runner.yields = ThrowcollectError("not finite")
-    assert queue.hand_over() == Refusal(A.token, "not finite")
+    assert queue.hand_over() == TrialRefusal(A.token, "not finite")
     assert queue.begin_next() is None
     assert runner.begun == [0, 1]
 

@@ -11,7 +11,7 @@ from throwcollect.errors import ConfigError, RequestError
 from throwcollect.robots.description import start_posture
 from throwcollect.robots.talos import TALOS
 from throwcollect.sim.present_trial import TrialSetup
-from throwcollect.sim.simulation import Scope, Simulation, State
+from throwcollect.sim.simulation import Scope, Simulation, StateCode
 
 CONFIG = Config()
 POSTURE = start_posture(CONFIG)
@@ -41,7 +41,7 @@ def shared() -> Iterator[Simulation]:
 @pytest.fixture
 def simulation(shared: Simulation) -> Simulation:
     shared.trial.setup = TrialSetup(-1, (), CONFIG)
-    shared.state = State.PLAYING
+    shared.state = StateCode.PLAYING
     shared.reset()
     shared.pop_results()
     return shared
@@ -96,7 +96,7 @@ def test_the_same_trial_gives_the_same_samples_however_it_is_sliced(simulation: 
     run(simulation)
     whole = simulation.episode()
     trial(simulation)
-    simulation.state = State.PAUSED
+    simulation.state = StateCode.PAUSED
     for steps in (1, 2, 77, 3, 400, 1000):
         simulation.step(steps)
     sliced = simulation.episode()
@@ -184,13 +184,13 @@ def test_a_cancelled_goal_stops_where_it_is(simulation: Simulation) -> None:
 
 
 def test_while_paused_steps_advance_the_clock_exactly(simulation: Simulation) -> None:
-    simulation.set_state(State.PAUSED)
+    simulation.set_state(StateCode.PAUSED)
     simulation.step(10)
     assert simulation.now_ns == 10 * 10**9 // CONFIG.sim.physics_hz
 
 
 def test_steps_that_are_asked_for_are_taken_slice_by_slice(simulation: Simulation) -> None:
-    simulation.set_state(State.PAUSED)
+    simulation.set_state(StateCode.PAUSED)
     request = simulation.request_steps(60)
     assert simulation.running
     simulation.advance(watched=True)
@@ -211,7 +211,7 @@ def test_steps_are_refused_unless_it_is_paused(simulation: Simulation) -> None:
 
 
 def test_no_steps_need_no_time(simulation: Simulation) -> None:
-    simulation.set_state(State.PAUSED)
+    simulation.set_state(StateCode.PAUSED)
     assert simulation.request_steps(0).is_over
     assert not simulation.running
 
@@ -221,11 +221,11 @@ def test_no_steps_need_no_time(simulation: Simulation) -> None:
     [
         (lambda simulation: simulation.reset(Scope.TIME), "the simulation was reset"),
         (lambda simulation: simulation.reset(Scope.STATE), "the simulation was reset"),
-        (lambda simulation: simulation.set_state(State.QUITTING), "the simulation is QUITTING now"),
+        (lambda simulation: simulation.set_state(StateCode.QUITTING), "the simulation is QUITTING now"),
     ],
 )
 def test_steps_end_when_something_comes_in_between(interrupt, reason: str, simulation: Simulation) -> None:
-    simulation.set_state(State.PAUSED)
+    simulation.set_state(StateCode.PAUSED)
     request = simulation.request_steps(10**9)
     simulation.advance(watched=True)
     interrupt(simulation)
@@ -234,7 +234,7 @@ def test_steps_end_when_something_comes_in_between(interrupt, reason: str, simul
 
 
 def test_taking_away_what_was_spawned_does_not_end_steps(simulation: Simulation) -> None:
-    simulation.set_state(State.PAUSED)
+    simulation.set_state(StateCode.PAUSED)
     request = simulation.request_steps(30)
     simulation.reset(Scope.SPAWNED)
     assert not request.is_over
@@ -261,7 +261,7 @@ def test_only_time_and_state_together_begin_a_trial(scope: Scope, simulation: Si
 
 
 def test_a_reset_of_time_leaves_the_robot_where_it_is(simulation: Simulation) -> None:
-    simulation.set_state(State.PAUSED)
+    simulation.set_state(StateCode.PAUSED)
     assert simulation.submit(ARM, 1, swing()) is None
     simulation.step(250)
     simulation.reset(Scope.TIME)
@@ -338,10 +338,10 @@ def test_slices_of_real_time_are_long_where_nobody_waits_for_messages(
 
 
 def test_samples_are_told_one_by_one_also_after_steps_that_ended_between_them(simulation: Simulation) -> None:
-    simulation.state = State.PAUSED
+    simulation.state = StateCode.PAUSED
     simulation.request_steps(3)
     simulation.advance(watched=True)
-    simulation.state = State.PLAYING
+    simulation.state = StateCode.PLAYING
     assert simulation.submit(ARM, 1, swing()) is None
     simulation.real_time_factor = 1.0
     simulation.fresh_samples()
@@ -363,10 +363,10 @@ def test_after_a_reset_that_fails_the_clock_stands_still_until_another_one_succe
         simulation.reset()
     assert simulation.submit(ARM, 2, swing()) is None
     assert not simulation.running
-    simulation.state = State.PAUSED
+    simulation.state = StateCode.PAUSED
     with pytest.raises(RequestError, match="there is no start state until a reset succeeds"):
         simulation.request_steps(1)
-    simulation.state = State.PLAYING
+    simulation.state = StateCode.PLAYING
     simulation.trial.setup = TrialSetup(0, (), config)
     simulation.reset()
     simulation.submit(ARM, 3, swing())

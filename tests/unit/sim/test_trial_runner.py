@@ -7,13 +7,13 @@ import pytest
 
 from throwcollect.config.schema import Config
 from throwcollect.config.values import with_values
-from throwcollect.control import ErrorCode, Refusal
+from throwcollect.control import ErrorCode, TrajectoryRefusal
 from throwcollect.dataset.judging import judge_episode
-from throwcollect.episode.message import Delivery
+from throwcollect.episode.episode_message import Delivery
 from throwcollect.errors import ConfigError, ThrowcollectError
 from throwcollect.sim.limb_controller import LimbController
 from throwcollect.sim.present_trial import TrialSetup
-from throwcollect.sim.simulation import Simulation, State
+from throwcollect.sim.simulation import Simulation, StateCode
 from throwcollect.sim.trial_runner import TrialRunner
 from throwcollect.tasks.task import task_of
 from throwcollect.trial.conditions import conditions_from_json
@@ -60,7 +60,9 @@ def test_what_cannot_be_begun_is_an_error(simulation: Simulation, monkeypatch: p
     runner = TrialRunner(simulation)
     with pytest.raises(ConfigError):
         runner.begin(0, {"ball.colour": 1.0})
-    monkeypatch.setattr(LimbController, "refuse_locked", lambda *_: Refusal(ErrorCode.INVALID_JOINTS, "is locked"))
+    monkeypatch.setattr(
+        LimbController, "refuse_locked", lambda *_: TrajectoryRefusal(ErrorCode.INVALID_JOINTS, "is locked")
+    )
     with pytest.raises(ThrowcollectError, match="trial 0: arm_right_controller refuses its goal"):
         runner.begin(0, {})
 
@@ -98,11 +100,11 @@ def test_what_is_set_up_meanwhile_is_of_the_next_trial_alone(simulation: Simulat
     runner = TrialRunner(simulation)
     simulation.trial.setup = TrialSetup(3, (), with_values(CONFIG, {"ball.mass_kg": 0.05}))
     simulation.reset()
-    simulation.state = State.PAUSED
+    simulation.state = StateCode.PAUSED
     simulation.step(100)
     simulation.trial.setup = TrialSetup(4, (), with_values(CONFIG, {"ball.mass_kg": 0.06}))
     simulation.step(100_000)
-    simulation.state = State.PLAYING
+    simulation.state = StateCode.PLAYING
     delivery = runner.hand_over()
     assert delivery is not None
     assert delivery.episode.header.trial == 3

@@ -13,7 +13,7 @@ from throwcollect.config.sweep import TargetConfig
 from throwcollect.config.values import values_by_key, with_values
 from throwcollect.sweep.digest import config_digest, trial_digests
 from throwcollect.sweep.points import Points
-from throwcollect.tasks.throw.config import UntilLanded
+from throwcollect.tasks.throw.throw_config import UntilLanded
 
 WITHOUT_EFFECT = {"name", "trials", "until", "sim.real_time_factor", "record.zstd_level", "record.trials_per_shard"}
 CAME_LATER = {"sim.engine", "robot.joint_offsets", "robot.speed_scale", "robot.motor_lag_s"}

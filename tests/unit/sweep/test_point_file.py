@@ -5,7 +5,7 @@ import pytest
 from throwcollect.config.schema import Config
 from throwcollect.errors import ConfigError
 from throwcollect.sweep.point_file import encode_points, read_points
-from throwcollect.tasks.throw.config import ThrowConfig
+from throwcollect.tasks.throw.throw_config import ThrowConfig
 
 HEADER = "ball.mass_kg,task.duration_s\n"
 

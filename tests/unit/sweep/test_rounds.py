@@ -12,7 +12,7 @@ from throwcollect.sweep.plan import make_plan, make_trials
 from throwcollect.sweep.rounds import Rounds
 from throwcollect.sweep.samplers import draw_points
 from throwcollect.sweep.trials import Trial
-from throwcollect.tasks.throw.outcome import ThrowOutcome, ThrowResult
+from throwcollect.tasks.throw.throw_result import ThrowOutcome, ThrowResult
 
 LANDED = throw(make_plan(configuration()).trials[0])
 FAILED = ThrowResult(ThrowOutcome.RECAUGHT)

@@ -13,7 +13,7 @@ from throwcollect.sweep.plan import make_plan, make_trials
 from throwcollect.sweep.rounds import Rounds
 from throwcollect.sweep.trials import Trial
 from throwcollect.tasks.measures import BallState
-from throwcollect.tasks.throw.outcome import ThrowOutcome, ThrowResult
+from throwcollect.tasks.throw.throw_result import ThrowOutcome, ThrowResult
 
 PARAMETERS = {
     "task.duration_s": {"min": 0.5, "max": 2.0},

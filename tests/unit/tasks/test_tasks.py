@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from throwcollect.config.schema import Config
-from throwcollect.config.target import is_target
-from throwcollect.config.task import TaskConfig
+from throwcollect.config.target_columns import is_target
+from throwcollect.config.task_config import TaskConfig
 from throwcollect.members import load_member, load_object, names_of
 from throwcollect.tasks.first_motion import find_first_motion
 from throwcollect.tasks.result import LIMIT_VIOLATED, LOST, TRACKING_FAILED, Result

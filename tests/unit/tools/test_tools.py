@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from throwcollect.config.tool import ToolConfig
+from throwcollect.config.tool_config import ToolConfig
 from throwcollect.members import load_member, names_of
 from throwcollect.tools.tool import tool_of
 

@@ -296,7 +296,7 @@ def test_a_failure_leaves_nothing_behind(collected: Path, tmp_path: Path, monkey
     def full(*_: object) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("throwcollect.view.robot.shutil.copyfile", full)
+    monkeypatch.setattr("throwcollect.view.drawn_robot.shutil.copyfile", full)
     with pytest.raises(DatasetError, match="No space left on device"):
         view(collected, tmp_path / "view", [0])
     assert not list(tmp_path.iterdir())

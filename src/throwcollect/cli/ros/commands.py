@@ -7,11 +7,11 @@ import shlex
 import typer
 
 from throwcollect.cli.options import RunOption
-from throwcollect.cli.ros.actions import action_app
-from throwcollect.cli.ros.nodes import node_app
+from throwcollect.cli.ros.graph_actions import action_app
+from throwcollect.cli.ros.graph_nodes import node_app
+from throwcollect.cli.ros.graph_services import service_app
+from throwcollect.cli.ros.graph_topics import topic_app
 from throwcollect.cli.ros.params import param_app
-from throwcollect.cli.ros.services import service_app
-from throwcollect.cli.ros.topics import topic_app
 from throwcollect.files import write_secret
 
 ros_app = typer.Typer(help="Look into the ROS graph, as the command `ros2` does.", no_args_is_help=True)
@@ -27,7 +27,7 @@ _PROFILE = "fast_dds.xml"
 @ros_app.command("env")
 def env(run: RunOption = None) -> None:
     """Print the line that lets a shell's ROS 2 nodes join a run: eval "$(throwcollect ros env)"."""
-    from throwcollect.cli.ros.joining import find_way
+    from throwcollect.cli.ros.joined_run import find_way
     from throwcollect.ros.fast_dds import PLAIN_DISCOVERY, PROFILE_VARIABLE, client_profile
     from throwcollect.ros.middleware import RMW_VARIABLE
 

@@ -8,10 +8,10 @@ from typing import Annotated, Any
 import typer
 
 from throwcollect import ros
-from throwcollect.cli.ros.options import NodeArgument, ParameterArgument, RunOption
-from throwcollect.cli.ros.session import Session, join_graph, require_name
+from throwcollect.cli.ros.graph_session import GraphSession, join_graph, require_name
+from throwcollect.cli.ros.ros_options import NodeArgument, ParameterArgument, RunOption
 from throwcollect.errors import ConfigError, WorkerError
-from throwcollect.ros.names import absolute_name, is_hidden
+from throwcollect.ros.graph_names import absolute_name, is_hidden
 
 param_app = typer.Typer(help="Parameters: list, get, set.", no_args_is_help=True)
 
@@ -57,7 +57,7 @@ def list_parameters(
 @param_app.command("get")
 def show_parameter(node: NodeArgument, name: ParameterArgument, run: RunOption = None) -> None:
     """Print the value of a parameter."""
-    from throwcollect.ros.values import plain
+    from throwcollect.ros.message_values import plain
 
     with join_graph(run) as session:
         owner = _find_node(session, node)
@@ -107,13 +107,13 @@ def _make_parameter(name: str, text: str) -> Any:
     return parameter.to_parameter_msg()
 
 
-def _find_node(session: Session, name: str) -> str:
+def _find_node(session: GraphSession, name: str) -> str:
     owner = absolute_name(name)
     require_name("node", owner, session.node_names())
     return owner
 
 
-def _ask(session: Session, node: str, service: str, **fields: Any) -> Any:
+def _ask(session: GraphSession, node: str, service: str, **fields: Any) -> Any:
     service_type: Any = ros.get_service(f"rcl_interfaces/srv/{service}")
     snake = "".join(f"_{letter.lower()}" if letter.isupper() else letter for letter in service).strip("_")
     client = session.node.create_client(service_type, f"{node}/{snake}")

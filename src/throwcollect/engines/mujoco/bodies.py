@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import mujoco
 
 from throwcollect.engines.engine import Bodies, BodyModel, BodyState, Box
-from throwcollect.engines.mujoco.frames import rotation, turn, turn_back
+from throwcollect.engines.mujoco.rotations import rotation, turn, turn_back
 from throwcollect.engines.mujoco.scenery import Surface, boxes, collide_with_everything, read_urdf, rename_links, watch
 from throwcollect.errors import RequestError
 

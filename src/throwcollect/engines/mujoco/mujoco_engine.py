@@ -26,8 +26,8 @@ from throwcollect.engines.engine import (
     ball_of,
 )
 from throwcollect.engines.mujoco.bodies import MujocoBodies
-from throwcollect.engines.mujoco.contacts import aim_contacts
-from throwcollect.engines.mujoco.frames import turn, turn_back
+from throwcollect.engines.mujoco.contact_targets import aim_contacts
+from throwcollect.engines.mujoco.rotations import turn, turn_back
 from throwcollect.engines.mujoco.scenery import (
     BALL,
     Surface,

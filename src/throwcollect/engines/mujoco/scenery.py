@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from throwcollect.engines.engine import GROUND, Box, Physics, Scene
-from throwcollect.engines.mujoco.contacts import HARDNESS
+from throwcollect.engines.mujoco.contact_targets import HARDNESS
 from throwcollect.errors import ConfigError
 from throwcollect.reproducible_math import matmul
 

@@ -10,7 +10,7 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from throwcollect.config.sweep import LANDING_HEIGHT, TargetConfig
-from throwcollect.report.points import read_numbers
+from throwcollect.report.plotted_points import read_numbers
 from throwcollect.report.throw.landings import Landings
 
 _BINS = 14
@@ -23,7 +23,7 @@ _TITLES = {
 
 
 @dataclass(frozen=True)
-class Axis:
+class CellAxis:
     """One dimension of the cells.
 
     Attributes:
@@ -48,7 +48,7 @@ class Coverage:
         configured: Whether the cells are those of the configuration; else they span the values of the throws.
     """
 
-    axes: tuple[Axis, ...]
+    axes: tuple[CellAxis, ...]
     counts: NDArray[np.intp]
     throws: int
     configured: bool
@@ -59,7 +59,7 @@ class Coverage:
         return int((self.counts > 0).sum())
 
     @property
-    def pairs(self) -> tuple[tuple[Axis, Axis, NDArray[np.intp]], ...]:
+    def pairs(self) -> tuple[tuple[CellAxis, CellAxis, NDArray[np.intp]], ...]:
         """Each pair of axes, and the throws over both, shape ``(n_first, n_second)``, summed over the third."""
         numbers = set(range(len(self.axes)))
         return tuple(
@@ -89,7 +89,7 @@ def count_throws(landings: Landings, throws: pa.Table, *, target: TargetConfig |
             # The configuration has radians, and the values above are degrees, as the axis shows them.
             edges["hit_angle_rad"] = np.degrees(edges["hit_angle_rad"])
     counts, _ = np.histogramdd(np.column_stack(list(values.values())), list(edges.values()))
-    axes = tuple(Axis(*_TITLES[name], edges[name]) for name in values)
+    axes = tuple(CellAxis(*_TITLES[name], edges[name]) for name in values)
     return Coverage(axes, counts.astype(np.intp), len(landings), target is not None)
 
 

@@ -16,8 +16,8 @@ from throwcollect.report.outcomes import LANDED, Outcomes
 from throwcollect.report.throw.landings import Landings
 from throwcollect.robots.quintic_curve import sample_positions
 from throwcollect.tasks.task import trajectory_of
-from throwcollect.tasks.throw.config import throw_section
 from throwcollect.tasks.throw.flight import flight_residual, release_of
+from throwcollect.tasks.throw.throw_config import throw_section
 from throwcollect.units import NS_PER_S
 
 MOST_RESIDUALS = 2000

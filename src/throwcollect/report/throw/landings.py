@@ -9,7 +9,7 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from throwcollect.report.outcomes import Outcomes
-from throwcollect.report.points import read_numbers
+from throwcollect.report.plotted_points import read_numbers
 
 
 @dataclass(frozen=True)

@@ -14,8 +14,8 @@ from throwcollect.errors import ConfigError, WorkerError
 from throwcollect.extras import MissingExtraError, explain_missing
 from throwcollect.files import sync_directory, unwritable
 from throwcollect.runtimes.apptainer.archive import check_archive, unpack_archive
-from throwcollect.runtimes.apptainer.contents import is_sif
 from throwcollect.runtimes.apptainer.program import call, find_program
+from throwcollect.runtimes.apptainer.sif_contents import is_sif
 from throwcollect.runtimes.image_sources import (
     DEFAULT_BASE,
     check_wheelhouse,
@@ -82,7 +82,7 @@ def _is_engine_there(image: str | None, say: Callable[[str], None]) -> bool:
     """Whether an engine answers; if an image is named, that no engine answers is an error."""
     try:
         with explain_missing():
-            from throwcollect.runtimes.docker.engine import connect
+            from throwcollect.runtimes.docker.docker_engine import connect
 
             connect().close()
     except MissingExtraError as error:

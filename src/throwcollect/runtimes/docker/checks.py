@@ -14,9 +14,16 @@ from throwcollect.config.host_paths import DEVICES, SECRETS, is_allowed_device, 
 from throwcollect.config.schema import Config
 from throwcollect.errors import ConfigError, Problem, WorkerError
 from throwcollect.runtimes.docker.address import engine_address
-from throwcollect.runtimes.docker.engine import engine_errors
+from throwcollect.runtimes.docker.container_options import (
+    ROUTER_PORT,
+    RUN_LABEL,
+    RunPlace,
+    image,
+    mount_source,
+    section_of,
+)
+from throwcollect.runtimes.docker.docker_engine import engine_errors
 from throwcollect.runtimes.docker.image import default_tag
-from throwcollect.runtimes.docker.options import ROUTER_PORT, RUN_LABEL, RunPlace, image, mount_source, section_of
 from throwcollect.runtimes.nodes import COORDINATOR, ROUTER
 from throwcollect.runtimes.ports import reserve_port
 

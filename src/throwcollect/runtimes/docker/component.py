@@ -16,14 +16,10 @@ from throwcollect.errors import ConfigError, WorkerError
 from throwcollect.ros.connection import Connection
 from throwcollect.ros.middleware import RMW_VARIABLE
 from throwcollect.run_key import RunKey
-from throwcollect.runtimes.docker import clock
+from throwcollect.runtimes.docker import engine_clock
 from throwcollect.runtimes.docker.address import engine_address, is_local
 from throwcollect.runtimes.docker.checks import check_container
-from throwcollect.runtimes.docker.clock import EngineClock
-from throwcollect.runtimes.docker.containers import LOG_S, end_in_words
-from throwcollect.runtimes.docker.engine import ENGINE_ERRORS, connect
-from throwcollect.runtimes.docker.node_container import NodeContainer
-from throwcollect.runtimes.docker.options import (
+from throwcollect.runtimes.docker.container_options import (
     API_VERSION,
     JOINED_LABEL,
     KEY,
@@ -31,6 +27,10 @@ from throwcollect.runtimes.docker.options import (
     RunPlace,
     container_options,
 )
+from throwcollect.runtimes.docker.docker_engine import ENGINE_ERRORS, connect
+from throwcollect.runtimes.docker.docker_nodes import LOG_S, end_in_words
+from throwcollect.runtimes.docker.engine_clock import EngineClock
+from throwcollect.runtimes.docker.node_container import NodeContainer
 from throwcollect.runtimes.docker.watch import EngineWatch
 from throwcollect.runtimes.node_logs import NodeLogs
 from throwcollect.runtimes.nodes import ROUTER
@@ -129,7 +129,7 @@ class ComponentContainer:
         with ExitStack() as undo:
             self._clock = EngineClock(warn)
             undo.callback(self._clock.close)
-            self._client: DockerClient = connect(timeout_s=clock.SILENCE_S)
+            self._client: DockerClient = connect(timeout_s=engine_clock.SILENCE_S)
             self._clock.attend(self._client)
             check_container(self._client, spec, component)
             undo.pop_all()

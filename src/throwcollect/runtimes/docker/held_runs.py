@@ -11,8 +11,7 @@ from docker.client import DockerClient
 from docker.errors import NotFound
 
 from throwcollect.errors import WorkerError
-from throwcollect.runtimes.docker.engine import ENGINE_ERRORS, engine_errors, in_words
-from throwcollect.runtimes.docker.options import (
+from throwcollect.runtimes.docker.container_options import (
     DIRECTORY_LABEL,
     JOINED_LABEL,
     KEY_LABEL,
@@ -20,6 +19,7 @@ from throwcollect.runtimes.docker.options import (
     RUN_LABEL,
     VERSION_LABEL,
 )
+from throwcollect.runtimes.docker.docker_engine import ENGINE_ERRORS, engine_errors, in_words
 from throwcollect.runtimes.runtime import HeldNode, HeldRun
 
 _GRACE_S = 3

@@ -15,7 +15,7 @@ from docker.errors import ImageNotFound
 
 from throwcollect.errors import ConfigError, WorkerError
 from throwcollect.files import unwritable, write_all
-from throwcollect.runtimes.docker.engine import connect, engine_errors
+from throwcollect.runtimes.docker.docker_engine import connect, engine_errors
 from throwcollect.runtimes.image_sources import (
     DEFAULT_BASE,
     DOCKERFILE,

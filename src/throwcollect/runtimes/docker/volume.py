@@ -19,8 +19,8 @@ from throwcollect.config.schema import Config
 from throwcollect.dataset.summary import Info
 from throwcollect.errors import DatasetError
 from throwcollect.run_key import RunKey
-from throwcollect.runtimes.docker.engine import ENGINE_ERRORS, engine_errors
-from throwcollect.runtimes.docker.options import DATA, KEY, KEY_LABEL, RunPlace, confine, image
+from throwcollect.runtimes.docker.container_options import DATA, KEY, KEY_LABEL, RunPlace, confine, image
+from throwcollect.runtimes.docker.docker_engine import ENGINE_ERRORS, engine_errors
 
 _IN_MEMORY = 16 * 1024**2
 _INFO_S = 120

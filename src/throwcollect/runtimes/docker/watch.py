@@ -11,9 +11,9 @@ from typing import Any
 from docker.client import DockerClient
 from docker.errors import NotFound
 
-from throwcollect.runtimes.docker.clock import EngineClock
-from throwcollect.runtimes.docker.engine import ENGINE_ERRORS, in_words, timed_out
-from throwcollect.runtimes.docker.options import RUN_LABEL, RunPlace
+from throwcollect.runtimes.docker.container_options import RUN_LABEL, RunPlace
+from throwcollect.runtimes.docker.docker_engine import ENGINE_ERRORS, in_words, timed_out
+from throwcollect.runtimes.docker.engine_clock import EngineClock
 
 _EVENTS = ["start", "die", "oom", "destroy", "pause", "unpause", "health_status"]
 _LOOK_EVERY_S = 2.0

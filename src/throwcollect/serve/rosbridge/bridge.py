@@ -13,11 +13,11 @@ from queue import Empty, SimpleQueue
 from throwcollect import ros
 from throwcollect.errors import ThrowcollectError
 from throwcollect.ros.connection import Connection
-from throwcollect.ros.endpoint import answers
-from throwcollect.serve.rosbridge.client import Client
+from throwcollect.ros.router_endpoint import answers
+from throwcollect.serve.rosbridge.bridge_client import BridgeClient
+from throwcollect.serve.rosbridge.bridge_session import BridgeSession
 from throwcollect.serve.rosbridge.codec import Frame
 from throwcollect.serve.rosbridge.offered_actions import FAREWELL_S
-from throwcollect.serve.rosbridge.session import Session
 
 _logger = logging.getLogger(__name__)
 
@@ -39,9 +39,9 @@ class Bridge:
 
     def __init__(self, connection: Connection | None) -> None:
         self._connection = connection
-        self._session: Session | None = None
+        self._session: BridgeSession | None = None
         self._joined: Connection | None = None
-        self._clients: list[Client] = []
+        self._clients: list[BridgeClient] = []
         self._work: SimpleQueue[Callable[[], None]] = SimpleQueue()
         # The number decides between equal times, because functions have no order.
         self._timers: list[tuple[float, int, Callable[[], None]]] = []
@@ -53,12 +53,12 @@ class Bridge:
         self._thread = threading.Thread(target=self._run, name="rosbridge", daemon=True)
         self._thread.start()
 
-    def attach(self, send: Callable[[Frame], None], *, read_only: bool = False) -> Client:
+    def attach(self, send: Callable[[Frame], None], *, read_only: bool = False) -> BridgeClient:
         """Add a client, which the caller has to close.
 
         Each frame for the client is given to ``send`` in the bridge's thread, so that may neither wait nor fail.
         """
-        client = Client(self, send, read_only=read_only)
+        client = BridgeClient(self, send, read_only=read_only)
         self.submit(lambda: self._clients.append(client))
         return client
 
@@ -79,7 +79,7 @@ class Bridge:
         return self._session is not None
 
     @property
-    def session(self) -> Session:
+    def session(self) -> BridgeSession:
         """The place in the ROS graph; only for the bridge's thread.
 
         Raises:
@@ -101,7 +101,7 @@ class Bridge:
                 # The thread waits in the executor then, which only a task wakes.
                 self._session.executor.create_task(self._do_next)
 
-    def forget(self, client: Client) -> None:
+    def forget(self, client: BridgeClient) -> None:
         """Take a client off the list."""
         self._clients.remove(client)
 
@@ -126,7 +126,7 @@ class Bridge:
             self._call_timers()
         self._leave()
 
-    def _spin(self, session: Session, seconds: float) -> None:
+    def _spin(self, session: BridgeSession, seconds: float) -> None:
         try:
             self._attempt(lambda: session.executor.spin_once(timeout_sec=seconds))
         except ros.ExternalShutdownException:
@@ -172,7 +172,7 @@ class Bridge:
 
     def _join(self, connection: Connection) -> None:
         try:
-            session = Session(connection)
+            session = BridgeSession(connection)
         except ThrowcollectError as error:
             _logger.warning("the bridge cannot join the run: %s", error)
             return

@@ -18,8 +18,8 @@ import orjson
 from numpy.typing import NDArray
 
 from throwcollect.errors import ConfigError
-from throwcollect.ros.values import plain
-from throwcollect.serve.rosbridge.request import Request
+from throwcollect.ros.message_values import plain
+from throwcollect.serve.rosbridge.request import BridgeRequest
 
 Frame = str | bytes
 """A text frame or a binary one."""
@@ -29,7 +29,7 @@ _TAG_OF = {np.dtype(kind): tag for tag, kind in _TAGS.items()}
 _NOT_ASCII = re.compile(r"[^\x00-\x7f]+")
 
 
-def read_frame(frame: Frame) -> Request:
+def read_frame(frame: Frame) -> BridgeRequest:
     """Read a frame of a client, which is JSON, or CBOR in a binary frame.
 
     Raises:
@@ -45,7 +45,7 @@ def read_frame(frame: Frame) -> Request:
         raise ConfigError(f"a frame is neither JSON nor CBOR: {error}") from error
     if not isinstance(fields, Mapping):
         raise ConfigError(f"a frame should be an object with an op, got {fields!r:.80}")
-    return Request(fields)
+    return BridgeRequest(fields)
 
 
 def _read_array(tag: cbor2.CBORTag, _immutable: bool) -> Any:

@@ -6,7 +6,7 @@ from typing import Any
 
 from throwcollect.coordinator.simulation_client import EPISODE_TOPIC
 from throwcollect.errors import ConfigError
-from throwcollect.ros.names import absolute_name
+from throwcollect.ros.graph_names import absolute_name
 from throwcollect.trial.lease import LEASES
 
 _GUARDED = {

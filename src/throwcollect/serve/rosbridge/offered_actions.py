@@ -8,11 +8,11 @@ from typing import Any
 
 from throwcollect import ros
 from throwcollect.errors import ConfigError
-from throwcollect.ros.names import absolute_name, find_interface
-from throwcollect.ros.values import fill
+from throwcollect.ros.graph_names import absolute_name, find_interface
+from throwcollect.ros.message_values import fill
 from throwcollect.serve.rosbridge.codec import plain_values
 from throwcollect.serve.rosbridge.peer import Peer
-from throwcollect.serve.rosbridge.request import Form, Request
+from throwcollect.serve.rosbridge.request import BridgeRequest, Form
 
 _SUCCEEDED, _CANCELED, _ABORTED = 4, 5, 6
 """Of action_msgs/msg/GoalStatus."""
@@ -61,7 +61,7 @@ class OfferedAction:
         self._server = None
         self._goals.clear()
 
-    def publish_feedback(self, request: Request) -> None:
+    def publish_feedback(self, request: BridgeRequest) -> None:
         """Publish feedback of the client on a goal.
 
         Raises:
@@ -72,7 +72,7 @@ class OfferedAction:
         fill(feedback, request.any("values"))
         handle.publish_feedback(feedback)
 
-    def end(self, request: Request) -> None:
+    def end(self, request: BridgeRequest) -> None:
         """End a goal with the client's result.
 
         Raises:
@@ -85,7 +85,7 @@ class OfferedAction:
             fill(result, {} if values is None else values)
         self._finish(number, result, request.natural_or("status", _SUCCEEDED) if has_succeeded else _ABORTED)
 
-    def settle(self, request: Request) -> None:
+    def settle(self, request: BridgeRequest) -> None:
         """Take note of the state of a goal; one that has ended gets an empty result, as the client sends none.
 
         Raises:
@@ -95,7 +95,7 @@ class OfferedAction:
         if status in (_SUCCEEDED, _CANCELED, _ABORTED):
             self._finish(number, self._type.Result(), status)
 
-    def _find(self, request: Request) -> str:
+    def _find(self, request: BridgeRequest) -> str:
         if not isinstance(request.id, str) or request.id not in self._goals:
             raise ConfigError(f"{request.op}: no goal {request.id} of {self._name} is under way")
         return request.id

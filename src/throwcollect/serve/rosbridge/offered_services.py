@@ -8,11 +8,11 @@ from typing import Any
 
 from throwcollect import ros
 from throwcollect.errors import ConfigError
-from throwcollect.ros.names import absolute_name, find_interface
-from throwcollect.ros.values import fill
+from throwcollect.ros.graph_names import absolute_name, find_interface
+from throwcollect.ros.message_values import fill
 from throwcollect.serve.rosbridge.codec import plain_values
 from throwcollect.serve.rosbridge.peer import Peer
-from throwcollect.serve.rosbridge.request import Form, Request
+from throwcollect.serve.rosbridge.request import BridgeRequest, Form
 
 _numbers = itertools.count(1)
 
@@ -50,7 +50,7 @@ class OfferedService:
         self._service = None
         self._pending.clear()
 
-    def respond(self, request: Request) -> None:
+    def respond(self, request: BridgeRequest) -> None:
         """Answer one request of a node as the client says.
 
         Raises:

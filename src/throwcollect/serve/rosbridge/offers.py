@@ -6,10 +6,10 @@ from collections.abc import Callable
 from typing import Literal
 
 from throwcollect.errors import ConfigError
-from throwcollect.ros.names import absolute_name
+from throwcollect.ros.graph_names import absolute_name
 from throwcollect.serve.rosbridge.belongings import ABelonging, Belongings
 from throwcollect.serve.rosbridge.peer import Peer
-from throwcollect.serve.rosbridge.request import Request
+from throwcollect.serve.rosbridge.request import BridgeRequest
 
 
 class Offers(Belongings[ABelonging]):
@@ -34,7 +34,7 @@ class Offers(Belongings[ABelonging]):
         self._make = make
         self._probe = probe
 
-    def advertise(self, request: Request) -> None:
+    def advertise(self, request: BridgeRequest) -> None:
         """Offer something, in place of what the client has offered by the same name before.
 
         Raises:
@@ -51,7 +51,7 @@ class Offers(Belongings[ABelonging]):
         offered.open()
         self._by_name[name] = offered
 
-    def unadvertise(self, request: Request) -> None:
+    def unadvertise(self, request: BridgeRequest) -> None:
         """Withdraw something.
 
         Raises:
@@ -60,11 +60,11 @@ class Offers(Belongings[ABelonging]):
         self._find(request).close()
         del self._by_name[absolute_name(request.text(self._kind))]
 
-    def pass_on(self, operation: Callable[[ABelonging, Request], None]) -> Callable[[Request], None]:
+    def pass_on(self, operation: Callable[[ABelonging, BridgeRequest], None]) -> Callable[[BridgeRequest], None]:
         """Make what hands a request of the client to the offer that it names."""
         return lambda request: operation(self._find(request), request)
 
-    def _find(self, request: Request) -> ABelonging:
+    def _find(self, request: BridgeRequest) -> ABelonging:
         name = absolute_name(request.text(self._kind))
         if name not in self._by_name:
             raise ConfigError(f"{request.op}: {name} is not advertised by this client")

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Literal, Protocol
 
+from throwcollect.serve.rosbridge.bridge_session import BridgeSession
 from throwcollect.serve.rosbridge.codec import Frame
 from throwcollect.serve.rosbridge.request import Form, RequestId
-from throwcollect.serve.rosbridge.session import Session
 
 Level = Literal["info", "warning", "error"]
 """How much a status message matters."""
@@ -17,7 +17,7 @@ class Peer(Protocol):
     """A client. Everything here is called in the thread of the bridge."""
 
     @property
-    def session(self) -> Session:
+    def session(self) -> BridgeSession:
         """The place of the bridge in the ROS graph."""
 
     def later(self, seconds: float, action: Callable[[], None]) -> None:

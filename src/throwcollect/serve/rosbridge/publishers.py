@@ -8,11 +8,11 @@ from typing import Any
 
 from throwcollect import ros
 from throwcollect.errors import ConfigError
-from throwcollect.ros.values import fill
+from throwcollect.ros.message_values import fill
 from throwcollect.serve.rosbridge.belongings import Belongings
 from throwcollect.serve.rosbridge.guarded import open_topic
 from throwcollect.serve.rosbridge.peer import Peer
-from throwcollect.serve.rosbridge.request import Request
+from throwcollect.serve.rosbridge.request import BridgeRequest
 
 _DEPTH = 100
 _LONGEST_QUEUE = 10_000
@@ -60,7 +60,7 @@ class Advertised:
 class Publishers(Belongings[Advertised]):
     """All topics that a client publishes."""
 
-    def advertise(self, request: Request) -> None:
+    def advertise(self, request: BridgeRequest) -> None:
         """Announce a topic.
 
         Raises:
@@ -68,7 +68,7 @@ class Publishers(Belongings[Advertised]):
         """
         self._advertise(open_topic(request.text("topic")), request, request.text("type"))
 
-    def unadvertise(self, request: Request) -> None:
+    def unadvertise(self, request: BridgeRequest) -> None:
         """Withdraw a topic.
 
         Raises:
@@ -81,7 +81,7 @@ class Publishers(Belongings[Advertised]):
         else:
             advertised.close()
 
-    def publish(self, request: Request) -> None:
+    def publish(self, request: BridgeRequest) -> None:
         """Publish a message; a topic that the client has not announced, but others have, is announced first.
 
         Raises:
@@ -99,7 +99,7 @@ class Publishers(Belongings[Advertised]):
             except ValueError as error:
                 raise ConfigError(f"publish: {error}") from error
 
-    def _advertise(self, topic: str, request: Request, wanted: str) -> Advertised:
+    def _advertise(self, topic: str, request: BridgeRequest, wanted: str) -> Advertised:
         type_name = self._client.session.type_of(topic, wanted)
         known = self._by_name.get(topic)
         if known is not None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from throwcollect.errors import ConfigError
-from throwcollect.serve.rosbridge.request import Request, RequestId
+from throwcollect.serve.rosbridge.request import BridgeRequest, RequestId
 
 LONGEST_FRAME = 10 * 2**20
 """Bytes of a frame that a client may send, whole or in fragments."""
@@ -28,7 +28,7 @@ class Reassembly:
         self._frames: dict[RequestId, _Unfinished] = {}
         self._size = 0
 
-    def add(self, request: Request) -> str | None:
+    def add(self, request: BridgeRequest) -> str | None:
         """Take a part.
 
         Returns:

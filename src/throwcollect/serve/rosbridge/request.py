@@ -107,7 +107,7 @@ class Fields:
         return ConfigError(f"{self._what}: {name} should be {what}, got {got}")
 
 
-class Request(Fields):
+class BridgeRequest(Fields):
     """One operation of the protocol.
 
     Attributes:

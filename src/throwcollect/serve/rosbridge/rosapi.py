@@ -8,7 +8,7 @@ from typing import Literal
 from rclzenoh.interfaces import message_definition
 from rclzenoh.names import join
 from throwcollect import ros
-from throwcollect.ros.names import absolute_name, full_name, is_hidden
+from throwcollect.ros.graph_names import absolute_name, full_name, is_hidden
 from throwcollect.serve.rosbridge.guarded import is_guarded
 from throwcollect.serve.rosbridge.peer import Peer
 from throwcollect.serve.rosbridge.questions import Questions

@@ -7,8 +7,8 @@ from typing import Any, Literal
 
 from rclzenoh.interfaces.catalog import structure
 from throwcollect import ros
-from throwcollect.ros.names import find_interface, full_name
-from throwcollect.ros.values import array_parts
+from throwcollect.ros.graph_names import find_interface, full_name
+from throwcollect.ros.message_values import array_parts
 
 Definition = Mapping[str, object]
 """Fields of rosapi_msgs/msg/TypeDef."""

@@ -10,8 +10,8 @@ import orjson
 
 from throwcollect import ros
 from throwcollect.errors import ConfigError
-from throwcollect.ros.names import absolute_name, is_hidden
-from throwcollect.ros.values import plain
+from throwcollect.ros.graph_names import absolute_name, is_hidden
+from throwcollect.ros.message_values import plain
 from throwcollect.serve.rosbridge.guarded import refuse_leases
 from throwcollect.serve.rosbridge.peer import Peer
 from throwcollect.serve.rosbridge.questions import Questions

@@ -6,13 +6,13 @@ from collections.abc import Mapping
 from typing import Any
 
 from throwcollect.errors import ConfigError
-from throwcollect.ros.names import absolute_name, find_interface, full_name
-from throwcollect.ros.values import fill
+from throwcollect.ros.graph_names import absolute_name, find_interface, full_name
+from throwcollect.ros.message_values import fill
 from throwcollect.serve.rosbridge.codec import plain_values
 from throwcollect.serve.rosbridge.guarded import refuse_secrets
 from throwcollect.serve.rosbridge.peer import Peer
 from throwcollect.serve.rosbridge.questions import Questions
-from throwcollect.serve.rosbridge.request import Fields, Form, Request
+from throwcollect.serve.rosbridge.request import BridgeRequest, Fields, Form
 
 
 class Call:
@@ -27,7 +27,7 @@ class Call:
         ConfigError: If the request names no service.
     """
 
-    def __init__(self, client: Peer, request: Request) -> None:
+    def __init__(self, client: Peer, request: BridgeRequest) -> None:
         self._client = client
         self._id = request.id
         self.given = request.text("service")
@@ -52,7 +52,7 @@ class Call:
         self._client.answer(fields, self.form)
 
 
-def call_node(client: Peer, questions: Questions, call: Call, request: Request) -> None:
+def call_node(client: Peer, questions: Questions, call: Call, request: BridgeRequest) -> None:
     """Call a service of a node, and answer the client when the node has answered.
 
     Raises:

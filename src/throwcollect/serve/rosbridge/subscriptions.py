@@ -12,11 +12,11 @@ from throwcollect.serve.rosbridge.belongings import Belongings
 from throwcollect.serve.rosbridge.feed import Feed, Sample
 from throwcollect.serve.rosbridge.guarded import open_topic
 from throwcollect.serve.rosbridge.peer import Peer
-from throwcollect.serve.rosbridge.request import COMPRESSIONS, Form, Request
+from throwcollect.serve.rosbridge.request import COMPRESSIONS, BridgeRequest, Form
 
 
 @dataclass(frozen=True)
-class Wish:
+class SubscriptionRequest:
     """What one subscription of a client asks for.
 
     Attributes:
@@ -30,18 +30,18 @@ class Wish:
     form: Form = field(default_factory=Form)
 
 
-class Pace:
+class RateLimit:
     """Lets samples through to `send` at the rate that a client asks for; `later` calls an action after a time [s]."""
 
     def __init__(self, send: Callable[[Sample], None], later: Callable[[float, Callable[[], None]], None]) -> None:
         self._send = send
         self._later = later
         self._queue: deque[Sample] = deque()
-        self._wish = Wish()
+        self._wish = SubscriptionRequest()
         self._due = 0.0
         self._waits = False
 
-    def change(self, wish: Wish) -> None:
+    def change(self, wish: SubscriptionRequest) -> None:
         """Use another wish from now on."""
         self._wish = wish
         self._queue = deque(self._queue, maxlen=wish.queue_length)
@@ -77,7 +77,7 @@ class Pace:
                 self._wait(now)
 
 
-class Subscription:
+class SubscribedTopic:
     """A topic of a client, which may have several subscriptions to it under different ids."""
 
     def __init__(self, client: Peer, given: str, type_name: str) -> None:
@@ -85,12 +85,12 @@ class Subscription:
         self._given = given
         self._topic = open_topic(given)
         self.type_name = type_name
-        self.wishes: dict[object, Wish] = {}
-        self._merged = Wish()
+        self.wishes: dict[object, SubscriptionRequest] = {}
+        self._merged = SubscriptionRequest()
         self._feed: Feed | None = None
-        self._pace = Pace(self._send, client.later)
+        self._pace = RateLimit(self._send, client.later)
 
-    def want(self, name: object, wish: Wish) -> None:
+    def want(self, name: object, wish: SubscriptionRequest) -> None:
         """Add one subscription of the client, or change it."""
         self.wishes[name] = wish
         self._merge()
@@ -117,7 +117,7 @@ class Subscription:
 
     def _merge(self) -> None:
         wishes = self.wishes.values()
-        self._merged = Wish(
+        self._merged = SubscriptionRequest(
             min(wish.throttle_s for wish in wishes),
             max(wish.queue_length for wish in wishes),
             Form(
@@ -136,10 +136,10 @@ class Subscription:
         self._client.send(frame, self._merged.form.fragment_size)
 
 
-class Subscriptions(Belongings[Subscription]):
+class Subscriptions(Belongings[SubscribedTopic]):
     """All topics that a client subscribes to."""
 
-    def subscribe(self, request: Request) -> None:
+    def subscribe(self, request: BridgeRequest) -> None:
         """Subscribe to a topic.
 
         Raises:
@@ -147,7 +147,7 @@ class Subscriptions(Belongings[Subscription]):
         """
         given, wanted = request.text("topic"), request.text_or("type", "")
         topic = open_topic(given)
-        wish = Wish(
+        wish = SubscriptionRequest(
             request.natural_or("throttle_rate", 0) / 1000,
             request.natural_or("queue_length", 0),
             request.form(),
@@ -157,14 +157,14 @@ class Subscriptions(Belongings[Subscription]):
         if subscription is not None and subscription.type_name != type_name:
             raise ConfigError(f"subscribe: {given} is heard as {subscription.type_name} already", expected="that type")
         if subscription is None:
-            subscription = Subscription(self._client, given, type_name)
+            subscription = SubscribedTopic(self._client, given, type_name)
             subscription.want(request.id, wish)
             subscription.open()
             self._by_name[given] = subscription
         else:
             subscription.want(request.id, wish)
 
-    def unsubscribe(self, request: Request) -> None:
+    def unsubscribe(self, request: BridgeRequest) -> None:
         """End one subscription to a topic, or all if none is named.
 
         Raises:

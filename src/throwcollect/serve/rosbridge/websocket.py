@@ -10,7 +10,7 @@ from contextlib import suppress
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from throwcollect.serve.rosbridge.bridge import Bridge
-from throwcollect.serve.rosbridge.client import Client
+from throwcollect.serve.rosbridge.bridge_client import BridgeClient
 from throwcollect.serve.rosbridge.codec import Frame, json_text
 from throwcollect.serve.rosbridge.reassembly import LONGEST_FRAME
 
@@ -89,7 +89,7 @@ async def attend(websocket: WebSocket, bridge: Bridge, *, read_only: bool) -> No
             await sending
 
 
-async def _receive_all(websocket: WebSocket, client: Client) -> None:
+async def _receive_all(websocket: WebSocket, client: BridgeClient) -> None:
     while True:
         message = await websocket.receive()
         if message["type"] == "websocket.disconnect":

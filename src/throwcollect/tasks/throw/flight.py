@@ -12,7 +12,7 @@ from throwcollect.config.schema import Config
 from throwcollect.episode.record import Contact, EpisodeHeader, Samples
 from throwcollect.tasks.free_flight import ballistic_positions
 from throwcollect.tasks.measures import BallState, Vector
-from throwcollect.tasks.throw.config import throw_section
+from throwcollect.tasks.throw.throw_config import throw_section
 from throwcollect.units import NS_PER_S
 
 BALLISTIC_TOLERANCE_M = 1e-9

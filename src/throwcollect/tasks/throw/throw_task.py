@@ -8,7 +8,6 @@ from dataclasses import replace
 from throwcollect.episode.record import Contact, EpisodeHeader, Samples
 from throwcollect.tasks.measures import BallState
 from throwcollect.tasks.task import Failure, Task
-from throwcollect.tasks.throw.config import throw_section
 from throwcollect.tasks.throw.drop import explain_drop, find_early_loss
 from throwcollect.tasks.throw.flight import (
     Flight,
@@ -18,7 +17,8 @@ from throwcollect.tasks.throw.flight import (
     spin_after,
     without_impact,
 )
-from throwcollect.tasks.throw.outcome import ThrowOutcome, ThrowResult
+from throwcollect.tasks.throw.throw_config import throw_section
+from throwcollect.tasks.throw.throw_result import ThrowOutcome, ThrowResult
 from throwcollect.units import NS_PER_S
 
 
@@ -45,7 +45,7 @@ class ThrowTask(Task[ThrowResult]):
     outcomes = ThrowOutcome
     results = ThrowResult
     reasons = "Why the throw did not simply land; null if it did."
-    report = "throwcollect.report.throw.sections:report_throws"
+    report = "throwcollect.report.throw.throw_sections:report_throws"
 
     def assess(
         self, result: ThrowResult, samples: Samples, header: EpisodeHeader

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from throwcollect.errors import ConfigError, Problem
 from throwcollect.pinocchio_library import pinocchio
 from throwcollect.reproducible_math import add_up
-from throwcollect.tools.spoon.config import SpoonConfig
+from throwcollect.tools.spoon.spoon_config import SpoonConfig
 from throwcollect.tools.tool import Box, Tool
 
 

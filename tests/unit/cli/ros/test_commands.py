@@ -39,8 +39,8 @@ from throwcollect.ros.connection import Connection
 from throwcollect.ros.middleware import Middleware
 from throwcollect.ros.router import router
 from throwcollect.run_key import RunKey
-from throwcollect.runs.record import Record
 from throwcollect.runs.records import Records
+from throwcollect.runs.run_record import RunRecord
 
 String: Any = get_message("std_msgs/msg/String")
 JointState: Any = get_message("sensor_msgs/msg/JointState")
@@ -309,7 +309,7 @@ def test_a_run_is_joined_by_its_name_or_directory(
     for variable in Connection(endpoint, RunKey(tmp_path)).environment():
         monkeypatch.setenv(variable, "nonsense")
     run = Records().new("throws")
-    record = Record(
+    record = RunRecord(
         run=run.run,
         name="throws",
         runtime="local",
@@ -348,7 +348,7 @@ def test_a_run_on_fast_dds_is_joined_by_a_profile_that_its_owner_alone_can_read(
     monkeypatch.setenv("THROWCOLLECT_STATE", str(tmp_path))
     run = Records().new("throws")
     run.key.create()
-    record = Record(
+    record = RunRecord(
         run=run.run,
         name="throws",
         runtime="local",

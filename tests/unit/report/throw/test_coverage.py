@@ -5,9 +5,9 @@ import pyarrow as pa
 import pytest
 
 from throwcollect.config.sweep import TargetConfig
-from throwcollect.report.throw.coverage import Axis, count_throws
-from throwcollect.report.throw.figures import draw_coverage_map
+from throwcollect.report.throw.coverage import CellAxis, count_throws
 from throwcollect.report.throw.landings import Landings
+from throwcollect.report.throw.throw_figures import draw_coverage_map
 
 
 def landed(distance: list[float], angle: list[float]) -> Landings:
@@ -50,6 +50,6 @@ def test_cells_without_targets_are_of_round_numbers() -> None:
 
 @pytest.mark.parametrize(("most", "mark"), [(1, 1), (8, 1), (9, None)])
 def test_the_scale_begins_with_no_throw_and_its_marks_are_whole_throws(most: int, mark: int | None) -> None:
-    axis = Axis("landing distance", "landing distance [m]", np.array([1.0, 2.0]))
+    axis = CellAxis("landing distance", "landing distance [m]", np.array([1.0, 2.0]))
     (cells,) = draw_coverage_map(axis, axis, np.array([[most]])).data
     assert (cells.zmin, cells.zmax, cells.colorbar.dtick) == (0, most, mark)

@@ -15,8 +15,8 @@ import throwcollect
 from throwcollect.errors import ConfigError, DatasetError, WorkerError
 from throwcollect.extras import MissingExtraError
 from throwcollect.runtimes.apptainer import sif
-from throwcollect.runtimes.apptainer.contents import check_sif, read_labels
 from throwcollect.runtimes.apptainer.sif import make_sif
+from throwcollect.runtimes.apptainer.sif_contents import check_sif, read_labels
 from throwcollect.runtimes.image_sources import SOURCES_LABEL, VERSION_LABEL, digest_sources, source_root
 
 SIF = b"#!/usr/bin/env run-singularity\n\0SIF_MAGIC\0"
@@ -140,7 +140,7 @@ def test_without_the_client_of_engines_the_clone_is_built_but_no_image_of_an_eng
     def import_client(**_: object) -> None:
         raise ModuleNotFoundError("No module named 'docker'", name="docker")
 
-    monkeypatch.setattr("throwcollect.runtimes.docker.engine.connect", import_client)
+    monkeypatch.setattr("throwcollect.runtimes.docker.docker_engine.connect", import_client)
     assert "the package docker is not installed" in make(tmp_path / "it.sif")[0]
     with pytest.raises(MissingExtraError):
         make(tmp_path / "it.sif", image="mine")

@@ -12,7 +12,7 @@ from throwcollect.runtimes.docker.address import check_socket, has_socket, is_lo
 CHOOSES = """
 import sys
 from throwcollect.config.schema import Config
-from throwcollect.runs.choice import choose
+from throwcollect.runs.runtime_choice import choose
 
 choose(Config(), say=print, warn=print)
 print(sorted({"docker", "requests", "urllib3"} & sys.modules.keys()))

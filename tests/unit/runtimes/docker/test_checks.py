@@ -13,8 +13,8 @@ from throwcollect.config.schema import Config
 from throwcollect.errors import ConfigError
 from throwcollect.runtimes.docker import checks as docker_checks
 from throwcollect.runtimes.docker.checks import check
-from throwcollect.runtimes.docker.engine import connect
-from throwcollect.runtimes.docker.options import RunPlace
+from throwcollect.runtimes.docker.container_options import RunPlace
+from throwcollect.runtimes.docker.docker_engine import connect
 
 Check = Callable[..., list[str]]
 

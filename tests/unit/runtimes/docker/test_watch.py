@@ -1,6 +1,6 @@
 import pytest
 
-from throwcollect.runtimes.docker.containers import end_in_words
+from throwcollect.runtimes.docker.docker_nodes import end_in_words
 from throwcollect.runtimes.docker.watch import ContainerState
 
 

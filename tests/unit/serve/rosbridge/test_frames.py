@@ -20,11 +20,11 @@ from tests.unit.serve.rosbridge.conftest import Party
 from rclzenoh.interfaces import deserialize, message_class, serialize
 from rclzenoh.interfaces.catalog import _JAZZY, DEFINITIONS
 from throwcollect.errors import ConfigError
-from throwcollect.ros.values import array_parts, fill
+from throwcollect.ros.message_values import array_parts, fill
 from throwcollect.serve.rosbridge.codec import encode, fragments, json_text, plain_values, read_frame
 from throwcollect.serve.rosbridge.feed import Sample
 from throwcollect.serve.rosbridge.reassembly import LONGEST_FRAME, Reassembly
-from throwcollect.serve.rosbridge.request import Request
+from throwcollect.serve.rosbridge.request import BridgeRequest
 
 
 @cache
@@ -111,7 +111,7 @@ def test_a_frame_that_says_nothing_is_told_in_a_sentence(party: Party, frame: st
 )
 def test_whatever_comes_is_read_or_refused(frame: str | bytes) -> None:
     try:
-        assert isinstance(read_frame(frame), Request)
+        assert isinstance(read_frame(frame), BridgeRequest)
     except ConfigError:
         return
 
@@ -125,8 +125,8 @@ def test_status_messages_come_from_the_level_on_that_is_asked_for(party: Party) 
     assert [each["level"] for each in party.got() if each["op"] == "status"] == ["error"]
 
 
-def part(number: object, total: object, data: object = "x", name: object = "a") -> Request:
-    return Request({"op": "fragment", "id": name, "num": number, "total": total, "data": data})
+def part(number: object, total: object, data: object = "x", name: object = "a") -> BridgeRequest:
+    return BridgeRequest({"op": "fragment", "id": name, "num": number, "total": total, "data": data})
 
 
 def test_parts_in_any_order_become_a_frame(party: Party) -> None:

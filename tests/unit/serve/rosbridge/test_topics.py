@@ -18,7 +18,7 @@ from tests.unit.serve.rosbridge.conftest import PATIENCE_S, Party, wait_for, wai
 from rclzenoh.interfaces import serialize
 from throwcollect.ros import DurabilityPolicy, Node, QoSProfile, get_message
 from throwcollect.serve.rosbridge import Bridge, subscriptions
-from throwcollect.serve.rosbridge.subscriptions import Pace, Wish
+from throwcollect.serve.rosbridge.subscriptions import RateLimit, SubscriptionRequest
 
 String: Any = get_message("std_msgs/msg/String")
 JointState: Any = get_message("sensor_msgs/msg/JointState")
@@ -151,10 +151,10 @@ def test_what_waits_in_a_queue_comes_at_even_times_however_late_each_is(monkeypa
     monkeypatch.setattr(subscriptions, "time", SimpleNamespace(monotonic=lambda: now))
     waiting: list[tuple[float, Callable[[], None]]] = []
     sent: list[tuple[Any, float]] = []
-    pace = Pace(
+    pace = RateLimit(
         lambda sample: sent.append((sample, now)), lambda seconds, action: waiting.append((now + seconds, action))
     )
-    pace.change(Wish(throttle_s=0.03, queue_length=100))
+    pace.change(SubscriptionRequest(throttle_s=0.03, queue_length=100))
     samples: list[Any] = list(range(20))
     for sample in samples:
         pace.offer(sample)
@@ -171,8 +171,8 @@ def test_of_50_a_second_a_plot_that_wants_30_gets_30(monkeypatch: pytest.MonkeyP
     monkeypatch.setattr(subscriptions, "time", SimpleNamespace(monotonic=lambda: now))
     waiting: list[tuple[float, Callable[[], None]]] = []
     sent: list[float] = []
-    pace = Pace(lambda _: sent.append(now), lambda seconds, action: waiting.append((now + seconds, action)))
-    pace.change(Wish(throttle_s=0.033, queue_length=1))
+    pace = RateLimit(lambda _: sent.append(now), lambda seconds, action: waiting.append((now + seconds, action)))
+    pace.change(SubscriptionRequest(throttle_s=0.033, queue_length=1))
     sample: Any = "sample"
     for number in range(60 * 50):
         arrives = 100.0 + number * 0.02

@@ -15,7 +15,7 @@ from throwcollect.robots.talos import TALOS
 from throwcollect.robots.tool_motion import ToolMotion
 from throwcollect.tasks.free_flight import ballistic_positions
 from throwcollect.tasks.task import task_of
-from throwcollect.tasks.throw.outcome import ThrowOutcome
+from throwcollect.tasks.throw.throw_result import ThrowOutcome
 
 from .episodes import GRAVITY, ORIGIN, RELEASE_S, VELOCITY, episode, landing_time, parabola
 

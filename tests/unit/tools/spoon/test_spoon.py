@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 
 from throwcollect.errors import ConfigError
-from throwcollect.tools.spoon.config import SpoonConfig
 from throwcollect.tools.spoon.spoon import Spoon
+from throwcollect.tools.spoon.spoon_config import SpoonConfig
 
 
 def gaps(tool, centre):

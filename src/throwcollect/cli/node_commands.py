@@ -1,0 +1,114 @@
+"""`throwcollect router`, `sim`, `coordinator` and `health`: the nodes, as `up` and Compose start them."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from throwcollect.cli.options import ConfigArgument, DatasetArgument
+from throwcollect.cli.streams import only_log
+from throwcollect.config.default_path import DEFAULT_CONFIG
+from throwcollect.errors import LossError
+from throwcollect.wording import format_count
+
+
+def router(
+    listen: Annotated[
+        str, typer.Option("--listen", metavar="ENDPOINT", help="Zenoh endpoint to listen on.")
+    ] = "tcp/127.0.0.1:7447",
+    key: Annotated[
+        Path | None,
+        typer.Option(
+            "--key",
+            metavar="DIR",
+            help="Key that tls/... lets nobody in without; made if DIR has none. By default, that of THROWCOLLECT_KEY.",
+            readable=False,
+        ),
+    ] = None,
+) -> None:
+    """Run the router that all nodes connect to."""
+    from throwcollect.ros.router import serve
+
+    only_log()
+    serve(listen, key)
+
+
+def sim(
+    config: ConfigArgument = DEFAULT_CONFIG,
+    name: Annotated[
+        str | None, typer.Option("--name", help="Name of the node, and of its namespace; sim_<host name> by default.")
+    ] = None,
+    namespace: Annotated[
+        str | None,
+        typer.Option("--namespace", help="Namespace; /<name> by default. / is where nodes of the real robot look."),
+    ] = None,
+) -> None:
+    """Run one simulation."""
+    from socket import gethostname
+
+    from throwcollect.runtimes.nodes import simulation_name_of
+    from throwcollect.sim.simulation_process import run
+
+    only_log()
+    run(config, name=name or simulation_name_of(gethostname()), namespace=namespace)
+
+
+def coordinator(
+    directory: DatasetArgument,
+    config: Annotated[
+        Path | None,
+        typer.Option("--config", metavar="CONFIG", help="Make the plan of this YAML file first.", readable=False),
+    ] = None,
+) -> None:
+    """Collect into a directory that holds `config.yaml` and `plan.parquet`, or into a new one with --config."""
+    from throwcollect.coordinator.coordinator_process import run
+
+    only_log()
+    if config is None:
+        run(directory)
+        return
+    from throwcollect.cli.dataset.info import describe
+    from throwcollect.coordinator.prepare import more_trials
+    from throwcollect.coordinator.resume import prepare_or_resume
+    from throwcollect.dataset.inspect import info
+
+    plan = prepare_or_resume(config, directory)
+    print(f"plan: {format_count(len(plan.trials), 'trial')}{more_trials(plan)}; dataset: {directory}", flush=True)
+    try:
+        run(directory)
+    except LossError:
+        # The dataset is finished even so.
+        typer.echo(describe(info(directory)))
+        raise
+    typer.echo(describe(info(directory)))
+
+
+def simulate(directory: DatasetArgument, trials: list[int]) -> None:
+    """Simulate trials of a plan and print the digests of their episodes; the coordinator starts this command."""
+    from throwcollect.config.loader import load
+    from throwcollect.dataset.directory import CONFIG, PLAN
+    from throwcollect.replay.replayer import Replayer
+    from throwcollect.sweep.plan import Plan
+
+    plan = Plan.read(directory / PLAN, load(directory / CONFIG))
+    replayer = Replayer(plan.config)
+    for trial in trials:
+        print(json.dumps({"trial": trial, "digest": replayer.run(plan.trial(trial)).digest}), flush=True)
+
+
+def health(
+    node: Annotated[
+        str | None,
+        typer.Argument(
+            metavar="NODE",
+            help="router, coordinator, or the name of a simulation; by default what THROWCOLLECT_NODE says.",
+        ),
+    ] = None,
+) -> None:
+    """Ask a node for a sign of life; exit code 1 if there is none."""
+    from throwcollect.ros.health_check import check
+
+    check(node)

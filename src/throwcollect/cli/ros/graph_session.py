@@ -1,0 +1,137 @@
+"""How a command of `throwcollect ros` joins the ROS graph, waits for answers and leaves."""
+
+from __future__ import annotations
+
+import difflib
+import time
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from throwcollect import ros
+from throwcollect.errors import ConfigError, Interrupted, ThrowcollectError, WorkerError
+from throwcollect.ros.graph_names import is_hidden, make_own_name
+
+_SLICE_S = 0.2
+"""Longest single wait: rclpy handles signals only between two waits."""
+_QUIET_S = 0.5
+"""Time without anything new after which discovery counts as complete."""
+_LOOKING_S = 3.0
+"""Longest time for discovery: nodes on DDS find each other within a second, and the machine may be busy."""
+_MOST_NAMES = 8
+
+
+class GraphSession:
+    """A hidden node, and the executor that it spins in."""
+
+    def __init__(self) -> None:
+        self.node = ros.Node(make_own_name(), enable_rosout=False, start_parameter_services=False)
+        self._executor = ros.SingleThreadedExecutor()
+        self._executor.add_node(self.node)
+
+    def spin_until(self, done: Callable[[], bool]) -> None:
+        """Run callbacks until a condition holds."""
+        while not done():
+            self._executor.spin_once(timeout_sec=_SLICE_S)
+
+    def look_around(self) -> None:
+        """Wait until other nodes are discovered, and nothing new follows for a moment.
+
+        DDS reports each node and topic as it finds it, and never that it has found all of them.
+        """
+        known: set[object] = set()
+        start = changed = time.monotonic()
+        while (now := time.monotonic()) < start + _LOOKING_S:
+            self._executor.spin_once(timeout_sec=_SLICE_S)
+            nodes = set(self.node.get_node_names_and_namespaces())
+            discovered: set[object] = {*nodes, *(name for name, _ in self.node.get_topic_names_and_types())}
+            if discovered != known:
+                known, changed = discovered, now
+            # The own node is always among them, so one node means that nobody else was found yet.
+            elif len(nodes) > 1 and now > changed + _QUIET_S:
+                return
+
+    def answer(self, future: ros.Future, *, alive: Callable[[], bool], who: str) -> Any:
+        """Wait for the answer to a request to a node or service; `alive` tells whether that still exists.
+
+        Raises:
+            WorkerError: If the node has vanished.
+        """
+        self.spin_until(lambda: future.done() or not alive())
+        if not future.done():
+            raise WorkerError(f"{who} is gone and has not answered")
+        return future.result()
+
+    def node_names(self) -> list[str]:
+        """Absolute names of all nodes but our own, sorted."""
+        nodes = self.node.get_node_names_and_namespaces()
+        own = self.node.get_name()
+        return sorted(f"{namespace.removesuffix('/')}/{name}" for name, namespace in nodes if name != own)
+
+    def close(self) -> None:
+        """Leave the graph."""
+        self.node.destroy_node()
+        ros.shutdown()
+
+
+@contextmanager
+def join_graph(run: str | None) -> Iterator[GraphSession]:
+    """Join the graph of a run, or without one that of the router that the environment names.
+
+    Raises:
+        ConfigError: If there is no such run or no router.
+        WorkerError: If the run has no router (any more).
+        Interrupted: If the user presses Ctrl-C; the message is empty, because that is the normal way to leave.
+    """
+    # These load Zenoh, and every command of throwcollect loads this module.
+    from throwcollect.ros.middleware import Middleware
+
+    connection = None
+    try:
+        if run is not None:
+            from throwcollect.cli.ros.joined_run import find_way
+
+            connection = find_way(run)[1]
+        try:
+            ros.init(connection=connection)
+        except ConfigError:
+            raise
+        except ThrowcollectError as error:
+            raise ConfigError(
+                error.message,
+                expected="a router there, or another one named in ZENOH_CONFIG_OVERRIDE",
+                hint="--run RUN joins a run; throwcollect ps lists them",
+            ) from error
+        session = GraphSession()
+        try:
+            if Middleware.of_process().is_fast_dds:
+                session.look_around()
+            yield session
+        finally:
+            session.close()
+    except KeyboardInterrupt:
+        raise Interrupted("") from None
+
+
+def require_name(what: str, name: str, names: Iterable[str], *, of: str = "") -> None:
+    """Refuse the name of a thing, such as a ``topic``, that does not exist, and propose those that are like it.
+
+    `of` is the node that would have it; empty if the graph would.
+
+    Raises:
+        ConfigError: If it is none of them.
+    """
+    existing = sorted(set(names))
+    if name in existing:
+        return
+    near = difflib.get_close_matches(name, existing, n=3) or [each for each in existing if not is_hidden(each)]
+    listed = ", ".join(near[:_MOST_NAMES]) + (", ..." if len(near) > _MOST_NAMES else "")
+    owner = f" of {of}" if of else ""
+    raise ConfigError(f"no {what} {name}{owner}" + ("" if existing else "; there is none"), expected=listed or None)
+
+
+def print_names(names_and_types: Iterable[tuple[str, list[str]]], *, types: bool, hidden: bool) -> None:
+    """Print names, one a line; `types` adds their types, and `hidden` the hidden names."""
+    for name, kinds in names_and_types:
+        if hidden or not is_hidden(name):
+            print(f"{name} [{', '.join(kinds)}]" if types else name)

@@ -1,0 +1,98 @@
+"""Keys of every task: a motion of some joints from a start to an end."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator
+from typing import Annotated, ClassVar
+
+from pydantic import Field
+
+from throwcollect.config.key import Effect, Key
+from throwcollect.config.kinds import Angle, Joint
+from throwcollect.config.motion import DynamicMovementPrimitive, MinimumJerk, Trajectory
+from throwcollect.config.section import Section
+from throwcollect.config.target_columns import TargetColumn
+from throwcollect.config.until import UntilConfig
+from throwcollect.wording import join_names
+
+
+class TaskConfig(Section):
+    """Base of the sections of tasks; a member of the family ``tasks`` is a class that is derived from it.
+
+    Attributes:
+        implementation: The task itself, ``module:class``: a `Task` that is made of a whole configuration. It is
+            imported where it is needed, so that reading a configuration stays cheap.
+        until: The section `until` of a configuration of this task; its key is the outcome of a trial that succeeded.
+        throws: Whether the ball is thrown: then the tool has to move, and `sweep.target` can ask for landings, as
+            results are `ThrowResult`.
+        targets: Columns of its results that say where a trial ended, which is what others aim at; none if there is
+            nothing to aim at.
+        given: Keys whose values belong to a target, in the order in which they follow it: aiming does not choose them.
+        target_columns: Columns of targets that lists of its trials may have, in the order of the table of throws; none
+            if its trials have no targets.
+    """
+
+    implementation: ClassVar[str]
+    until: ClassVar[type[UntilConfig]]
+    throws: ClassVar[bool] = False
+    targets: ClassVar[tuple[str, ...]] = ()
+    given: ClassVar[tuple[str, ...]] = ()
+    target_columns: ClassVar[tuple[TargetColumn, ...]] = ()
+
+    name: str
+    """Task."""
+    start: Annotated[dict[Joint, Angle], Key(Effect.PHYSICS, swept=True)]
+    """Joint angles at the start of each trial."""
+    end: Annotated[dict[Joint, Angle], Key(swept=True)]
+    """Joint angles at the end of the motion. The joints named here are the moving ones, even if end equals start."""
+    duration_s: Annotated[float, Field(ge=0.1, le=10), Key(swept=True)] = 1.0
+    """Duration of the motion (tau of a DMP)."""
+    trajectory: Annotated[Trajectory, Key(swept=True)] = MinimumJerk()
+    """How the joints go from start to end."""
+    points_hz: Annotated[float, Field(ge=5, le=1000)] = 25.0
+    """Points per second of the joint trajectories that are sent to the controllers (quintic between them)."""
+
+    @property
+    def success(self) -> str:
+        """Outcome of a trial that succeeded."""
+        return self.until.outcome()
+
+    @property
+    def noun(self) -> str:
+        """Noun for one of its trials."""
+        return "throw" if self.throws else "trial"
+
+    @property
+    def keyword(self) -> str:
+        """Keyword by which a hub finds its datasets."""
+        return "throwing" if self.throws else self.name
+
+    @property
+    def subject(self) -> str:
+        """Description of its trials, for a sentence in which it follows their number."""
+        return "throws of a ball" if self.throws else f"trials of the task {self.name}"
+
+    def find_wrong_targets(self, columns: Collection[str]) -> dict[str, str]:
+        """Say what is wrong with the names of the columns of targets of a list of its trials, or of one trial.
+
+        Returns:
+            Sentence that says what is wrong, by column; empty if they are targets of this task, or none at all.
+        """
+        known = {each.name: each for each in self.target_columns}
+        has = f"it has {', '.join(known)}" if known else "it has none"
+        wrong = {name: f"the task {self.name} has no such target; {has}" for name in columns if name not in known}
+        if there := [name for name in known if name in columns]:
+            missing = (name for name, each in known.items() if each.required and name not in columns)
+            wrong |= {name: f"is missing beside {join_names(there)}" for name in missing}
+        return wrong
+
+    def _find_contradictions(self) -> Iterator[tuple[str, str]]:
+        if not self.end:
+            yield "end", "names no joint, so nothing would move"
+        for joint in self.end:
+            if joint not in self.start:
+                yield f"end.{joint}", "start should name this joint, too"
+        if isinstance(self.trajectory, DynamicMovementPrimitive):
+            for joint in self.trajectory.weights:
+                if joint not in self.end:
+                    yield f"trajectory.weights.{joint}", "end does not name this joint, so it does not move"

@@ -1,0 +1,116 @@
+"""Reports of a controller: results of goals, and its state after an update."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from throwcollect.control.goal import TrajectoryPoint
+
+
+class GoalStatus(IntEnum):
+    """How a goal ended (action_msgs/msg/GoalStatus)."""
+
+    SUCCEEDED = 4
+    CANCELED = 5
+    ABORTED = 6
+
+
+class ErrorCode(IntEnum):
+    """Why a goal ended (control_msgs/action/FollowJointTrajectory)."""
+
+    SUCCESSFUL = 0
+    INVALID_GOAL = -1
+    INVALID_JOINTS = -2
+    OLD_HEADER_TIMESTAMP = -3
+    PATH_TOLERANCE_VIOLATED = -4
+    GOAL_TOLERANCE_VIOLATED = -5
+
+
+@dataclass(frozen=True)
+class TrajectoryRefusal:
+    """Why a trajectory cannot be executed.
+
+    Attributes:
+        error_code: The rule that is broken, where the action has a code for it.
+        text: One sentence.
+    """
+
+    error_code: ErrorCode
+    text: str
+
+
+@dataclass(frozen=True)
+class GoalResult:
+    """The end of a goal.
+
+    Attributes:
+        goal_id: Identity of the goal, as it was submitted.
+        status: How it ended.
+        error_code: Why.
+        error_string: Why, in words; empty for a cancelled goal.
+    """
+
+    goal_id: Hashable
+    status: GoalStatus
+    error_code: ErrorCode
+    error_string: str
+
+
+@dataclass(frozen=True)
+class JointState:
+    """Measured state of a controller's joints.
+
+    Attributes:
+        positions: [rad], shape ``(n_joints,)``.
+        velocities: [rad/s], shape ``(n_joints,)``; used where joints brake when they are stopped.
+    """
+
+    positions: NDArray[np.float64]
+    velocities: NDArray[np.float64] | None = None
+
+
+@dataclass(frozen=True)
+class ControllerState:
+    """State of a controller in an update: the content of action feedback and of the controller's state topic.
+
+    Fields are in the controller's joint order and empty where there is no interface.
+
+    Attributes:
+        stamp_ns: Time of the update [ns].
+        joint_names: Joints of the controller.
+        desired: The point that was due (``reference`` of the state topic), timed by the trajectory's clock.
+        actual: The measured state (``feedback`` of the state topic), timed by the simulated time that has passed.
+        error: Desired minus actual; velocities are 0, as positions alone are commanded.
+        output: The command.
+        speed_scaling_factor: Speed of the trajectory's clock [-].
+    """
+
+    stamp_ns: int
+    joint_names: tuple[str, ...]
+    desired: TrajectoryPoint
+    actual: TrajectoryPoint
+    error: TrajectoryPoint
+    output: TrajectoryPoint
+    speed_scaling_factor: float
+
+
+@dataclass(frozen=True)
+class TrajectoryState:
+    """The trajectory at a time that was asked for (control_msgs/srv/QueryTrajectoryState).
+
+    Attributes:
+        success: Whether the time lies between the first update and the end.
+        positions: [rad], shape ``(n_joints,)``; after the end the last point, before the start the measured state.
+        velocities: [rad/s], shape ``(n_joints,)``; None if unknown.
+        accelerations: [rad/s²], shape ``(n_joints,)``; None if unknown.
+    """
+
+    success: bool
+    positions: NDArray[np.float64]
+    velocities: NDArray[np.float64] | None = None
+    accelerations: NDArray[np.float64] | None = None

@@ -1,0 +1,102 @@
+"""The coordinator's process."""
+
+from __future__ import annotations
+
+import gc
+import signal
+import time
+from collections.abc import Callable
+from pathlib import Path
+from types import FrameType
+
+from throwcollect import ros
+from throwcollect.coordinator.collection import TrialCollection
+from throwcollect.coordinator.coordinator_node import Coordinator
+from throwcollect.heartbeat import Heartbeat
+from throwcollect.interruption import stop_signals
+from throwcollect.ros.self_check import check_answers
+from throwcollect.side_by_side import count_cores
+
+_IDLE_S = 0.05
+_TELL_EVERY_S = 10.0
+"""Real time between two lines of progress in the log; the topic has it more often."""
+
+
+def run(directory: Path) -> None:
+    """Collect all trials of a dataset's plan that have no episode yet, and finish the dataset.
+
+    SIGINT, SIGTERM and SIGHUP drain: running trials are finished and written within `run.grace_s`, none is started.
+
+    Raises:
+        DatasetError: If the directory holds no plan, or cannot be written, or a trial came out otherwise when it was
+            simulated again.
+        WorkerError: If every simulation refuses every trial, trials cannot be simulated again, or ROS 2 is silent.
+        LossError: If the dataset is finished, and trials of it are lost.
+        Interrupted: If a signal ended the collection before its last trial.
+    """
+    # The dataset is opened before the node exists, because opening a large one takes long and a node has to answer.
+    with TrialCollection.open(directory, say=_say, processes=count_cores()) as collection:
+        ros.init()
+        # The journal keeps that anybody could join this run, because the dataset has to say so later on.
+        if not ros.joins_protected():
+            collection.writer.note("exposed")
+        node = Coordinator(collection)
+
+        executor = ros.SingleThreadedExecutor()
+        executor.add_node(node)
+        asked = False
+
+        def ask_to_drain(_number: int, _frame: FrameType | None) -> None:
+            # The loop drains, because this may come in the middle of anything, also of what draining does itself.
+            nonlocal asked
+            asked = True
+            ros.stop_waiting(executor)
+
+        for number in stop_signals():
+            signal.signal(number, ask_to_drain)
+        check_answers(node, executor)
+        # The present objects stay until the end, so the garbage collector need not go through them again and again.
+        gc.freeze()
+        heartbeat = Heartbeat()
+
+        def go_on() -> None:
+            """Answer while trials are simulated again."""
+            heartbeat.beat()
+            executor.spin_once(timeout_sec=_IDLE_S)
+
+        try:
+            _collect(node, collection, executor, heartbeat, is_to_drain=lambda: asked)
+            collection.finish(meanwhile=go_on, say=_say)
+        finally:
+            node.destroy_node()
+            ros.shutdown()
+
+
+def _collect(
+    node: Coordinator,
+    collection: TrialCollection,
+    executor: ros.Executor,
+    heartbeat: Heartbeat,
+    *,
+    is_to_drain: Callable[[], bool],
+) -> None:
+    """Collect until all trials have ended, or those that run when it drains."""
+    told = time.monotonic()
+    while not collection.finished:
+        heartbeat.beat()
+        if is_to_drain():
+            collection.drain()
+        # Messages of simulations come first; other work is done when there is none.
+        waiting = collection.backlog or collection.grow_plan()
+        ros.spin_some(executor, timeout_sec=0.0 if waiting else _IDLE_S)
+        if collection.backlog:
+            collection.write_one()
+        collection.look_after()
+        if time.monotonic() >= told + _TELL_EVERY_S:
+            told = time.monotonic()
+            _say(node.report().line)
+    _say(node.report().line)
+
+
+def _say(line: str) -> None:
+    print(line, flush=True)

@@ -1,0 +1,245 @@
+"""The one message that carries an episode from a simulation to the coordinator: std_msgs/UInt8MultiArray.
+
+Its layout names the parts of its data: ``header``, an `EpisodeHeader` in JSON; ``result``, the result of the trial in
+JSON; ``conditions``, the conditions of the episode in JSON; ``hashes``, the SHA-256 of the records of each chunk as 32
+bytes; ``chunk``, one or more MCAP Chunk records; and ``signature``, that of all parts before it. The coordinator trusts
+a sender who has the key of the run, so it does not decompress, hash or judge the episode again.
+
+The same message carries a refusal: its header and its chunk are empty, its result is the reason, and its conditions
+are the token of the lease that was refused.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import itertools
+import re
+import struct
+from collections.abc import Sequence
+from functools import cache, cached_property
+from typing import NamedTuple
+
+import numpy as np
+from pydantic import TypeAdapter, ValidationError
+
+from rclzenoh.interfaces import get_message
+from throwcollect.episode.chunk import Chunk
+from throwcollect.episode.message_layout import MessageLayout
+from throwcollect.episode.message_table import MessageTable
+from throwcollect.episode.record import EpisodeHeader, Samples
+from throwcollect.episode.recorded_chunk import RecordedChunk
+from throwcollect.errors import DatasetError
+from throwcollect.run_key import Signer
+
+_PARTS = ("header", "result", "conditions", "hashes", "chunk", "signature")
+_HASH_BYTES = 32
+_SHA256 = re.compile(r"[0-9a-f]{64}")
+_HEADER = TypeAdapter(EpisodeHeader)
+_LONGEST_NAME = 256
+"""Most characters of a recorded name that a message shows."""
+_COUNT = struct.Struct("<I")
+
+
+class Episode:
+    """The recording of one trial, in a message and on disk: a header and chunks, which are decompressed when needed.
+
+    The state chunk comes first and holds one message per channel and sample. Chunks of sensors may follow it, with
+    messages of any size at rates of their own. The digest covers header and state chunk alone, so a throw has the same
+    digest with and without sensors; each chunk of a sensor has a hash of its own beside it.
+
+    Attributes:
+        header: The facts besides the samples.
+        chunks: All chunks in order, the state chunk first.
+        state: The state chunk.
+        sensors: Chunks of sensors, in the order of the channels that they hold.
+    """
+
+    def __init__(self, header: EpisodeHeader, state: RecordedChunk, *sensors: RecordedChunk) -> None:
+        self.header = header
+        self.chunks = (state, *sensors)
+        self.state = state
+        self.sensors = sensors
+
+    @property
+    def chunk(self) -> Chunk:
+        """The state chunk, compressed."""
+        return self.state.chunk
+
+    @cached_property
+    def header_json(self) -> str:
+        """The header as `header_to_json` writes it."""
+        return header_to_json(self.header)
+
+    @cached_property
+    def table(self) -> MessageTable:
+        """The message records of the state chunk as a table.
+
+        Raises:
+            DatasetError: If the chunk is damaged, or does not hold one message per channel and sample.
+        """
+        return MessageTable(self.state.contents, self.header.samples)
+
+    def samples(self, joints: Sequence[str] | None = None) -> Samples:
+        """Read the samples, as views of the records where possible; `joints` must have been recorded, in this order.
+
+        Raises:
+            DatasetError: If the chunk is damaged, its messages have another layout than this version writes, or other
+                joints were recorded.
+        """
+        if joints is not None:
+            _require_joints(self.table.joints, tuple(joints))
+        return self.table.samples
+
+    @cached_property
+    def digest(self) -> str:
+        """SHA-256 over the header's JSON, one zero byte and the hash of the state chunk as 32 bytes, in hexadecimal."""
+        records = bytes.fromhex(self.state.records_sha256)
+        return hashlib.sha256(self.header_json.encode() + b"\0" + records).hexdigest()
+
+    def channels(self) -> tuple[tuple[int, ...], ...]:
+        """List the numbers of the channels of each chunk.
+
+        Raises:
+            DatasetError: If a chunk is damaged.
+        """
+        return (tuple(self.table.columns), *(sensor.messages.channels for sensor in self.sensors))
+
+    def check_records(self) -> None:
+        """Hash the message records of all chunks again.
+
+        Raises:
+            DatasetError: If a chunk is damaged, or its hash is not that of its records.
+        """
+        for chunk in self.chunks:
+            chunk.check_records()
+
+
+def _require_joints(recorded: tuple[str, ...], wanted: tuple[str, ...]) -> None:
+    if len(recorded) != len(wanted):
+        raise DatasetError(f"chunk: joint states of {len(recorded)} joints", expected=f"{len(wanted)}")
+    for number, (found, joint) in enumerate(zip(recorded, wanted, strict=True), start=1):
+        if found != joint:
+            raise DatasetError(f"chunk: joint {number} of the joint states is {found[:_LONGEST_NAME]}", expected=joint)
+
+
+def header_to_json(header: EpisodeHeader) -> str:
+    """Write a header in JSON: keys in the order of their declaration, no blanks; equal headers give equal text."""
+    return _HEADER.dump_json(header).decode()
+
+
+def header_from_json(text: bytes | str) -> EpisodeHeader:
+    """Read the text that `header_to_json` writes, also with other blanks.
+
+    Raises:
+        DatasetError: If the text is anything else.
+    """
+    try:
+        header = _HEADER.validate_json(text, strict=True)
+    except ValidationError as error:
+        first = error.errors()[0]
+        place = ".".join(map(str, first["loc"]))
+        raise DatasetError(f"episode header: {place}: {first['msg']}; {error.error_count()} problems in all") from error
+    for contact in header.contacts:
+        if contact.end_ns is not None and contact.end_ns < contact.start_ns:
+            raise DatasetError(f"episode header: a contact with {contact.body} that ends before it begins")
+    return header
+
+
+@cache
+def _layout() -> MessageLayout:
+    dimension = get_message("std_msgs/msg/MultiArrayDimension")
+    layout = get_message("std_msgs/msg/MultiArrayLayout")(dim=[dimension(label=part) for part in _PARTS])
+    message = get_message("std_msgs/msg/UInt8MultiArray")(layout=layout)
+    return MessageLayout(message, [f"layout.dim.{n}.{key}" for n in range(len(_PARTS)) for key in ("size", "stride")])
+
+
+class Delivery(NamedTuple):
+    """An episode that a simulation hands over, with its conditions and the result of the trial, both in JSON.
+
+    The result is empty if the simulation has not judged the episode.
+    """
+
+    episode: Episode
+    result: str
+    conditions: str
+
+
+class TrialRefusal(NamedTuple):
+    """A refusal of a simulation to do a trial, with the token of its lease."""
+
+    token: str
+    reason: str
+
+
+def pack(handed: Delivery | TrialRefusal, signer: Signer) -> bytes:
+    """Encode the CDR message that carries an episode or a refusal."""
+    if isinstance(handed, TrialRefusal):
+        parts = [b"", handed.reason.encode(), handed.token.encode(), b"", b""]
+    else:
+        episode = handed.episode
+        parts = [
+            episode.header_json.encode(),
+            handed.result.encode(),
+            handed.conditions.encode(),
+            b"".join(bytes.fromhex(chunk.records_sha256) for chunk in episode.chunks),
+            b"".join(chunk.chunk.record() for chunk in episode.chunks),
+        ]
+    signature = signer.sign(*parts).encode()
+    return b"".join((_prefix([*map(len, parts), len(signature)]), *parts, signature))
+
+
+def _prefix(sizes: list[int]) -> bytes:
+    """Encode everything before the data: the layout, and at the end the size of the data."""
+    prefix = bytearray(_layout().template)
+    np.frombuffer(prefix, _layout().dtype)[0] = tuple(size for size in sizes for _ in ("size", "stride"))
+    # The sizes may be those of a stranger's message, whose sum need not fit; such a message is refused by its length.
+    _COUNT.pack_into(prefix, len(prefix) - _COUNT.size, sum(sizes) % 2**32)
+    return bytes(prefix)
+
+
+def unpack(message: bytes, signer: Signer) -> Delivery | TrialRefusal:
+    """Read the message that `pack` writes, without decompressing chunks.
+
+    Raises:
+        DatasetError: If it is another message, or is signed with another key.
+    """
+    layout = _layout()
+    length = len(layout.template)
+    if len(message) < length:
+        raise DatasetError(f"episode: a message of {len(message)} bytes", expected=f"at least {length}")
+    sizes = list(np.frombuffer(message, layout.dtype, count=1)[0].item()[::2])
+    # Names of the parts, strides and the size of the data follow from the sizes, so one comparison checks them all.
+    if message[:length] != _prefix(sizes):
+        raise DatasetError(f"episode: not a UInt8MultiArray of the parts {', '.join(_PARTS)}")
+    # Some RMWs hand over messages with padding behind them.
+    if len(message) < length + sum(sizes):
+        raise DatasetError(f"episode: {len(message) - length} bytes of data", expected=f"{sum(sizes)} as announced")
+    whole = memoryview(message)
+    ends = list(itertools.accumulate(sizes, initial=length))
+    *parts, signature = (whole[start:end] for start, end in itertools.pairwise(ends))
+    if not signer.has_signed(bytes(signature).decode(errors="replace"), whole[length : ends[-2]]):
+        raise DatasetError("episode: is not signed with the key of this run")
+    header, result, conditions, hashes, chunks = parts
+    try:
+        texts = bytes(result).decode(), bytes(conditions).decode()
+    except UnicodeDecodeError as error:
+        raise DatasetError("episode: its result or its conditions are no UTF-8 text") from error
+    if not header:
+        return TrialRefusal(token=texts[1], reason=texts[0])
+    said = [hashes[start : start + _HASH_BYTES].hex() for start in range(0, len(hashes), _HASH_BYTES)]
+    return Delivery(make_episode(bytes(header), said, Chunk.parse_all(chunks)), *texts)
+
+
+def make_episode(header: bytes | str, hashes: Sequence[str], chunks: Sequence[Chunk]) -> Episode:
+    """Make an episode of its header in JSON, its chunks, the state chunk first, and the SHA-256 of their records.
+
+    Raises:
+        DatasetError: If the header cannot be read, a hash is no SHA-256 in hexadecimal, or there are not as many hashes
+            as chunks.
+    """
+    for said in hashes:
+        if not _SHA256.fullmatch(said):
+            raise DatasetError(f"episode: SHA-256 {said[:80]!r}", expected="64 hexadecimal digits")
+    if len(hashes) != len(chunks) or not chunks:
+        raise DatasetError(f"episode: {len(chunks)} chunks", expected=f"{len(hashes)}, as many as it has hashes of")
+    return Episode(header_from_json(header), *map(RecordedChunk, chunks, hashes))

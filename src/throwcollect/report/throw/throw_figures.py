@@ -1,0 +1,220 @@
+"""Figures of throws, in plotly; `painter` draws the same ones with matplotlib for print."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import plotly.graph_objects as go
+from numpy.typing import NDArray
+
+from throwcollect.report.figures import (
+    BLUE,
+    LEGEND_ABOVE,
+    LIMIT_LINE,
+    MOMENT_LINE,
+    NEUTRAL,
+    place_bars,
+    single_precision,
+)
+from throwcollect.report.outcomes import LANDED, Outcomes, in_words, style_of
+from throwcollect.report.plotted_points import choose_points
+from throwcollect.report.throw.coverage import CellAxis
+from throwcollect.report.throw.episodes import BallPath, JointMotion, Residuals
+from throwcollect.report.throw.landings import Landings
+from throwcollect.tasks.throw.flight import BALLISTIC_TOLERANCE_M
+
+_SCALE = "Viridis"
+_SHADES = ("#3b528b", "#2c728e", "#21908d", "#27ad81", "#5dc863", "#aadc32")
+"""Colours of paths that landed, from the nearest to the farthest."""
+_MOST_SVG_POINTS = 1500
+"""Plots of more points are drawn by WebGL, which is faster."""
+_FEW = 8
+"""Up to so many throws in a cell, each of them has its own mark beside the scale; Plotly would mark halves."""
+FLOOR_M = 1e-17
+"""Residuals are drawn as at least this, as 0 has no place on a logarithmic axis."""
+
+
+def draw_landing_map(landings: Landings, outcomes: Outcomes) -> go.Figure:
+    """Draw landings from above, coloured by release speed."""
+    figure = _draw_coloured(
+        landings,
+        outcomes,
+        columns=("x_m", "y_m", "speed_mps"),
+        hover="x %{x:.3f} m, y %{y:.3f} m, released at %{marker.color:.2f} m/s",
+        scale_title="release speed [m/s]",
+    )
+    robot = {"symbol": "star-triangle-up", "size": 13, "color": NEUTRAL, "line": {"width": 1, "color": "white"}}
+    figure.add_scatter(x=[0], y=[0], mode="markers", name="robot", marker=robot, hovertemplate="robot<extra></extra>")
+    figure.update_xaxes(title="x, forward [m]", constrain="domain")
+    figure.update_yaxes(title="y, left [m]", scaleanchor="x", constrain="domain")
+    return figure.update_layout(height=460)
+
+
+def draw_release_map(landings: Landings, outcomes: Outcomes) -> go.Figure:
+    """Draw speed and elevation at release, coloured by the distance at which the ball landed."""
+    figure = _draw_coloured(
+        landings,
+        outcomes,
+        columns=("speed_mps", "elevation_deg", "distance_m"),
+        hover="%{x:.2f} m/s at %{y:.1f}°, landed at %{marker.color:.3f} m",
+        scale_title="landing distance [m]",
+    )
+    figure.update_xaxes(title="release speed [m/s]")
+    figure.update_yaxes(title="release elevation [°]")
+    return figure.update_layout(height=420)
+
+
+def _draw_coloured(
+    landings: Landings, outcomes: Outcomes, *, columns: tuple[str, str, str], hover: str, scale_title: str
+) -> go.Figure:
+    """Draw points in one colour scale, each outcome with its own marker."""
+    shown = landings[choose_points(len(landings))]
+    x, y, colour = (getattr(shown, name) for name in columns)
+    kind = go.Scattergl if len(shown) > _MOST_SVG_POINTS else go.Scatter
+    size = 8 if len(shown) <= 300 else 6 if len(shown) <= 1500 else 4
+    figure = go.Figure()
+    present = [(code, name) for code, name in enumerate(outcomes.names) if (shown.code == code).any()]
+    # Throws that landed are drawn last, on top of the others, as the colours are for them.
+    for code, name in reversed(present):
+        own, style = shown.code == code, style_of(name)
+        outline = {"size": 1.4 * size, "line": {"color": style.colour, "width": size / 5}} if name != LANDED else {}
+        figure.add_trace(
+            kind(
+                x=single_precision(x[own]),
+                y=single_precision(y[own]),
+                customdata=shown.trial[own],
+                mode="markers",
+                marker={
+                    "symbol": style.symbol,
+                    "size": size,
+                    **outline,
+                    "color": single_precision(colour[own]),
+                    "coloraxis": "coloraxis",
+                },
+                showlegend=False,
+                hovertemplate=f"trial %{{customdata}}<br>{hover}<extra>{in_words(name)}</extra>",
+            )
+        )
+    # The legend has other markers than the points, which have no single colour.
+    for _, name in present:
+        style = style_of(name)
+        look = {"symbol": style.symbol, "color": NEUTRAL}
+        if name != LANDED:
+            look = {"symbol": f"{style.symbol}-open", "color": style.colour}
+        figure.add_scatter(x=[None], y=[None], mode="markers", name=in_words(name), marker={**look, "size": 9})
+    axis = {"colorscale": _SCALE, "colorbar": _colour_bar(scale_title)}
+    return figure.update_layout(coloraxis=axis, legend=LEGEND_ABOVE)
+
+
+def _colour_bar(title: str) -> dict[str, object]:
+    return {"title": {"text": title, "side": "right"}, "thickness": 12, "outlinewidth": 0}
+
+
+def draw_coverage_map(x: CellAxis, y: CellAxis, counts: NDArray[np.intp]) -> go.Figure:
+    """Draw the number of throws over two axes of the cells; empty cells are blank."""
+    most = max(int(counts.max()), 1)
+    marks = {"dtick": 1} if most <= _FEW else {}
+    figure = go.Figure(
+        go.Heatmap(
+            x=x.edges,
+            y=y.edges,
+            z=np.where(counts, counts, np.nan).T,
+            colorscale=_SCALE,
+            zmin=0,
+            zmax=most,
+            xgap=1,
+            ygap=1,
+            colorbar={**_colour_bar("throws"), **marks},
+            hovertemplate="%{x:.3f}, %{y:.3f}<br>%{z} throws<extra></extra>",
+        )
+    )
+    figure.update_xaxes(title=x.label, showgrid=False)
+    figure.update_yaxes(title=y.label, showgrid=False)
+    return figure.update_layout(height=460)
+
+
+def draw_coverage_bars(axis: CellAxis, counts: NDArray[np.intp]) -> go.Figure:
+    """Draw the number of throws over the only axis of the cells."""
+    hover = "near %{x:.3f}: %{y} throws<extra></extra>"
+    figure = go.Figure(go.Bar(**place_bars(axis.edges), y=counts, marker_color=BLUE, hovertemplate=hover))
+    figure.update_xaxes(title=axis.label, showgrid=False)
+    figure.update_yaxes(title="throws")
+    return figure.update_layout(height=460, bargap=0)
+
+
+def draw_residuals(residuals: Residuals) -> go.Figure:
+    """Draw how far flights depart from ballistic motion, on a logarithmic axis."""
+    shown = np.maximum(residuals.finite_m, FLOOR_M)
+    low = np.floor(np.log10(shown.min()))
+    high = max(np.ceil(np.log10(max(shown.max(), 10 * FLOOR_M))), low + 1)
+    # There are four bins for each power of ten; 0.1 more includes the last edge in spite of rounding.
+    edges = 10 ** np.arange(low, high + 0.1, 0.25)
+    counts, _ = np.histogram(np.clip(shown, edges[0], edges[-1]), edges)
+    hover = "%{y} flights near %{x:.1e} m<extra></extra>"
+    figure = go.Figure(go.Bar(**place_bars(edges), y=counts, marker_color=BLUE, hovertemplate=hover))
+    figure.add_vline(x=BALLISTIC_TOLERANCE_M, line=LIMIT_LINE)
+    ends = [low - 0.2, max(high, np.log10(BALLISTIC_TOLERANCE_M)) + 0.5]
+    figure.update_xaxes(title="distance from ballistic motion [m]", type="log", range=ends, exponentformat="e")
+    figure.update_yaxes(title="flights")
+    return figure.update_layout(height=300, bargap=0)
+
+
+def draw_ball_views(paths: Sequence[BallPath], landing_height_m: float | None) -> tuple[go.Figure, go.Figure]:
+    """Draw paths of the ball as seen from the robot's right, and from above."""
+    side, above = _draw_paths(paths, 2), _draw_paths(paths, 1)
+    if landing_height_m is not None:
+        side.add_hline(y=landing_height_m, line={"color": NEUTRAL, "width": 1})
+    side.update_yaxes(title="z, up [m]")
+    above.update_yaxes(title="y, left [m]")
+    return side, above
+
+
+def _draw_paths(paths: Sequence[BallPath], axis: int) -> go.Figure:
+    """Draw paths of the ball: x against another coordinate."""
+    letter = "xyz"[axis]
+    figure = go.Figure()
+    landed = [path.trial for path in paths if path.outcome == LANDED]
+    for path in paths:
+        name, colour = f"trial {path.trial}, {in_words(path.outcome)}", style_of(path.outcome).colour
+        if path.outcome == LANDED:
+            name = f"trial {path.trial}"
+            colour = _SHADES[landed.index(path.trial) * (len(_SHADES) - 1) // max(len(landed) - 1, 1)]
+        x, y = single_precision(path.positions[:, 0]), single_precision(path.positions[:, axis])
+        release = len(x) - 1 if path.release is None else path.release
+        hover = f"x %{{x:.3f}} m, {letter} %{{y:.3f}} m<extra>{name}</extra>"
+        common = {"legendgroup": name, "name": name, "hovertemplate": hover}
+        # Both lines have the sample of the release, so that they meet.
+        held, free = slice(release + 1), slice(release, None)
+        line = {"color": colour, "width": 1, "dash": "dot"}
+        figure.add_scatter(x=x[held], y=y[held], mode="lines", line=line, showlegend=False, **common)
+        figure.add_scatter(x=x[free], y=y[free], mode="lines", line={"color": colour, "width": 2}, **common)
+        if path.release is not None:
+            at = slice(release, release + 1)
+            marker = {"color": colour, "size": 8, "symbol": "circle-open", "line": {"width": 2}}
+            figure.add_scatter(x=x[at], y=y[at], mode="markers", marker=marker, showlegend=False, **common)
+    figure.update_xaxes(title="x, forward [m]", constrain="domain")
+    figure.update_yaxes(scaleanchor="x", constrain="domain")
+    return figure.update_layout(height=480, legend=LEGEND_ABOVE)
+
+
+def draw_joint(motion: JointMotion, column: int) -> go.Figure:
+    """Draw commanded and measured position of one joint."""
+    figure = go.Figure()
+    for values, name, line in (
+        (motion.measured, "measured", {"color": "#56B4E9", "width": 4}),
+        (motion.commanded, "commanded", {"color": "#D55E00", "width": 1.5, "dash": "dash"}),
+    ):
+        figure.add_scatter(
+            x=single_precision(motion.times_s),
+            y=single_precision(np.degrees(values[:, column])),
+            mode="lines",
+            name=name,
+            line=line,
+            hovertemplate=f"%{{x:.3f}} s, %{{y:.2f}}°<extra>{name}</extra>",
+        )
+    if motion.release_s is not None:
+        figure.add_vline(x=motion.release_s, line=MOMENT_LINE, name="release")
+    figure.update_xaxes(title="time [s]")
+    figure.update_yaxes(title="position [°]", range=list(motion.span(column)))
+    return figure.update_layout(height=230, showlegend=False)

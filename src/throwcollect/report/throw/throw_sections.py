@@ -1,0 +1,188 @@
+"""The sections that the task of throwing adds to a report: landings, releases, single throws and their physics."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from markupsafe import Markup
+
+from throwcollect.config.sweep import LANDING_HEIGHT
+from throwcollect.dataset.reader import Dataset
+from throwcollect.report.amounts import format_share
+from throwcollect.report.contents import Panel, ReportSection, TaskReport, Tile
+from throwcollect.report.outcomes import LANDED, Outcomes
+from throwcollect.report.plotted_points import MOST_POINTS
+from throwcollect.report.throw import throw_figures
+from throwcollect.report.throw.coverage import Coverage, count_throws
+from throwcollect.report.throw.episodes import (
+    BallPath,
+    JointMotion,
+    Residuals,
+    choose_examples,
+    measure_residuals,
+    read_motion,
+    read_paths,
+)
+from throwcollect.report.throw.landings import Landings, read_landings
+from throwcollect.robots.description import robot_of
+from throwcollect.tasks.throw.flight import BALLISTIC_TOLERANCE_M
+
+
+def report_throws(dataset: Dataset, outcomes: Outcomes) -> TaskReport:
+    """Make the part of a report that only datasets of throws have.
+
+    Raises:
+        DatasetError: If an episode is damaged, or not where the table says.
+    """
+    robot = robot_of(dataset.config)
+    throws, swept = dataset.throws, LANDING_HEIGHT in dataset.plan.keys
+    height_m = None if swept else dataset.config.scene.landing_height_m
+    landings = read_landings(throws, outcomes)
+    planned = landings[outcomes.are(LANDED)[landings.trial]]
+    coverage = count_throws(planned, throws, target=dataset.config.sweep.target)
+    examples = choose_examples(dataset, planned, outcomes)
+    paths = tuple(read_paths(dataset, examples))
+    motion = read_motion(dataset, _choose_middle(paths)) if paths else None
+    return TaskReport(
+        subject=f"simulated throw{'s' if len(throws) > 1 else ''} of a ball by {robot.introduction}",
+        tiles=tuple(_show_key_numbers(landings, outcomes)),
+        results=(
+            _show_landings(landings, outcomes, coverage, height_m=height_m),
+            _show_releases(landings, outcomes),
+        ),
+        episodes=(
+            _show_examples(paths, motion, tool=dataset.config.tool.name, height_m=height_m),
+            _show_physics(measure_residuals(dataset)),
+        ),
+    )
+
+
+def _choose_middle(paths: Sequence[BallPath]) -> int:
+    """Choose, of the trials that landed, the one in the middle; the first of all if none landed."""
+    landed = [path.trial for path in paths if path.outcome == LANDED]
+    return landed[len(landed) // 2] if landed else paths[0].trial
+
+
+def _show_key_numbers(landings: Landings, outcomes: Outcomes) -> Iterator[Tile]:
+    trials = len(outcomes.codes)
+    yield Tile(f"{trials:,}", "throws planned")
+    yield Tile(format_share(outcomes.succeeded, trials), "landed")
+    if len(landings):
+        distance, speed = landings.distance_m, landings.speed_mps
+        yield Tile(f"{distance.min():.2f}–{distance.max():.2f} m", "landing distance")
+        yield Tile(f"{speed.min():.2f}–{speed.max():.2f} m/s", "release speed")
+
+
+def _show_landings(
+    landings: Landings, outcomes: Outcomes, coverage: Coverage | None, *, height_m: float | None
+) -> ReportSection:
+    title = "Where the balls land"
+    if not len(landings):
+        return ReportSection("landing", "Landings", title, "No ball crossed the landing plane.")
+    x, y, distance = landings.x_m, landings.y_m, landings.distance_m
+    text = (
+        f"{len(landings):,} of {len(outcomes.codes):,} balls crossed the landing plane"
+        f"{'' if height_m is None else f' at z = {height_m:g} m'}, {distance.min():.2f} to {distance.max():.2f} m from "
+        f"the robot: x {x.min():.2f} to {x.max():.2f} m, y {y.min():.2f} to {y.max():.2f} m."
+    )
+    figure = throw_figures.draw_landing_map(landings, outcomes)
+    above = Panel("map", "Landings from above", figure, _say_how_many(landings), picture="landing_map")
+    return ReportSection("landing", "Landings", title, text, ((above, *_show_targets(coverage)),))
+
+
+def _show_targets(coverage: Coverage | None) -> Iterator[Panel]:
+    if coverage is None:
+        return
+    text = f"{coverage.hit:,} of {coverage.counts.size:,} cells have a throw that landed, "
+    text += f"at most {coverage.counts.max():,}"
+    if coverage.configured:
+        text += f"; {coverage.throws - int(coverage.counts.sum()):,} landed in no cell"
+    if len(coverage.axes) == 1:
+        figure = throw_figures.draw_coverage_bars(coverage.axes[0], coverage.counts)
+        yield Panel("cells", "Throws by target", figure, f"{text}.", picture="target_coverage")
+    for number, (first, second, counts) in enumerate(coverage.pairs):
+        yield Panel(
+            key=f"cells-{number}",
+            title=f"{'Targets:' if coverage.configured else 'Throws by'} {first.name} and {second.name}",
+            figure=throw_figures.draw_coverage_map(first, second, counts),
+            text="" if number else f"{text}.",
+            picture="" if number else "target_coverage",
+        )
+
+
+def _show_releases(landings: Landings, outcomes: Outcomes) -> ReportSection:
+    title = "How the balls are released"
+    if not len(landings):
+        return ReportSection("release", "Release", title, "No ball crossed the landing plane.")
+    elevation_deg = np.median(landings.elevation_deg)
+    text = (
+        f"Of the balls that crossed the landing plane, the median speed is {np.median(landings.speed_mps):.2f} m/s, "
+        f"the median direction {abs(elevation_deg):.1f}° {'below' if elevation_deg < 0 else 'above'} the horizontal."
+    )
+    figure = throw_figures.draw_release_map(landings, outcomes)
+    panel = Panel("map", "Speed and elevation at release", figure, _say_how_many(landings), picture="release")
+    return ReportSection("release", "Release", title, text, ((panel,),))
+
+
+def _say_how_many(landings: Landings) -> str:
+    count = len(landings)
+    return f"{MOST_POINTS:,} of {count:,} throws, chosen at random." if count > MOST_POINTS else ""
+
+
+def _show_examples(
+    paths: Sequence[BallPath], motion: JointMotion | None, *, tool: str, height_m: float | None
+) -> ReportSection:
+    title = "A few throws"
+    if motion is None:
+        return ReportSection("throws", "Throws", title, "No trial has an episode.")
+    text = f"Dotted while the {tool} holds the ball; a ring marks the release."
+    if (landed := sum(path.outcome == LANDED for path in paths)) > 1:
+        text = f"{landed} throws that landed, from the nearest to the farthest. {text}"
+    side, above = throw_figures.draw_ball_views(paths, height_m)
+    views = (
+        Panel("side", "The ball from the side", side, picture="ball_paths"),
+        Panel("above", "The ball from above", above),
+    )
+    note = f"Joints of trial {motion.trial}: measured (blue) and commanded (orange, dashed)"
+    note += "; the vertical line is the release." if motion.release_s is not None else "."
+    errors = np.degrees(np.abs(motion.measured - motion.commanded).max(axis=0))
+    joints = tuple(
+        Panel(
+            key=joint,
+            title=joint,
+            figure=throw_figures.draw_joint(motion, column),
+            text=f"Largest tracking error: {errors[column]:.2g}°.",
+            picture="joint_tracking",
+            small=True,
+        )
+        for column, joint in enumerate(motion.joints)
+    )
+    return ReportSection("throws", "Throws", title, text, (views, note, joints))
+
+
+def _show_physics(residuals: Residuals) -> ReportSection:
+    title = "Whether flights obey physics"
+    if not len(residuals.finite_m):
+        return ReportSection(
+            "physics", "Physics", title, "No flight was long enough to compare it with ballistic motion."
+        )
+    compared = "All episodes"
+    if residuals.checked < residuals.episodes:
+        compared = f"{residuals.checked:,} of {residuals.episodes:,} episodes, chosen at random,"
+    exact = int((residuals.distance_m == 0).sum())
+    exactly = f", {exact:,} agree to the last bit (drawn at {throw_figures.FLOOR_M:g} m)" if exact else ""
+    text = (
+        f"{compared} were compared, sample by sample, with ballistic motion from their release: the largest distance "
+        f"is {residuals.finite_m.max():.1e} m{exactly}. "
+    )
+    # NaN counts as a departure, too.
+    above = int((~(residuals.distance_m <= BALLISTIC_TOLERANCE_M)).sum())
+    if above:
+        text += Markup("<b>{:,} depart by more than the tolerance</b>; ").format(above)
+        text += Markup("<code>throwcollect dataset verify</code> names them.")
+    else:
+        text += f"None departs by more than the tolerance of {BALLISTIC_TOLERANCE_M:g} m (dashed)."
+    heading = "Largest distance of each flight from ballistic motion"
+    panel = Panel("residuals", heading, throw_figures.draw_residuals(residuals), picture="ballistic_residuals")
+    return ReportSection("physics", "Physics", title, text, ((panel,),))

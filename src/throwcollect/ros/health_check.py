@@ -1,0 +1,85 @@
+"""Asks a node for a sign of life, from wherever its router can be reached; containers look at a `heartbeat` instead."""
+
+from __future__ import annotations
+
+import os
+import re
+import socket
+
+import zenoh
+
+from rclzenoh.domain import domain_of_environment
+from rclzenoh.health import node_answers
+from rclzenoh.session_config import OPEN, connect_endpoint, environment_config
+from throwcollect.errors import ConfigError, ThrowcollectError
+from throwcollect.heartbeat import is_beating
+from throwcollect.ros.middleware import Middleware
+from throwcollect.ros.router_endpoint import split_address
+from throwcollect.ros.zenoh_errors import zenoh_errors
+
+NODE_VARIABLE = "THROWCOLLECT_NODE"
+"""Names the node of a container."""
+
+TIMEOUT_S = 3.0
+"""Time for the session, and then for the answer."""
+
+_ROUTER, _COORDINATOR = "router", "coordinator"
+_NAME = re.compile("[A-Za-z_][A-Za-z0-9_]*")
+
+
+def check(node: str | None = None) -> None:
+    """Ask a node for a sign of life.
+
+    Args:
+        node: ``router``, ``coordinator``, or the name of a simulation; None for the one that ``THROWCOLLECT_NODE``
+            names.
+
+    Raises:
+        ConfigError: If no node is named, or a variable of the environment does not hold what it should.
+        ThrowcollectError: If it does not answer.
+    """
+    name = node or os.environ.get(NODE_VARIABLE)
+    if not name or not _NAME.fullmatch(name):
+        raise ConfigError(
+            f"health: got {name!r} as node" if name else "health: no node is named",
+            expected=f"router, coordinator, or the name of a simulation; by default what {NODE_VARIABLE} says",
+        )
+    is_fast_dds = Middleware.of_process().is_fast_dds
+    if is_fast_dds and name != _ROUTER:
+        # Nothing can be asked over DDS at so little cost; the loop of the node in this container keeps a heartbeat.
+        if not is_beating():
+            raise ThrowcollectError(f"{name}: does not answer")
+        return
+    with zenoh_errors():
+        endpoint, config, domain_id = connect_endpoint(), environment_config(), domain_of_environment()
+    if is_fast_dds and endpoint is not None and not endpoint.startswith(OPEN):
+        _check_discovery_server(endpoint)
+        return
+    config.insert_json5("transport/unicast/open_timeout", str(round(TIMEOUT_S * 1000)))
+    try:
+        session = zenoh.open(config)
+    except zenoh.ZError as error:
+        raise ThrowcollectError(
+            f"{name}: no session with the router: {config.get_json('connect/endpoints')}"
+        ) from error
+    try:
+        # A simulation lives in a namespace of its own name, or in that of the root.
+        path = name if name == _COORDINATOR else f"**/{name}"
+        if name != _ROUTER and not node_answers(session, path, domain_id=domain_id, timeout_s=TIMEOUT_S):
+            raise ThrowcollectError(f"{name}: does not answer")
+    finally:
+        session.close()  # type: ignore[no-untyped-call]
+
+
+def _check_discovery_server(endpoint: str) -> None:
+    """Check that the router of a private run on Fast DDS takes a connection.
+
+    Raises:
+        ThrowcollectError: If it does not.
+    """
+    try:
+        with socket.create_connection(split_address(endpoint), TIMEOUT_S) as connection:
+            # The router hangs up at once; one that is stuck does not.
+            connection.recv(1)
+    except OSError as error:
+        raise ThrowcollectError(f"{_ROUTER}: no session with the router at {endpoint}: {error}") from error

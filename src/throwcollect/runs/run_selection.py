@@ -1,0 +1,231 @@
+"""Finds the run that a user names, and runs whose nodes are still there after their launcher has died."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from pathlib import Path
+
+from throwcollect.dataset.directory import config_path
+from throwcollect.errors import ConfigError, ConflictError, NotFoundError, WorkerError
+from throwcollect.members import names_of
+from throwcollect.runs.records import Records, Run
+from throwcollect.runs.run_record import RunRecord
+from throwcollect.runtimes.registry import get_runtime
+from throwcollect.runtimes.runtime import HeldRun
+from throwcollect.wording import command
+
+_MOST_LISTED = 5
+
+
+def find_run_to_change(records: Records, named: str | None, *, command: str, died: bool = False) -> Run:
+    """Find the run that a command is to change, whose name without its option ``--run`` is `command`.
+
+    The user names it as for `id_of`. None takes the only run that lives, or with `died` whose launcher died, and that
+    belongs to the current directory, because it was begun there or its dataset lies below.
+
+    Raises:
+        ConfigError: If there is no such run, or more than one, or the only one belongs to another directory.
+    """
+    if named is not None:
+        return records.get(id_of(records, named))
+    runs = records.all()
+    candidates = [run for run in runs if run.status == "running" or (died and run.status == "died")]
+    here = [run for run in candidates if _belongs_here(run.record)]
+    if not here and len(candidates) == 1:
+        (other,) = candidates
+        raise ConfigError(
+            f"no run of this directory lives; {other.id} {_origin(other)}",
+            hint=f"throwcollect {command} --run {other.id}, if that one is meant",
+        )
+    return _only(here or candidates, runs)
+
+
+def find(named: str | os.PathLike[str]) -> Run:
+    """Find a run of this machine by its id, the beginning of its id, or the directory of its dataset; see `id_of`.
+
+    Raises:
+        ConfigError: If there is no such run, or more than one.
+    """
+    records = Records()
+    return records.get(id_of(records, os.fspath(named)))
+
+
+def find_run_to_watch(records: Records, named: str | None, *, say: Callable[[str], object]) -> Run:
+    """Find the run that a command is to look at, and `say` which it is if it belongs to another directory.
+
+    The user names it as for `id_of`. None takes the only run that lives, or else the latest run, of the current
+    directory; if no run belongs to that, of any directory.
+
+    Raises:
+        ConfigError: If there is no such run, or more than one.
+    """
+    if named is not None:
+        return records.get(id_of(records, named))
+    runs = records.all()
+    here = [run for run in runs if _belongs_here(run.record)]
+    known = here or runs
+    living = [run for run in known if run.status == "running"]
+    run = known[-1] if known and not living else _only(living, runs)
+    if not here:
+        say(f"run {run.record.run}, which {_origin(run)}")
+    return run
+
+
+def _only(living: Sequence[Run], runs: Sequence[Run]) -> Run:
+    if len(living) == 1:
+        return living[0]
+    if living:
+        raise ConfigError(f"{len(living)} runs live", expected=_list(living), hint="name one of them with --run")
+    over = f"; of those that are over, there is {_list(runs)}" if runs else ""
+    raise ConfigError(f"no run lives{over}", hint="throwcollect up -d starts one" if not runs else "name it with --run")
+
+
+def _belongs_here(record: RunRecord) -> bool:
+    """Whether a run was begun in the current directory, or its dataset lies below that."""
+    here = os.getcwd()
+    dataset = None if record.volume else Path(os.path.realpath(record.directory))
+    return record.begun_in == here or (dataset is not None and dataset.is_relative_to(here))
+
+
+def _origin(run: Run) -> str:
+    begun_in = run.record.begun_in
+    return f"was begun in {begun_in}" if begun_in else f"collects into {run.place.dataset}"
+
+
+def id_of(records: Records, named: str) -> str:
+    """Find the id of the run that a user names by its id, the beginning of that, or the directory of the dataset.
+
+    Of several runs with the same beginning, the only one that lives is meant. Which one of several that live, or of
+    several that are over, would be a guess.
+
+    Raises:
+        ConfigError: If there is no such run, or more than one.
+    """
+    ids = records.ids()
+    # A whole id comes first, because it may also be the beginning of another one.
+    if named in ids:
+        return named
+    if into := records.into(Path(named)):
+        return into[-1].id
+    matches = [run for run in ids if run.startswith(named)]
+    if len(matches) == 1:
+        return matches[0]
+    if matches:
+        return _find_only_living(records, matches, named)
+    known = _list(records.all())
+    hint = "throwcollect ps -a lists all" if known else None
+    raise NotFoundError(f"no run {named!r}", expected=f"one of {known}" if known else None, hint=hint)
+
+
+def _find_only_living(records: Records, ids: Sequence[str], named: str) -> str:
+    """Find the only one of several runs that lives; all of their ids begin with `named`.
+
+    Raises:
+        ConfigError: If none lives, or more than one.
+    """
+    runs = []
+    for run in ids:
+        with suppress(ConfigError):
+            runs.append(records.get(run))
+    living = [run for run in runs if run.status == "running"]
+    if len(living) == 1:
+        return living[0].id
+    runs.sort(key=lambda run: (run.status == "running", run.record.started), reverse=True)
+    lines = [f"{run.id} ({run.status}): {run.place.dataset}" for run in runs[:_MOST_LISTED]]
+    if more := len(ids) - len(lines):
+        lines.append(f"{more} more, which throwcollect ps -a lists")
+    raise ConfigError(f"{len(ids)} runs begin with {named!r}", expected="\n".join(["one of", *lines]))
+
+
+def _list(runs: Sequence[Run]) -> str:
+    """The ids of the latest runs, of which the last is the latest, and how many there are besides."""
+    more = len(runs) - _MOST_LISTED
+    return ", ".join(run.id for run in runs[: -_MOST_LISTED - 1 : -1]) + (f" and {more} more" if more > 0 else "")
+
+
+def find_left_in(records: Records, directory: Path, *, own: str | None = None) -> Run | None:
+    """Find a run that collects, or has collected, into a directory, and whose nodes are still there without a launcher.
+
+    The run that this process prepares, whose id is `own`, is not looked at.
+
+    Raises:
+        ConfigError: If a run whose launcher lives collects into the directory.
+        WorkerError: If the runtime does not tell in time whether nodes are left.
+    """
+    for run in reversed(records.into(directory)):
+        if run.id == own:
+            continue
+        if run.status == "running":
+            raise busy_error(run.record)
+        if run.status not in ("died", "abandoned"):
+            continue
+        try:
+            if run.record.runtime and get_runtime(run.record.runtime).is_left(run.id):
+                return run
+        except WorkerError as error:
+            raise WorkerError(
+                f"{directory.absolute()}: containers of run {run.id} may still collect into it: {error.message}",
+                hint=error.hint,
+            ) from error
+    return None
+
+
+def busy_error(record: RunRecord) -> ConflictError:
+    """The error that a run collects into a directory."""
+    return ConflictError(
+        f"{record.directory}: run {record.run} collects into it",
+        hint=f"{command('wait', '--run', record.run)} follows it",
+    )
+
+
+def describe_death(run: Run) -> WorkerError:
+    """The error that the launcher of a run died before the run ended."""
+    hint = f"{command('down', '--run', run.id)} cleans up"
+    if has_complete_dataset(run):
+        return WorkerError(
+            f"run {run.id}: its launcher died, but the dataset is complete: {run.place.dataset}", hint=hint
+        )
+    what = f"run {run.id}: its launcher died"
+    # No runtime is chosen before there is a plan, and no trial has run before.
+    is_planned = run.record.runtime != "" or config_path(run.place.directory).is_file()
+    if run.record.kind == "collection" and is_planned:
+        what = f"{what}; finished throws are in {run.place.dataset}"
+        if again := run.place.way_on:
+            hint = f"{again} goes on where it ended, or with its containers if they live; {hint}"
+    return WorkerError(what, evidence=f"the logs are in {run.record.logs}", hint=hint)
+
+
+def has_complete_dataset(run: Run) -> bool:
+    """Whether nothing is left to collect into the directory of a run.
+
+    A later run may have gone on with what this one left, so the dataset is asked unless this run has completed it.
+    """
+    if run.record.kind != "collection" or run.status == "running":
+        return False
+    if run.record.exit_code == 0:
+        return True
+    # This imports what reads tables, which takes a while and is rarely needed.
+    from throwcollect.coordinator.resume import is_complete
+
+    return run.record.volume is None and is_complete(run.place.directory)
+
+
+def require_living(run: Run) -> RunRecord:
+    """The record of a run, which has to live.
+
+    Raises:
+        ConflictError: If the run has ended.
+        WorkerError: If the launcher of the run died.
+    """
+    if run.status == "died":
+        raise describe_death(run)
+    if run.status != "running":
+        raise ConflictError(f"run {run.id} has ended", hint="throwcollect ps lists those that live")
+    return run.record
+
+
+def find_held_runs() -> dict[str, tuple[str, HeldRun]]:
+    """Find all runs of which some runtime holds nodes or a network: by id, the name of the runtime and the run."""
+    return {held.run_id: (name, held) for name in names_of("runtimes") for held in get_runtime(name).find_held()}

@@ -1,0 +1,85 @@
+"""Chooses the runtime of a run, and the middleware of its nodes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from throwcollect.config.schema import Config
+from throwcollect.errors import WorkerError
+from throwcollect.extras import MissingExtraError, explain_missing
+from throwcollect.ros.middleware import Middleware, choose_middleware
+from throwcollect.runtimes.registry import AUTOMATIC, get_runtime
+from throwcollect.runtimes.runtime import Runtime
+
+
+@dataclass(frozen=True)
+class RuntimeChoice:
+    """The runtime of a run, by its name and as an object, and the middleware that carries the messages of its nodes."""
+
+    name: str
+    runtime: Runtime
+    middleware: Middleware
+
+
+def begin(config: Config) -> RuntimeChoice | None:
+    """Let the runtime that the run will most likely have begin what it can before there is a plan.
+
+    Returns:
+        The runtime, to be handed to `choose` and to be closed in any case; None if no runtime seems to be there.
+
+    Raises:
+        ConfigError: If rclpy is asked for, and is not there, or there is no such runtime.
+        MissingExtraError: If the runtime needs a package that is not installed.
+    """
+    middleware = choose_middleware(config.run.ros)
+    for name in _candidates(config):
+        runtime = get_runtime(name)
+        if not runtime.is_absent():
+            runtime.begin(config, middleware)
+            return RuntimeChoice(name, runtime, middleware)
+    return None
+
+
+def choose(
+    config: Config, *, say: Callable[[str], None], warn: Callable[[str], None], begun: RuntimeChoice | None = None
+) -> RuntimeChoice:
+    """Choose the runtime that a configuration asks for, and make sure that it can be used.
+
+    With ``auto``, that is containers where there is an engine for them. rclpy is used where it is installed. `say` is
+    told what is chosen, and before that what is done to get it; `warn` of what may be wrong, such as an image that was
+    made from other sources. `begun` is what `begin` returned.
+
+    Raises:
+        ConfigError: If rclpy is asked for, and is not there, or there is no such runtime.
+        MissingExtraError: If the runtime needs a package that is not installed.
+        WorkerError: If the runtime that is asked for cannot be used.
+    """
+    launcher = choose_middleware(config.run.ros)
+
+    def prepare(name: str, note: str) -> RuntimeChoice:
+        runtime = begun.runtime if begun is not None and begun.name == name else get_runtime(name)
+        # A runtime imports the packages that only it needs when it is used.
+        with explain_missing():
+            middleware = runtime.prepare(config, launcher, say=say, warn=warn)
+        rclpy = f" on genuine rclpy with {middleware.rmw}" if middleware.backend == "rclpy" else ""
+        say(f"runtime: {runtime.in_words(config)}{rclpy}{note}")
+        return RuntimeChoice(name, runtime, middleware)
+
+    *others, last = candidates = _candidates(config)
+    note = " (auto)" if candidates == AUTOMATIC else ""
+    for name in others:
+        try:
+            return prepare(name, note)
+        except MissingExtraError as error:
+            note = f" (auto, as the package {error.package} is not installed)"
+        except WorkerError as error:
+            note = f" (auto, as {error.message})"
+    return prepare(last, note)
+
+
+def _candidates(config: Config) -> tuple[str, ...]:
+    """Names of the runtimes that the run may have, in the order in which they are tried."""
+    # Simulations of other machines can join a run only if its nodes are processes.
+    name = config.run.runtime if config.run.listen is None else "local"
+    return AUTOMATIC if name == "auto" else (name,)

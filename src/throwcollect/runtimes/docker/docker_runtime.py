@@ -1,0 +1,160 @@
+"""The runtime ``docker``: whether an engine can be used, and which runs it holds.
+
+The client of the engine is imported only when it is needed, because most commands only ask whether there is an engine.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import closing
+from typing import TYPE_CHECKING
+
+from throwcollect.errors import ConfigError, Problem, WorkerError
+from throwcollect.extras import is_installed
+from throwcollect.ros.middleware import Middleware
+from throwcollect.runtimes.docker.address import check_socket, engine_address, has_socket, is_local
+from throwcollect.runtimes.runtime import Check, HeldRun, Place, Runtime
+
+if TYPE_CHECKING:
+    from docker.client import DockerClient
+
+    from throwcollect.config.schema import Config
+    from throwcollect.runtimes.docker.docker_nodes import DockerNodes
+
+_PROBE_S = 3.0
+"""With ``run.runtime: auto``, an engine that takes longer to answer is not used."""
+_LOOK_S = 2.0
+
+
+class DockerRuntime(Runtime):
+    """Nodes as containers of a Docker engine, which outlive their launcher."""
+
+    handle = "container"
+    outlives_launcher = True
+    has_volumes = True
+
+    def is_absent(self) -> bool:
+        """Whether the client is not installed, or the engine has no socket."""
+        return not is_installed("docker") or not has_socket()
+
+    def in_words(self, config: Config) -> str:
+        """See `Runtime.in_words`."""
+        from throwcollect.runtimes.docker.container_options import image
+
+        return f"Docker containers of {image(config)}"
+
+    def host(self, place: Place, config: Config, *, warn: Callable[[str], None]) -> DockerNodes:
+        """Make the host of a run; see `Runtime.host`."""
+        from throwcollect.runtimes.docker.docker_nodes import DockerNodes
+
+        return DockerNodes(place, config, warn=warn)
+
+    def prepare(
+        self, config: Config, middleware: Middleware, *, say: Callable[[str], None], warn: Callable[[str], None]
+    ) -> Middleware:
+        """Get the image, and find out the middleware of containers; see `Runtime.prepare`."""
+        if is_installed("docker"):
+            check_socket()
+        from throwcollect.runtimes.docker.container_options import image
+        from throwcollect.runtimes.docker.docker_engine import PATIENCE_S, connect
+        from throwcollect.runtimes.docker.image import ensure, is_outdated, rmw_of
+
+        name = image(config)
+        with closing(connect(timeout_s=PATIENCE_S if config.run.runtime == "docker" else _PROBE_S)) as client:
+            ensure(client, name, say=say)
+            if is_outdated(client, name):
+                _handle_outdated_image(client, name, config, warn)
+            return _choose_middleware(rmw_of(client, name), name, config, middleware)
+
+    def check(self) -> Check:
+        """Whether an engine answers, and has the image of these sources."""
+        from throwcollect.runtimes.docker.docker_engine import connect, engine_errors
+        from throwcollect.runtimes.docker.image import default_tag, is_outdated, is_there
+
+        try:
+            with closing(connect(timeout_s=_PROBE_S)) as client, engine_errors("the Docker engine fails"):
+                engine = client.version()["Version"]
+                found = f"Docker {engine} answers at {engine_address()}"
+                if not is_there(client, default_tag()):
+                    lacking = f"the image {default_tag()} is not there yet; throwcollect image build makes it"
+                    return Check("docker", "note", f"{found}; {lacking}")
+                if is_outdated(client, default_tag()):
+                    old = f"the image {default_tag()} was made from other sources than these"
+                    return Check("docker", "note", f"{found}; {old}; throwcollect image build makes it anew")
+        except WorkerError as error:
+            return Check("docker", "note", f"{error.message}; runs use processes")
+        return Check("docker", "ok", f"{found}, with the image {default_tag()}")
+
+    def find_held(self) -> list[HeldRun]:
+        """See `Runtime.find_held`; none if there is no client, or the engine does not answer quickly."""
+        if self.is_absent():
+            return []
+        from throwcollect.runtimes.docker.docker_engine import connect
+        from throwcollect.runtimes.docker.held_runs import find_held_runs
+
+        try:
+            return find_held_runs(connect(timeout_s=_LOOK_S))
+        except WorkerError:
+            return []
+
+    def is_left(self, run: str) -> bool:
+        """Whether the engine holds containers of a run; an engine that has ended has no running containers.
+
+        Raises:
+            WorkerError: If the engine does not answer in time.
+        """
+        from throwcollect.runtimes.docker.docker_engine import connect, timed_out
+        from throwcollect.runtimes.docker.held_runs import find_held_runs
+
+        try:
+            return any(found.nodes for found in find_held_runs(connect()) if found.run_id == run)
+        except WorkerError as error:
+            if error.__cause__ is None or not timed_out(error.__cause__):
+                return False
+            raise WorkerError(error.message, hint="try again once the Docker engine answers") from error
+
+    def remove(self, run: str, *, volumes: bool) -> list[str]:
+        """Remove containers, network, key and, if asked for, the dataset's volume; see `Runtime.remove`."""
+        from throwcollect.runtimes.docker.docker_engine import connect
+        from throwcollect.runtimes.docker.held_runs import remove
+
+        return remove(connect(), run, volumes=volumes)
+
+
+def _choose_middleware(rmw: str | None, image: str, config: Config, launcher: Middleware) -> Middleware:
+    """Choose the middleware of containers: the image has to have it, and the launcher has to be able to join it.
+
+    Raises:
+        ConfigError: If rclpy is asked for, and the image has none, or the launcher could not join its nodes.
+    """
+    if rmw is None:
+        problem = f"the image {image} has no rclpy"
+    # The embedded client understands this middleware, so every launcher can join it, on another machine, too.
+    elif (found := Middleware("rclpy", rmw)).joining.backend == "embedded":
+        return found if config.run.ros != "embedded" else Middleware()
+    # With another middleware, the launcher has to load the same one, and to be on the machine of the nodes.
+    elif not is_local():
+        problem = f"with {rmw} nodes talk to each other directly, and those at {engine_address()} cannot be reached"
+    else:
+        return found if launcher.rmw == rmw else Middleware()
+    if config.run.ros == "rclpy":
+        raise ConfigError([Problem(problem, key="run.ros")], expected="embedded, or auto")
+    return Middleware()
+
+
+def _handle_outdated_image(client: DockerClient, name: str, config: Config, warn: Callable[[str], None]) -> None:
+    """Use an image of other sources only if the user has named it, as it may collect other bytes; else build a new one.
+
+    Raises:
+        WorkerError: If ``run.runtime: auto`` may use processes instead, or the image cannot be built.
+    """
+    from throwcollect.runtimes.docker.image import build
+
+    finding = f"the image {name} was made from other sources than these"
+    if config.containers.image is not None:
+        warn(f"{finding}; it is used, as containers.image names it")
+    elif config.run.runtime == "auto":
+        raise WorkerError(f"{finding}; throwcollect image build makes it anew")
+    else:
+        warn(f"{finding}; building it anew, which takes minutes")
+        build(client, name, say=lambda _line: None)

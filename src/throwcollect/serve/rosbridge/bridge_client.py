@@ -1,0 +1,242 @@
+"""One client of a bridge: its requests, and all that it has in the ROS graph."""
+
+from __future__ import annotations
+
+import itertools
+import logging
+from collections import deque
+from collections.abc import Callable, Mapping
+from typing import Protocol
+
+from throwcollect.errors import ConfigError, ThrowcollectError
+from throwcollect.serve.rosbridge.bridge_session import BridgeSession
+from throwcollect.serve.rosbridge.client_goals import Goal, Goals
+from throwcollect.serve.rosbridge.codec import Frame, encode, fragments, read_frame
+from throwcollect.serve.rosbridge.file_server import GET_FILE, give_file
+from throwcollect.serve.rosbridge.offered_actions import OfferedAction
+from throwcollect.serve.rosbridge.offered_services import OfferedService
+from throwcollect.serve.rosbridge.offers import Offers
+from throwcollect.serve.rosbridge.peer import Level
+from throwcollect.serve.rosbridge.publishers import Publishers
+from throwcollect.serve.rosbridge.questions import Questions
+from throwcollect.serve.rosbridge.reassembly import Reassembly
+from throwcollect.serve.rosbridge.request import BridgeRequest, Form, RequestId, sentence
+from throwcollect.serve.rosbridge.rosapi import SET_PARAMETER, Answer, Rosapi
+from throwcollect.serve.rosbridge.service_calls import Call, call_node
+from throwcollect.serve.rosbridge.subscriptions import Subscriptions
+
+Operation = Callable[[BridgeRequest], None]
+
+_logger = logging.getLogger(__name__)
+
+_LEVELS = ("none", "error", "warning", "info")
+_numbers = itertools.count()
+
+
+class ClientHost(Protocol):
+    """A bridge as its clients see it."""
+
+    @property
+    def session(self) -> BridgeSession:
+        """The bridge's place in the ROS graph."""
+
+    @property
+    def is_connected(self) -> bool:
+        """Whether the bridge has a place in the ROS graph by now."""
+
+    def later(self, seconds: float, action: Callable[[], None]) -> None:
+        """Call an action after a time [s], in the bridge's thread."""
+
+    def submit(self, action: Callable[[], None]) -> None:
+        """Call an action soon, in the bridge's thread; may be called in any thread."""
+
+    def forget(self, client: BridgeClient) -> None:
+        """Take a client off the list."""
+
+
+class BridgeClient:
+    """One client. `receive` and `close` may be called in any thread, everything else only in that of the bridge."""
+
+    def __init__(self, host: ClientHost, send: Callable[[Frame], None], *, read_only: bool) -> None:
+        self._host = host
+        self._send = send
+        self._read_only = read_only
+        self._frames: deque[Frame] = deque()
+        self._level = "error"
+        self._is_closed = False
+        self._questions = Questions(self)
+        self._goals = Goals(self)
+        subscriptions, publishers = Subscriptions(self), Publishers(self)
+        services = Offers(self, "service", OfferedService)
+        actions = Offers(self, "action", OfferedAction, probe="/_action/send_goal")
+        self._parts = (subscriptions, publishers, services, actions, self._questions, self._goals)
+        self._reassembly = Reassembly()
+        rosapi = Rosapi(self, self._questions).answers
+        self._answers: Mapping[str, Answer] = {**rosapi, GET_FILE: give_file}
+        self._looking: Mapping[str, Operation] = {
+            "subscribe": subscriptions.subscribe,
+            "unsubscribe": subscriptions.unsubscribe,
+            "call_service": self._call_service,
+            "fragment": self._take_part,
+            "set_level": self._set_level,
+            "status": self._take_status,
+            "auth": self._authenticate,
+        }
+        self._acting: Mapping[str, Operation] = {
+            "advertise": publishers.advertise,
+            "unadvertise": publishers.unadvertise,
+            "publish": publishers.publish,
+            "advertise_service": services.advertise,
+            "unadvertise_service": services.unadvertise,
+            "service_response": services.pass_on(OfferedService.respond),
+            "send_action_goal": self._send_goal,
+            "cancel_action_goal": self._goals.cancel,
+            "advertise_action": actions.advertise,
+            "unadvertise_action": actions.unadvertise,
+            "action_feedback": actions.pass_on(OfferedAction.publish_feedback),
+            "action_result": actions.pass_on(OfferedAction.end),
+            "action_status": actions.pass_on(OfferedAction.settle),
+        }
+
+    @property
+    def session(self) -> BridgeSession:
+        """The place of the bridge in the ROS graph."""
+        return self._host.session
+
+    @property
+    def waiting(self) -> int:
+        """Number of received frames that wait to be handled."""
+        return len(self._frames)
+
+    def receive(self, frame: Frame) -> None:
+        """Take a frame of the client; the client is told what is wrong with it."""
+        self._frames.append(frame)
+        self._host.submit(self.work_off)
+
+    def close(self) -> None:
+        """Withdraw all that the client had."""
+        self._host.submit(self._close)
+
+    def work_off(self) -> None:
+        """Handle the frames of the client; without a router, they wait."""
+        while self._frames and self._host.is_connected and not self._is_closed:
+            self._handle(self._frames.popleft())
+
+    def lose(self) -> None:
+        """Forget the session, as the router has gone, and tell the client."""
+        for part in self._parts:
+            part.lose()
+        self.say("error", "the router of the run has gone; what is asked for now waits until it is back")
+
+    def restore(self) -> None:
+        """Make everything that the client had again, in a new session."""
+        for part in self._parts:
+            part.restore()
+        # This takes back the error that `lose` has told, so clients that only want errors get it, too.
+        if self._level != "none":
+            self.answer({"op": "status", "level": "info", "msg": "the router of the run is back"}, Form())
+        self.work_off()
+
+    def later(self, seconds: float, action: Callable[[], None]) -> None:
+        """Call an action after a time [s]."""
+        self._host.later(seconds, action)
+
+    def send(self, frame: Frame, fragment_size: int = 0) -> None:
+        """Send a frame, in parts if it is a text longer than ``fragment_size``, unless that is 0."""
+        if self._is_closed:
+            return
+        if isinstance(frame, str) and 0 < fragment_size < len(frame):
+            for part in fragments(frame, fragment_size, str(next(_numbers))):
+                self._send(part)
+        else:
+            self._send(frame)
+
+    def answer(self, fields: Mapping[str, object], form: Form) -> None:
+        """Send an operation; what is None is left out."""
+        filled = {name: value for name, value in fields.items() if value is not None}
+        self.send(encode(filled, form.compression), form.fragment_size)
+
+    def say(self, level: Level, text: str, request: RequestId = None) -> None:
+        """Send a status message about a request, if the client wants messages of this level."""
+        if _LEVELS.index(level) <= _LEVELS.index(self._level):
+            self.answer({"op": "status", "id": request, "level": level, "msg": text}, Form())
+
+    def _close(self) -> None:
+        if not self._is_closed:
+            self._is_closed = True
+            self._frames.clear()
+            self._host.forget(self)
+            for part in self._parts:
+                part.close()
+
+    def _handle(self, frame: Frame) -> None:
+        number: RequestId = None
+        try:
+            request = read_frame(frame)
+            number = request.id
+            operation = self._looking.get(request.op) or self._acting.get(request.op)
+            if operation is None:
+                raise ConfigError(f"no operation {request.op}", expected=", ".join([*self._looking, *self._acting]))
+            # Whoever sends a goal waits for a result, so `_send_goal` refuses by a result and not by a status message.
+            if request.op in self._acting and request.op != "send_action_goal":
+                self._require_writing(request.op)
+            operation(request)
+        except ThrowcollectError as error:
+            self.say("error", sentence(error), number)
+        except Exception as error:
+            # A frame of one client must not end the bridge, which serves the others, too.
+            _logger.exception("a client of the bridge sent what could not be done")
+            self.say("error", f"this could not be done: {type(error).__name__}: {error}", number)
+
+    def _set_level(self, request: BridgeRequest) -> None:
+        level = request.text("level")
+        if level not in _LEVELS:
+            raise ConfigError(f"set_level: no level {level}", expected="info, warning, error or none")
+        self._level = level
+
+    def _call_service(self, request: BridgeRequest) -> None:
+        call = Call(self, request)
+        try:
+            call.form = request.form()
+            name = call.given.lstrip("/")
+            if name not in self._answers or name == SET_PARAMETER:
+                self._require_writing(call.given)
+            if name in self._answers:
+                self._answers[name](call)
+            else:
+                call_node(self, self._questions, call, request)
+        except ThrowcollectError as error:
+            call.fail(sentence(error))
+
+    def _send_goal(self, request: BridgeRequest) -> None:
+        goal = Goal(self, request)
+        try:
+            self._require_writing(request.op)
+            self._goals.send(goal, request)
+        except ThrowcollectError as error:
+            goal.fail(sentence(error))
+
+    def _require_writing(self, what: str) -> None:
+        """Refuse what changes something to a client that may only look.
+
+        Raises:
+            ConfigError: If it is such a client.
+        """
+        if self._read_only:
+            raise ConfigError(f"{what}: this client may only look", expected="the token of those who may act")
+
+    def _take_part(self, request: BridgeRequest) -> None:
+        frame = self._reassembly.add(request)
+        if frame is not None:
+            self._handle(frame)
+
+    def _take_status(self, request: BridgeRequest) -> None:
+        _logger.info("a client says: %s", request.text_or("msg", ""))
+
+    def _authenticate(self, request: BridgeRequest) -> None:
+        """Refuse the way of ROS 1 to say who one is.
+
+        Raises:
+            ConfigError: Always.
+        """
+        raise ConfigError(f"{request.op}: nobody has to say who he is here", expected="the token in the address")

@@ -1,0 +1,104 @@
+"""The process of one simulation."""
+
+from __future__ import annotations
+
+import gc
+import signal
+from pathlib import Path
+from types import FrameType
+
+from throwcollect import ros
+from throwcollect.config.loader import load
+from throwcollect.config.schema import Config
+from throwcollect.errors import ConfigError
+from throwcollect.heartbeat import Heartbeat, ready_line
+from throwcollect.interruption import stop_signals
+from throwcollect.members import load_member
+from throwcollect.ros.self_check import check_answers
+from throwcollect.sim.simulation import Simulation
+from throwcollect.sim.simulation_node import SimulationNode
+
+_made: list[Simulation] = []
+"""The simulation that `make_ahead` has made; empty if there is none."""
+
+
+def make_ahead(config: Config) -> None:
+    """Make the simulation that `run` takes in processes that are forked off this one, if its engine can be forked.
+
+    Raises:
+        ConfigError: As `Simulation`.
+        WorkerError: As `Simulation`.
+    """
+    if load_member("engines", config.sim.engine).can_be_forked:
+        _made.append(Simulation(config))
+
+
+def _take(config: Config) -> Simulation:
+    """Take the simulation that was made ahead if it is one of this configuration, or else make one.
+
+    Raises:
+        ConfigError: As `Simulation`.
+        WorkerError: As `Simulation`.
+    """
+    while _made:
+        simulation = _made.pop()
+        if simulation.config == config:
+            return simulation
+        simulation.world.close()
+    return Simulation(config)
+
+
+def run(config: Path, *, name: str, namespace: str | None = None) -> None:
+    """Serve one simulation until SIGTERM, SIGINT or SIGHUP, or until a client sets its state to quitting.
+
+    It reads messages between slices of a running trial; otherwise the process sleeps until one arrives.
+
+    Args:
+        config: YAML file of the collection.
+        name: Name of the node.
+        namespace: Its namespace; None for the root where `run.root_namespace` says so, otherwise ``/<name>``.
+
+    Raises:
+        ConfigError: If the configuration or the namespace cannot be used.
+        WorkerError: If the physics engine does not start, or the ROS 2 backend does not answer.
+    """
+    simulation = _take(load(config))
+    if namespace is None and simulation.config.run.root_namespace:
+        namespace = "/"
+    ros.init()
+    try:
+        node = SimulationNode(name, simulation, namespace=namespace)
+    except ros.NameValidationException as error:
+        raise ConfigError(str(error)) from error
+    executor = ros.SingleThreadedExecutor()
+    nodes = (node, *node.companions)
+    for served in nodes:
+        executor.add_node(served)
+    stopped = 0
+
+    def stop(number: int, _frame: FrameType | None) -> None:
+        nonlocal stopped
+        stopped = number
+        # The loop may be waiting for messages, and would see `stopped` only after that.
+        ros.stop_waiting(executor)
+
+    for number in stop_signals():
+        signal.signal(number, stop)
+    check_answers(node, executor)
+    # The present objects stay until the end, so the garbage collector need not go through them again and again.
+    gc.freeze()
+    heartbeat = Heartbeat()
+    print(ready_line(name), flush=True)
+    try:
+        while not stopped and not node.quitting:
+            heartbeat.beat()
+            # Messages come first, so that a cancel or a reset has its effect before time goes on.
+            ros.spin_some(executor, timeout_sec=0.0 if simulation.running else node.patience_s)
+            if simulation.running:
+                simulation.advance(watched=node.watched)
+            node.follow_up()
+        node.get_logger().info(f"ends: {signal.Signals(stopped).name if stopped else 'a client asked for it'}")
+    finally:
+        for served in reversed(nodes):
+            served.destroy_node()
+        ros.shutdown()

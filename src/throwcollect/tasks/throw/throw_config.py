@@ -1,0 +1,85 @@
+"""Keys of the task `throw`."""
+
+from __future__ import annotations
+
+from typing import Annotated, ClassVar, Literal
+
+from pydantic import Field
+
+from throwcollect.config.key import Effect, Key
+from throwcollect.config.kinds import Angle, Joint
+from throwcollect.config.target_columns import TargetColumn
+from throwcollect.config.task_config import TaskConfig
+from throwcollect.config.until import UntilConfig, Wanted
+from throwcollect.errors import ConfigError, Problem
+
+
+class UntilLanded(UntilConfig):
+    """When enough has been collected."""
+
+    landed: Wanted
+    """Throws that should land, at least; trials are added to the plan until so many have."""
+
+
+class ThrowConfig(TaskConfig):
+    """The task `throw`: the arm swings from `start` to `end`; the ball leaves the spoon when the spoon brakes."""
+
+    implementation: ClassVar[str] = "throwcollect.tasks.throw.throw_task:ThrowTask"
+    until: ClassVar[type[UntilConfig]] = UntilLanded
+    throws: ClassVar[bool] = True
+    targets: ClassVar[tuple[str, ...]] = ("landing_x_m", "landing_y_m")
+    given: ClassVar[tuple[str, ...]] = ("scene.landing_height_m",)
+    target_columns: ClassVar[tuple[TargetColumn, ...]] = (
+        TargetColumn(
+            "target_x_m", "landing_x_m", "miss_m", "x", "Where the ball should land: x in world [m].", required=True
+        ),
+        TargetColumn(
+            "target_y_m", "landing_y_m", "miss_m", "y", "Where the ball should land: y in world [m].", required=True
+        ),
+        TargetColumn(
+            "target_z_m", "scene.landing_height_m", "miss_m", "z", "Height at which the ball should land [m]."
+        ),
+        TargetColumn(
+            "target_hit_angle_rad",
+            "hit_angle_rad",
+            "miss_hit_angle_rad",
+            "hit angle",
+            "Direction of flight below the horizontal with which the ball should land [rad].",
+        ),
+    )
+
+    name: Literal["throw"] = "throw"
+    """Task."""
+    start: Annotated[dict[Joint, Angle], Key(Effect.PHYSICS, swept=True)] = {
+        "torso_1_joint": 0.0,
+        "arm_right_1_joint": 1.5,
+        "arm_right_2_joint": -2.6,
+        "arm_right_3_joint": -1.57,
+        "arm_right_4_joint": -1.9,
+        "arm_right_5_joint": 0.0,
+        "arm_right_6_joint": 0.0,
+        "arm_right_7_joint": -0.1,
+    }
+    """Joint angles at the start of each trial; the spoon must hold the ball, or the trial is refused."""
+    end: Annotated[dict[Joint, Angle], Key(swept=True)] = {
+        "torso_1_joint": 0.0,
+        "arm_right_1_joint": 1.5,
+        "arm_right_2_joint": -2.6,
+        "arm_right_4_joint": -0.5,
+        "arm_right_7_joint": 0.5,
+    }
+    """Joint angles at the end of the motion. The joints named here are the moving ones, even if end equals start.
+    One of them must move the spoon."""
+    recatch_gap_s: Annotated[float, Field(ge=0, le=1)] = 0.02
+    """The ball counts as released when it has been out of the spoon for this long."""
+
+
+def throw_section(task: TaskConfig) -> ThrowConfig:
+    """Return the section of a task, which has to be a throw.
+
+    Raises:
+        ConfigError: If it is another task's.
+    """
+    if not isinstance(task, ThrowConfig):
+        raise ConfigError([Problem(f"should be 'throw', got {task.name!r}", key="task.name")])
+    return task

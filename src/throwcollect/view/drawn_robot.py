@@ -1,0 +1,174 @@
+"""Robot and ball as viewers draw them: URDF texts without collision shapes, their shapes, and the files of meshes."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import xml.etree.ElementTree as ElementTree
+from dataclasses import dataclass
+from pathlib import Path
+
+from throwcollect.config.schema import BallConfig, Config
+from throwcollect.episode.frames import read_origin
+from throwcollect.episode.topics import BALL
+from throwcollect.errors import DatasetError
+from throwcollect.robots.description import full_description, robot_of
+from throwcollect.tools.tool import tool_of
+
+Rgba = tuple[float, float, float, float]
+
+BALL_RGBA: Rgba = (1.0, 0.45, 0.0, 1.0)
+"""Colour of the ball."""
+
+_TOOL_RGBA: Rgba = (0.55, 0.35, 0.2, 1.0)
+_DEFAULT_RGBA: Rgba = (1.0, 1.0, 1.0, 1.0)
+_PACKAGE = "package://"
+
+
+@dataclass(frozen=True)
+class DrawnShape:
+    """A shape of a link.
+
+    Attributes:
+        link: The link, whose frame it moves with.
+        position: Its origin in that frame [m].
+        rotation_xyzw: Unit quaternion, shape to frame.
+        size: Edge lengths of a box, or of the box around a sphere or a cylinder along z [m]; scale of a mesh.
+        kind: ``box``, ``cylinder``, ``sphere`` or ``mesh``.
+        mesh: Path of the mesh's file, relative to the directory that holds its package; empty if it is none.
+        rgba: Its colour.
+    """
+
+    link: str
+    position: tuple[float, ...]
+    rotation_xyzw: tuple[float, ...]
+    size: tuple[float, ...]
+    kind: str
+    mesh: str
+    rgba: Rgba
+
+
+@dataclass(frozen=True)
+class DrawnRobot:
+    """The robot as viewers draw it.
+
+    Attributes:
+        urdf: URDF text without collision shapes; meshes are ``package://`` URLs.
+        shapes: The shapes in it.
+        share: Directory that the paths of meshes are relative to.
+    """
+
+    urdf: str
+    shapes: tuple[DrawnShape, ...]
+    share: Path
+
+    @property
+    def meshes(self) -> list[str]:
+        """Paths of the mesh files, each once."""
+        return sorted({shape.mesh for shape in self.shapes if shape.mesh})
+
+    def copy_package(self, directory: Path) -> None:
+        """Put the meshes into a directory, with a ``package.xml`` by which viewers find them.
+
+        Raises:
+            OSError: If a file cannot be copied.
+        """
+        for mesh in self.meshes:
+            target = directory / mesh
+            target.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(self.share / mesh, target)
+        for package in sorted({mesh.split("/", 1)[0] for mesh in self.meshes}):
+            path = Path(package, "package.xml")
+            source = self.share / path
+            text = source.read_text(encoding="utf-8") if source.exists() else "<package><name></name></package>\n"
+            # URLs of meshes have the name of the directory, but Foxglove searches for the name in `package.xml`.
+            renamed = re.sub(r"<name>[^<]*</name>", f"<name>{package}</name>", text, count=1)
+            (directory / path).write_text(renamed, encoding="utf-8")
+
+
+def draw_robot_of(config: Config) -> DrawnRobot:
+    """Read the robot with its tool as viewers draw it.
+
+    Raises:
+        ConfigError: If the robot's files cannot be read.
+        DatasetError: If its description cannot be drawn.
+    """
+    return read_drawn_robot(full_description(config), tool_of(config.tool).link, robot_of(config).share())
+
+
+def read_drawn_robot(description: str, tool: str, share: Path) -> DrawnRobot:
+    """Read a URDF text as viewers draw it; the link of the tool has a colour of its own.
+
+    Raises:
+        DatasetError: If the text is not a URDF that can be drawn.
+    """
+    try:
+        robot = ElementTree.fromstring(description)  # noqa: S314 - the dataset's own description
+        for link in robot.iter("link"):
+            for shape in link.findall("collision"):
+                link.remove(shape)
+            if link.get("name") == tool:
+                for shape in link.findall("visual"):
+                    for material in shape.findall("material"):
+                        shape.remove(material)
+                    shape.append(_material("tool", _TOOL_RGBA))
+        # A material may be defined in one place of a URDF, and only named in others.
+        colors = {name: rgba for each in robot.iter("material") for name, rgba in _color(each).items() if name}
+        shapes = tuple(
+            _shape(link.attrib["name"], visual, colors) for link in robot.iter("link") for visual in link.iter("visual")
+        )
+    except (ElementTree.ParseError, AttributeError, KeyError, ValueError) as error:
+        raise DatasetError(f"robot description: cannot be drawn: {error}") from error
+    return DrawnRobot(ElementTree.tostring(robot, encoding="unicode"), shapes, share)
+
+
+def ball_urdf(ball: BallConfig) -> str:
+    """URDF text of the ball, whose only link is its frame."""
+    robot = ElementTree.Element("robot", name=BALL)
+    shape = ElementTree.SubElement(ElementTree.SubElement(robot, "link", name=BALL), "visual")
+    geometry = ElementTree.SubElement(shape, "geometry")
+    ElementTree.SubElement(geometry, "sphere", radius=repr(ball.radius_m))
+    shape.append(_material(BALL, BALL_RGBA))
+    return ElementTree.tostring(robot, encoding="unicode")
+
+
+def _material(name: str, rgba: Rgba) -> ElementTree.Element:
+    material = ElementTree.Element("material", name=name)
+    ElementTree.SubElement(material, "color", rgba=" ".join(map(repr, rgba)))
+    return material
+
+
+def _color(material: ElementTree.Element) -> dict[str, Rgba]:
+    """The name of a material and the colour that it defines, if it defines one."""
+    color = material.find("color")
+    if color is None:
+        return {}
+    r, g, b, a = _numbers(color.attrib["rgba"])
+    return {material.get("name", ""): (r, g, b, a)}
+
+
+def _shape(link: str, visual: ElementTree.Element, colors: dict[str, Rgba]) -> DrawnShape:
+    material = visual.find("material")
+    position, rotation = read_origin(visual)
+    (geometry,) = visual.findall("geometry/*")
+    mesh = ""
+    if geometry.tag == "mesh":
+        size = _numbers(geometry.get("scale", "1 1 1"))
+        mesh = geometry.attrib["filename"].removeprefix(_PACKAGE)
+    elif geometry.tag == "box":
+        size = _numbers(geometry.attrib["size"])
+    elif geometry.tag == "sphere":
+        size = (2 * float(geometry.attrib["radius"]),) * 3
+    elif geometry.tag == "cylinder":
+        diameter = 2 * float(geometry.attrib["radius"])
+        size = (diameter, diameter, float(geometry.attrib["length"]))
+    else:
+        raise ValueError(f"link {link} has a {geometry.tag}")
+    # Materials need no name, so the colour of the shape's own comes first.
+    found = {} if material is None else colors | _color(material)
+    rgba = _DEFAULT_RGBA if material is None else found.get(material.get("name", ""), _DEFAULT_RGBA)
+    return DrawnShape(link, position, rotation, size, geometry.tag, mesh, rgba)
+
+
+def _numbers(text: str) -> tuple[float, ...]:
+    return tuple(map(float, text.split()))

@@ -1,0 +1,67 @@
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
+from pathlib import Path
+
+import pytest
+from tests.unit.dataset.conftest import Collection
+
+from throwcollect.cli.dataset.verify_command import verify_dataset
+from throwcollect.errors import DatasetError
+from throwcollect.replay.comparison import Comparison
+
+
+@pytest.fixture
+def source(tmp_path: Path) -> Path:
+    return Collection({"trials": 3}).collect(tmp_path / "a dataset")
+
+
+@pytest.fixture
+def replays(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """Trials that are replayed; trial 1 comes out otherwise."""
+    trials: list[int] = []
+
+    def replayed(_: Path, wanted: Sequence[int]) -> Iterator[Comparison]:
+        trials.extend(wanted)
+        yield from (Comparison(trial, "aa", "bb", ("effort: otherwise",) * (trial == 1)) for trial in wanted)
+
+    monkeypatch.setattr("throwcollect.replay.verification.replay_throws", replayed)
+    return trials
+
+
+def test_what_only_a_replay_tells_is_said_with_the_command(source: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    verify_dataset(source, replay=None, json=False)
+    first, second = capsys.readouterr().out.splitlines()
+    assert first == f"{source}: nothing wrong"
+    assert f"throwcollect dataset verify '{source}' --replay 100" in second
+
+
+def test_a_throw_that_comes_out_otherwise_is_a_finding(
+    source: Path, replays: list[int], capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(DatasetError, match="1 finding"):
+        verify_dataset(source, replay=100, json=True)
+    assert replays == [0, 1, 2]
+    assert json.loads(capsys.readouterr().out) == [
+        {"file": "quick_00000.mcap", "place": "trial 1", "problem": "comes out otherwise: effort: otherwise"}
+    ]
+
+
+def test_the_seed_chooses_what_is_replayed(source: Path, replays: list[int]) -> None:
+    for _ in range(2):
+        with suppress(DatasetError):
+            verify_dataset(source, replay=2, json=False)
+    assert len(replays) == 4
+    assert replays[:2] == replays[2:]
+
+
+def test_a_dataset_that_cannot_be_opened_is_still_told_about(
+    source: Path, replays: list[int], capsys: pytest.CaptureFixture[str]
+) -> None:
+    (source / "throws.parquet").unlink()
+    with pytest.raises(DatasetError, match="findings"):
+        verify_dataset(source, replay=2, json=False)
+    assert "cannot be replayed: " in capsys.readouterr().out
+    assert replays == []

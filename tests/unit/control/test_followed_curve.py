@@ -1,0 +1,59 @@
+"""The clock of a motion, and its rows."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from throwcollect.control.controller_reports import JointState
+from throwcollect.control.followed_curve import Motion
+from throwcollect.control.goal import Trajectory, TrajectoryPoint
+from throwcollect.control.interpolation import interpolate
+from throwcollect.control.waypoints import arrange
+
+PERIOD_NS = 10
+
+
+def motion(end_ns: int = 100, first_ns: int = 1000) -> Motion:
+    """One joint that goes from 0 at one radian per nanosecond."""
+    trajectory = Trajectory(("j",), [TrajectoryPoint(end_ns, (end_ns,))])
+    start, start_ns = JointState(np.zeros(1)), first_ns - 1000
+    curve = interpolate(arrange(trajectory, ("j",), np.zeros(1), start, start_ns), start, start_ns)
+    return Motion(curve, start_ns=1000, first_ns=first_ns, period_ns=PERIOD_NS)
+
+
+def test_command_and_desired_are_one_period_apart_in_either_order() -> None:
+    moving = motion()
+    assert (moving.command[0], moving.desired[0]) == pytest.approx((10, 0))
+    moving.advance()
+    assert (moving.desired[0], moving.command[0]) == pytest.approx((10, 20))
+
+
+@pytest.mark.parametrize(("end_ns", "past_end"), [(100, 9), (101, 10), (109, 10), (110, 10), (111, 11)])
+def test_the_end_is_noticed_one_period_early(end_ns: int, past_end: int) -> None:
+    moving = motion(end_ns)
+    assert moving.updates_until_end() == past_end - 1
+    seen = []
+    for _ in range(13):
+        seen.append(moving.past_end)
+        moving.advance()
+    assert seen.index(True) == past_end
+    assert all(seen[past_end:])
+
+
+def test_rows_go_on_with_the_last_point() -> None:
+    moving = motion(35)
+    assert moving.skip(5)[:, 0] == pytest.approx([20, 30, 35, 35, 35])
+    assert moving.clock_ns == 50
+    assert moving.since_end_ns == 15
+    assert moving.skip(2)[:, 0].tolist() == [35, 35]
+
+
+@pytest.mark.parametrize(("tolerance_ns", "updates"), [(0, 10), (5, 10), (6, 11), (15, 11), (16, 12)])
+def test_lateness_is_strict(tolerance_ns: int, updates: int) -> None:
+    moving = motion(104)
+    assert moving.updates_until_late(tolerance_ns) == updates
+    moving.skip(updates)
+    assert moving.since_end_ns <= tolerance_ns
+    moving.advance()
+    assert moving.since_end_ns > tolerance_ns

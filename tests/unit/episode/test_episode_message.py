@@ -1,0 +1,203 @@
+from __future__ import annotations
+
+import hashlib
+from dataclasses import replace
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rclzenoh.interfaces import deserialize, get_message
+from throwcollect.config.schema import Config
+from throwcollect.episode.channels import Channels
+from throwcollect.episode.chunk_encoder import ChunkEncoder
+from throwcollect.episode.episode_message import (
+    Delivery,
+    Episode,
+    TrialRefusal,
+    header_from_json,
+    header_to_json,
+    make_episode,
+    pack,
+    unpack,
+)
+from throwcollect.episode.record import EpisodeHeader
+from throwcollect.episode.recorded_chunk import RecordedChunk
+from throwcollect.errors import DatasetError
+from throwcollect.robots.description import full_description
+from throwcollect.run_key import Signer
+
+SIGNER = Signer(b"key of the run")
+RESULT = '{"outcome": "landed"}'
+CONDITIONS = '{"ball.mass_kg": 0.05}'
+
+
+@pytest.fixture(scope="module")
+def encoder() -> ChunkEncoder:
+    return ChunkEncoder(Channels(Config(), full_description(Config())), level=1)
+
+
+@pytest.fixture
+def sent(encoder: ChunkEncoder, header: EpisodeHeader, make_samples: Any) -> Episode:
+    return Episode(header, RecordedChunk(encoder.encode(make_samples(50))))
+
+
+def test_an_episode_arrives_as_it_was_sent(sent: Episode, make_samples: Any) -> None:
+    episode, result, conditions = unpack(pack(Delivery(sent, RESULT, CONDITIONS), SIGNER), SIGNER)
+    assert (result, conditions) == (RESULT, CONDITIONS)
+    assert (episode.header, episode.chunk, episode.sensors) == (sent.header, sent.chunk, ())
+    assert episode.state.said_sha256 == sent.state.records_sha256
+    assert episode.digest == sent.digest
+    assert episode.samples().ball_position.tolist() == make_samples(50).ball_position.tolist()
+
+
+def test_the_message_is_a_stock_one_that_names_its_parts(sent: Episode) -> None:
+    message = deserialize(pack(Delivery(sent, RESULT, CONDITIONS), SIGNER), get_message("std_msgs/msg/UInt8MultiArray"))
+    sizes = {part.label: part.size for part in message.layout.dim}
+    assert list(sizes) == ["header", "result", "conditions", "hashes", "chunk", "signature"]
+    data, parts = message.data.tobytes(), {}
+    for name, size in sizes.items():
+        parts[name], data = data[:size], data[size:]
+    assert header_from_json(parts["header"]) == sent.header
+    assert parts["result"].decode() == RESULT
+    assert parts["conditions"].decode() == CONDITIONS
+    assert parts["hashes"].hex() == sent.state.records_sha256
+    assert parts["chunk"] == sent.chunk.record()
+    assert SIGNER.has_signed(parts.pop("signature").decode(), *parts.values())
+
+
+def test_the_digest_covers_header_and_messages_but_not_their_packing(
+    encoder: ChunkEncoder, header: EpisodeHeader, sent: Episode, make_samples: Any
+) -> None:
+    records = hashlib.sha256(sent.chunk.decompress()).digest()
+    assert sent.digest == hashlib.sha256(header_to_json(header).encode() + b"\0" + records).hexdigest()
+    packer = ChunkEncoder(Channels(Config(), full_description(Config())), level=9)
+    packed_more = Episode(header, RecordedChunk(packer.encode(make_samples(50))))
+    assert packed_more.chunk.data != sent.chunk.data
+    assert packed_more.digest == sent.digest
+    others = [
+        Episode(replace(header, end_reason="rest"), sent.state),
+        Episode(replace(header, contacts=header.contacts[:1]), sent.state),
+        Episode(replace(header, goals=()), sent.state),
+        Episode(header, RecordedChunk(encoder.encode(make_samples(50, seed=1)))),
+    ]
+    assert len({sent.digest, *(other.digest for other in others)}) == 5
+
+
+def test_a_hash_that_is_not_that_of_the_records_is_found(sent: Episode) -> None:
+    sent.check_records()
+    with pytest.raises(DatasetError, match="SHA-256 of its records is"):
+        Episode(sent.header, RecordedChunk(sent.chunk, "0" * 64)).check_records()
+
+
+@pytest.mark.parametrize("sha256", ["", "0" * 63, "0" * 65, "G" * 64, "\xff" * 64, "A" * 64])
+def test_what_is_no_hash_is_refused(sent: Episode, sha256: str) -> None:
+    with pytest.raises(DatasetError, match="64 hexadecimal digits"):
+        make_episode(sent.header_json, [sha256], [sent.chunk])
+
+
+def test_the_header_is_one_text(header: EpisodeHeader) -> None:
+    text = header_to_json(header)
+    assert text.startswith('{"trial":7,"start_ns":10000000000,"end_reason":"landed","contacts":[{"body":"spoon",')
+    assert header_to_json(header_from_json(text)) == text
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ('"trial":7', '"trial":-1'),
+        ('"trial":7', '"trial":7.0'),
+        ('"trial":7', '"trial":"7"'),
+        ('"trial":7,', ""),
+        ('"samples":50', '"samples":0'),
+        ('"end_ns":null', '"end_ns":"never"'),
+        ('"end_reason":"landed"', '"end_reason":"vanished"'),
+        ('"body":"spoon"', f'"body":"{"s" * 300}"'),
+        ('"body":"spoon"', '"body":""'),
+        ('"status":4', '"status":7'),
+        ("}", ""),
+    ],
+)
+def test_a_wrong_header_is_refused(header: EpisodeHeader, old: str, new: str) -> None:
+    text = header_to_json(header)
+    assert old in text
+    with pytest.raises(DatasetError, match="episode header: "):
+        header_from_json(text.replace(old, new, 1))
+
+
+def test_more_samples_than_there_are_is_an_error(sent: Episode) -> None:
+    claim = Episode(replace(sent.header, samples=51), sent.state)
+    with pytest.raises(DatasetError, match="are not the records of 51 samples"):
+        unpack(pack(Delivery(claim, "", ""), SIGNER), SIGNER).episode.samples()
+
+
+@pytest.mark.parametrize("length", [0, 3, 60, 100, 300, -1])
+def test_a_message_that_is_cut_off_is_refused(sent: Episode, length: int) -> None:
+    with pytest.raises(DatasetError, match="episode: "):
+        unpack(pack(Delivery(sent, "", ""), SIGNER)[:length], SIGNER)
+
+
+def test_padding_is_left_alone(sent: Episode) -> None:
+    assert unpack(pack(Delivery(sent, "", ""), SIGNER) + bytes(3), SIGNER).episode.chunk == sent.chunk
+
+
+def test_a_message_of_another_layout_is_refused(sent: Episode) -> None:
+    message = pack(Delivery(sent, "", ""), SIGNER)
+    for wrong in (message[:-1], message.replace(b"chunk", b"blobs", 1), b"\1" + message[1:]):
+        with pytest.raises(DatasetError, match="episode: "):
+            unpack(wrong, SIGNER)
+
+
+@pytest.fixture(scope="module")
+def whole(encoder: ChunkEncoder, header: EpisodeHeader, make_samples: Any) -> bytes:
+    episode = Episode(replace(header, samples=3), RecordedChunk(encoder.encode(make_samples(3))))
+    return pack(Delivery(episode, RESULT, CONDITIONS), SIGNER)
+
+
+@settings(max_examples=300)
+@given(data=st.data())
+def test_garbage_is_refused_with_one_kind_of_error(whole: bytes, data: st.DataObject) -> None:
+    """A changed byte or a changed stretch: a DatasetError, or nothing was changed but padding."""
+    message = bytearray(whole)
+    if data.draw(st.booleans()):
+        message[data.draw(st.integers(0, len(message) - 1))] ^= data.draw(st.integers(1, 255))
+    else:
+        start = data.draw(st.integers(0, len(message)))
+        message[start : data.draw(st.integers(start, len(message)))] = data.draw(st.binary(max_size=200))
+    try:
+        delivery = unpack(bytes(message), SIGNER)
+    except DatasetError:
+        return
+    assert bytes(message).startswith(whole)
+    assert isinstance(delivery, Delivery)
+    assert delivery.conditions == CONDITIONS
+
+
+def test_a_refusal_arrives_as_it_was_sent() -> None:
+    refusal = TrialRefusal("ab.cd", "zu schnell für den Ellbogen")
+    assert unpack(pack(refusal, SIGNER), SIGNER) == refusal
+    with pytest.raises(DatasetError, match="signed"):
+        unpack(pack(refusal, Signer(b"another")), SIGNER)
+
+
+def test_each_chunk_comes_with_a_hash(sent: Episode) -> None:
+    message = pack(Delivery(sent, "", ""), SIGNER)
+    without = Episode(sent.header, RecordedChunk(sent.chunk, ""))
+    without.state.__dict__["records_sha256"] = ""
+    with pytest.raises(DatasetError, match="episode: 1 chunks"):
+        unpack(pack(Delivery(without, "", ""), SIGNER), SIGNER)
+    assert unpack(message, SIGNER).episode.digest == sent.digest
+
+
+def test_what_another_key_has_signed_is_refused(sent: Episode) -> None:
+    with pytest.raises(DatasetError, match="episode: is not signed with the key of this run"):
+        unpack(pack(Delivery(sent, RESULT, CONDITIONS), Signer(b"another")), SIGNER)
+
+
+@pytest.mark.parametrize("part", [b'"trial":7', RESULT.encode(), CONDITIONS.encode()])
+def test_every_part_is_signed(sent: Episode, part: bytes) -> None:
+    message = pack(Delivery(sent, RESULT, CONDITIONS), SIGNER)
+    assert message.count(part) == 1
+    with pytest.raises(DatasetError, match="signed"):
+        unpack(message.replace(part, bytes(byte ^ 1 for byte in part)), SIGNER)

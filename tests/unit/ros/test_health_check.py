@@ -1,0 +1,126 @@
+import json
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from contextlib import suppress
+
+import pytest
+import zenoh
+
+import throwcollect.ros.health_check as health
+from rclzenoh.session_config import OVERRIDE_VARIABLE
+from throwcollect.errors import ConfigError, ThrowcollectError
+from throwcollect.ros.health_check import check
+
+
+@pytest.fixture
+def spinning(rig):
+    """Spins the nodes of the rig in a thread of their own while the test asks them."""
+    ended = threading.Event()
+    thread = threading.Thread(target=lambda: rig.spin(ended.is_set, timeout=60.0))
+    yield thread.start
+    ended.set()
+    if thread.is_alive():
+        thread.join()
+
+
+@pytest.fixture
+def impatient(monkeypatch):
+    monkeypatch.setattr(health, "TIMEOUT_S", 0.3)
+
+
+@pytest.mark.parametrize(("name", "namespace"), [("sim_3", "/sim_3"), ("sim_3", "/"), ("coordinator", "/")])
+def test_a_node_that_works_answers(rig, spinning, name, namespace):
+    rig.node(name, namespace=namespace)
+    spinning()
+    # The router may hear the question before it knows of the node: nothing orders two sessions.
+    deadline = time.monotonic() + 10
+    while time.monotonic() < deadline:
+        with suppress(ThrowcollectError):
+            check(name)
+            break
+    check(name)
+
+
+def test_asking_leaves_no_trace_in_the_graph_and_in_the_logs(rig, spinning, capfd):
+    node = rig.node("sim_3", namespace="/sim_3")
+    spinning()
+    changes = node.context.graph.changes
+    check("sim_3")
+    assert node.context.graph.changes == changes
+    assert "ignored" not in capfd.readouterr().err
+
+
+def test_a_node_whose_loop_is_stuck_does_not_answer(rig, impatient):
+    rig.node("sim_3", namespace="/sim_3")
+    with pytest.raises(ThrowcollectError, match="sim_3: does not answer") as caught:
+        check("sim_3")
+    assert caught.value.exit_code == 1
+    assert "\n" not in str(caught.value)
+
+
+def test_a_node_that_is_not_there_does_not_answer(environment):
+    with pytest.raises(ThrowcollectError, match="sim_4: does not answer"):
+        check("sim_4")
+
+
+def test_a_node_of_another_domain_is_another_node(rig, spinning, monkeypatch):
+    rig.node("sim_3", namespace="/sim_3")
+    spinning()
+    monkeypatch.setenv("ROS_DOMAIN_ID", "231")
+    with pytest.raises(ThrowcollectError, match="sim_3: does not answer"):
+        check("sim_3")
+
+
+def test_the_environment_names_the_node(environment, monkeypatch):
+    monkeypatch.setenv("THROWCOLLECT_NODE", "router")
+    check()
+    monkeypatch.setenv("THROWCOLLECT_NODE", "sim_4")
+    with pytest.raises(ThrowcollectError, match="sim_4: does not answer"):
+        check()
+
+
+@pytest.mark.parametrize("name", ["", "a*", "**", "a/b", "$x"])
+def test_a_name_that_is_none_is_refused(environment, monkeypatch, name):
+    monkeypatch.delenv("THROWCOLLECT_NODE", raising=False)
+    with pytest.raises(ConfigError, match="health: "):
+        check(name)
+
+
+def test_without_a_router_nothing_is_healthy(environment, monkeypatch):
+    monkeypatch.setenv(OVERRIDE_VARIABLE, 'connect/endpoints=["tcp/127.0.0.1:1"]')
+    for node in ("router", "sim_3"):
+        with pytest.raises(ThrowcollectError, match=f"{node}: no session with the router: .*tcp/127.0.0.1:1"):
+            check(node)
+
+
+def test_a_router_that_is_stuck_is_not_healthy(environment, monkeypatch, impatient):
+    command = [sys.executable, "-m", "throwcollect.ros.router", "--listen", "tcp/127.0.0.1:0"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as router:
+        try:
+            endpoint = router.stdout.readline().split()[-1]
+            monkeypatch.setenv(OVERRIDE_VARIABLE, f"connect/endpoints={json.dumps([endpoint])}")
+            check("router")
+            router.send_signal(signal.SIGSTOP)
+            # The signal may take effect only after the call that sends it.
+            os.waitpid(router.pid, os.WUNTRACED)
+            with pytest.raises(ThrowcollectError, match="router: no session with the router"):
+                check("router")
+        finally:
+            router.kill()
+
+
+def test_a_session_is_waited_for_no_longer_than_an_answer(environment, monkeypatch):
+    opened = []
+
+    def refuse(config):
+        opened.append(json.loads(config.get_json("transport/unicast/open_timeout")))
+        raise zenoh.ZError("no")
+
+    monkeypatch.setattr(zenoh, "open", refuse)
+    with pytest.raises(ThrowcollectError, match="router: no session"):
+        check("router")
+    assert opened == [health.TIMEOUT_S * 1000]

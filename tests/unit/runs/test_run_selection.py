@@ -1,0 +1,373 @@
+import json
+import os
+import re
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from datetime import datetime, timedelta, timezone
+from pathlib import Path
+
+import pytest
+from tests.e2e.collection import FAST, collect_here, write_config
+from tests.unit.runtimes.docker.engine import Engine, engine_at
+
+from throwcollect.cli.runs import ps
+from throwcollect.errors import ConfigError, DatasetError, Interrupted, ThrowcollectError, WorkerError
+from throwcollect.runs.records import Records, Run
+from throwcollect.runs.run_record import RunFailure, RunRecord
+from throwcollect.runs.run_selection import (
+    describe_death,
+    find_held_runs,
+    find_left_in,
+    find_run_to_change,
+    find_run_to_watch,
+    has_complete_dataset,
+    require_living,
+)
+from throwcollect.runs.state_directory import STATE_VARIABLE
+from throwcollect.runtimes.docker import docker_engine as docker_engine
+from throwcollect.runtimes.docker.container_options import NODE_LABEL, RUN_LABEL
+
+NOW = datetime.now(timezone.utc)
+Make = Callable[..., RunRecord]
+
+
+def find(records: Records, named: str | None) -> Run:
+    return find_run_to_change(records, named, command="stop")
+
+
+def find_to_watch(records: Records, named: str) -> Run:
+    return find_run_to_watch(records, named, say=print)
+
+
+def watched(records: Records) -> tuple[RunRecord, list[str]]:
+    """The run that is looked at without being named, and what is said of it."""
+    said: list[str] = []
+    return find_run_to_watch(records, None, say=said.append).record, said
+
+
+@pytest.fixture
+def records(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Records:
+    monkeypatch.setenv(STATE_VARIABLE, str(tmp_path / "state"))
+    # Runs are made in directories below.
+    monkeypatch.chdir(tmp_path)
+    return Records()
+
+
+@pytest.fixture
+def make(records: Records, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Make]:
+    """Makes a run: ``lives``, ``died`` or ``ended``, in directories of its own unless told otherwise."""
+    held = ExitStack()
+
+    def make(name: str, status: str, *, age_h: int = 0, **fields: object) -> RunRecord:
+        monkeypatch.setattr("throwcollect.runs.records.secrets.token_hex", lambda _: "0123")
+        run = records.new(name)
+        values = {
+            "name": name,
+            "runtime": "local",
+            "directory": str(tmp_path / name),
+            "volume": None,
+            "logs": "logs",
+            "domain_id": 0,
+            "started": NOW - timedelta(hours=age_h),
+            "launcher": 1,
+            "simulations": 2,
+            "ended": NOW if status == "ended" else None,
+        }
+        run.write(RunRecord(run=run.run, **{**values, **fields}))  # type: ignore[arg-type]
+        if status == "lives":
+            held.callback(run.close)
+        else:
+            run.close()
+        return run.record
+
+    with held:
+        yield make
+
+
+@pytest.mark.parametrize("named", ["b-0123", "b", "b-0"])
+def test_a_run_is_found_by_its_id_or_the_beginning_of_it(named: str, records: Records, make: Make) -> None:
+    make("a", "lives")
+    record = make("b", "ended")
+    assert find(records, named).record == record
+
+
+def test_a_run_is_found_by_the_directory_of_its_dataset(
+    records: Records, make: Make, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    make("a", "ended", age_h=2, directory=str(tmp_path / "data"))
+    latest = make("b", "ended", age_h=1, directory=str(tmp_path / "data"))
+    make("c", "ended", directory=str(tmp_path / "data"), volume="other")
+    monkeypatch.chdir(tmp_path)
+    assert find(records, "data").record == latest
+    assert find(records, str(tmp_path / "data")).record == latest
+
+
+def test_an_exact_id_wins_over_longer_ones(records: Records, make: Make) -> None:
+    make("a-0123", "ended")
+    short = make("a", "ended")
+    assert find(records, "a-0123").record == short
+
+
+def test_a_name_of_several_or_of_none_is_refused_with_what_there_is(records: Records, make: Make) -> None:
+    with pytest.raises(ConfigError, match="no run 'x'"):
+        find(records, "x")
+    make("ab", "ended", age_h=1)
+    make("ac", "ended")
+    listed = r"ac-0123 \(ended\): /.*/ac\n    ab-0123 \(ended\): /.*/ab$"
+    with pytest.raises(ConfigError, match=rf"2 runs begin with 'a'\n  expected: one of\n    {listed}"):
+        find(records, "a")
+    with pytest.raises(ConfigError, match=r"no run 'x'\n  expected: one of ac-0123, ab-0123\n  try: .* ps -a"):
+        find(records, "x")
+
+
+def test_of_many_runs_the_latest_are_named(records: Records, make: Make) -> None:
+    for age_h in range(8):
+        make(f"a{age_h}", "ended", age_h=age_h)
+    latest = "a0-0123, a1-0123, a2-0123, a3-0123, a4-0123 and 3 more"
+    for named, said in (("x", f"one of {latest}\n"), (None, f"there is {latest}\n")):
+        with pytest.raises(ConfigError, match=said):
+            find(records, named)
+    with pytest.raises(ConfigError, match=r"8 runs begin with 'a'\n") as caught:
+        find(records, "a")
+    assert re.findall(r"a\d-0123", str(caught.value)) == [f"a{age_h}-0123" for age_h in range(5)]
+    assert str(caught.value).endswith("\n    3 more, which throwcollect ps -a lists")
+
+
+@pytest.mark.parametrize("look", [find, find_to_watch])
+def test_of_runs_that_begin_alike_the_only_one_that_lives_is_meant(
+    records: Records, make: Make, look: Callable[[Records, str], Run]
+) -> None:
+    make("ab", "ended")
+    make("ac", "died")
+    living = make("ad", "lives", age_h=3)
+    assert look(records, "a").record == living
+    make("ae", "lives", age_h=9)
+    with pytest.raises(
+        ConfigError, match=r"4 runs begin with 'a'\n  expected: one of\n    ad.*running.*\n    ae"
+    ) as told:
+        look(records, "a")
+    assert re.findall(r"\((\w+)\): /", str(told.value))[2:] in (["ended", "died"], ["died", "ended"])
+
+
+def test_without_a_name_it_is_the_only_one_that_lives(records: Records, make: Make) -> None:
+    with pytest.raises(ConfigError, match=r"no run lives\n  try: throwcollect up -d starts one"):
+        find(records, None)
+    make("a", "ended")
+    make("b", "died")
+    with pytest.raises(ConfigError, match="no run lives; of those that are over, there is b-0123, a-0123"):
+        find(records, None)
+    only = make("c", "lives")
+    assert find(records, None).record == only
+    make("d", "lives")
+    with pytest.raises(ConfigError, match=r"2 runs live\n  expected: d-0123, c-0123\n  try: name one of them"):
+        find(records, None)
+
+
+def test_what_is_looked_at_may_have_ended(records: Records, make: Make) -> None:
+    latest = make("a", "ended")
+    make("b", "ended", age_h=1)
+    assert watched(records) == (latest, [])
+    living = make("c", "lives", age_h=9)
+    assert watched(records) == (living, [])
+
+
+@pytest.mark.parametrize(
+    "elsewhere", [{"begun_in": "/other", "directory": "/other/data"}, {"directory": "/other/data"}]
+)
+def test_a_run_of_another_directory_is_not_changed_without_its_name(
+    elsewhere: dict[str, str], records: Records, make: Make
+) -> None:
+    record = make("a", "lives", **elsewhere)
+    origin = "was begun in /other" if "begun_in" in elsewhere else "collects into /other/data"
+    with pytest.raises(ConfigError) as caught:
+        find_run_to_change(records, None, command="scale 4")
+    assert str(caught.value) == (
+        f"no run of this directory lives; a-0123 {origin}\n"
+        "  try: throwcollect scale 4 --run a-0123, if that one is meant"
+    )
+    assert find_run_to_change(records, "a", command="scale 4").record == record
+    assert watched(records) == (record, [f"run a-0123, which {origin}"])
+
+
+def test_a_run_belongs_to_where_it_was_begun_and_to_where_its_dataset_lies(
+    records: Records, make: Make, tmp_path: Path
+) -> None:
+    make("a", "lives", begun_in="/other", directory="/other/data")
+    begun = make("b", "lives", begun_in=str(tmp_path), directory="/other/more")
+    assert find(records, None).record == begun
+    assert watched(records) == (begun, [])
+    make("c", "lives", begun_in="/other")
+    with pytest.raises(ConfigError, match=r"2 runs live\n  expected: .-0123, .-0123\n"):
+        find(records, None)
+
+
+def test_what_ended_here_is_looked_at_before_what_lives_elsewhere(records: Records, make: Make) -> None:
+    make("a", "lives", begun_in="/other", directory="/other/data")
+    ended = make("b", "ended", age_h=1)
+    assert watched(records) == (ended, [])
+
+
+def test_a_run_whose_dataset_is_in_a_volume_belongs_to_where_it_was_begun_alone(records: Records, make: Make) -> None:
+    record = make("a", "lives", begun_in="/other", volume="v")
+    with pytest.raises(ConfigError, match=r"a-0123 was begun in /other"):
+        find(records, None)
+    assert watched(records) == (record, ["run a-0123, which was begun in /other"])
+
+
+def test_whose_launcher_died_may_be_ended(records: Records, make: Make) -> None:
+    record = make("a", "died")
+    assert find_run_to_change(records, None, command="down", died=True).record == record
+    with pytest.raises(ConfigError, match="no run lives"):
+        find(records, None)
+
+
+@pytest.mark.parametrize(
+    ("code", "kind"),
+    [(1, ThrowcollectError), (2, ConfigError), (3, WorkerError), (4, DatasetError), (130, Interrupted)],
+)
+def test_what_a_run_ended_with_is_told_with_its_exit_code(code: int, kind: type, records: Records, make: Make) -> None:
+    make("a", "ended", exit_code=code, failure=RunFailure("no luck", evidence="none"))
+    error = records.get("a-0123").record.error
+    assert (type(error), error and error.exit_code, str(error)) == (kind, code, "no luck\n  evidence: none")
+    assert error is not None
+    assert (error.message, error.evidence) == ("no luck", "none")
+
+
+def test_a_finished_run_has_no_error(make: Make) -> None:
+    assert make("a", "ended", exit_code=0).error is None
+
+
+def test_only_a_living_run_can_be_changed(records: Records, make: Make) -> None:
+    record = make("a", "lives")
+    assert require_living(find(records, "a")) == record
+    make("b", "ended")
+    with pytest.raises(ConfigError, match="run b-0123 has ended"):
+        require_living(find(records, "b"))
+    make("c", "died")
+    with pytest.raises(WorkerError, match="run c-0123: its launcher died; finished throws are in /"):
+        require_living(find(records, "c"))
+
+
+def test_a_directory_into_which_a_living_run_collects_is_refused(records: Records, make: Make, tmp_path: Path) -> None:
+    make("a", "lives")
+    with pytest.raises(ConfigError, match=r"/a: run a-0123 collects into it\n  try: throwcollect wait --run a-0123"):
+        find_left_in(records, tmp_path / "a")
+    assert find_left_in(records, tmp_path / "b") is None
+
+
+@pytest.fixture
+def engine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Engine]:
+    monkeypatch.setenv("DOCKER_HOST", f"unix://{tmp_path}/engine.sock")
+    with engine_at(tmp_path / "engine.sock") as engine:
+        yield engine
+
+
+@pytest.mark.parametrize(
+    ("fields", "nodes", "left"),
+    [
+        ({"runtime": "docker"}, ["router", "coordinator"], True),
+        ({"runtime": "docker"}, ["sim_0"], True),
+        ({"runtime": "docker"}, [], False),
+        ({"runtime": "local"}, ["coordinator"], False),
+        ({"runtime": "docker", "ended": NOW}, ["coordinator"], False),
+        # Its launcher gave up, and could not remove them.
+        ({"runtime": "docker", "ended": NOW, "left": True}, ["sim_0"], True),
+        ({"runtime": "docker", "ended": NOW, "left": True}, [], False),
+    ],
+)
+def test_containers_outlive_their_launcher(
+    fields: dict[str, object],
+    nodes: list[str],
+    left: bool,
+    records: Records,
+    make: Make,
+    tmp_path: Path,
+    engine: Engine,
+) -> None:
+    record = make("a", "died", **fields)
+    for name in nodes:
+        engine.create(f"throwcollect-a-0123-{name}", {RUN_LABEL: "a-0123", NODE_LABEL: name})
+    run = find_left_in(records, tmp_path / "a")
+    assert (run is not None) == left
+    assert run is None or run.record == record
+
+
+def test_a_directory_into_which_containers_may_still_collect_is_refused_while_the_engine_is_silent(
+    records: Records, make: Make, tmp_path: Path, engine: Engine, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    make("a", "died", runtime="docker")
+    engine.withheld = "."
+    monkeypatch.setattr(docker_engine, "PATIENCE_S", 0.1)
+    with pytest.raises(
+        WorkerError, match=r"/a: containers of run a-0123 may still collect into it: .*no answer in time"
+    ):
+        find_left_in(records, tmp_path / "a")
+
+
+def test_an_engine_that_is_gone_holds_no_containers_that_run(
+    records: Records, make: Make, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    make("a", "died", runtime="docker")
+    monkeypatch.setenv("DOCKER_HOST", f"unix://{tmp_path}/none.sock")
+    assert find_left_in(records, tmp_path / "a") is None
+
+
+def test_the_record_of_containers_that_are_left_is_kept(records: Records, make: Make, tmp_path: Path) -> None:
+    left = make("a", "ended", age_h=999, ended=NOW - timedelta(hours=999), left=True)
+    make("b", "ended", age_h=999, ended=NOW - timedelta(hours=999))
+    for path in (tmp_path / "state" / "runs").glob("*.json"):
+        os.utime(path, times=(0, 0))
+    records.new("c").close()
+    assert [(run.record.run, run.status) for run in records.all()] == [(left.run, "abandoned")]
+
+
+def test_the_way_on_after_the_death_of_a_launcher_depends_on_where_the_dataset_is(records: Records, make: Make) -> None:
+    def told(record: RunRecord) -> str:
+        return str(describe_death(records.get(record.run)))
+
+    again = "try: throwcollect resume /b goes on where it ended, or with its containers if they live; throwcollect down"
+    # Before there is a plan there is no dataset, but one that is resumed is there from the start.
+    for died in (make("d", "died", runtime=""), make("e", "died", kind="session")):
+        assert told(died) == (
+            f"run {died.run}: its launcher died\n  evidence: the logs are in logs\n"
+            f"  try: throwcollect down --run {died.run} cleans up"
+        )
+    resumed = make("f", "died", runtime="")
+    Path(resumed.directory).mkdir()
+    (Path(resumed.directory) / "config.yaml").touch()
+    assert f"throwcollect resume {resumed.directory} goes on" in told(resumed)
+    assert again in told(make("a", "died", directory="/b"))
+    assert again in told(make("b", "died", runtime="docker", directory="/b"))
+    assert "resume" not in told(make("c", "died", runtime="docker", volume="v"))
+
+
+def test_a_run_that_died_is_told_with_a_dataset_that_is_complete_by_now(
+    records: Records, make: Make, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    collect_here(write_config(tmp_path, trials=2, sim=FAST), tmp_path / "data")
+    record = make("a", "died", directory=str(tmp_path / "data"))
+    said = str(describe_death(records.get(record.run)))
+    assert said.startswith(f"run {record.run}: its launcher died, but the dataset is complete: {tmp_path / 'data'}\n")
+    assert "resume" not in said
+    ps()
+    assert "died, but the dataset is complete" in capsys.readouterr().out
+    interrupted = make("b", "ended", directory=str(tmp_path / "data"), exit_code=130)
+    assert has_complete_dataset(records.get(interrupted.run))
+    (tmp_path / "data" / "throws.parquet").unlink()
+    ps(json=True)
+    assert [each["complete"] for each in json.loads(capsys.readouterr().out) if each["run"] == record.run] == [False]
+
+
+def test_without_a_client_of_engines_none_is_asked(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    def import_client(**_: object) -> None:
+        raise ModuleNotFoundError("No module named 'docker'", name="docker")
+
+    monkeypatch.setenv("DOCKER_HOST", f"unix://{tmp_path}/engine.sock")
+    monkeypatch.setattr("throwcollect.runtimes.docker.docker_engine.connect", import_client)
+    monkeypatch.setattr("throwcollect.runtimes.docker.docker_runtime.is_installed", lambda _: False)
+    assert find_held_runs() == {}
+
+
+def test_an_engine_that_is_not_there_is_not_waited_for(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setenv("DOCKER_HOST", f"unix://{tmp_path}/none.sock")
+    assert find_held_runs() == {}

@@ -1,0 +1,228 @@
+from collections.abc import Callable
+from pathlib import Path
+from unittest.mock import Mock
+
+import pytest
+
+from throwcollect.config.containers import ContainersConfig
+from throwcollect.config.run import RunConfig
+from throwcollect.config.schema import Config
+from throwcollect.errors import ConfigError, WorkerError
+from throwcollect.extras import MissingExtraError
+from throwcollect.ros.middleware import Middleware
+from throwcollect.runs import runtime_choice
+from throwcollect.runtimes.docker import docker_engine as docker_engine
+from throwcollect.runtimes.docker import image as docker_image
+from throwcollect.runtimes.docker.docker_runtime import DockerRuntime
+from throwcollect.runtimes.docker.image import default_tag
+from throwcollect.runtimes.node_server import NodeServer
+
+
+@pytest.fixture
+def choose() -> Callable[..., tuple[str, list[str]]]:
+    """Chooses the runtime; what was warned of begins with an exclamation mark."""
+
+    def choose(runtime: str, image: str | None = None) -> tuple[str, list[str]]:
+        said: list[str] = []
+        config = Config(run=RunConfig(runtime=runtime), containers=ContainersConfig(image=image))
+        chosen = runtime_choice.choose(config, say=said.append, warn=lambda line: said.append(f"! {line}"))
+        assert chosen.middleware == Middleware()
+        return chosen.name, said
+
+    return choose
+
+
+@pytest.fixture(autouse=True)
+def socket_is_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("DOCKER_HOST", f"unix://{tmp_path}")
+
+
+@pytest.fixture
+def no_engine(socket_is_there, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("DOCKER_HOST", f"unix://{tmp_path}/nothing.sock")
+
+
+@pytest.fixture
+def engine(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(docker_engine, "connect", lambda **_: Mock())
+    monkeypatch.setattr(docker_image, "is_outdated", lambda *_: False)
+    monkeypatch.setattr(docker_image, "rmw_of", lambda *_: None)
+
+
+@pytest.fixture
+def outdated(engine, monkeypatch: pytest.MonkeyPatch) -> Mock:
+    """An engine whose images are all there, and of other sources; what it is told to build."""
+    monkeypatch.setattr(docker_image, "ensure", lambda *_, **__: None)
+    monkeypatch.setattr(docker_image, "is_outdated", lambda *_: True)
+    monkeypatch.setattr(docker_image, "rmw_of", lambda *_: None)
+    build = Mock()
+    monkeypatch.setattr(docker_image, "build", build)
+    return build
+
+
+def lacks_image(*_: object, **__: object) -> None:
+    raise WorkerError("the image is not here and cannot be built")
+
+
+def test_without_an_engine_auto_takes_processes_and_says_why(choose, no_engine, tmp_path: Path) -> None:
+    assert choose("auto") == (
+        "local",
+        [
+            f"runtime: local processes (auto, as no Docker engine answers at unix://{tmp_path}/nothing.sock: "
+            "No such file or directory)"
+        ],
+    )
+
+
+def test_without_a_client_of_an_engine_auto_takes_processes_and_says_why(
+    choose, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def import_client(**_: object) -> None:
+        raise ModuleNotFoundError("No module named 'docker'", name="docker")
+
+    monkeypatch.setattr(docker_engine, "connect", import_client)
+    assert choose("auto") == ("local", ["runtime: local processes (auto, as the package docker is not installed)"])
+    with pytest.raises(MissingExtraError) as caught:
+        choose("docker")
+    assert caught.value.extra == "docker"
+
+
+def test_containers_that_are_asked_for_and_cannot_be_had_are_an_error(choose, no_engine) -> None:
+    with pytest.raises(WorkerError, match="no Docker engine answers") as caught:
+        choose("docker")
+    assert caught.value.exit_code == 3
+    assert caught.value.hint
+
+
+@pytest.mark.parametrize(("runtime", "note"), [("auto", " (auto)"), ("docker", "")])
+def test_where_engine_and_image_are_there_containers_are_taken(
+    choose, engine, monkeypatch: pytest.MonkeyPatch, runtime: str, note: str
+) -> None:
+    monkeypatch.setattr(docker_image, "ensure", lambda *_, **__: None)
+    assert choose(runtime) == ("docker", [f"runtime: Docker containers of {default_tag()}{note}"])
+
+
+def test_an_image_that_cannot_be_had_counts_like_no_engine(choose, engine, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(docker_image, "ensure", lacks_image)
+    assert choose("auto") == (
+        "local",
+        ["runtime: local processes (auto, as the image is not here and cannot be built)"],
+    )
+    with pytest.raises(WorkerError, match="cannot be built"):
+        choose("docker")
+
+
+def test_processes_need_no_engine(choose, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(docker_engine, "connect", lacks_image)
+    assert choose("local") == ("local", ["runtime: local processes"])
+
+
+def test_auto_takes_processes_where_the_image_is_of_other_sources_and_says_how_to_get_it(choose, outdated) -> None:
+    assert choose("auto") == (
+        "local",
+        [
+            f"runtime: local processes (auto, as the image {default_tag()} was made from other sources than these; "
+            "throwcollect image build makes it anew)"
+        ],
+    )
+    outdated.assert_not_called()
+
+
+def test_containers_that_are_asked_for_get_an_image_of_these_sources(choose, outdated) -> None:
+    runtime, (warning, _) = choose("docker")
+    assert (runtime, outdated.call_args.args[1]) == ("docker", default_tag())
+    assert warning == (
+        f"! the image {default_tag()} was made from other sources than these; building it anew, which takes minutes"
+    )
+
+
+def test_an_image_of_other_sources_that_cannot_be_built_anew_is_an_error(choose, outdated) -> None:
+    outdated.side_effect = WorkerError("cannot be built")
+    with pytest.raises(WorkerError, match="cannot be built"):
+        choose("docker")
+
+
+@pytest.mark.parametrize("runtime", ["auto", "docker"])
+@pytest.mark.parametrize("image", ["lab/throws:2", default_tag()])
+def test_an_image_that_the_user_names_is_used_with_a_warning(choose, outdated, runtime: str, image: str) -> None:
+    chosen, (warning, _) = choose(runtime, image)
+    assert chosen == "docker"
+    assert warning == (
+        f"! the image {image} was made from other sources than these; it is used, as containers.image names it"
+    )
+    outdated.assert_not_called()
+
+
+FAST_DDS = Middleware("rclpy", "rmw_fastrtps_cpp")
+ZENOH = Middleware("rclpy", "rmw_zenoh_cpp")
+
+
+@pytest.mark.parametrize(
+    ("launcher", "rmw", "ros", "expected"),
+    [
+        (Middleware(), None, "auto", Middleware()),
+        (FAST_DDS, None, "auto", Middleware()),
+        (FAST_DDS, "rmw_fastrtps_cpp", "auto", FAST_DDS),
+        # A launcher without rclpy cannot join nodes on Fast DDS, but those on Zenoh.
+        (Middleware(), "rmw_fastrtps_cpp", "auto", Middleware()),
+        (Middleware(), "rmw_zenoh_cpp", "auto", ZENOH),
+        (Middleware(), "rmw_zenoh_cpp", "embedded", Middleware()),
+    ],
+)
+def test_containers_get_what_their_image_has_and_the_launcher_can_join(
+    engine, monkeypatch: pytest.MonkeyPatch, launcher: Middleware, rmw: str | None, ros: str, expected: Middleware
+) -> None:
+    monkeypatch.setattr(docker_image, "ensure", lambda *_, **__: None)
+    monkeypatch.setattr(docker_image, "rmw_of", lambda *_: rmw)
+    monkeypatch.setattr(runtime_choice, "choose_middleware", lambda _: launcher)
+    said: list[str] = []
+    found = runtime_choice.choose(Config(run=RunConfig(runtime="docker", ros=ros)), say=said.append, warn=said.append)
+    assert found.middleware == expected
+    assert ("on genuine rclpy" in said[0]) == (expected.backend == "rclpy")
+
+
+@pytest.mark.parametrize(
+    ("rmw", "host", "problem"),
+    [
+        (None, None, "has no rclpy"),
+        ("rmw_fastrtps_cpp", "tcp://192.0.2.7:2375", "those at tcp://192.0.2.7:2375 cannot"),
+    ],
+)
+def test_rclpy_that_is_asked_for_and_cannot_be_had_in_containers_is_an_error(
+    engine, monkeypatch: pytest.MonkeyPatch, rmw: str | None, host: str | None, problem: str
+) -> None:
+    monkeypatch.setattr(docker_image, "ensure", lambda *_, **__: None)
+    monkeypatch.setattr(docker_image, "rmw_of", lambda *_: rmw)
+    monkeypatch.setattr(runtime_choice, "choose_middleware", lambda _: FAST_DDS)
+    if host is not None:
+        monkeypatch.setenv("DOCKER_HOST", host)
+    with pytest.raises(ConfigError, match=problem) as caught:
+        runtime_choice.choose(Config(run=RunConfig(runtime="docker", ros="rclpy")), say=print, warn=print)
+    assert "run.ros" in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("wanted", "no_docker", "name", "begun"),
+    [("local", False, "local", True), ("auto", True, "local", True), ("auto", False, "docker", False)],
+)
+def test_processes_are_begun_when_it_is_plain_that_they_will_be_needed(
+    wanted: str, no_docker: bool, name: str, begun: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    begin = Mock()
+    monkeypatch.setattr(NodeServer, "begin", begin)
+    monkeypatch.setattr(DockerRuntime, "is_absent", lambda _: no_docker)
+    config = Config(run=RunConfig(runtime=wanted))
+    found = runtime_choice.begin(config)
+    assert found is not None
+    assert found.name == name
+    assert begin.called == begun
+    if begun:
+        chosen = runtime_choice.choose(
+            config.model_copy(update={"run": RunConfig(runtime="local")}), say=Mock(), warn=Mock(), begun=found
+        )
+        assert chosen.runtime is found.runtime
+
+
+def test_nothing_is_begun_of_a_runtime_that_cannot_be_had(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(DockerRuntime, "is_absent", lambda _: True)
+    assert runtime_choice.begin(Config(run=RunConfig(runtime="docker"))) is None

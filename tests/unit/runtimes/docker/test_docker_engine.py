@@ -1,0 +1,50 @@
+from pathlib import Path
+
+import pytest
+import requests
+from docker.errors import APIError, DockerException
+from urllib3.exceptions import ReadTimeoutError
+
+from throwcollect.errors import WorkerError
+from throwcollect.runtimes.docker.docker_engine import connect, engine_errors, in_words
+
+
+def api_error(explanation: str) -> APIError:
+    return APIError("500 Server Error for http+docker://localhost", requests.Response(), explanation)
+
+
+@pytest.mark.parametrize(
+    ("error", "words"),
+    [
+        (api_error("port is already allocated"), "port is already allocated"),
+        (
+            requests.ConnectionError("Connection aborted.", ConnectionRefusedError(111, "Connection refused")),
+            "Connection refused",
+        ),
+        (DockerException("something else"), "something else"),
+        (TimeoutError(), "no answer in time"),
+        (requests.ReadTimeout(ReadTimeoutError(None, "/", "Read timed out. (read timeout=30)")), "no answer in time"),
+        (requests.ConnectionError(ReadTimeoutError(None, "/", "Read timed out.")), "no answer in time"),
+    ],
+)
+def test_the_engines_own_words_come_through(error: Exception, words: str) -> None:
+    assert in_words(error) == words
+    with pytest.raises(WorkerError, match=f"^sim_0: {words}$"), engine_errors("sim_0"):
+        raise error
+
+
+def test_other_errors_are_none_of_the_engines() -> None:
+    with pytest.raises(KeyError, match="a mistake"), engine_errors("sim_0"):
+        raise KeyError("a mistake")
+
+
+def test_where_no_engine_answers_the_place_and_a_way_out_are_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    address = f"unix://{tmp_path}/nothing.sock"
+    monkeypatch.setenv("DOCKER_HOST", address)
+    with pytest.raises(
+        WorkerError, match=f"no Docker engine answers at {address}: No such file or directory"
+    ) as caught:
+        connect(timeout_s=1.0)
+    assert "--runtime local" in (caught.value.hint or "")

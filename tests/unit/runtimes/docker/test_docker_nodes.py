@@ -1,0 +1,185 @@
+"""What happens when a Docker engine answers late, or not at all."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+from tests.unit.runtimes.docker.engine import Engine, engine_at
+
+from throwcollect.config.schema import Config
+from throwcollect.errors import WorkerError
+from throwcollect.ros.middleware import Middleware
+from throwcollect.run_key import RunKey
+from throwcollect.runtimes.docker import docker_engine as docker_engine
+from throwcollect.runtimes.docker import docker_nodes as module
+from throwcollect.runtimes.docker import engine_clock as docker_clock
+from throwcollect.runtimes.docker import watch as docker_watch
+from throwcollect.runtimes.docker.docker_nodes import DockerNodes
+from throwcollect.runtimes.nodes import NodeExit, NodeRole, NodeSpec
+from throwcollect.runtimes.runtime import Place
+
+CONFIG = Config.model_validate({"containers": {"image": "image"}})
+
+
+@pytest.fixture
+def engine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Engine]:
+    path = tmp_path / "engine.sock"
+    monkeypatch.setenv("DOCKER_HOST", f"unix://{path}")
+    # Times are a hundredth or so of what they are.
+    monkeypatch.setattr(docker_watch, "_LOOK_EVERY_S", 0.1)
+    monkeypatch.setattr(docker_clock, "_TICK_S", 0.025)
+    monkeypatch.setattr(docker_clock, "_WARN_S", 0.3)
+    monkeypatch.setattr(docker_clock, "SILENCE_S", 1.0)
+    with engine_at(path) as engine:
+        yield engine
+
+
+@pytest.fixture
+def warnings() -> list[str]:
+    return []
+
+
+@pytest.fixture
+def make(engine: Engine, tmp_path: Path, warnings: list[str]) -> Iterator[Callable[[], DockerNodes]]:
+    made: list[DockerNodes] = []
+
+    def make() -> DockerNodes:
+        directory = tmp_path / "my data"
+        key = RunKey(tmp_path / "key")
+        key.create()
+        made.append(
+            DockerNodes(
+                Place("run-1a2b", directory, None, tmp_path / "logs", 1, Middleware(), key),
+                CONFIG,
+                warn=warnings.append,
+            )
+        )
+        made[-1].open()
+        return made[-1]
+
+    yield make
+    engine.answer_all()
+    for runtime in made:
+        runtime.close()
+
+
+def until(condition: Callable[[], Any], *, runtime: DockerNodes | None = None) -> list[NodeExit]:
+    """Wait, and look after the nodes as a supervisor does."""
+    exits: list[NodeExit] = []
+    deadline = time.monotonic() + 10
+    while not condition():
+        assert time.monotonic() < deadline, "did not happen"
+        exits += runtime.exits() if runtime else []
+        time.sleep(0.01)
+    return exits
+
+
+def test_an_engine_that_answers_others_is_not_silent(
+    engine: Engine, make: Callable[[], DockerNodes], warnings: list[str]
+) -> None:
+    runtime = make()
+    # What the nodes are watched by is not answered; starts are.
+    engine.withheld = "GET /containers/json|GET /events"
+    began = time.monotonic()
+    number = 0
+    while time.monotonic() < began + 1.2:
+        runtime.start(NodeSpec(f"sim_{number}", ("sim",), NodeRole.EXPENDABLE))
+        until(lambda: f"throwcollect-run-1a2b-sim_{number}" in engine.names(), runtime=runtime)  # noqa: B023
+        number += 1
+        time.sleep(0.1)
+    assert not warnings
+    assert not runtime.exits()
+
+
+def test_a_slow_answer_is_waited_for_with_a_word(
+    engine: Engine, make: Callable[[], DockerNodes], warnings: list[str]
+) -> None:
+    runtime = make()
+    engine.withheld = "."
+    until(lambda: warnings, runtime=runtime)
+    assert warnings == ["the Docker engine has not answered for 0 s; waiting"]
+    engine.answer_all()
+    until(lambda: len(warnings) > 1, runtime=runtime)
+    assert warnings[1:] == ["the Docker engine answers again"]
+    runtime.close()
+    assert runtime.cleared
+
+
+def test_an_engine_is_listened_to_even_if_nobody_hears_of_it(
+    engine: Engine, make: Callable[[], DockerNodes], warnings: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def gone(_: str) -> None:
+        raise BrokenPipeError
+
+    runtime = make()
+    monkeypatch.setattr(runtime._clock, "_warn", gone)
+    engine.withheld = "."
+    with pytest.raises(WorkerError, match="has not answered for 1 s"):
+        until(lambda: False, runtime=runtime)
+
+
+def test_a_silent_engine_is_given_up_with_what_is_left_on_it_and_how_to_go_on(
+    engine: Engine, make: Callable[[], DockerNodes], tmp_path: Path
+) -> None:
+    runtime = make()
+    runtime.start(NodeSpec("sim_0", ("sim",), NodeRole.EXPENDABLE))
+    until(lambda: runtime.handle("sim_0"), runtime=runtime)
+    engine.withheld = "."
+    with pytest.raises(
+        WorkerError, match=rf"has not answered for 1 s; finished throws are safe in {tmp_path}/my data"
+    ) as caught:
+        until(lambda: False, runtime=runtime)
+    assert caught.value.evidence == "containers that may run on: throwcollect-run-1a2b-sim_0"
+    resume = f"throwcollect resume '{tmp_path}/my data'"
+    assert caught.value.hint == (
+        f"once it answers, throwcollect down --run run-1a2b ends them, and {resume} goes on with them"
+    )
+    runtime.close()
+    assert not runtime.cleared
+    assert engine.names() == ["throwcollect-run-1a2b-sim_0"]
+
+
+def test_time_in_which_the_launcher_itself_was_stopped_is_no_silence(
+    make: Callable[[], DockerNodes], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    runtime = make()
+    monkeypatch.setattr(module, "time", SimpleNamespace(monotonic=lambda: time.monotonic() + 3600))
+    assert runtime.exits() == []
+
+
+def test_a_container_that_is_still_being_made_at_the_end_is_removed_when_it_is_there(
+    engine: Engine, make: Callable[[], DockerNodes], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(module, "_BEGIN_S", 0.1)
+    runtime = make()
+    engine.withheld = "POST /containers/create"
+    runtime.start(NodeSpec("sim_0", ("sim",), NodeRole.EXPENDABLE))
+    until(lambda: engine.withheld in engine.asked)
+    runtime.stop(["sim_0"])
+    engine.answer_all()
+    runtime.close()
+    assert engine.names() == []
+    assert runtime.cleared
+
+
+def test_an_answer_that_does_not_come_in_time_is_said_in_our_words(
+    engine: Engine, make: Callable[[], DockerNodes], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    engine.withheld = "version"
+    with pytest.raises(WorkerError, match=r"no Docker engine answers at unix://\S+: no answer in time"):
+        docker_engine.connect(timeout_s=0.1)
+    engine.answer_all()
+    engine.released.clear()
+    monkeypatch.setattr(docker_clock, "SILENCE_S", 0.3)
+    runtime = make()
+    engine.withheld = "POST /containers/create"
+    monkeypatch.setattr(docker_clock, "SILENCE_S", 10.0)
+    runtime.start(NodeSpec("sim_0", ("sim",), NodeRole.EXPENDABLE))
+    ends: list[NodeExit] = []
+    until(lambda: ends.extend(runtime.exits()) or ends)
+    assert [end.reason for end in ends] == ["cannot be started: no answer in time"]

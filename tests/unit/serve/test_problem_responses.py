@@ -1,0 +1,52 @@
+"""Errors as answers."""
+
+import json
+
+import pytest
+
+from throwcollect.errors import (
+    ConfigError,
+    ConflictError,
+    DatasetError,
+    NotFoundError,
+    Problem,
+    ThrowcollectError,
+    WorkerError,
+)
+from throwcollect.extras import MissingExtraError, MissingLibraryError
+from throwcollect.serve.problem_responses import answer
+
+
+@pytest.mark.parametrize(
+    ("error", "status"),
+    [
+        (NotFoundError("x"), 404),
+        (ConflictError("x"), 409),
+        (ConfigError("x"), 422),
+        (MissingExtraError("plotly", "report"), 503),
+        (MissingLibraryError("pinocchio"), 503),
+        (WorkerError("x"), 503),
+        (DatasetError("x"), 500),
+        (ThrowcollectError("x"), 500),
+    ],
+)
+def test_each_kind_of_error_has_a_status(error: ThrowcollectError, status: int) -> None:
+    response = answer(error)
+    assert response.status_code == status
+    assert response.media_type == "application/problem+json"
+    assert json.loads(response.body)["status"] == status
+
+
+def test_all_facts_of_an_error_are_told() -> None:
+    problems = [Problem("should be 1", key="trials", line=3), Problem("unknown key", key="trails")]
+    found = json.loads(answer(ConfigError(problems, expected="one", hint="mend it")).body)
+    assert (found["expected"], found["hint"]) == ("one", "mend it")
+    assert found["problems"] == [
+        {"message": "should be 1", "key": "trials", "line": 3},
+        {"message": "unknown key", "key": "trails", "line": None},
+    ]
+    assert json.loads(answer(WorkerError("lost", evidence="a log")).body) == {
+        "title": "lost",
+        "status": 503,
+        "evidence": "a log",
+    }

@@ -1,0 +1,18 @@
+"""The process that serves, before it does."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from tests.unit.serve.conftest import Served
+
+from throwcollect.errors import ConfigError
+from throwcollect.serve.models import Models
+from throwcollect.serve.server_process import serve
+
+
+@pytest.mark.parametrize("host", ["é..b", "no host", "192.0.2.1"])
+def test_where_nobody_can_be_served_is_told(served: Served, host: str) -> None:
+    with pytest.raises(ConfigError, match=f"--host {host} --port 0: nobody can be served there: "):
+        serve(served.instances, Models(Path()), host=host, port=0, tell=lambda *_: None)

@@ -1,0 +1,54 @@
+"""Robots of other packages as viewers draw them: shapes that Talos has not, and packages that ROS does not know."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ElementTree
+from pathlib import Path
+
+import pytest
+
+from throwcollect.view.drawn_robot import DrawnRobot, read_drawn_robot
+from throwcollect.view.markers import robot_markers
+
+URDF = """\
+<robot name="snowman">
+  <link name="head"><visual><geometry><sphere radius="0.1"/></geometry></visual></link>
+  <link name="nose"><visual><geometry><mesh filename="package://snow/meshes/nose.stl"/></geometry></visual></link>
+</robot>
+"""
+
+
+@pytest.fixture
+def snowman(tmp_path: Path) -> DrawnRobot:
+    mesh = tmp_path / "share" / "snow" / "meshes" / "nose.stl"
+    mesh.parent.mkdir(parents=True)
+    mesh.write_bytes(b"solid nose")
+    return read_drawn_robot(URDF, "nose", tmp_path / "share")
+
+
+def test_a_sphere_is_drawn_with_its_diameter(snowman: DrawnRobot) -> None:
+    head, nose = robot_markers(snowman, 0).markers
+    assert (head.type, head.scale.x, head.scale.y, head.scale.z) == (head.SPHERE, 0.2, 0.2, 0.2)
+    assert (nose.type, nose.mesh_resource) == (nose.MESH_RESOURCE, "data:model/stl;base64,c29saWQgbm9zZQ==")
+
+
+def test_a_package_without_a_name_gets_that_of_its_directory(snowman: DrawnRobot, tmp_path: Path) -> None:
+    snowman.copy_package(tmp_path / "view")
+    assert (tmp_path / "view" / "snow" / "meshes" / "nose.stl").read_bytes() == b"solid nose"
+    assert ElementTree.parse(tmp_path / "view" / "snow" / "package.xml").findtext("name") == "snow"  # noqa: S314
+
+
+def test_each_shape_has_its_own_colour(tmp_path: Path) -> None:
+    shape = '<visual><geometry><sphere radius="0.1"/></geometry>{}</visual>'
+    red, green, named = (
+        f'<material name=""><color rgba="{rgba}"/></material>' for rgba in ("1 0 0 1", "0 1 0 1", "0 0 1 1")
+    )
+    blue = named.replace('""', '"blue"')
+    parts = [red, green, blue, '<material name="blue"/>', "", red]
+    links = "".join(f'<link name="{number}">{shape.format(part)}</link>' for number, part in enumerate(parts))
+    drawn = read_drawn_robot(f'<robot name="r">{links}</robot>', "5", tmp_path)
+    colours = [part.rgba for part in drawn.shapes]
+    assert colours[:4] == [(1, 0, 0, 1), (0, 1, 0, 1), (0, 0, 1, 1), (0, 0, 1, 1)]
+    # A part without a colour is grey, and the tool has one of its own, whatever its description says.
+    assert len(set(colours)) == 5
+    assert drawn.urdf.count("<material") == 5
