@@ -62,7 +62,7 @@ def compile_all(project: Project, generated: Generated, prefix: Path, work: Path
     c, cxx = compilers()
     headers = [path for path in sorted((prefix / "include").iterdir()) if (path / path.name).is_dir()]
     ours = (generated.structures, generated.introspection, generated.fastrtps)
-    # What is generated copies fields one by one, a handful of messages for each throw, so more than -O1 only takes time.
+    # Generated code copies fields, for a handful of messages in each throw, so more than -O1 only takes time.
     flags = ["-O1", "-DNDEBUG", "-fPIC", "-g0", f"-ffile-prefix-map={work}=."]
     flags += [f"-I{path}" for path in (*ours, *headers, prefix / "include")]
     c = [*c, "-std=gnu11", *flags, f"-I{sysconfig.get_path('include')}", f"-I{np.get_include()}"]
