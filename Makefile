@@ -101,7 +101,7 @@ define twice
 $(1) -o cache_dir=.pytest_cache/$@ || $(1) -o cache_dir=.pytest_cache/$@ --last-failed --last-failed-no-failures none
 endef
 
-# Each group is one process: workers of pytest-xdist would each find and import the tests of all groups. There are three groups, so
+# Each group is one process: those of pytest-xdist would each find and import the tests of all groups. There are three groups, so
 # that two cores have something to do while a test waits, for a client that never reads or for a pause.
 DATA := $(addprefix tests/unit/,coordinator dataset)
 FACES := $(addprefix tests/unit/,cli derive export learning report runs serve view)
@@ -137,7 +137,7 @@ WITHOUT_RUNS := $(addprefix tests/docker/,test_compose.py test_image.py)
 test-image: wait-for-image
 	$(call twice,$(BIN)/python -m pytest $(WITHOUT_RUNS))
 
-# Two files at a time, in their order: files of few long tests come first, and short ones at the end, so that both workers have
+# Two files at a time, in their order: files of few long tests come first, and short ones at the end, so that both processes have
 # something to do until then.
 test-processes: wait-for-image
 	$(call twice,$(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder tests/e2e tests/integration)

@@ -53,11 +53,11 @@ def measure(directory: Path) -> tuple[float, float]:
         messages.append(pack(Delivery(episode, result, conditions.to_json()), _SIGNER))
     random.Random(0).shuffle(messages)
     with tempfile.TemporaryDirectory(prefix="throwcollect-bench-") as scratch:
-        taken_in = _taken_in(messages, dataset.plan, acceptance, Path(scratch) / "data")
+        taken_in = _take_in(messages, dataset.plan, acceptance, Path(scratch) / "data")
         return taken_in, _raw(messages, Path(scratch) / "raw")
 
 
-def _taken_in(messages: list[bytes], plan: Plan, acceptance: Acceptance, directory: Path) -> float:
+def _take_in(messages: list[bytes], plan: Plan, acceptance: Acceptance, directory: Path) -> float:
     writer = DatasetWriter.create(directory, plan)
     task = task_of(plan.config)
     columns = task.columns

@@ -82,13 +82,15 @@ def _measure(trials: int, one: Path, scratch: Path) -> None:
     """Print the times for one size, as a row of the table."""
     config: Config = load(CONFIG, [*_SETTINGS, f"trials={trials}"])
     tasks = trials // PER_SHARD
-    planned, plan = _timed(lambda: make_plan(config))
-    frozen, _ = _timed(lambda: create(scratch / "data", plan))
+    planned, plan = _measure_time(lambda: make_plan(config))
+    frozen, _ = _measure_time(lambda: create(scratch / "data", plan))
     changes = [*_SETTINGS, f"trials={trials}"]
-    submitted, _ = _timed(lambda: submit(CONFIG, scratch / "dry", tasks, overrides=changes, dry=True, onlooker=SILENT))
+    submitted, _ = _measure_time(
+        lambda: submit(CONFIG, scratch / "dry", tasks, overrides=changes, dry=True, onlooker=SILENT)
+    )
     _make_slices(scratch / "data", plan, one)
     before_mb = _peak_mb()
-    joined, _ = _timed(lambda: join(scratch / "data"))
+    joined, _ = _measure_time(lambda: join(scratch / "data"))
     print(
         f"| {trials} | {tasks} | {planned:.1f} | {frozen:.1f} | {submitted:.2f} | {joined:.1f} "
         f"| {joined / trials * 1e6:.0f} | {before_mb:.0f} | {_peak_mb():.0f} |",
@@ -96,7 +98,7 @@ def _measure(trials: int, one: Path, scratch: Path) -> None:
     )
 
 
-def _timed(work: Callable[[], _T]) -> tuple[float, _T]:
+def _measure_time(work: Callable[[], _T]) -> tuple[float, _T]:
     began = time.perf_counter()
     result = work()
     return time.perf_counter() - began, result

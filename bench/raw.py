@@ -80,16 +80,16 @@ def measure(plan: Plan, processes: int, trials: int) -> float:
     context = multiprocessing.get_context("spawn")
     barrier = context.Barrier(processes)
     seconds: multiprocessing.Queue[float] = context.Queue()
-    workers = []
+    started = []
     # Bound to cores where the collection's simulations are, so that the limit has the same advantage.
     cores = sorted(os.sched_getaffinity(0))
     for index in range(processes):
         core = cores[index % len(cores)] if processes >= len(cores) else None
         numbers = [feasible[(index * trials + k) % len(feasible)] for k in range(trials)]
-        workers.append(context.Process(target=_loop, args=(plan, numbers, barrier, seconds, core)))
-    for worker in workers:
-        worker.start()
-    durations = [seconds.get() for _ in workers]
-    for worker in workers:
-        worker.join()
+        started.append(context.Process(target=_loop, args=(plan, numbers, barrier, seconds, core)))
+    for each in started:
+        each.start()
+    durations = [seconds.get() for _ in started]
+    for each in started:
+        each.join()
     return sum(trials / duration for duration in durations)

@@ -89,7 +89,7 @@ def measure(directory: Path, *, rounds: int, throws: int = THROWS) -> Reading:
         throws: At least so many are read.
     """
     with tempfile.TemporaryDirectory(prefix="throwcollect-bench-", dir=directory.parent) as scratch:
-        dataset = _multiplied(load(directory).recorded, throws, Path(scratch))
+        dataset = _multiply(load(directory).recorded, throws, Path(scratch))
         files = [dataset.directory / name for name in dict.fromkeys(dataset.throws["shard"].to_pylist())]
         before, after = _decompress(files, crc=True)
         arrays_mb = sum(column.nbytes for column in dataset.trajectories(COLUMNS).columns.values()) / 1e6
@@ -105,13 +105,13 @@ def measure(directory: Path, *, rounds: int, throws: int = THROWS) -> Reading:
                 "threads": lambda: dataset.trajectories(COLUMNS),
                 "by_messages": lambda: _by_messages(files[0], few),
             }.items():
-                times.setdefault(name, []).append(_timed(read))
+                times.setdefault(name, []).append(_measure_times(read))
         scale = len(dataset) / few
         times["by_messages"] = [Times(each.wall_s * scale, each.processor_s * scale) for each in times["by_messages"]]
     return Reading(len(dataset), before / 1e6, after / 1e6, arrays_mb, **times)
 
 
-def _multiplied(dataset: Dataset, throws: int, scratch: Path) -> Dataset:
+def _multiply(dataset: Dataset, throws: int, scratch: Path) -> Dataset:
     """At least so many throws: whole copies of all shards, which are links to one file."""
     shards = dataset.throws["shard"].to_pylist()
     column = dataset.throws.schema.get_field_index("shard")
@@ -124,7 +124,7 @@ def _multiplied(dataset: Dataset, throws: int, scratch: Path) -> Dataset:
     return replace(dataset, directory=scratch, throws=pa.concat_tables(tables))
 
 
-def _timed(read: Callable[[], object]) -> Times:
+def _measure_times(read: Callable[[], object]) -> Times:
     wall, processor = time.perf_counter(), time.process_time()
     result = read()
     times = Times(time.perf_counter() - wall, time.process_time() - processor)

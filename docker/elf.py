@@ -22,7 +22,7 @@ def is_elf(content: bytes) -> bool:
     return content.startswith(_MAGIC)
 
 
-def needed(content: bytes) -> list[str]:
+def list_needed(content: bytes) -> list[str]:
     """File names of the libraries that the loader looks for when it loads this one.
 
     Args:
@@ -39,7 +39,7 @@ def needed(content: bytes) -> list[str]:
     return [content[start : content.index(b"\0", start)].decode() for start in starts]
 
 
-def stripped(content: bytes) -> bytes:
+def strip(content: bytes) -> bytes:
     """The file without what is behind its last segment: symbols for linkers and debuggers, and the section headers.
 
     Unlike `strip`, it moves nothing, so that libraries that were patched after linking stay intact.

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterable, Mapping
 from fnmatch import fnmatchcase
 from pathlib import Path, PurePosixPath
 
-from elf import is_elf, needed, stripped
+from elf import is_elf, list_needed, strip
 
 DROPPED = (
     # For compilers, type checkers and developers.
@@ -106,7 +106,7 @@ LIBRARY = re.compile(r"lib[^.]*\.so(\.\d+)*")
 """File names of libraries; those of modules say for which Python: ``lib.cpython-311-x86_64-linux-gnu.so``."""
 
 
-def kept(path: str) -> bool:
+def is_kept(path: str) -> bool:
     """Whether a file stays, as far as its name tells.
 
     Args:
@@ -119,7 +119,7 @@ def kept(path: str) -> bool:
     return not any(fnmatchcase(path, pattern) for pattern in DROPPED)
 
 
-def unreached(files: Mapping[str, Callable[[], bytes]]) -> set[str]:
+def find_unreached(files: Mapping[str, Callable[[], bytes]]) -> set[str]:
     """Shared libraries that no extension module loads, be it by way of others.
 
     Wheels hold a library up to three times, under the names that elsewhere are links to it; one of them is loaded.
@@ -130,7 +130,7 @@ def unreached(files: Mapping[str, Callable[[], bytes]]) -> set[str]:
     Returns:
         Paths of the libraries.
     """
-    shared = {path: needed(content) for path, read in files.items() if ".so" in path and is_elf(content := read())}
+    shared = {path: list_needed(content) for path, read in files.items() if ".so" in path and is_elf(content := read())}
     libraries = {path for path in shared if LIBRARY.fullmatch(PurePosixPath(path).name)}
     by_name = {path for path in libraries if fnmatchcase(PurePosixPath(path).name, LOADED_BY_NAME)}
     reached = set(shared) - libraries | by_name
@@ -142,7 +142,7 @@ def unreached(files: Mapping[str, Callable[[], bytes]]) -> set[str]:
     return libraries - reached
 
 
-def repeated(files: Iterable[str]) -> set[str]:
+def find_repeated(files: Iterable[str]) -> set[str]:
     """Copies of libraries that ROS' wheels hold more than once, but for the first one of each name.
 
     Args:
@@ -169,13 +169,13 @@ def slim(directory: Path) -> None:
         files |= {
             f"{ENVIRONMENT}/{path.relative_to(environment).as_posix()}": path for path in beside if path.is_file()
         }
-    staying = {name: path for name, path in files.items() if kept(name)}
-    superfluous = unreached({name: path.read_bytes for name, path in staying.items()}) | repeated(staying)
+    staying = {name: path for name, path in files.items() if is_kept(name)}
+    superfluous = find_unreached({name: path.read_bytes for name, path in staying.items()}) | find_repeated(staying)
     for name, path in files.items():
         if name not in staying or name in superfluous:
             path.unlink()
         elif ".so" in name and is_elf(content := path.read_bytes()):
-            path.write_bytes(stripped(content))
+            path.write_bytes(strip(content))
     for path in sorted(directory.rglob("*"), reverse=True):
         if path.is_dir() and not any(path.iterdir()):
             path.rmdir()

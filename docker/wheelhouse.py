@@ -23,8 +23,8 @@ from functools import partial
 from pathlib import Path
 
 import tomllib
-from elf import is_elf, stripped
-from slim import kept, repeated, unreached
+from elf import is_elf, strip
+from slim import find_repeated, find_unreached, is_kept
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.append(str(ROOT / "packaging"))
@@ -111,9 +111,12 @@ def repack(wheels: list[Path], directory: Path) -> None:
     """
     archives = {wheel: zipfile.ZipFile(wheel) for wheel in wheels}
     files: dict[str, Callable[[], bytes]] = {
-        name: partial(archive.read, name) for archive in archives.values() for name in archive.namelist() if kept(name)
+        name: partial(archive.read, name)
+        for archive in archives.values()
+        for name in archive.namelist()
+        if is_kept(name)
     }
-    superfluous = unreached(files) | repeated(files)
+    superfluous = find_unreached(files) | find_repeated(files)
     for wheel, archive in archives.items():
         names = [name for name in archive.namelist() if name in files and name not in superfluous]
         _write_wheel(directory / wheel.name, archive, [name for name in names if not name.endswith("/")])
@@ -128,7 +131,7 @@ def _write_wheel(target: Path, archive: zipfile.ZipFile, names: list[str]) -> No
         for name in names:
             content = archive.read(name)
             if ".so" in name and is_elf(content):
-                content = stripped(content)
+                content = strip(content)
             hashed = base64.urlsafe_b64encode(hashlib.sha256(content).digest()).rstrip(b"=").decode()
             rows.append(f"{name},sha256={hashed},{len(content)}\n")
             entry = zipfile.ZipInfo(name, _EPOCH)

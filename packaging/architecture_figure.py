@@ -78,7 +78,7 @@ def read_imports() -> tuple[dict[str, set[str]], dict[str, set[str]]]:
         room = package if package == "rclzenoh" else parts[0]
         if room not in imported:
             continue  # The face of the package, which belongs to no room.
-        for name in _imported_names(ast.parse(path.read_text(encoding="utf-8"))):
+        for name in _list_imported_names(ast.parse(path.read_text(encoding="utf-8"))):
             first, *rest = name.split(".")
             imported[room] |= {first if first == "rclzenoh" else rest[0]} & imported.keys() if _is_ours(name) else set()
             outside[room] |= {first} & set(DOORS)
@@ -90,7 +90,7 @@ def _is_ours(name: str) -> bool:
     return name.split(".")[0] == "rclzenoh" or name.startswith("throwcollect.")
 
 
-def _imported_names(tree: ast.AST) -> Iterator[str]:
+def _list_imported_names(tree: ast.AST) -> Iterator[str]:
     for node in ast.walk(tree):
         if isinstance(node, ast.ImportFrom) and node.module and not node.level:
             yield from (f"{node.module}.{alias.name}" for alias in node.names)

@@ -27,7 +27,7 @@ from pathlib import Path
 
 import psutil
 
-from tests.e2e.collection import Running, collect_here, fingerprints, launched, start, words_of, write_config
+from tests.e2e.collection import Running, collect_here, fingerprints, launch, start, words_of, write_config
 from tests.unit.dataset.conftest import Collection
 from tests.unit.dataset.test_forgeries import FORGED, FORGERIES, problems
 from throwcollect.config.loader import load
@@ -112,7 +112,7 @@ def kills(config: Path, reference: Path, scratch: Path, count: int, source: rand
                 result.tried += 1
             code, _, err = running.finish()
             if code != 0:
-                running = _gone_on(config, directory)
+                running = _go_on(config, directory)
         if code != 0:
             code, _, err = running.finish()
         if code != 0:
@@ -128,11 +128,11 @@ def kills(config: Path, reference: Path, scratch: Path, count: int, source: rand
     return result
 
 
-def _gone_on(config: Path, directory: Path) -> Running:
+def _go_on(config: Path, directory: Path) -> Running:
     """The collection into a directory once more: from what is there, or from its beginning if nothing is."""
     begun = (directory / "plan.parquet").exists() or (directory / "config.yaml").exists()
     where = ("--resume", directory) if begun else ("--output", directory)
-    return launched(directory, "up", "-n", "2", "--runtime", "local", config, *where)
+    return launch(directory, "up", "-n", "2", "--runtime", "local", config, *where)
 
 
 def _disturbances(running: Running, source: random.Random) -> Iterator[str]:

@@ -85,11 +85,11 @@ def environment_config() -> zenoh.Config:
     else:
         config = zenoh.Config()
         _apply(config, {"mode": "client", "connect/endpoints": [DEFAULT_ENDPOINT], **_SETTINGS}, "default")
-    for assignment in filter(str.strip, os.environ.get(OVERRIDE_VARIABLE, "").split(";")):
-        key, separator, value = assignment.partition("=")
+    for override in filter(str.strip, os.environ.get(OVERRIDE_VARIABLE, "").split(";")):
+        key, separator, value = override.partition("=")
         if not separator:
             raise ConfigurationError(
-                f"{OVERRIDE_VARIABLE}: {assignment.strip()!r} has no '='", expected="key/path=json5;key/path=json5"
+                f"{OVERRIDE_VARIABLE}: {override.strip()!r} has no '='", expected="key/path=json5;key/path=json5"
             )
         _insert(config, key.strip(), value.strip(), OVERRIDE_VARIABLE)
     _check_key(config)

@@ -52,7 +52,7 @@ class Errors:
         is_error = isinstance(kind, type) and issubclass(kind, BaseException)
         return {each.__name__ for each in kind.__mro__[:-1]} if is_error else set()
 
-    def raised(self, node: ast.Raise) -> str:
+    def find_raised(self, node: ast.Raise) -> str:
         """Name of the class that is raised; empty if it cannot be told, as of ``raise error``."""
         name = last_name(node.exc) if isinstance(node.exc, ast.Call) else ""
         return next((each for each in (name, self._makers.get(name, "")) if self.ancestors(each)), "")
@@ -61,7 +61,7 @@ class Errors:
 def raises(node: ast.AST, errors: Errors, caught: frozenset[str] = frozenset()) -> Iterator[str]:
     """Classes that leave a piece of code, without those that it catches and those of functions inside of it."""
     if isinstance(node, ast.Raise):
-        name = errors.raised(node)
+        name = errors.find_raised(node)
         if name and not errors.ancestors(name) & caught:
             yield name
     for field, value in ast.iter_fields(node):
@@ -75,7 +75,7 @@ def raises(node: ast.AST, errors: Errors, caught: frozenset[str] = frozenset()) 
                 yield from raises(inner, errors, handled)
 
 
-def undocumented(path: Path, text: str, errors: Errors) -> Iterator[str]:
+def find_undocumented(path: Path, text: str, errors: Errors) -> Iterator[str]:
     for function in (node for node in ast.walk(parse(text)) if isinstance(node, ast.FunctionDef)):
         docstring = ast.get_docstring(function)
         is_command = "cli" in path.parts and not function.name.startswith("_")
@@ -90,7 +90,7 @@ def undocumented(path: Path, text: str, errors: Errors) -> Iterator[str]:
 
 def test_raises_are_documented() -> None:
     errors = Errors(MODULES)
-    found = {str(path.relative_to(ROOT)): list(undocumented(path, text, errors)) for path, text in MODULES.items()}
+    found = {str(path.relative_to(ROOT)): list(find_undocumented(path, text, errors)) for path, text in MODULES.items()}
     assert {path: each for path, each in found.items() if each} == {}
 
 
@@ -119,5 +119,5 @@ def says_it():
     raise made(2)
 '''
     errors = Errors({Path(): text})
-    assert list(undocumented(Path("room/a.py"), text, errors)) == ["says_too_little raises OwnError"]
-    assert list(undocumented(Path("cli/a.py"), text, errors)) == []
+    assert list(find_undocumented(Path("room/a.py"), text, errors)) == ["says_too_little raises OwnError"]
+    assert list(find_undocumented(Path("cli/a.py"), text, errors)) == []

@@ -1,4 +1,4 @@
-"""Words that the glossary puts in italics are in no name, comment, docstring or message."""
+"""Words that the glossary puts in italics are in no name, comment, docstring, message or document."""
 
 from __future__ import annotations
 
@@ -12,50 +12,100 @@ from pathlib import Path
 from tests.architecture.parsing import parse
 
 ROOT = Path(__file__).parents[2]
-MODULES = sorted((ROOT / "src" / "throwcollect").rglob("*.py"))
-PUBLISHED = {"WorkerError"}
-"""Names that programs of others catch, and that are older than the glossary."""
+GLOSSARY = ROOT / "docs" / "glossary.md"
+FOLDERS = ("src", "tests", "bench", "docker", "packaging", "examples")
+MODULES = sorted({path for folder in FOLDERS for path in (ROOT / folder).rglob("*.py")} - {Path(__file__)})
+PAGES = sorted({*(ROOT / "docs").rglob("*.md"), *ROOT.glob("*.md")} - {GLOSSARY})
+COMMENTED = sorted(
+    [
+        ROOT / "Makefile",
+        ROOT / "docker" / "Dockerfile",
+        *(
+            path
+            for folder in ("docker", "packaging", "compose", "configs")
+            for ending in ("sh", "def", "yaml", "toml")
+            for path in (ROOT / folder).rglob(f"*.{ending}")
+        ),
+    ]
+)
+"""Files that are no Python, whose comments begin with ``#``."""
+SCRIPTS = sorted((ROOT / "src" / "throwcollect" / "serve" / "page").glob("*.js"))
+
+ALLOWED = {
+    "WorkerError": "programs of others catch it, and it is older than the glossary",
+}
+"""Names that have a forbidden word in them, and why. In documents, words of other programs stand as code: `rollout`."""
 
 
 def read_forbidden() -> list[str]:
     """The words in italics in the last column of the glossary."""
-    rows = re.findall(r"^\| \*\*.*\|$", (ROOT / "docs" / "glossary.md").read_text(encoding="utf-8"), flags=re.MULTILINE)
+    rows = re.findall(r"^\| \*\*.*\|$", GLOSSARY.read_text(encoding="utf-8"), flags=re.MULTILINE)
     return [word for row in rows for word in re.findall(r"(?<!\*)\*(\w[\w ]*)\*(?!\*)", row.split("|")[-2])]
 
 
-def names(tree: ast.AST) -> Iterator[str]:
+def find_words(text: str, words: list[str]) -> list[str]:
+    """Forbidden words of a text, in the singular or the plural, in which a line may end between two of them."""
+    alternatives = "|".join(words).replace(" ", r"\s+")
+    return [found[0] for found in re.finditer(rf"\b(?:{alternatives})s?\b", text, flags=re.IGNORECASE)]
+
+
+def list_names(tree: ast.AST) -> Iterator[str]:
     """Names that a module gives; those of other packages are not its own."""
     for node in ast.walk(tree):
         match node:
-            case ast.FunctionDef(name=name) | ast.ClassDef(name=name) | ast.arg(arg=name):
+            case ast.FunctionDef(name=name) | ast.AsyncFunctionDef(name=name) | ast.ClassDef(name=name):
                 yield name
-            case ast.Name(id=name, ctx=ast.Store()) | ast.Attribute(attr=name, ctx=ast.Store()):
+            case ast.Name(id=name, ctx=ast.Store()) | ast.Attribute(attr=name, ctx=ast.Store()) | ast.arg(arg=name):
                 yield name
 
 
-def texts(code: str) -> Iterator[str]:
+def list_texts(code: str) -> Iterator[str]:
     """Comments and strings, docstrings among them."""
     for token in tokenize.generate_tokens(io.StringIO(code).readline):
         if token.type in (tokenize.COMMENT, tokenize.STRING):
             yield re.sub(r"type: ignore\[.*?\]", "", token.string)
 
 
-def offences(code: str, words: list[str]) -> Iterator[str]:
-    pattern = re.compile(rf"\b({'|'.join(words)})s?\b", flags=re.IGNORECASE)
-    for name in set(names(parse(code))) - PUBLISHED:
+def find_offences(code: str, words: list[str]) -> Iterator[str]:
+    """Forbidden words in a module of Python, each after the name or the text that has it."""
+    for name in sorted(set(list_names(parse(code))) - set(ALLOWED)):
         parts = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", name).replace("_", " ")
-        yield from (f"{name}: {found[0]}" for found in pattern.finditer(parts))
-    for text in texts(code):
-        yield from (f"{text:.60}: {found[0]}" for found in pattern.finditer(text))
+        yield from (f"{name}: {word}" for word in find_words(parts, words))
+    for text in list_texts(code):
+        yield from (f"{text:.60}: {word}" for word in find_words(text, words))
 
 
-def test_forbidden_words_are_not_used() -> None:
+def read_prose(page: str) -> str:
+    """What a page of Markdown says in words of ours: no code, and no changes of versions that are published."""
+    unreleased = re.sub(r"^## \[\d.*", "", page, flags=re.MULTILINE | re.DOTALL)
+    no_blocks = re.sub(r"^( *)```.*?^\1```$", "", unreleased, flags=re.MULTILINE | re.DOTALL)
+    return re.sub(r"`[^`]*`", "", re.sub(r"^    .*$", "", no_blocks, flags=re.MULTILINE))
+
+
+def read_comments(text: str) -> str:
+    """Comments of a file in which they begin with ``#``."""
+    return "\n".join(re.findall(r"(?:^|(?<=\s))#.*$", text, flags=re.MULTILINE))
+
+
+def test_forbidden_words_are_not_used_in_python() -> None:
     words = read_forbidden()
-    found = {path.name: list(offences(path.read_text(encoding="utf-8"), words)) for path in MODULES}
+    found = {str(path): list(find_offences(path.read_text(encoding="utf-8"), words)) for path in MODULES}
     assert {path: each for path, each in found.items() if each} == {}
 
 
-def test_the_rule_sees_what_it_should() -> None:
+def test_forbidden_words_are_not_used_in_documents_scripts_and_comments() -> None:
+    words = read_forbidden()
+    texts = {path: read_prose(path.read_text(encoding="utf-8")) for path in PAGES}
+    texts |= {path: read_comments(path.read_text(encoding="utf-8")) for path in COMMENTED}
+    texts |= {path: path.read_text(encoding="utf-8") for path in SCRIPTS}
+    found = {str(path): find_words(text, words) for path, text in texts.items()}
+    assert {path: each for path, each in found.items() if each} == {}
+    assert len(PAGES) > 50
+    assert len(COMMENTED) > 10
+    assert len(SCRIPTS) > 5
+
+
+def test_the_rule_finds_forbidden_words_in_python() -> None:
     words = read_forbidden()
     assert {"ticket", "worker", "settings file"} < set(words)
     assert not {"goal", "frame", "session", "trial"} & set(words)
@@ -65,7 +115,34 @@ class TicketList:
     'Waiting tickets.'
 def run(next_ticket, ticketing):
     raise ValueError(f"no agent")  # the Broker ended it
+async def roll_experiment(): ...
 """
-    found = {offence.rpartition(": ")[2] for offence in offences(code, words)}
-    assert found == {"Ticket", "tickets", "ticket", "agent", "Broker"}
-    assert list(offences("class WorkerError: ...", words)) == []
+    found = {offence.rpartition(": ")[2] for offence in find_offences(code, words)}
+    assert found == {"Ticket", "tickets", "ticket", "agent", "Broker", "experiment"}
+    assert list(find_offences("class WorkerError: ...", words)) == []
+
+
+def test_the_rule_finds_forbidden_words_in_documents() -> None:
+    words = read_forbidden()
+    page = """
+Its workers read the settings
+file, and `rollout` of MuJoCo does not.
+
+    broker --port 7447
+
+1. A list:
+   ```sh
+   ticket
+   ```
+
+## [Unreleased]
+A skill.
+## [0.1.0] - 2025-01-01
+An agent.
+"""
+    assert find_words(read_prose(page), words) == ["workers", "settings\nfile", "skill"]
+
+
+def test_the_rule_finds_forbidden_words_in_comments() -> None:
+    text = "# An agent.\nrun worker  # of a broker\ncurl a#ticket\n"
+    assert find_words(read_comments(text), read_forbidden()) == ["agent", "broker"]

@@ -148,7 +148,7 @@ def test_the_rule_about_clocks_sees_what_it_should() -> None:
     assert not CLOCK_OF_ALL.search(f'{setting}(access, "time", SimpleNamespace(monotonic=f))')
 
 
-def unfolded(statement: ast.stmt) -> list[ast.stmt]:
+def unfold(statement: ast.stmt) -> list[ast.stmt]:
     """What stands in both branches of `if TYPE_CHECKING`, or else the statement itself."""
     if isinstance(statement, ast.If) and ast.unparse(statement.test) == "TYPE_CHECKING":
         return [*statement.body, *statement.orelse]
@@ -158,7 +158,7 @@ def unfolded(statement: ast.stmt) -> list[ast.stmt]:
 def test_package_faces_hold_re_exports_only() -> None:
     for path in (path for path in MODULES if path.name == "__init__.py"):
         statements = parse(path.read_text(encoding="utf-8")).body
-        for node in [inner for each in statements for inner in unfolded(each)]:
+        for node in [inner for each in statements for inner in unfold(each)]:
             plain = isinstance(node, ast.Expr | ast.ImportFrom | ast.Import)
             lazy = isinstance(node, ast.FunctionDef) and node.name in {"__getattr__", "__dir__"}
             table = isinstance(node, ast.Assign) and node.targets[0].id in {"__all__", "_PLACES"}

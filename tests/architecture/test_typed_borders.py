@@ -25,7 +25,7 @@ def parse_modules() -> dict[str, ast.Module]:
     }
 
 
-def imported_elsewhere(modules: Mapping[str, ast.Module]) -> set[tuple[str, str]]:
+def find_imported_elsewhere(modules: Mapping[str, ast.Module]) -> set[tuple[str, str]]:
     """Names that a room other than their own imports, with the modules that they come from."""
     return {
         (node.module, name.name)
@@ -62,7 +62,7 @@ def is_document(name: str) -> bool:
 
 def test_rooms_give_each_other_types() -> None:
     modules = parse_modules()
-    shared = imported_elsewhere(modules)
+    shared = find_imported_elsewhere(modules)
     found = {
         f"{module}: {name}"
         for module, tree in modules.items()

@@ -9,7 +9,7 @@ from pathlib import Path
 from tests.architecture.parsing import parse
 
 ROOT = Path(__file__).parents[2]
-SOURCE = ROOT / "src"
+FOLDERS = ("src", "tests", "bench", "docker", "packaging", "examples")
 IRREGULAR = """
 begun born bound bought broken brought built caught chosen done drawn driven fallen felt flown forgotten found given
 gone grown heard held hidden kept known laid led left lost made meant met paid said seen sent shown sought sold spent
@@ -27,13 +27,13 @@ def is_participle(word: str) -> bool:
 def participles(tree: ast.AST) -> Iterator[str]:
     """Functions whose first word is a participle.
 
-    Properties are things, what is true or not may be told by a participle, and what makes an error is called by what is
-    wrong, as in ``raise malformed(...)``.
+    Properties and what tests are given by pytest are things, what is true or not may be told by a participle, and what
+    makes an error is called by what is wrong, as in ``raise malformed(...)``.
     """
     for node in ast.walk(tree):
-        if not isinstance(node, ast.FunctionDef):
+        if not isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
             continue
-        is_thing = any("property" in ast.unparse(decorator) for decorator in node.decorator_list)
+        is_thing = any(kind in ast.unparse(each) for each in node.decorator_list for kind in ("property", "fixture"))
         returns = ast.unparse(node.returns) if node.returns is not None else ""
         if (
             not is_thing
@@ -45,8 +45,11 @@ def participles(tree: ast.AST) -> Iterator[str]:
 
 
 def test_functions_are_verbs() -> None:
-    modules = {path: parse(path.read_text(encoding="utf-8")) for path in sorted(SOURCE.rglob("*.py"))}
-    found = {str(path.relative_to(SOURCE)): set(participles(tree)) - OTHERS_CALL_IT for path, tree in modules.items()}
+    paths = sorted(path for folder in FOLDERS for path in (ROOT / folder).rglob("*.py"))
+    found = {
+        str(path.relative_to(ROOT)): set(participles(parse(path.read_text(encoding="utf-8")))) - OTHERS_CALL_IT
+        for path in paths
+    }
     assert {path: names for path, names in found.items() if names} == {}
 
 
@@ -57,6 +60,9 @@ def _found(): ...
 def feed(): ...
 def seed_of(): ...
 def read_plan(): ...
+async def _heard(): ...
+@pytest.fixture(scope="module")
+def collected() -> Path: ...
 class Lease:
     @property
     def ended(self) -> int: ...
@@ -66,4 +72,4 @@ class Lease:
     def malformed(self) -> RequestError: ...
     def held_by(self) -> int: ...
 """
-    assert list(participles(parse(code))) == ["checked_plan", "_found", "held_by"]
+    assert list(participles(parse(code))) == ["checked_plan", "_found", "_heard", "held_by"]

@@ -19,8 +19,8 @@ from throwcollect.ros.middleware import Middleware
 from throwcollect.ros.router import router
 
 # Above 101, the ports of a domain are among those that any process may be given. Tests at the same time share them out.
-_WORKER, _WORKERS = os.environ.get("PYTEST_XDIST_WORKER", "gw0"), os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1")
-_domains = itertools.cycle(range(1 + int(_WORKER.removeprefix("gw")), 102, int(_WORKERS)))
+_PROCESS, _PROCESSES = os.environ.get("PYTEST_XDIST_WORKER", "gw0"), os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1")
+_domains = itertools.cycle(range(1 + int(_PROCESS.removeprefix("gw")), 102, int(_PROCESSES)))
 
 
 @pytest.fixture(scope="session")

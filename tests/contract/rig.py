@@ -54,7 +54,7 @@ else:
     get_logger = Logger
 
 
-def said(*, embedded: str, rclpy: str) -> str:
+def choose_words(*, embedded: str, rclpy: str) -> str:
     """What an error says, as a regular expression: its kind is the same on both backends, its words are not."""
     return rclpy if ON_RCLPY else embedded
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.contract.rig import ON_RCLPY, names_of, said
+from tests.contract.rig import ON_RCLPY, choose_words, names_of
 from throwcollect.ros import (
     ActionClient,
     ActionServer,
@@ -221,10 +221,10 @@ def test_an_execute_callback_that_fails_aborts_the_goal(rig):
 def test_wrong_types_are_refused(rig, controller, client):
     _, ours = send(rig, controller, client, "a")
     with pytest.raises(
-        TypeError, match=said(embedded="expected .*FollowJointTrajectory.Goal, got .*Result", rclpy="^$")
+        TypeError, match=choose_words(embedded="expected .*FollowJointTrajectory.Goal, got .*Result", rclpy="^$")
     ):
         client.send_goal_async(FJT.Result())
-    with pytest.raises(TypeError, match=said(embedded="expected .*FollowJointTrajectory.Feedback", rclpy="^$")):
+    with pytest.raises(TypeError, match=choose_words(embedded="expected .*FollowJointTrajectory.Feedback", rclpy="^$")):
         ours.publish_feedback(FJT.Goal())
 
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from tests.contract.rig import said
+from tests.contract.rig import choose_words
 from throwcollect import ros
 
 
@@ -11,11 +11,11 @@ def test_a_context_lives_from_init_to_shutdown(environment):
     assert not context.ok()
     context.init()
     assert context.ok()
-    with pytest.raises(RuntimeError, match=said(embedded="already", rclpy="only be called once")):
+    with pytest.raises(RuntimeError, match=choose_words(embedded="already", rclpy="only be called once")):
         context.init()
     context.shutdown()
     assert not context.ok()
-    with pytest.raises(RuntimeError, match=said(embedded="not been initialised", rclpy="already called")):
+    with pytest.raises(RuntimeError, match=choose_words(embedded="not been initialised", rclpy="already called")):
         context.shutdown()
     context.try_shutdown()
 

@@ -3,7 +3,7 @@ import time
 
 import pytest
 
-from tests.contract.rig import ON_RCLPY, said
+from tests.contract.rig import ON_RCLPY, choose_words
 from throwcollect.ros import ExternalShutdownException, Future, SingleThreadedExecutor, get_message
 
 String = get_message("std_msgs/msg/String")
@@ -142,7 +142,7 @@ def test_work_of_a_node_follows_it_to_another_executor(rig, node, executor):
 
 def test_shutting_the_context_down_ends_spinning(node, executor):
     threading.Timer(0.05, node.context.shutdown).start()
-    with pytest.raises(ExternalShutdownException, match=said(embedded="shut down", rclpy="^$")):
+    with pytest.raises(ExternalShutdownException, match=choose_words(embedded="shut down", rclpy="^$")):
         executor.spin()
     # rclpy has nothing to wait with any more, and says so.
     with pytest.raises(Exception if ON_RCLPY else ExternalShutdownException, match=r"shut down|rcl_shutdown\(\)"):

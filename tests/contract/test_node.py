@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.contract.rig import NotInitializedException, exceptions, get_logger, said
+from tests.contract.rig import NotInitializedException, choose_words, exceptions, get_logger
 from throwcollect.ros import Context, DurabilityPolicy, Node, QoSProfile, get_message
 
 Log = get_message("rcl_interfaces/msg/Log")
@@ -45,7 +45,7 @@ def test_what_a_node_logs_goes_to_standard_error_and_rosout(rig, capfd):
 
 
 # rclpy knows of other nodes of its own process alone, and warns that what both log takes one way.
-WARNING = said(embedded="there is another node /ns/twin", rclpy="node name: 'twin'.*'ns.twin'")
+WARNING = choose_words(embedded="there is another node /ns/twin", rclpy="node name: 'twin'.*'ns.twin'")
 
 
 @pytest.mark.parametrize("same_session", [True, False])

@@ -6,7 +6,7 @@ from array import array
 
 import pytest
 
-from tests.contract.rig import ON_RCLPY, said
+from tests.contract.rig import ON_RCLPY, choose_words
 from tests.contract.rig import exceptions as ex
 from throwcollect.ros import (
     IntegerRange,
@@ -32,10 +32,10 @@ def test_declaring_twice_and_using_undeclared_parameters_is_refused(node):
     node.declare_parameter("a", 1)
     with pytest.raises(
         ex.ParameterAlreadyDeclaredException,
-        match=said(embedded="'a' is declared already", rclpy=r"already declared: \['a'\]"),
+        match=choose_words(embedded="'a' is declared already", rclpy=r"already declared: \['a'\]"),
     ):
         node.declare_parameter("a", 1)
-    undeclared = said(embedded="'b' is not declared", rclpy="undeclared parameter")
+    undeclared = choose_words(embedded="'b' is not declared", rclpy="undeclared parameter")
     with pytest.raises(ex.ParameterNotDeclaredException, match=undeclared):
         node.get_parameter("b")
     with pytest.raises(ex.ParameterNotDeclaredException, match=undeclared):
@@ -51,7 +51,7 @@ def test_a_parameter_has_a_type_or_is_typed_dynamically(node):
     node.declare_parameter("b", Parameter.Type.INTEGER)
     with pytest.raises(
         ex.ParameterUninitializedException,
-        match=said(embedded="no value yet", rclpy="'b' is not initialized"),
+        match=choose_words(embedded="no value yet", rclpy="'b' is not initialized"),
     ):
         node.get_parameter("b")
     assert node.set_parameters([Parameter("b", value=3)])[0].successful
@@ -73,13 +73,13 @@ def test_values_survive_the_way_through_messages(value):
 @pytest.mark.parametrize("value", [object(), [1, "a"], {"a": 1}])
 def test_values_that_parameters_cannot_have_are_refused(value):
     with pytest.raises(
-        TypeError, match=said(embedded="is no value of a parameter", rclpy="not .* of the allowed types")
+        TypeError, match=choose_words(embedded="is no value of a parameter", rclpy="not .* of the allowed types")
     ):
         Parameter("p", value=value)
 
 
 def test_a_value_must_be_of_the_type_that_is_given():
-    with pytest.raises(ValueError, match=said(embedded="not of type DOUBLE", rclpy="DOUBLE.* do not agree")):
+    with pytest.raises(ValueError, match=choose_words(embedded="not of type DOUBLE", rclpy="DOUBLE.* do not agree")):
         Parameter("p", Parameter.Type.DOUBLE, 1)
 
 
@@ -111,9 +111,9 @@ def test_read_only_and_static_parameters_keep_value_and_type(node):
     node.declare_parameter("fixed", 1, ParameterDescriptor(read_only=True))
     node.declare_parameter("typed", 1)
     assert "read-only" in node.set_parameters([Parameter("fixed", value=2)])[0].reason
-    wrong_type = said(embedded="expected INTEGER, got DOUBLE", rclpy="expected .*INTEGER.* got .*DOUBLE")
+    wrong_type = choose_words(embedded="expected INTEGER, got DOUBLE", rclpy="expected .*INTEGER.* got .*DOUBLE")
     assert re.search(wrong_type, node.set_parameters([Parameter("typed", value=2.0)])[0].reason)
-    undeclared = said(embedded="cannot be undeclared", rclpy="cannot be undeclared")
+    undeclared = choose_words(embedded="cannot be undeclared", rclpy="cannot be undeclared")
     assert re.search(undeclared, node.set_parameters([Parameter("typed")])[0].reason)
 
 
@@ -210,7 +210,7 @@ def test_unknown_names_and_types_are_answered_and_not_fatal(rig, node):
     wanted = [absent] if ON_RCLPY else [absent, odd]
     results = remote.call("SetParameters", parameters=wanted).results
     assert [result.successful for result in results] == [False] * len(wanted)
-    assert said(embedded="not declared", rclpy="undeclared") in results[0].reason
+    assert choose_words(embedded="not declared", rclpy="undeclared") in results[0].reason
 
 
 def test_a_request_that_cannot_be_read_ends_no_node(rig):
@@ -221,7 +221,7 @@ def test_a_request_that_cannot_be_read_ends_no_node(rig):
     odd = Parameter("use_sim_time", value=True).to_parameter_msg()
     odd.value.type = 77
 
-    def asked(parameter):
+    def ask(parameter):
         future = client.call_async(client.srv_type.Request(parameters=[parameter]))
         deadline = time.monotonic() + 2
         while not future.done() and time.monotonic() < deadline:
@@ -230,6 +230,6 @@ def test_a_request_that_cannot_be_read_ends_no_node(rig):
         return future.done() and future.result().results[0].successful
 
     assert rig.sees(client.service_is_ready)
-    assert not asked(odd)
-    assert any(asked(Parameter("use_sim_time", value=False).to_parameter_msg()) for _ in range(10))
+    assert not ask(odd)
+    assert any(ask(Parameter("use_sim_time", value=False).to_parameter_msg()) for _ in range(10))
     asking.shutdown()

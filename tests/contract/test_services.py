@@ -2,7 +2,7 @@
 
 import pytest
 
-from tests.contract.rig import ON_RCLPY, InvalidHandle, said
+from tests.contract.rig import ON_RCLPY, InvalidHandle, choose_words
 from throwcollect.ros import Future, get_service
 
 Trigger = get_service("std_srvs/srv/Trigger")
@@ -103,20 +103,20 @@ def test_a_callback_that_returns_no_response_is_a_mistake(rig, pair):
     client.wait_for_service(5)
     client.call_async(SetBool.Request())
     with pytest.raises(
-        TypeError, match=said(embedded="must return std_srvs/srv/SetBool.Response, got None", rclpy="^$")
+        TypeError, match=choose_words(embedded="must return std_srvs/srv/SetBool.Response, got None", rclpy="^$")
     ):
         rig.rest(5)
 
 
 def test_a_request_of_another_type_is_not_sent(rig, pair):
-    with pytest.raises(TypeError, match=said(embedded="expected std_srvs/srv/SetBool.Request", rclpy="^$")):
+    with pytest.raises(TypeError, match=choose_words(embedded="expected std_srvs/srv/SetBool.Request", rclpy="^$")):
         pair[2].call_async(Trigger.Request())
 
 
 def test_a_destroyed_client_sends_nothing(rig, pair):
     _, node, client = pair
     node.destroy_client(client)
-    with pytest.raises(InvalidHandle, match=said(embedded="destroyed", rclpy="destruction was requested")):
+    with pytest.raises(InvalidHandle, match=choose_words(embedded="destroyed", rclpy="destruction was requested")):
         client.call_async(SetBool.Request())
 
 

@@ -66,8 +66,8 @@ class Collection:
             time.sleep(0.02)
 
     def until_more_is_written(self) -> None:
-        before = self.written()
-        self.until(lambda: self.written() > before)
+        before = self.count_bytes()
+        self.until(lambda: self.count_bytes() > before)
 
     def finish(self) -> str:
         """Wait for the coordinator's end; the digest of the dataset."""
@@ -76,7 +76,7 @@ class Collection:
         assert self.end.code == 0, self.end
         return info(self.directory).digest
 
-    def written(self) -> int:
+    def count_bytes(self) -> int:
         return sum(path.stat().st_size for path in self.directory.glob("*.mcap*"))
 
     def status(self, node: str) -> str:

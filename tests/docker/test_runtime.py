@@ -61,7 +61,7 @@ def until(condition: Callable[[], bool], *, seconds: float = 60) -> None:
         time.sleep(0.02)
 
 
-def ended(runtime: DockerNodes) -> NodeExit:
+def wait_for_end(runtime: DockerNodes) -> NodeExit:
     found: list[NodeExit] = []
     until(lambda: bool(found.extend(runtime.exits()) or found))
     return found[0]
@@ -73,7 +73,7 @@ def container(client: DockerClient, collection: Collection, node: str) -> Contai
     return client.containers.get(handle)
 
 
-def left_of(client: DockerClient, label: str) -> list[Any]:
+def list_what_is_left(client: DockerClient, label: str) -> list[Any]:
     filters = {"label": label}
     containers, networks = client.containers.list(all=True, filters=filters), client.networks.list(filters=filters)
     # The volume of a dataset stays, if there is one.
@@ -113,7 +113,7 @@ def test_a_collection_in_containers_yields_the_dataset_of_one_in_processes(
         assert ":1D17" in listening
         assert "00000000:1D17 00000000:0000 0A" not in listening
         assert collection.finish() == digest
-    assert left_of(client, f"throwcollect.run={run}") == []
+    assert list_what_is_left(client, f"throwcollect.run={run}") == []
     assert {path.stat().st_uid for path in prepared.iterdir()} == {caller}
     assert "sim_0 is ready" in (prepared / "logs" / "sim_0.log").read_text()
     assert re.search(rf"^{TRIALS}/{TRIALS} throws", (prepared / "logs" / "coordinator.log").read_text(), re.MULTILINE)
@@ -180,7 +180,7 @@ def test_runs_side_by_side_do_not_disturb_one_another(client: DockerClient, tmp_
             collection.supervisor.host.close()
             until(lambda: supervisor.poll()[0] is not None)
             assert runtime.info().digest == digest
-        assert left_of(client, f"throwcollect.run={run}") == []
+        assert list_what_is_left(client, f"throwcollect.run={run}") == []
         assert client.volumes.get(volume).attrs["Labels"]["throwcollect.run"] == run
     finally:
         assert remove(client, run, volumes=True) == [f"volume {volume}"]
@@ -251,25 +251,25 @@ def bare(client: DockerClient, tmp_path: Path) -> Any:
 def test_what_the_engine_refuses_is_the_reason_of_an_end(bare: Any) -> None:
     runtime = bare("containers.sim.options.runtime=nowhere", "containers.coordinator.memory=16m")
     runtime.start(NodeSpec("sim_0", ("--version",), NodeRole.EXPENDABLE))
-    end = ended(runtime)
+    end = wait_for_end(runtime)
     assert (end.name, end.code) == ("sim_0", None)
     assert "cannot be started" in end.reason
     assert "nowhere" in end.reason
     assert (runtime.running(), runtime.handle("sim_0")) == ((), None)
     runtime.start(NodeSpec(COORDINATOR, ("config", "/data/small.yaml"), NodeRole.EXPENDABLE))
-    assert ended(runtime).reason == "ran out of memory (limit 16m)"
+    assert wait_for_end(runtime).reason == "ran out of memory (limit 16m)"
 
 
 def test_a_node_says_how_it_ended_and_what_it_said_last(monkeypatch: pytest.MonkeyPatch, bare: Any) -> None:
     monkeypatch.setattr(docker_watch, "_LOOK_EVERY_S", 3600.0)  # the engine's events are enough
     runtime = bare()
     runtime.start(NodeSpec("sim_0", ("sim", "/data/nothing.yaml"), NodeRole.EXPENDABLE))
-    end = ended(runtime)
+    end = wait_for_end(runtime)
     assert (end.code, end.reason) == (2, "exit code 2")
     assert end.log.splitlines()[-1] == "throwcollect: /data/nothing.yaml: no such file"
     assert runtime.exits() == []
     runtime.start(NodeSpec("sim_0", ("--version",), NodeRole.EXPENDABLE))
-    assert ended(runtime).log.splitlines()[-2:] == [*end.log.splitlines()[-1:], f"throwcollect {__version__}"]
+    assert wait_for_end(runtime).log.splitlines()[-2:] == [*end.log.splitlines()[-1:], f"throwcollect {__version__}"]
 
 
 def test_a_container_that_somebody_removes_has_ended(bare: Any, client: DockerClient) -> None:
@@ -277,7 +277,7 @@ def test_a_container_that_somebody_removes_has_ended(bare: Any, client: DockerCl
     runtime.start(NodeSpec(ROUTER, ("router", "--listen", runtime.listen), NodeRole.EXPENDABLE))
     until(lambda: runtime.handle(ROUTER) is not None)
     client.containers.get(runtime.handle(ROUTER)).remove(force=True)
-    assert ended(runtime).reason in ("its container was removed", "ended by SIGKILL")
+    assert wait_for_end(runtime).reason in ("its container was removed", "ended by SIGKILL")
 
 
 def test_a_published_router_is_reached_on_the_loopback_interface_alone(bare: Any, client: DockerClient) -> None:
@@ -382,7 +382,7 @@ def test_a_broken_line_to_the_engine_is_mended(bare: Any, client: DockerClient, 
     handle = runtime.handle(ROUTER)
     line.interrupt()
     client.containers.get(handle).kill("SIGTERM")
-    assert ended(runtime).reason == "exit code 0"
+    assert wait_for_end(runtime).reason == "exit code 0"
     assert runtime.log_tail(ROUTER) == "router listening on tls/router:7447"
 
 

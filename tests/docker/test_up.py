@@ -39,13 +39,13 @@ def expected(config: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str
 def engine() -> Iterator[docker.DockerClient]:
     """The engine; afterwards nothing of ours may be left on it."""
     client = docker.from_env()
-    before = left_on(client)
+    before = list_what_is_left(client)
     yield client
-    assert left_on(client) == before
+    assert list_what_is_left(client) == before
     client.close()
 
 
-def left_on(client: docker.DockerClient) -> set[str]:
+def list_what_is_left(client: docker.DockerClient) -> set[str]:
     filters = {"label": LABEL}
     containers = client.containers.list(all=True, filters=filters)
     keys = client.volumes.list(filters={"label": KEY_LABEL})
@@ -64,7 +64,7 @@ def test_chaos(engine: docker.DockerClient, tmp_path: Path) -> None:
     directory = tmp_path / "data"
     collect_here(config, tmp_path / "undisturbed")
     running = start(config, directory, 4, "--runtime", "docker")
-    running.wait_until(lambda: running.written() > 0)
+    running.wait_until(lambda: running.count_bytes() > 0)
     chance = random.Random(time.time_ns())
     harms = ["kill", "kill", "pause", "router", "coordinator"]
     chance.shuffle(harms)
@@ -129,7 +129,7 @@ def test_containers_get_nothing_that_they_do_not_need_and_the_files_are_those_of
 
 def test_ctrl_c_leaves_nothing_behind(config: Path, engine: docker.DockerClient, tmp_path: Path) -> None:
     running: Running = start(config, tmp_path / "data", 1, "--runtime", "docker", "--trials", "40")
-    running.wait_until(lambda: running.written() > 0)
+    running.wait_until(lambda: running.count_bytes() > 0)
     running.process.send_signal(signal.SIGINT)
     code, _, err = running.finish()
     assert (code, "interrupted; finished throws are in" in err) == (130, True), err

@@ -101,7 +101,7 @@ class Running:
                 return node
         raise LookupError(words)
 
-    def written(self) -> int:
+    def count_bytes(self) -> int:
         """Number of bytes of the shards so far."""
         return sum(path.stat().st_size for path in self.directory.glob("*.mcap*"))
 
@@ -120,10 +120,10 @@ class Running:
 
 def start(config: Path, directory: Path, simulations: int, *options: str, **environment: str) -> Running:
     wanted = ("up", "-n", str(simulations), "--runtime", "local", config, "--output", directory, *options)
-    return launched(directory, *wanted, **environment)
+    return launch(directory, *wanted, **environment)
 
 
-def launched(directory: Path, *arguments: str | Path, **environment: str) -> Running:
+def launch(directory: Path, *arguments: str | Path, **environment: str) -> Running:
     """A running command that collects into a directory."""
     return Running(start_command(*arguments, **environment), directory)
 

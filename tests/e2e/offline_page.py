@@ -13,7 +13,7 @@ import sys
 from pathlib import Path
 
 from tests.e2e.chromium import browse
-from tests.e2e.page import load, press, served
+from tests.e2e.page import load, press, serve
 
 _SIOCSIFFLAGS, _UP = 0x8914, 1
 _WHOLE = """
@@ -30,7 +30,7 @@ def main(catalogue: Path, directory: Path) -> None:
         fcntl.ioctl(any_socket, _SIOCSIFFLAGS, struct.pack("16sh14x", b"lo", _UP))
     networks = sorted(name for _, name in socket.if_nameindex())
     with (
-        served(catalogue, directory / "datasets") as told,
+        serve(catalogue, directory / "datasets") as told,
         browse(told["page"], width=800, height=600, features={"prefers-reduced-motion": "reduce"}) as tab,
     ):
         load(tab)

@@ -20,7 +20,7 @@ CHANGED = "ERR_NETWORK_CHANGED"
 
 
 @contextmanager
-def served(catalogue: Path, datasets: Path, models: Path | None = None) -> Iterator[dict[str, Any]]:
+def serve(catalogue: Path, datasets: Path, models: Path | None = None) -> Iterator[dict[str, Any]]:
     """Serve a catalogue, and models; gives what `throwcollect serve --json` tells."""
     options = ("--port", "0", "--datasets", datasets, "--models", models or datasets, "--json")
     with start_command("serve", catalogue, *options, stderr=None) as server:
@@ -50,7 +50,7 @@ def press(tab: Tab, button: str) -> None:
     tab.evaluate(f"document.querySelector('button[aria-label={json.dumps(button)}]').click()")
 
 
-def unexpected(tab: Tab) -> list[str]:
+def find_own_errors(tab: Tab) -> list[str]:
     """Errors of a page that are its own."""
     return [error for error in tab.errors if CHANGED not in error]
 

@@ -394,16 +394,16 @@ def test_every_command_has_help(say: Callable[..., Said]) -> None:
 
 
 def test_progress_is_a_bar_on_a_terminal(small: Path, tmp_path: Path) -> None:
-    master, slave = pty.openpty()
+    terminal, own_end = pty.openpty()
     words = ("up", *INPROCESS, small, "--output", tmp_path / "bar")
     screen = {"TERM": "xterm", "COLUMNS": "80", "NO_COLOR": "1"}
-    running = start_command(*words, stdout=subprocess.DEVNULL, stderr=slave, **screen)
-    os.close(slave)
+    running = start_command(*words, stdout=subprocess.DEVNULL, stderr=own_end, **screen)
+    os.close(own_end)
     shown = b""
     with contextlib.suppress(OSError):  # the terminal's end is an error on Linux
-        while piece := os.read(master, 65536):
+        while piece := os.read(terminal, 65536):
             shown += piece
-    os.close(master)
+    os.close(terminal)
     assert running.wait(60) == 0
     text = shown.decode()
     assert "\x1b[?25l" in text

@@ -78,7 +78,7 @@ def home(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return directory / "datasets"
 
 
-def collected_anew(derived: Path, directory: Path) -> dict[str, str]:
+def collect_anew(derived: Path, directory: Path) -> dict[str, str]:
     collect_here(derived / "config.yaml", directory)
     return as_derived(directory)
 
@@ -89,7 +89,7 @@ def as_derived(directory: Path) -> dict[str, str]:
 
 def test_a_merged_dataset_is_what_a_collection_of_its_trials_gives(home: Path, tmp_path: Path) -> None:
     assert verify(home / "both") == []
-    assert as_derived(home / "both") == collected_anew(home / "both", tmp_path / "anew")
+    assert as_derived(home / "both") == collect_anew(home / "both", tmp_path / "anew")
 
 
 def test_a_filtered_dataset_is_what_a_collection_of_its_trials_gives(home: Path) -> None:

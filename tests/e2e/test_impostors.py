@@ -62,7 +62,7 @@ def spinning(context: ros.Context, *nodes: ros.Node) -> Iterator[None]:
 
 
 @contextmanager
-def started(*arguments: str | Path, log: Path) -> Iterator[Command]:
+def run_in_background(*arguments: str | Path, log: Path) -> Iterator[Command]:
     with log.open("wb") as file, start_command(*arguments, stdout=file.fileno(), stderr=subprocess.STDOUT) as process:
         # Also when what is tried meanwhile fails; the process is waited for either way.
         try:
@@ -90,12 +90,12 @@ def test_a_dataset_is_that_of_its_configuration_whoever_poses_as_a_simulation(
     other = tmp_path / "other.yaml"
     other.write_text(config.read_text() + "ball: {friction: 0.1}\n")
     refuser = Impostor("refuser", graph, answer=None)
-    forger = Impostor("forger", graph, answer=forged(tmp_path, other))
+    forger = Impostor("forger", graph, answer=forge_message(tmp_path, other))
     data = tmp_path / "data"
     with ExitStack() as stack:
         stack.enter_context(spinning(graph, refuser, forger))
-        stack.enter_context(started("sim", other, "--name", "other", log=tmp_path / "other.log"))
-        stack.enter_context(started("sim", config, "--name", "sim_0", log=tmp_path / "sim.log"))
+        stack.enter_context(run_in_background("sim", other, "--name", "other", log=tmp_path / "other.log"))
+        stack.enter_context(run_in_background("sim", config, "--name", "sim_0", log=tmp_path / "sim.log"))
         ended = call("coordinator", data, "--config", config)
     assert ended.returncode == 0, ended.stderr
     assert f"{TRIALS} trials simulated again in a fresh process: the same bit for bit" in ended.stdout
@@ -109,7 +109,7 @@ def test_a_dataset_is_that_of_its_configuration_whoever_poses_as_a_simulation(
         assert f"/{name}: gets no more trials, as others could do what it refused" in said
 
 
-def forged(directory: Path, path: Path) -> bytes:
+def forge_message(directory: Path, path: Path) -> bytes:
     """A sound episode of the first trial, of another configuration, and with another key."""
     config = load(path)
     delivery = Replayer(config).delivery(make_plan(config, directory=directory).trials[0])

@@ -74,7 +74,7 @@ def begin(started: list[Running], config: Path, directory: Path, *options: str) 
 
 def in_the_middle(running: Running, share: float = 0.3, *, whole: Path) -> None:
     size = (whole / "small_00000.mcap").stat().st_size
-    running.wait_until(lambda: running.written() > share * size)
+    running.wait_until(lambda: running.count_bytes() > share * size)
 
 
 def assert_gone(nodes: list[psutil.Process]) -> None:
@@ -140,13 +140,13 @@ def test_an_interruption_finishes_what_runs(
 ) -> None:
     running, nodes = begin(started, config, tmp_path / "data")
     in_the_middle(running, share, whole=reference)
-    before = running.written()
+    before = running.count_bytes()
     running.process.send_signal(number)
     code, out, err = running.finish()
     assert (code, out) == (130, "")
     assert "interrupted: finishing the running trials; once more ends at once" in err
     assert_gone(nodes)
-    assert running.written() >= before
+    assert running.count_bytes() >= before
     found = episodes(tmp_path / "data" / "small_00000.mcap.part")
     assert 0 < len(found) < TRIALS
     assert set(found.values()) == {1}

@@ -152,7 +152,7 @@ def _scene_in(directory: Path) -> Iterator[Scene]:
         elsewhere = {STATE_VARIABLE: str(directory / "elsewhere")}
         undisturbed = start(config, directory / "undisturbed", 1, **elsewhere)
         try:
-            running.wait_until(lambda: running.written() > 0)
+            running.wait_until(lambda: running.count_bytes() > 0)
             (run,) = Records().all()
             assert run.record.endpoint is not None
             home = directory / "home"

@@ -28,7 +28,7 @@ from tests.e2e.collection import (
     call_here,
     collect_here,
     fingerprints,
-    launched,
+    launch,
 )
 from throwcollect.run_key import RunKey
 
@@ -128,7 +128,7 @@ def listen(directory: Path, *options: str) -> tuple[Running, str, int]:
     path.write_text(CONFIG.format(trials=TRIALS) + f"sim: {{{FAST}}}\n")
     with socket.create_server(("", 0)) as free:
         port = free.getsockname()[1]
-    running = launched(
+    running = launch(
         directory / "data", "up", path, "--output", directory / "data", "-n", "0", "--runtime", "local",
         "--listen", f"tcp/0.0.0.0:{port}", *options,
     )  # fmt: skip
@@ -145,7 +145,7 @@ def listen(directory: Path, *options: str) -> tuple[Running, str, int]:
     raise AssertionError("no token was printed")
 
 
-def moved(token: str, address: str, port: int) -> str:
+def move_endpoint(token: str, address: str, port: int) -> str:
     """The token with another way to the router."""
     from dataclasses import replace
 
@@ -162,8 +162,8 @@ def join(machine: Machine, token: str) -> subprocess.Popen[str]:
 def wait_for(written: int, running: Running, joined: list[subprocess.Popen[str]]) -> None:
     """Wait until a run has written so many bytes; say what the joined simulations said if it does not come to that."""
     try:
-        running.wait_until(lambda: running.written() >= written or any(each.poll() for each in joined), seconds=120)
-        assert running.written() >= written, "a simulation that joined has failed"
+        running.wait_until(lambda: running.count_bytes() >= written or any(each.poll() for each in joined), seconds=120)
+        assert running.count_bytes() >= written, "a simulation that joined has failed"
     except AssertionError as error:
         for each in joined:
             each.kill()
@@ -193,13 +193,16 @@ def test_machines_come_and_go_and_the_files_are_the_same(
 ) -> None:
     running, token, port = listen(tmp_path, "--set", SLOW)
     steady, late, gone = machines
-    processes += [join(steady, moved(token, steady.gateway, port)), join(gone, moved(token, gone.gateway, port))]
+    processes += [
+        join(steady, move_endpoint(token, steady.gateway, port)),
+        join(gone, move_endpoint(token, gone.gateway, port)),
+    ]
     wait_for(100_000, running, processes)
     gone.cut()  # so that nothing can be said any more
     processes[1].kill()
     wire = SlowWire(late.gateway, port)
-    processes.append(join(late, moved(token, late.gateway, wire.port)))
-    wait_for(running.written() + 100_000, running, [processes[0], processes[2]])
+    processes.append(join(late, move_endpoint(token, late.gateway, wire.port)))
+    wait_for(running.count_bytes() + 100_000, running, [processes[0], processes[2]])
     steady.cut()
     time.sleep(CUT_S)
     steady.mend()

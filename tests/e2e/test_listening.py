@@ -11,7 +11,7 @@ from mcap.reader import make_reader
 
 from rclzenoh.interfaces import get_message
 from tests.e2e.collection import FAST, collect_here, fingerprints, start, write_config
-from tests.integration.robot import connected
+from tests.integration.robot import connect
 from throwcollect.dataset.reader import Dataset
 from throwcollect.ros import Context, HistoryPolicy, Node, QoSProfile, SingleThreadedExecutor
 
@@ -47,7 +47,7 @@ class Listener:
 
 @contextmanager
 def listener(port: int) -> Iterator[Listener]:
-    with connected(f"tcp/127.0.0.1:{port}") as context:
+    with connect(f"tcp/127.0.0.1:{port}") as context:
         yield Listener(context)
 
 
@@ -67,7 +67,7 @@ def during_trials(messages: Messages) -> Messages:
     return {topic: [data for data in found if any(data[_STAMP])] for topic, found in messages.items()}
 
 
-def recorded(directory: Path) -> dict[str, dict[bytes, int]]:
+def read_recorded(directory: Path) -> dict[str, dict[bytes, int]]:
     """Trial of every message in the dataset, by topic; read by MCAP's own library."""
     starts = {episode.header.start_ns: episode.header.trial for episode in Dataset.open(directory).episodes()}
     messages: dict[str, dict[bytes, int]] = {topic: {} for topic in KINDS}
@@ -101,7 +101,7 @@ def listened(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, 
 
 def test_every_message_heard_is_in_the_dataset_byte_for_byte(listened: tuple[Path, dict[str, Messages]]) -> None:
     directory, heard = listened
-    messages = recorded(directory)
+    messages = read_recorded(directory)
     for topic in KINDS:
         everything = [data for name in SIMULATIONS for data in heard[name][topic]]
         strange = [data for data in everything if data not in messages[topic]]
@@ -112,7 +112,7 @@ def test_every_message_heard_is_in_the_dataset_byte_for_byte(listened: tuple[Pat
 
 def test_whole_trials_are_heard(listened: tuple[Path, dict[str, Messages]]) -> None:
     directory, heard = listened
-    messages = recorded(directory)
+    messages = read_recorded(directory)
     complete = []
     for topic in KINDS:
         wanted = Counter(messages[topic].values())

@@ -73,12 +73,12 @@ def test_every_file_is_the_same_for_any_number_of_simulations(
 
 def test_every_file_is_the_same_when_trials_end_in_another_order(config: Path, reference: Path, tmp_path: Path) -> None:
     running = start(config, tmp_path / "data", 2)
-    running.wait_until(lambda: running.written() > 100_000)
+    running.wait_until(lambda: running.count_bytes() > 100_000)
     # Frozen in the middle of a trial, it hands it in long after those that follow.
     frozen = running.node("--name", "sim_0")
     frozen.suspend()
-    before = running.written()
-    running.wait_until(lambda: running.written() > before + 300_000)
+    before = running.count_bytes()
+    running.wait_until(lambda: running.count_bytes() > before + 300_000)
     frozen.resume()
     code, _, err = running.finish()
     assert code == 0, err
@@ -87,7 +87,7 @@ def test_every_file_is_the_same_when_trials_end_in_another_order(config: Path, r
 
 def test_every_file_is_the_same_when_a_simulation_is_killed(config: Path, reference: Path, tmp_path: Path) -> None:
     running = start(config, tmp_path / "data", 2)
-    running.wait_until(lambda: running.written() > 100_000)
+    running.wait_until(lambda: running.count_bytes() > 100_000)
     running.node("--name", "sim_1").send_signal(signal.SIGKILL)
     code, _, err = running.finish()
     assert code == 0, err

@@ -78,7 +78,7 @@ def detach(config: Path, directory: Path, *options: str) -> str:
     return said.stdout.strip()
 
 
-def listed(*options: str) -> list[dict[str, Any]]:
+def list_runs(*options: str) -> list[dict[str, Any]]:
     said = call_here("ps", "--json", *options)
     assert (said.returncode, said.stderr) == (0, "")
     documents: list[dict[str, Any]] = json.loads(said.stdout)
@@ -130,8 +130,8 @@ def test_a_run_goes_on_by_itself_and_is_waited_for_elsewhere(
     assert waited.stdout.startswith(info)
     assert "look into it: throwcollect dataset info" in waited.stdout
     assert fingerprints(tmp_path / "data") == fingerprints(reference)
-    assert listed() == []
-    (ended,) = listed("-a")
+    assert list_runs() == []
+    (ended,) = list_runs("-a")
     assert (ended["run"], ended["status"], ended["exit_code"], ended["progress"]["ended"]) == (run, "ended", 0, TRIALS)
     # Whoever comes late gets the same answer.
     again = call_here("wait", "--run", tmp_path / "data", "--json")
@@ -198,7 +198,7 @@ def test_down_ends_everything_and_keeps_the_directory(config: Path, records: Rec
     said = call_here("down", "-v")
     assert (said.returncode, said.stdout) == (0, f"{run}: ended and forgotten\n")
     assert_gone(processes)
-    assert listed("-a") == []
+    assert list_runs("-a") == []
     assert list((tmp_path / "state" / "runs").iterdir()) == []
     assert (tmp_path / "data" / "small_00000.mcap.part").stat().st_size > 0
 

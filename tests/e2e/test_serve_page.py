@@ -14,7 +14,7 @@ import pytest
 
 from tests.e2e.chromium import browse, chromium
 from tests.e2e.collection import FAST, collect_here, write_config
-from tests.e2e.page import CHANGED, load, press, served, unexpected
+from tests.e2e.page import CHANGED, find_own_errors, load, press, serve
 from tests.unit.serve.made_model import make_model
 from throwcollect.runs.records import Records
 from throwcollect.runs.run_record import RunRecord
@@ -49,7 +49,7 @@ def address(tmp_path: Path) -> Iterator[str]:
     catalogue = tmp_path / "catalogue.yaml"
     catalogue.write_text("components: {throws: {pretty_name: Throws, config: small.yaml}}\n")
     make_model(tmp_path / "models" / "quick")
-    with served(catalogue, tmp_path / "datasets", tmp_path / "models") as told:
+    with serve(catalogue, tmp_path / "datasets", tmp_path / "models") as told:
         yield told["page"]
 
 
@@ -84,7 +84,7 @@ def test_a_collection_is_started_watched_and_stopped_by_the_page(address: str) -
         assert {urlsplit(url).netloc for url in tab.requests if not url.startswith(("data:", "blob:"))} == {
             urlsplit(address).netloc
         }
-        assert unexpected(tab) == []
+        assert find_own_errors(tab) == []
 
 
 @pytest.fixture
@@ -114,7 +114,7 @@ def test_the_address_names_the_run_that_is_seen_also_in_a_tab_that_has_the_page(
         tab.ask("Page.navigate", url=make_page_address(server, over[1]))
         tab.wait_for(f"{watched} === {json.dumps(over[1])}")
         assert tab.evaluate("location.hash") == ""
-        assert unexpected(tab) == []
+        assert find_own_errors(tab) == []
 
 
 @pytest.fixture
@@ -139,7 +139,7 @@ def test_only_what_is_not_complete_can_be_resumed_by_the_page(died: tuple[str, s
         button = "document.querySelector('[aria-label=\"Resume {}\"]')"
         tab.wait_for(" && ".join(f"{button.format(each)} !== null" for each in died))
         assert [tab.evaluate(f"{button.format(each)}.hidden") for each in died] == [True, False]
-        assert unexpected(tab) == []
+        assert find_own_errors(tab) == []
 
 
 @pytest.mark.skipif(chromium() is None, reason="needs Chromium: apt-get install chromium")
@@ -166,7 +166,7 @@ def test_a_model_is_seen_and_aims_where_somebody_clicks(address: str) -> None:
         tab.wait_for("document.querySelector('#aim-text').textContent.startsWith('Out of reach')")
         assert tab.evaluate(values) == ""
         assert tab.evaluate("document.documentElement.scrollWidth") == 390
-        assert unexpected(tab) == []
+        assert find_own_errors(tab) == []
 
 
 @pytest.mark.skipif(chromium() is None, reason="needs Chromium: apt-get install chromium")

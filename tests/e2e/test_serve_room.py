@@ -14,7 +14,7 @@ import pytest
 
 from tests.e2e.chromium import Tab, browse, chromium
 from tests.e2e.collection import FAST, write_config
-from tests.e2e.page import load, press, served, unexpected, wait_for
+from tests.e2e.page import find_own_errors, load, press, serve, wait_for
 from tests.npm import install
 from throwcollect import ros
 from throwcollect.config.loader import load as load_config
@@ -117,7 +117,7 @@ def server(tmp_path: Path) -> Iterator[dict[str, Any]]:
     write_config(tmp_path, trials=600, text=_CONFIG, sim=f"{FAST}, real_time_factor: 1")
     catalogue = tmp_path / "catalogue.yaml"
     catalogue.write_text("components: {throws: {pretty_name: Throws, config: small.yaml, max_instances: 2}}\n")
-    with served(catalogue, tmp_path / "datasets") as told:
+    with serve(catalogue, tmp_path / "datasets") as told:
         yield told
 
 
@@ -214,7 +214,7 @@ def test_a_target_is_set_by_hand_and_collected_for(server: dict[str, Any], emula
         assert (aimed.min, aimed.max) == pytest.approx((distance - 0.1, distance + 0.1), abs=_MM)
         assert found.scene.landing_height_m == pytest.approx(0.5, abs=_MM)
         leave(tab)
-        assert unexpected(tab) == []
+        assert find_own_errors(tab) == []
 
 
 def test_a_room_that_is_left_while_it_is_entered_stays_left(server: dict[str, Any], emulator: str) -> None:
@@ -226,7 +226,7 @@ def test_a_room_that_is_left_while_it_is_entered_stays_left(server: dict[str, An
         enter(tab)
         leave(tab)
         tab.wait_for(f"{_PAGE.strip().rstrip(';')} === {json.dumps(before)}")
-        assert unexpected(tab) == []
+        assert find_own_errors(tab) == []
 
 
 def set_by_hand(tab: Tab, ears: Ears) -> None:

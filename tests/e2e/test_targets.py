@@ -73,7 +73,7 @@ def test_every_file_is_the_same_when_it_is_interrupted_and_goes_on_with_more_sim
 ) -> None:
     directory = tmp_path / "data"
     running = start(config, directory, 1)
-    running.wait_until(lambda: running.written() > 0 and (directory / "plan.rounds.part").exists())
+    running.wait_until(lambda: running.count_bytes() > 0 and (directory / "plan.rounds.part").exists())
     interrupt(running)
     assert running.finish()[0] == 130
     assert not (directory / "metadata.yaml").exists()

@@ -64,7 +64,7 @@ echo "{name}" "$@"
     path.chmod(0o755)
 
 
-def made(*arguments: str, cwd: Path | None = None) -> tuple[int, str, str]:
+def make_environment(*arguments: str, cwd: Path | None = None) -> tuple[int, str, str]:
     words = [SCRIPT, "there", *arguments]
     done = subprocess.run(words, capture_output=True, text=True, timeout=60, check=False, cwd=cwd)
     return done.returncode, done.stdout, done.stderr
@@ -75,14 +75,14 @@ def test_the_first_python_with_wheels_is_taken(commands: Path) -> None:
     put(commands, "python3.10", version="3.10")
     put(commands, "python3")
     put(commands, "uv")
-    code, out, _ = made()
+    code, out, _ = make_environment()
     assert (code, out.splitlines()[-1]) == (0, "python3.10 -m venv there")
 
 
 def test_where_no_python_suits_uv_fetches_one(commands: Path) -> None:
     put(commands, "python3", version="3.13")
     put(commands, "uv")
-    code, out, _ = made()
+    code, out, _ = make_environment()
     assert (code, out.splitlines()) == (
         0,
         ["uv venv --quiet --seed --python 3.11 there", "environment: there, with Python 3.11 by uv"],
@@ -99,7 +99,7 @@ def test_what_is_left_of_an_unfinished_environment_keeps_uv_from_nothing(
     (tmp_path / "there" / "pyvenv.cfg").touch()
     if finished:
         (tmp_path / "there" / "bin" / "python").touch()
-    code, out, _ = made(cwd=tmp_path)
+    code, out, _ = make_environment(cwd=tmp_path)
     assert (code, out.splitlines()[0]) == (0, "uv venv --quiet --seed --python 3.11 there")
     assert (tmp_path / "there").exists() == finished
 
@@ -110,7 +110,7 @@ def test_where_uv_is_missing_pip_fetches_it_or_a_script_without_pip(commands: Pa
         (commands / name).symlink_to(shutil.which(name) or f"/bin/{name}")
     fetched = """mkdir -p build/uv/bin; echo 'echo "uv $*"' > build/uv/bin/uv; chmod +x build/uv/bin/uv; exit 0"""
     put(commands, "python3", version="3.12", makes=by == "pip", **{by: fetched})
-    code, out, _ = made(cwd=tmp_path)
+    code, out, _ = make_environment(cwd=tmp_path)
     assert (code, out.splitlines()[1:]) == (
         0,
         ["uv venv --quiet --seed --python 3.11 there", "environment: there, with Python 3.11 by uv"],
@@ -124,7 +124,7 @@ def test_a_python_without_the_modules_for_it_gets_its_environment_by_uv(
 ) -> None:
     put(commands, "python3", version=version, makes=False)
     put(commands, "uv")
-    code, out, _ = made("python3")
+    code, out, _ = make_environment("python3")
     by_uv, environment = out.splitlines()
     assert (code, by_uv) == (0, "uv venv --quiet --seed --python python3 there")
     assert environment.partition(" by uv")[2].startswith(told)
@@ -158,7 +158,7 @@ def test_where_uv_is_not_to_be_had_or_fetches_nothing_mujoco_simulates(
     put(commands, "python3", version="3.13")
     if uv:
         put(commands, "uv", ends="echo 'error: x\n  cause: y https://z\n  cause: no name' >&2; exit 2")
-    code, out, err = made(cwd=tmp_path)
+    code, out, err = make_environment(cwd=tmp_path)
     *before, told, made_with = out.splitlines()
     assert (code, made_with, err) == (0, "python3 -m venv there", "")
     assert before == (
@@ -172,28 +172,28 @@ def test_a_python_that_is_named_is_the_only_one_that_is_looked_at(commands: Path
     put(commands, "python3.9", version="3.9")
     put(commands, "python3.12", version="3.12")
     put(commands, "uv")
-    code, _, err = made("python3.9")
+    code, _, err = make_environment("python3.9")
     assert code == 1
     assert err.startswith("python3.9 is ")
     assert "from 3.10 to 3.14" in err
-    assert made("python3.8") == (1, "", "there is no python3.8 here: make PYTHON=/path/to/python3.11\n")
+    assert make_environment("python3.8") == (1, "", "there is no python3.8 here: make PYTHON=/path/to/python3.11\n")
     put(commands, "python3.13", version="3.13", makes=False)
     (commands / "uv").unlink()
-    assert made("python3.13")[2].startswith(
+    assert make_environment("python3.13")[2].startswith(
         "no Python from 3.10 to 3.14 that can make environments is here (python3.13)"
     )
-    assert "python3.12 -m venv there" in made("python3.12")[1]
-    assert "python3.11 -m venv there" in made("python3.11")[1]
+    assert "python3.12 -m venv there" in make_environment("python3.12")[1]
+    assert "python3.11 -m venv there" in make_environment("python3.11")[1]
     for version in ("3.11", "3.12"):
         blank = commands / "of somebody"
         blank.mkdir(exist_ok=True)
         put(blank, f"python{version}", version=version)
-        assert f"python{version} -m venv there" in made(str(blank / f"python{version}"))[1]
+        assert f"python{version} -m venv there" in make_environment(str(blank / f"python{version}"))[1]
 
 
 def test_without_python_and_uv_one_sentence_says_so_at_once(commands: Path) -> None:
     began = time.monotonic()
-    code, out, err = made()
+    code, out, err = make_environment()
     assert (code, out, err.count("\n")) == (1, "", 1)
     assert err.startswith("no Python from 3.10 to 3.14 that can make environments is here (python3.11, python3.10,")
     assert "make PYTHON=" in err
@@ -205,7 +205,7 @@ def test_a_genuine_python_is_judged_by_its_version(tmp_path: Path) -> None:
     if not pythons:
         pytest.skip("no Python before 3.10 is here")
     for python in pythons:
-        assert made(python, cwd=tmp_path)[0] == 1, python
+        assert make_environment(python, cwd=tmp_path)[0] == 1, python
     assert not (tmp_path / "there").exists()
 
 

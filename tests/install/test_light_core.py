@@ -38,13 +38,13 @@ def find_python(version: str) -> str | None:
     return None
 
 
-def chosen_versions() -> tuple[str, ...]:
+def choose_versions() -> tuple[str, ...]:
     if asked := os.environ.get("THROWCOLLECT_TRY_PYTHONS"):
         return tuple(asked.split(","))
     return next(((version,) for version in KNOWN if find_python(version)), (KNOWN[0],))
 
 
-@pytest.fixture(scope="module", params=chosen_versions())
+@pytest.fixture(scope="module", params=choose_versions())
 def environment(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A fresh environment with the wheel of these sources and nothing but what it depends on."""
     python = find_python(request.param)

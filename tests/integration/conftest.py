@@ -16,7 +16,7 @@ from tests.integration.robot import (
     OWN,
     PLAYING,
     Robot,
-    connected,
+    connect,
     discovery_server,
     running_simulation,
     start_simulation,
@@ -47,7 +47,7 @@ def endpoint() -> Iterator[str]:
 
 @pytest.fixture(scope="session")
 def session(endpoint: str) -> Iterator[Context]:
-    with connected(endpoint) as context:
+    with connect(endpoint) as context:
         yield context
 
 

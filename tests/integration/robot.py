@@ -130,7 +130,7 @@ def running_simulation(
 
 
 @contextmanager
-def connected(endpoint: str) -> Iterator[Context]:
+def connect(endpoint: str) -> Iterator[Context]:
     """A session of the test's own."""
     context = Context()
     with pytest.MonkeyPatch.context() as patch:

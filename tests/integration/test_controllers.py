@@ -56,7 +56,7 @@ def put(robot: Robot, **parameters: Any) -> Any:
 
 
 @contextmanager
-def changed(robot: Robot, **parameters: Any) -> Iterator[None]:
+def change_parameters(robot: Robot, **parameters: Any) -> Iterator[None]:
     before = values(robot)
     assert put(robot, **parameters).successful
     yield
@@ -101,7 +101,7 @@ def test_tolerances_that_are_changed_hold_for_the_next_goal(robot: Robot) -> Non
     robot.put_into(PAUSED)
     first = robot.send(swing())
     wide = {f"constraints__{joint}__goal": 9.0 for joint in TALOS.controllers[ARM]}
-    with changed(robot, **wide):
+    with change_parameters(robot, **wide):
         robot.put_into(PLAYING)
         assert robot.outcome(first)[:2] == (ABORTED, -5)
         assert robot.outcome(robot.send(swing()))[0] == SUCCEEDED
@@ -113,7 +113,7 @@ def test_partial_goals_can_be_allowed(robot: Robot) -> None:
     for point, angle in zip(wish.trajectory.points, (POSTURE[ELBOW], -1.2), strict=True):
         point.positions, point.velocities, point.accelerations = [angle], [0.0], [0.0]
     assert not robot.send(wish).accepted
-    with changed(robot, allow_partial_joints_goal=True):
+    with change_parameters(robot, allow_partial_joints_goal=True):
         assert robot.outcome(robot.send(wish))[0] == SUCCEEDED
     assert robot.joint(ELBOW) == pytest.approx(-1.2, abs=0.005)
     assert robot.joint("arm_right_1_joint") == pytest.approx(POSTURE["arm_right_1_joint"], abs=0.005)

@@ -90,7 +90,7 @@ def bounds(kind: int, *points: tuple[float, float, float]) -> Any:
     return Bounds(type=kind, points=[Vector3(x=x, y=y, z=z) for x, y, z in points])
 
 
-def found(robot: Robot, **filters: Any) -> list[str]:
+def find_entities(robot: Robot, **filters: Any) -> list[str]:
     response = robot.call("get_entities", filters=EntityFilters(**filters))
     assert response.result.result == Result.RESULT_OK, response.result.error_message
     return list(response.entities)
@@ -109,7 +109,7 @@ def found(robot: Robot, **filters: Any) -> list[str]:
     ],
 )
 def test_entities_are_found_by_extended_regular_expressions(pattern: str, names: list[str], robot: Robot) -> None:
-    assert found(robot, filter=pattern) == names
+    assert find_entities(robot, filter=pattern) == names
 
 
 @pytest.mark.parametrize(
@@ -130,7 +130,7 @@ def test_expressions_that_are_none_are_refused_with_the_reason(pattern: str, wor
 
 
 def test_an_expression_that_never_ends_elsewhere_is_answered(robot: Robot) -> None:
-    assert found(robot, filter="^(([a-z])+.)+[A-Z]([a-z])+$") == []
+    assert find_entities(robot, filter="^(([a-z])+.)+[A-Z]([a-z])+$") == []
 
 
 def test_entities_are_found_by_category(robot: Robot) -> None:
@@ -142,10 +142,10 @@ def test_entities_are_found_by_category(robot: Robot) -> None:
             EntityCategory.CATEGORY_HUMAN,
         )
     )
-    assert found(robot, categories=robots) == ["talos"]
-    assert found(robot, categories=robots + moving) == ["ball", "talos"]
-    assert found(robot, categories=humans) == []
-    assert found(robot, categories=robots, filter="ball") == []
+    assert find_entities(robot, categories=robots) == ["talos"]
+    assert find_entities(robot, categories=robots + moving) == ["ball", "talos"]
+    assert find_entities(robot, categories=humans) == []
+    assert find_entities(robot, categories=robots, filter="ball") == []
 
 
 def test_what_is_said_about_an_entity_can_be_changed_and_found_until_a_full_reset(robot: Robot) -> None:
@@ -156,9 +156,9 @@ def test_what_is_said_about_an_entity_can_be_changed_and_found_until_a_full_rese
     assert robot.call("set_entity_info", entity="ball", info=info).result.result == Result.RESULT_OK
     assert robot.call("get_entity_info", entity="ball").info == info
     any_tag, all_tags = TagsFilter.FILTER_MODE_ANY, TagsFilter.FILTER_MODE_ALL
-    assert found(robot, tags=TagsFilter(tags=["soft", "square"], filter_mode=any_tag)) == ["ball"]
-    assert found(robot, tags=TagsFilter(tags=["soft", "square"], filter_mode=all_tags)) == []
-    assert found(robot, tags=TagsFilter(tags=["soft", "round"], filter_mode=all_tags)) == ["ball"]
+    assert find_entities(robot, tags=TagsFilter(tags=["soft", "square"], filter_mode=any_tag)) == ["ball"]
+    assert find_entities(robot, tags=TagsFilter(tags=["soft", "square"], filter_mode=all_tags)) == []
+    assert find_entities(robot, tags=TagsFilter(tags=["soft", "round"], filter_mode=all_tags)) == ["ball"]
     robot.reset()
     assert robot.call("get_entity_info", entity="ball").info == before
 
@@ -182,11 +182,11 @@ def test_entities_are_found_by_place(robot: Robot) -> None:
     near = bounds(Bounds.TYPE_SPHERE, (x, y, z), (0.01, 0.0, 0.0))
     far = bounds(Bounds.TYPE_SPHERE, (x + 3, y, z), (1.0, 0.0, 0.0))
     feet = bounds(Bounds.TYPE_BOX, (1.0, 1.0, 0.1), (-1.0, -1.0, 0.0))
-    assert "ball" in found(robot, bounds=near)
-    assert found(robot, bounds=far) == []
-    assert found(robot, bounds=feet) == ["talos"]
+    assert "ball" in find_entities(robot, bounds=near)
+    assert find_entities(robot, bounds=far) == []
+    assert find_entities(robot, bounds=feet) == ["talos"]
     beside = bounds(Bounds.TYPE_SPHERE, (x, y, z + 0.1), (0.07, 0.0, 0.0))
-    assert found(robot, bounds=beside, filter="ball") == []
+    assert find_entities(robot, bounds=beside, filter="ball") == []
 
 
 @pytest.mark.parametrize(
@@ -237,7 +237,7 @@ def test_ball_and_robot_cannot_be_deleted(robot: Robot) -> None:
         refused = robot.call("delete_entity", entity=name).result
         assert refused.result == Result.RESULT_OPERATION_FAILED
         assert refused.error_message == f"{name} is part of every trial and cannot be deleted"
-    assert found(robot) == ["ball", "talos"]
+    assert find_entities(robot) == ["ball", "talos"]
 
 
 def test_a_state_may_be_given_in_the_frame_of_another_entity(robot: Robot) -> None:

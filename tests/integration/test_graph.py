@@ -75,7 +75,7 @@ def visible(names_and_types: list[tuple[str, list[str]]]) -> dict[str, str]:
     return {name: kind for name, (kind,) in names_and_types if not any(part in name for part in hidden)}
 
 
-def latched(robot: Robot, kind: str, topic: str) -> Any:
+def wait_for_latched(robot: Robot, kind: str, topic: str) -> Any:
     with robot.listening(kind, topic, LATE) as heard:
         robot.wait_until(lambda: bool(heard), topic)
     return heard[0]
@@ -83,7 +83,7 @@ def latched(robot: Robot, kind: str, topic: str) -> Any:
 
 @pytest.fixture
 def description(robot: Robot) -> str:
-    return str(latched(robot, "std_msgs/msg/String", "robot_description").data)
+    return str(wait_for_latched(robot, "std_msgs/msg/String", "robot_description").data)
 
 
 def test_the_simulation_its_controllers_and_their_manager_are_nodes_of_its_namespace(robot: Robot) -> None:
@@ -156,7 +156,7 @@ def test_a_late_listener_gets_a_description_with_the_spoon_and_32_movable_joints
 
 
 def test_every_link_has_its_place_below_world_by_static_and_moving_transforms(robot: Robot, description: str) -> None:
-    static = latched(robot, "tf2_msgs/msg/TFMessage", "tf_static")
+    static = wait_for_latched(robot, "tf2_msgs/msg/TFMessage", "tf_static")
     with robot.listening("tf2_msgs/msg/TFMessage", "tf") as moving:
         robot.put_into(PAUSED)
         robot.step(10)
@@ -172,6 +172,6 @@ def test_every_link_has_its_place_below_world_by_static_and_moving_transforms(ro
 
 
 def test_the_base_stands_where_the_configuration_says(robot: Robot) -> None:
-    static = latched(robot, "tf2_msgs/msg/TFMessage", "tf_static")
+    static = wait_for_latched(robot, "tf2_msgs/msg/TFMessage", "tf_static")
     (base,) = [each.transform.translation for each in static.transforms if each.header.frame_id == "world"]
     assert (base.x, base.y, base.z) == (0.0, 0.0, CONFIG.robot.base_height_m)

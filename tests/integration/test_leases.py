@@ -53,7 +53,7 @@ def leased(robot: Robot) -> Iterator[Robot]:
     robot.set({"sim.real_time_factor": 0.0})
 
 
-def handed_over(robot: Robot, *leases: Lease, meanwhile: Callable[[], object] = lambda: None) -> list[Any]:
+def wait_for_episodes(robot: Robot, *leases: Lease, meanwhile: Callable[[], object] = lambda: None) -> list[Any]:
     """What a simulation hands over of these leases."""
     with robot.listening("std_msgs/msg/UInt8MultiArray", "episode", raw=True) as heard:
         assert ask_for(robot, *leases).successful
@@ -64,7 +64,7 @@ def handed_over(robot: Robot, *leases: Lease, meanwhile: Callable[[], object] = 
 
 def test_leased_trials_are_simulated_and_judged_in_their_order(robot: Robot) -> None:
     leases = [lease(robot, {"ball.mass_kg": 0.04 + trial / 1000}, trial=trial) for trial in (4, 2, 3)]
-    deliveries = handed_over(robot, *leases)
+    deliveries = wait_for_episodes(robot, *leases)
     assert [delivery.episode.header.trial for delivery in deliveries] == [4, 2, 3]
     conditions = [json.loads(delivery.conditions) for delivery in deliveries]
     assert [each["values"] for each in conditions] == [dict(each.values) for each in leases]
@@ -76,7 +76,7 @@ def test_leased_trials_are_simulated_and_judged_in_their_order(robot: Robot) -> 
 
 def test_a_trial_that_cannot_be_simulated_is_refused_and_the_others_are_not(robot: Robot) -> None:
     wrong, right = lease(robot, {"ball.mass_kg": -1.0}), lease(robot, {}, trial=5)
-    refusal, delivery = handed_over(robot, wrong, right)
+    refusal, delivery = wait_for_episodes(robot, wrong, right)
     assert refusal.token == wrong.token
     assert "ball.mass_kg" in refusal.reason
     assert delivery.episode.header.trial == 5
@@ -101,7 +101,7 @@ def test_what_a_lease_does_not_say_is_as_configured(robot: Robot) -> None:
     by_hand = {"trial.number": 7, "trial.controllers": [ARM], "ball.friction": 0.1, "scene.gravity_mps2": 1.6}
     assert robot.set(by_hand).successful
     assert robot.set({"constraints.goal_time": 0.1, "cmd_timeout": 0.2}, node=ARM).successful
-    (delivery,) = handed_over(robot, lease(robot, {"ball.mass_kg": 0.05}))
+    (delivery,) = wait_for_episodes(robot, lease(robot, {"ball.mass_kg": 0.05}))
     assert json.loads(delivery.conditions)["values"] == {"ball.mass_kg": 0.05}
     number, controllers, *physics = robot.parameters("get_parameters", names=list(by_hand)).values
     assert (number.integer_value, list(controllers.string_array_value)) == (-1, [""])
@@ -111,7 +111,7 @@ def test_what_a_lease_does_not_say_is_as_configured(robot: Robot) -> None:
 
 
 def test_after_a_lease_a_reset_begins_what_the_parameters_say(robot: Robot) -> None:
-    handed_over(robot, lease(robot, {"ball.mass_kg": 0.05}))
+    wait_for_episodes(robot, lease(robot, {"ball.mass_kg": 0.05}))
     robot.reset()
     assert robot.now_ns() == 0
     assert robot.set({"trial.number": 4, "trial.controllers": [ARM, TORSO]}).successful
@@ -132,7 +132,7 @@ def test_a_leased_trial_is_slowed_down_to_real_time_and_no_further(
 
 def test_slow_motion_ends_when_a_trial_is_leased(robot: Robot) -> None:
     assert robot.set({"sim.real_time_factor": 0.01}).successful
-    handed_over(robot, lease(robot, {}))
+    wait_for_episodes(robot, lease(robot, {}))
     (value,) = robot.parameters("get_parameters", names=["sim.real_time_factor"]).values
     assert value.double_value == 0.0
 
@@ -170,7 +170,7 @@ def test_the_world_of_a_leased_trial_cannot_be_changed(service: str, fields: dic
 
 def test_nothing_else_moves_or_stops_a_leased_controller(robot: Robot) -> None:
     asked = [lease(robot, {"ball.mass_kg": 0.05}) for _ in range(2)]
-    (untouched,) = handed_over(robot, asked[0])
+    (untouched,) = wait_for_episodes(robot, asked[0])
     assert robot.set(SLOWLY).successful
 
     def disturb() -> None:
@@ -179,16 +179,16 @@ def test_nothing_else_moves_or_stops_a_leased_controller(robot: Robot) -> None:
         robot.publish(f"{ARM}/joint_trajectory", trajectory(ARM, 0.5))
         robot.publish(f"{ARM}/speed_scaling_input", SpeedScalingFactor(factor=0.5), LATCHED)
 
-    (touched,) = handed_over(robot, asked[1], meanwhile=disturb)
+    (touched,) = wait_for_episodes(robot, asked[1], meanwhile=disturb)
     robot.set({"sim.real_time_factor": 0.0})
     assert touched.episode.digest == untouched.episode.digest
 
 
 def test_controllers_are_as_configured_in_every_leased_trial(robot: Robot) -> None:
-    (untouched,) = handed_over(robot, lease(robot, {}))
+    (untouched,) = wait_for_episodes(robot, lease(robot, {}))
     assert robot.set({f"constraints.{ELBOW}.trajectory": 1e-12}, node=ARM).successful
     robot.publish(f"{ARM}/speed_scaling_input", SpeedScalingFactor(factor=0.5), LATCHED)
-    (touched,) = handed_over(robot, lease(robot, {}))
+    (touched,) = wait_for_episodes(robot, lease(robot, {}))
     assert touched.episode.digest == untouched.episode.digest
 
 

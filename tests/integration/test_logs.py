@@ -17,7 +17,7 @@ LATCHED = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 """As the simulation subscribes to speeds; on DDS it would not hear others."""
 
 
-def said(heard: list[Any], words: str) -> list[Any]:
+def find_logged(heard: list[Any], words: str) -> list[Any]:
     return [each for each in heard if words in each.msg]
 
 
@@ -32,7 +32,7 @@ def test_a_refused_goal_is_one_line_that_names_where_it_was_refused(robot: Robot
         for _ in range(3):
             assert not robot.send(goal(ARM, 0.0)).accepted
         settle(robot)
-    lines = said(heard, "not strictly increasing")
+    lines = find_logged(heard, "not strictly increasing")
     assert len(lines) == 3
     assert (Path(lines[0].file).name, lines[0].function) == ("controller.py", "_refusal")
     assert lines[0].line > 0
@@ -46,7 +46,7 @@ def test_speeds_that_are_refused_do_not_flood_the_log(robot: Robot) -> None:
             publisher.publish(SpeedScalingFactor(factor=-1.0 - number))
         settle(robot)
         robot.node.destroy_publisher(publisher)
-    lines = said(heard, "Scaling factor has to be")
+    lines = find_logged(heard, "Scaling factor has to be")
     assert 1 <= len(lines) <= 2
     assert "0 to 1000" in lines[0].msg
     assert (Path(lines[0].file).name, lines[0].function) == ("controller.py", "scale_speed")
@@ -60,7 +60,7 @@ def test_what_cannot_take_effect_is_said_once_for_one_request(robot: Robot) -> N
         results = robot.parameters("set_parameters", node=ARM, parameters=messages).results
         assert all(each.successful for each in results)
         settle(robot)
-    assert len(said(heard, "Command timeout must be higher than goal_time tolerance (0.1 vs. 0.6)")) == 1
+    assert len(find_logged(heard, "Command timeout must be higher than goal_time tolerance (0.1 vs. 0.6)")) == 1
     undone = [Parameter("cmd_timeout", value=0.0), *(Parameter(each.name, value=0.02) for each in wanted[1:])]
     robot.parameters("set_parameters", node=ARM, parameters=[each.to_parameter_msg() for each in undone])
 
@@ -75,10 +75,10 @@ def test_a_simulation_says_why_it_ends(way: str, running: tuple[Command, Robot])
         process.send_signal(signal.SIGTERM)
     else:
         robot.put_into(QUITTING)
-    robot.wait_until(lambda: bool(said(heard, "ends: ")), "a last word")
+    robot.wait_until(lambda: bool(find_logged(heard, "ends: ")), "a last word")
     output, _ = process.communicate(timeout=10)
     robot.wait_until(lambda: robot.node.count_publishers(robot.topic("episode")) == 0)
-    (line,) = said(heard, "ends: ")
+    (line,) = find_logged(heard, "ends: ")
     assert way in line.msg
     assert line.name.endswith(f"{OWN}.{OWN}")
     assert output.count("ends: ") == 1

@@ -21,13 +21,17 @@ LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 JOINT_STATES = ("sensor_msgs/msg/JointState", "joint_states", LATEST)
 
 
-def numbered(limb: str, count: int) -> list[str]:
+def number_joints(limb: str, count: int) -> list[str]:
     return [f"{limb}_{number}_joint" for number in range(1, count + 1)]
 
 
-TORSO, HEAD, GRIPPERS = numbered("torso", 2), numbered("head", 2), ["gripper_left_joint", "gripper_right_joint"]
-LEFT_ARM, RIGHT_ARM = numbered("arm_left", 7), numbered("arm_right", 7)
-LEGS = [*numbered("leg_left", 6), *numbered("leg_right", 6)]
+TORSO, HEAD, GRIPPERS = (
+    number_joints("torso", 2),
+    number_joints("head", 2),
+    ["gripper_left_joint", "gripper_right_joint"],
+)
+LEFT_ARM, RIGHT_ARM = number_joints("arm_left", 7), number_joints("arm_right", 7)
+LEGS = [*number_joints("leg_left", 6), *number_joints("leg_right", 6)]
 
 Motion = tuple[list[str], dict[float, list[float]]]
 HOME: Motion = (

@@ -17,7 +17,7 @@ from rclzenoh.attachment import Attachment
 from rclzenoh.interfaces import deserialize, message_class, serialize
 from rclzenoh.keys import EntityKind, Token, data_key
 from tests.commands import Command
-from tests.integration.robot import ARM, OWN, PLAYING, Robot, connected, environment, goal, start_simulation, swing
+from tests.integration.robot import ARM, OWN, PLAYING, Robot, connect, environment, goal, start_simulation, swing
 from throwcollect.ros import DurabilityPolicy, QoSProfile, get_message
 from throwcollect.ros.middleware import uses_rclpy
 
@@ -67,7 +67,7 @@ def endpoints(robot: Robot, kind: EntityKind) -> list[Token]:
     return [token for token in tokens if token.namespace == namespace or token.namespace.startswith(f"{namespace}/")]
 
 
-def changed(data: bytes, chance: random.Random) -> bytes:
+def mutate(data: bytes, chance: random.Random) -> bytes:
     """A message with some octets changed, inserted or left out."""
     out = bytearray(data)
     for _ in range(chance.randint(1, 8)):
@@ -98,7 +98,7 @@ def hostile(type_name: str, sample: Any, chance: random.Random) -> Iterator[tupl
         yield body, VALID
         yield b"\0\1\0\0" + body, VALID
         yield good, chance.choice((None, b"", chance.randbytes(chance.randint(0, 60)), VALID[:-1], VALID + b"x"))
-        yield changed(good, chance), VALID
+        yield mutate(good, chance), VALID
 
 
 @embedded_alone
@@ -259,7 +259,7 @@ def test_a_simulation_goes_on_while_its_router_is_away_and_is_all_there_when_it_
     router, endpoint = start_router("tcp/127.0.0.1:0")
     simulation = start_simulation(tmp_path, endpoint, OWN)
     try:
-        with connected(endpoint) as context:
+        with connect(endpoint) as context:
             robot = Robot(context, OWN)
             robot.wait_until_ready(simulation)
             # It asks itself for something before it says that it is ready, by a client that goes then.
@@ -273,10 +273,10 @@ def test_a_simulation_goes_on_while_its_router_is_away_and_is_all_there_when_it_
             robot.wait_until(lambda: not endpoints(robot, EntityKind.NODE), "it is out of sight")
             router, _ = start_router(endpoint)
 
-            def seen() -> set[str]:
+            def list_keys() -> set[str]:
                 return {token.key() for kind in EntityKind for token in endpoints(robot, kind)}
 
-            robot.wait_until(lambda: seen() == before, "everything is announced again")
+            robot.wait_until(lambda: list_keys() == before, "everything is announced again")
             # The request for the result died with the router, but not what it asked for.
             assert robot.outcome(handle)[:2] == (4, 0)
             assert not lost.done()

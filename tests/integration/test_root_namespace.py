@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.integration.robot import ARM, OWN, Robot, connected, start_simulation, swing
+from tests.integration.robot import ARM, OWN, Robot, connect, start_simulation, swing
 from throwcollect.ros import Node, Parameter, SingleThreadedExecutor
 from throwcollect.ros.router import router
 
@@ -22,7 +22,7 @@ def endpoint() -> Iterator[str]:
 @pytest.fixture(scope="module")
 def talos(endpoint: str, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Robot]:
     process = start_simulation(tmp_path_factory.mktemp("root"), endpoint, OWN, options=("--namespace", "/"))
-    with connected(endpoint) as context:
+    with connect(endpoint) as context:
         robot = Robot(context, OWN, "/")
         robot.wait_until_ready(process)
         yield robot

@@ -104,11 +104,11 @@ def interrupt_after(directory: Path, text: str, size: int) -> Path:
     """Interrupt the collection of a slice when it has written so many bytes; returns the directory of the attempt."""
     slice = Slice.parse(text)
 
-    def written() -> int:
+    def count_bytes() -> int:
         return sum(p.stat().st_size for each in find_attempts(directory, slice) for p in each.glob("*.mcap*"))
 
     with pytest.raises(Interrupted, match=f"slice {text}"):
-        collect_slice(directory, slice, overrides=INPROCESS, interruptions=lambda: int(written() > size))
+        collect_slice(directory, slice, overrides=INPROCESS, interruptions=lambda: int(count_bytes() > size))
     (attempt,) = find_attempts(directory, slice)
     return attempt
 

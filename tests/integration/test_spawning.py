@@ -33,7 +33,7 @@ def spawn(robot: Robot, name: str = "crate", **fields: Any) -> Any:
     return robot.call("spawn_entity", name=name, **request)
 
 
-def spawned(robot: Robot, name: str = "crate", **fields: Any) -> str:
+def spawn_successfully(robot: Robot, name: str = "crate", **fields: Any) -> str:
     response = spawn(robot, name, **fields)
     assert response.result.result == Result.RESULT_OK, response.result.error_message
     return str(response.entity_name)
@@ -59,7 +59,7 @@ def episode(robot: Robot, scope: int = Reset.SCOPE_DEFAULT) -> str:
 
 def test_a_spawned_body_falls_to_the_ground_and_lies_there(robot: Robot) -> None:
     robot.put_into(PAUSED)
-    assert spawned(robot, initial_pose=pose(2.0, 2.0, 0.5)) == "crate"
+    assert spawn_successfully(robot, initial_pose=pose(2.0, 2.0, 0.5)) == "crate"
     assert entities(robot) == ["ball", "talos", "crate"]
     robot.step(50)
     assert height(robot, "crate") == pytest.approx(0.5 - 9.81 * 0.1**2 / 2, abs=2e-3)
@@ -70,7 +70,8 @@ def test_a_spawned_body_falls_to_the_ground_and_lies_there(robot: Robot) -> None
 def test_the_ball_lands_on_what_was_spawned(robot: Robot) -> None:
     robot.put_into(PAUSED)
     assert (
-        spawned(robot, "table", resource_string=box("0.5 0.5 1.0", mass=0), initial_pose=pose(2.0, 2.0, 0.5)) == "table"
+        spawn_successfully(robot, "table", resource_string=box("0.5 0.5 1.0", mass=0), initial_pose=pose(2.0, 2.0, 0.5))
+        == "table"
     )
     state = EntityState()
     state.pose.position.x, state.pose.position.y, state.pose.position.z = 2.0, 2.0, 1.2
@@ -81,15 +82,17 @@ def test_the_ball_lands_on_what_was_spawned(robot: Robot) -> None:
 
 
 def test_a_name_is_given_once_unless_another_one_will_do(robot: Robot) -> None:
-    assert spawned(robot) == "crate"
+    assert spawn_successfully(robot) == "crate"
     refused = spawn(robot)
     assert refused.result.result == Spawn.NAME_NOT_UNIQUE
     assert refused.entity_name == ""
-    assert spawned(robot, allow_renaming=True) == "crate_1"
-    assert spawned(robot, allow_renaming=True) == "crate_2"
+    assert spawn_successfully(robot, allow_renaming=True) == "crate_1"
+    assert spawn_successfully(robot, allow_renaming=True) == "crate_2"
     assert spawn(robot, "ball").result.result == Spawn.NAME_NOT_UNIQUE
-    assert spawned(robot, "ball", allow_renaming=True) == "ball_1"
-    assert spawned(robot, "", resource_string=box(name="from the file"), allow_renaming=True) == "from_the_file"
+    assert spawn_successfully(robot, "ball", allow_renaming=True) == "ball_1"
+    assert (
+        spawn_successfully(robot, "", resource_string=box(name="from the file"), allow_renaming=True) == "from_the_file"
+    )
     assert entities(robot) == ["ball", "talos", "crate", "crate_1", "crate_2", "ball_1", "from_the_file"]
 
 
@@ -146,7 +149,7 @@ def test_a_description_that_would_blow_up_is_refused_and_the_simulation_goes_on(
         refused = spawn(robot, resource_string=text).result
         assert refused.result == Spawn.RESOURCE_PARSE_ERROR
         assert words in refused.error_message
-    assert spawned(robot) == "crate"
+    assert spawn_successfully(robot) == "crate"
 
 
 def test_a_robot_is_spawned_from_its_package_and_found_by_its_category(robot: Robot) -> None:
@@ -155,7 +158,7 @@ def test_a_robot_is_spawned_from_its_package_and_found_by_its_category(robot: Ro
     assert {PANDA, "package://example-robot-data/robots/talos_data/robots/talos_reduced.urdf"} <= {
         each.uri for each in spawnables.spawnables
     }
-    assert spawned(robot, "arm", uri=PANDA, entity_namespace="/left") == "arm"
+    assert spawn_successfully(robot, "arm", uri=PANDA, entity_namespace="/left") == "arm"
     info = robot.call("get_entity_info", entity="arm").info
     assert info.category.category == EntityCategory.CATEGORY_ROBOT
     assert info.description == f"URDF 'panda' of {PANDA}, namespace /left"
@@ -172,14 +175,14 @@ def test_spawnables_are_looked_for_where_one_says(robot: Robot, tmp_path: Path) 
     assert "'magic': unknown kind of URI" in response.result.error_message
     own = [each for each in response.spawnables if each.uri.startswith(tmp_path.as_uri())]
     assert [(each.uri, each.description) for each in own] == [((tmp_path / "good.urdf").as_uri(), "a crate")]
-    assert spawned(robot, uri=own[0].uri) == "crate"
+    assert spawn_successfully(robot, uri=own[0].uri) == "crate"
 
 
 def test_a_pose_may_be_given_in_the_frame_of_what_was_spawned_before(robot: Robot) -> None:
     first = pose(1.0, 1.0, 0.5)
     first.pose.orientation.z, first.pose.orientation.w = 0.5**0.5, 0.5**0.5
-    spawned(robot, "table", resource_string=box(mass=0), initial_pose=first)
-    spawned(robot, "cup", initial_pose=pose(0.25, 0.0, 0.5, frame="table"))
+    spawn_successfully(robot, "table", resource_string=box(mass=0), initial_pose=first)
+    spawn_successfully(robot, "cup", initial_pose=pose(0.25, 0.0, 0.5, frame="table"))
     there = robot.call("get_entity_state", entity="cup").state.pose
     assert (there.position.x, there.position.y, there.position.z) == pytest.approx((1.0, 1.25, 1.0), abs=1e-6)
     assert there.orientation.z == pytest.approx(0.5**0.5, abs=1e-6)
@@ -212,7 +215,7 @@ def test_many_wishes_are_met_one_by_one(robot: Robot) -> None:
 
 
 def test_what_is_fixed_can_be_put_somewhere_but_not_set_in_motion(robot: Robot) -> None:
-    spawned(robot, resource_string=box(mass=0))
+    spawn_successfully(robot, resource_string=box(mass=0))
     state = EntityState()
     state.pose.position.z = 3.0
     assert robot.call("set_entity_state", entity="crate", state=state).result.result == Result.RESULT_OK
@@ -228,16 +231,16 @@ def test_what_is_fixed_can_be_put_somewhere_but_not_set_in_motion(robot: Robot) 
 
 
 def test_what_was_spawned_is_deleted_once(robot: Robot) -> None:
-    spawned(robot)
+    spawn_successfully(robot)
     assert robot.call("delete_entity", entity="crate").result.result == Result.RESULT_OK
     assert robot.call("delete_entity", entity="crate").result.result == Result.RESULT_NOT_FOUND
     assert entities(robot) == ["ball", "talos"]
-    assert spawned(robot) == "crate"
+    assert spawn_successfully(robot) == "crate"
 
 
 def test_a_reset_of_what_was_spawned_leaves_time_and_robot(robot: Robot) -> None:
     robot.put_into(PAUSED)
-    spawned(robot)
+    spawn_successfully(robot)
     robot.step(100)
     now, ball = robot.now_ns(), height(robot, "ball")
     assert robot.call("reset_simulation", scope=Reset.SCOPE_SPAWNED).result.result == Result.RESULT_OK
@@ -248,7 +251,7 @@ def test_a_reset_of_what_was_spawned_leaves_time_and_robot(robot: Robot) -> None
 
 def test_a_reset_of_time_and_state_puts_what_was_spawned_where_it_was_spawned(robot: Robot) -> None:
     robot.put_into(PAUSED)
-    spawned(robot, initial_pose=pose(2.0, 2.0, 1.0))
+    spawn_successfully(robot, initial_pose=pose(2.0, 2.0, 1.0))
     robot.step(100)
     assert height(robot, "crate") < 0.9
     assert robot.call("reset_simulation", scope=Reset.SCOPE_TIME | Reset.SCOPE_STATE).result.result == Result.RESULT_OK
@@ -261,13 +264,13 @@ def test_a_trial_goes_on_among_spawned_bodies_and_leaves_no_trace_in_later_ones(
     alone = episode(robot)
     assert episode(robot) == alone
     # In the way of the arm and of the ball.
-    spawned(robot, "wall", resource_string=box("0.1 3.0 4.0", mass=0), initial_pose=pose(0.9, 0.0, 0.0))
-    spawned(robot, "crate", initial_pose=pose(0.5, -0.4, 1.6))
+    spawn_successfully(robot, "wall", resource_string=box("0.1 3.0 4.0", mass=0), initial_pose=pose(0.9, 0.0, 0.0))
+    spawn_successfully(robot, "crate", initial_pose=pose(0.5, -0.4, 1.6))
     among = episode(robot, Reset.SCOPE_TIME | Reset.SCOPE_STATE)
     assert among != alone
     assert episode(robot, Reset.SCOPE_TIME | Reset.SCOPE_STATE) == among
     assert episode(robot) == alone
     assert entities(robot) == ["ball", "talos"]
-    spawned(robot, "crate", initial_pose=pose(0.5, -0.4, 1.6))
+    spawn_successfully(robot, "crate", initial_pose=pose(0.5, -0.4, 1.6))
     assert robot.call("delete_entity", entity="crate").result.result == Result.RESULT_OK
     assert episode(robot, Reset.SCOPE_TIME | Reset.SCOPE_STATE) == alone

@@ -38,7 +38,7 @@ GoalInfo: Any = get_message("action_msgs/msg/GoalInfo")
 CancelGoal: Any = get_service("action_msgs/srv/CancelGoal").Response
 
 
-def changed(wish: Any, **fields: Any) -> Any:
+def change_trajectory(wish: Any, **fields: Any) -> Any:
     for name, value in fields.items():
         setattr(wish.trajectory, name, value)
     return wish
@@ -124,12 +124,12 @@ def test_there_is_no_feedback_while_time_stands_still(robot: Robot) -> None:
     ("wish", "reason"),
     [
         (
-            changed(goal(ARM), joint_names=list(TALOS.controllers["arm_left_controller"])),
+            change_trajectory(goal(ARM), joint_names=list(TALOS.controllers["arm_left_controller"])),
             "Incoming joint arm_left_1_joint",
         ),
         (partial(), "Joints on incoming trajectory don't match the controller joints"),
-        (changed(goal(ARM), points=[]), "Empty trajectory received"),
-        (changed(goal(ARM), joint_names=[], points=[]), "Joints on incoming trajectory don't match"),
+        (change_trajectory(goal(ARM), points=[]), "Empty trajectory received"),
+        (change_trajectory(goal(ARM), joint_names=[], points=[]), "Joints on incoming trajectory don't match"),
         (with_last_point(positions=START[:-1]), "Mismatch between joint_names size (7) and positions (6) at point #1"),
         (goal(ARM, arm_right_4_joint=float("nan")), f"Position of joint {ELBOW} at point #1 is not finite"),
         (with_last_point(velocities=[0.1] * 7), "Velocity of last trajectory point of joint arm_right_1_joint"),

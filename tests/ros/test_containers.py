@@ -27,15 +27,15 @@ def test_nodes_that_are_killed_come_back_and_find_each_other(engine: docker.Dock
     slow = ("--set", "sim.real_time_factor=1", "--set", "run.trial_timeout_s=20")
     rclpy = ("--runtime", "docker", "--set", "run.ros=rclpy", *slow)
     running = start(config, directory, 2, *rclpy)
-    running.wait_until(lambda: running.written() > 0)
+    running.wait_until(lambda: running.count_bytes() > 0)
     for name in ("router", "sim_0", "coordinator"):
-        size = running.written()
+        size = running.count_bytes()
         before = containers_of(engine, directory)[name]
         before.kill()
         running.wait_until(lambda name=name, old=before.id: is_another(engine, directory, name, old))
         if name == "router":
             assert address_of(containers_of(engine, directory)[name]) == address_of(before)
-        running.wait_until(lambda size=size: running.written() > size)
+        running.wait_until(lambda size=size: running.count_bytes() > size)
     code, _, err = running.finish()
     assert code == 0, err
     assert f"Docker containers of {default_tag()} on genuine rclpy with rmw_fastrtps_cpp" in err
@@ -48,7 +48,7 @@ def test_health_is_that_of_the_loop(engine: docker.DockerClient, tmp_path: Path)
     directory = tmp_path / "data"
     slow = ("--runtime", "docker", "--set", "run.ros=rclpy", "--set", "sim.real_time_factor=1", "--trials", "300")
     running = start(write_config(tmp_path, trials=8, sim=FAST), directory, 1, *slow)
-    running.wait_until(lambda: running.written() > 0)
+    running.wait_until(lambda: running.count_bytes() > 0)
     nodes = containers_of(engine, directory)
     assert nodes.keys() == {"router", "sim_0", "coordinator"}
     for node in nodes.values():

@@ -19,14 +19,14 @@ BUILT = ("control_msgs", "controller_manager_msgs", "simulation_interfaces", "tf
 NAME = re.compile(r"""["']([a-z0-9_]+/(?:msg|srv|action)/[A-Z]\w+)["']""")
 
 
-def used() -> set[str]:
+def find_used() -> set[str]:
     """Every interface that is named in the sources, or that they import."""
     sources = (ROOT / "src" / "throwcollect").rglob("*.py")
     named = {name for path in sources for name in NAME.findall(path.read_text(encoding="utf-8"))}
     return named.union(MESSAGES.values(), SERVICES.values(), ACTIONS.values())
 
 
-def defined() -> set[str]:
+def find_defined() -> set[str]:
     """Every interface that the wheel is built from."""
     paths = (path for package in BUILT for path in (DEFINITIONS / package).glob("*/*"))
     return {path.relative_to(DEFINITIONS).with_suffix("").as_posix() for path in paths}
@@ -47,7 +47,7 @@ def _wheels() -> None:
 
 
 @pytest.mark.usefixtures("_wheels")
-@pytest.mark.parametrize("name", sorted(used() | defined()))
+@pytest.mark.parametrize("name", sorted(find_used() | find_defined()))
 def test_type_hashes_of_both_backends_are_equal(name):
     assert type_hash(name) == genuine_hash(name)
 
@@ -56,10 +56,10 @@ def test_type_hashes_of_both_backends_are_equal(name):
 def test_the_wheel_holds_what_is_defined_and_nothing_else():
     files = [file.as_posix() for file in distribution("throwcollect-ros-interfaces").files or ()]
     found = [file for file in files if file.endswith((".msg", ".srv", ".action"))]
-    assert {file.partition("share/")[2].rpartition(".")[0] for file in found} == defined()
+    assert {file.partition("share/")[2].rpartition(".")[0] for file in found} == find_defined()
 
 
-@pytest.mark.parametrize("name", sorted(used() | defined()))
+@pytest.mark.parametrize("name", sorted(find_used() | find_defined()))
 def test_an_interface_that_is_used_is_loaded_with_its_type_support(name):
     package, kind, short = name.split("/")
     interface = getattr(import_module(f"{package}.{kind}"), short)

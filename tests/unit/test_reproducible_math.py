@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from tests import processors
-from tests.unit.sweep.thrower import collected, configuration
+from tests.unit.sweep.thrower import collect, configuration
 
 from throwcollect.config.loader import load
 from throwcollect.episode.frames import MovingFrame
@@ -46,12 +46,12 @@ def compute() -> Iterator[str]:
             sent = (trajectory.times, trajectory.positions, trajectory.velocities, trajectory.accelerations)
             yield show("sent", *sent)
             yield show("desired", *sample_quintic(trajectory, np.linspace(0, 2, 500)))
-    yield show("grown", *([*trial.values.values()] for trial in collected(configuration(trials=384))))
+    yield show("grown", *([*trial.values.values()] for trial in collect(configuration(trials=384))))
     frame = MovingFrame("a", "b", (0.0, 0.0, 0.0), (0.0, 0.6, 0.0, 0.8), "j", (0.36, 0.48, 0.8))
     yield show("frame", frame.rotation_at(np.linspace(-7, 7, 5000)))
 
 
-def computed_on_another_processor() -> list[str]:
+def compute_on_another_processor() -> list[str]:
     whole = {**os.environ, "PYTHONPATH": f"{ROOT / 'src'}:{ROOT}", **processors.PLAIN}
     script = [sys.executable, "-c", PRINTED]
     done = subprocess.run(script, cwd=ROOT, env=whole, capture_output=True, text=True, timeout=120, check=True)
@@ -61,7 +61,7 @@ def computed_on_another_processor() -> list[str]:
 def test_plans_and_motions_are_the_same_on_another_processor() -> None:
     here = list(compute())
     assert len(here) > 200
-    assert here == computed_on_another_processor()
+    assert here == compute_on_another_processor()
 
 
 @pytest.mark.parametrize(

@@ -41,21 +41,21 @@ def session(mode: str, changes: dict[str, object]) -> Iterator[zenoh.Session]:
         opened.close()
 
 
-def made(directory: Path) -> RunKey:
+def make_key(directory: Path) -> RunKey:
     key = RunKey(directory)
     key.create()
     return key
 
 
 def test_a_key_is_for_its_owner_alone(tmp_path: Path) -> None:
-    key = made(tmp_path / "key")
+    key = make_key(tmp_path / "key")
     assert stat.S_IMODE(key.directory.stat().st_mode) == 0o700
     assert stat.S_IMODE(key.private_key.stat().st_mode) == 0o600
     assert sorted(path.name for path in key.directory.iterdir()) == ["certificate.pem", "key.pem"]
 
 
 def test_only_who_has_the_key_of_a_router_is_let_in(tmp_path: Path) -> None:
-    key, other = made(tmp_path / "one"), made(tmp_path / "other")
+    key, other = make_key(tmp_path / "one"), make_key(tmp_path / "other")
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         endpoint = f"tls/127.0.0.1:{probe.getsockname()[1]}"
@@ -69,12 +69,12 @@ def test_only_who_has_the_key_of_a_router_is_let_in(tmp_path: Path) -> None:
 
 
 def test_signatures_are_of_one_key_and_one_text(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv(KEY_VARIABLE, str(made(tmp_path / "one").directory))
+    monkeypatch.setenv(KEY_VARIABLE, str(make_key(tmp_path / "one").directory))
     signer = Signer.of_environment()
     signature = signer.sign(b"an ", b"episode")
     assert signer.has_signed(signature, b"an episode")
     assert not signer.has_signed(signature, b"an episodf")
-    monkeypatch.setenv(KEY_VARIABLE, str(made(tmp_path / "other").directory))
+    monkeypatch.setenv(KEY_VARIABLE, str(make_key(tmp_path / "other").directory))
     assert not Signer.of_environment().has_signed(signature, b"an episode")
     assert not Signer(b"").has_signed(signature, b"an episode")
 

@@ -91,7 +91,7 @@ def add_handlers(app: FastAPI) -> None:
         return answer(error)
 
     @app.exception_handler(Exception)
-    async def unexpected(_: Request, __: Exception) -> ProblemResponse:
+    async def answer_unexpected(_: Request, __: Exception) -> ProblemResponse:
         # Starlette raises the error again after this answer, so that it gets into the log.
         return problem(500, "internal error", hint="the log of the server says where; please report it")
 

@@ -175,7 +175,7 @@ def test_yaml_errors_name_the_line(read):
         read("a: 1\nb: c: d\n")
 
 
-def chained(levels: int) -> str:
+def chain_aliases(levels: int) -> str:
     """A text that is nested by its aliases alone."""
     return "k0: &k0 [1]\n" + "".join(f"k{n}: &k{n} [*k{n - 1}]\n" for n in range(1, levels))
 
@@ -186,7 +186,7 @@ def chained(levels: int) -> str:
         "a: " + 100_000 * "[",
         "a: " + 300 * "{a: ",
         "".join(f"{' ' * level}a:\n" for level in range(900)),
-        chained(200),
+        chain_aliases(200),
     ],
 )
 def test_what_is_nested_too_deeply_is_refused_at_once(text, read):

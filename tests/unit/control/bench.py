@@ -31,13 +31,13 @@ PERIOD_NS = 10_000_000
 SHIPPED = ControllerParameters(JOINTS)
 
 
-def constrained(goal: float = 0.0, goal_time: float = 0.0, trajectory: float = 0.0) -> ControllerParameters:
+def constrain(goal: float = 0.0, goal_time: float = 0.0, trajectory: float = 0.0) -> ControllerParameters:
     limits = {joint: JointConstraints(trajectory=trajectory, goal=goal) for joint in JOINTS}
     constraints = Constraints(goal_time=goal_time, joints=limits)
     return ControllerParameters(JOINTS, constraints=constraints)
 
 
-TALOS = constrained(goal=0.02, goal_time=0.6)
+TALOS = constrain(goal=0.02, goal_time=0.6)
 
 
 def seconds(value: float) -> int:
@@ -84,7 +84,7 @@ class Plant:
             share = 1 - math.exp(-PERIOD_NS / 1e9 / self.lag_s)
             self.position = self.position + share * (command - self.position)
 
-    def measured(self) -> JointState:
+    def measure(self) -> JointState:
         if not self.measures_velocity:
             return JointState(self.position)
         return JointState(self.position, np.broadcast_to(self.velocity, self.position.shape))
@@ -103,7 +103,7 @@ class Bench:
         self.plant = dataclasses.replace(plant or Plant(), measures_velocity=parameters.measures_velocity)
         self.controller = JointTrajectoryController("c", parameters, period_ns=PERIOD_NS, **deviations)
         self.now_ns = seconds(now_s)
-        self.controller.reset(self.now_ns, self.plant.measured())
+        self.controller.reset(self.now_ns, self.plant.measure())
         self.k = 0
         self.commands: dict[int, np.ndarray] = {}
         self.results: list[tuple[int, GoalResult]] = []
@@ -122,7 +122,7 @@ class Bench:
         for _ in range(updates):
             self.k += 1
             self.now_ns += PERIOD_NS
-            command = self.controller.update(self.now_ns, self.plant.measured())
+            command = self.controller.update(self.now_ns, self.plant.measure())
             self.commands[self.k] = np.array(command)
             self.plant.apply(command)
             self.collect()

@@ -26,7 +26,7 @@ from .bench import (
     Bench,
     Plant,
     braking,
-    constrained,
+    constrain,
     goal,
     point,
     seconds,
@@ -37,7 +37,7 @@ from .test_courses import COURSES
 
 
 def test_tolerance_texts_go_on_with_joint_error_and_tolerance() -> None:
-    off_path = Bench(constrained(trajectory=0.105), Plant("frozen"))
+    off_path = Bench(constrain(trajectory=0.105), Plant("frozen"))
     off_path.send(goal(to(1.0, 2.1)))
     off_path.step(20)
     assert off_path.results[0][1].error_string == (
@@ -80,7 +80,7 @@ def test_new_goals_preempt_and_start_from_the_measured_state() -> None:
 def test_results_outlive_the_next_goal() -> None:
     bench = Bench()
     bench.controller.submit("A", goal(to(0.0, 2.1)), bench.now_ns)
-    bench.controller.update(bench.now_ns + 1, bench.plant.measured())
+    bench.controller.update(bench.now_ns + 1, bench.plant.measure())
     bench.controller.submit("B", goal(to(1.0, 2.1)), bench.now_ns)
     assert [(result.goal_id, result.status) for result in bench.controller.pop_results()] == [("A", REACHED[0])]
 
@@ -89,7 +89,7 @@ def test_parameters_that_change_during_a_goal_hold_for_the_next() -> None:
     bench = Bench(TALOS, Plant("frozen"))
     bench.send(goal(to(0.5, 1.6)), "A")
     bench.step(10)
-    bench.controller.parameters = constrained(goal=9.0, goal_time=0.6)
+    bench.controller.parameters = constrain(goal=9.0, goal_time=0.6)
     bench.step(120)
     bench.send(goal(to(0.5, 1.6)), "B")
     bench.step(120)
@@ -177,7 +177,7 @@ def test_reset_aborts_the_goal_and_holds_the_pose_after_it() -> None:
     bench.step(50)
     bench.plant.position = np.array((0.5, 0.6, 0.7))
     bench.now_ns = 0
-    bench.controller.reset(0, bench.plant.measured())
+    bench.controller.reset(0, bench.plant.measure())
     bench.collect()
     ((_, result),) = bench.results
     assert (result.status, result.error_code) == (GoalStatus.ABORTED, ErrorCode.INVALID_GOAL)
@@ -271,7 +271,7 @@ def test_scaled_and_real_time_are_told_apart() -> None:
 def test_a_reset_brings_the_initial_speed_back() -> None:
     bench = Bench()
     bench.controller.scale_speed(0.25)
-    bench.controller.reset(bench.now_ns, bench.plant.measured())
+    bench.controller.reset(bench.now_ns, bench.plant.measure())
     assert bench.controller.state().speed_scaling_factor == 1.0
 
 

@@ -20,7 +20,7 @@ from throwcollect.control import (
     TrajectoryPoint,
 )
 
-from .bench import JOINTS, PERIOD_NS, TALOS, Bench, Plant, constrained, goal, seconds, to
+from .bench import JOINTS, PERIOD_NS, TALOS, Bench, Plant, constrain, goal, seconds, to
 
 UPDATES = 120
 positions = st.tuples(*[st.floats(-3, 3)] * 3)
@@ -88,7 +88,7 @@ class Side:
         elif request == "cancel":
             controller.cancel(controller.goal_id)
         else:
-            controller.reset(now_ns, self.bench.plant.measured())
+            controller.reset(now_ns, self.bench.plant.measure())
 
     def step(self) -> None:
         self.bench.step()
@@ -98,7 +98,7 @@ class Side:
         rows = self.bench.controller.take(n_updates)
         assert rows.shape == (n_updates, 3)
         for row in rows:
-            measured = self.bench.plant.measured()
+            measured = self.bench.plant.measure()
             self.bench.plant.apply(row)
             self.commands.append(np.array(row))
         self.bench.controller.observe(measured)
@@ -170,7 +170,7 @@ def test_only_the_first_update_and_those_at_the_end_of_a_goal_need_a_look() -> N
 
 
 def test_path_tolerances_need_a_look_in_every_update() -> None:
-    bench = Bench(constrained(trajectory=0.5))
+    bench = Bench(constrain(trajectory=0.5))
     bench.send(goal(to(1.0, 2.1)))
     for _ in range(100):
         assert bench.controller.next_decision() == 0
@@ -207,7 +207,7 @@ def test_a_trajectory_of_years_is_computed_in_parts() -> None:
 
 def test_commands_cannot_be_changed_from_outside() -> None:
     bench = Bench()
-    command = bench.controller.update(bench.now_ns, bench.plant.measured())
+    command = bench.controller.update(bench.now_ns, bench.plant.measure())
     for positions in (bench.controller.command, command):
         with pytest.raises(ValueError, match="read-only"):
             positions[0] = 9.0
@@ -233,7 +233,7 @@ def test_joint_order_of_a_goal_does_not_matter() -> None:
 
 
 def test_refusals_and_stops_are_logged(caplog: pytest.LogCaptureFixture) -> None:
-    bench = Bench(constrained(trajectory=0.1), Plant("frozen"))
+    bench = Bench(constrain(trajectory=0.1), Plant("frozen"))
     bench.send(goal())
     bench.controller.replace(goal(to(1.0, 2.1)).trajectory, bench.now_ns)
     bench.step(20)

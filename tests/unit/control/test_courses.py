@@ -34,7 +34,7 @@ from .bench import (
     Bench,
     Plant,
     braking,
-    constrained,
+    constrain,
     goal,
     point,
     seconds,
@@ -72,7 +72,7 @@ def put_on_target(bench: Bench) -> None:
     bench.plant.position = np.array((1.6, 2.1, 3.1))
 
 
-WITH_PATH = constrained(trajectory=0.05)
+WITH_PATH = constrain(trajectory=0.05)
 
 
 THREE_QUARTERS = (3 * math.pi / 2, 0, 0)
@@ -202,7 +202,7 @@ COURSES = [
         goal(to(0.5, 1.6)),
         {3000: 1.6},
         (3001, *REACHED),
-        parameters=constrained(goal=0.02),
+        parameters=constrain(goal=0.02),
         plant=FROZEN,
         updates=3010,
         during={3000: put_on_target},
@@ -213,7 +213,7 @@ COURSES = [
         goal(to(1.0, 2.1)),
         {11: 1.21, 12: 1.21, 13: 1.1, 50: 1.1},
         (12, GoalStatus.ABORTED, ErrorCode.PATH_TOLERANCE_VIOLATED, OFF_PATH),
-        parameters=constrained(trajectory=0.105),
+        parameters=constrain(trajectory=0.105),
         plant=FROZEN,
     ),
     Course(
@@ -221,7 +221,7 @@ COURSES = [
         goal(to(0.0, 2.1)),
         {1: 1.1, 2: 1.1, 50: 1.1},
         (1, GoalStatus.ABORTED, ErrorCode.PATH_TOLERANCE_VIOLATED, OFF_PATH),
-        parameters=constrained(trajectory=1e-4),
+        parameters=constrain(trajectory=1e-4),
         plant=FROZEN,
     ),
     Course(
@@ -287,7 +287,7 @@ COURSES = [
         goal(to(1.0, 2.1)),
         {11: 1.21, 12: 1.21, 13: 1.21, 50: 1.21},
         (12, GoalStatus.ABORTED, ErrorCode.PATH_TOLERANCE_VIOLATED, OFF_PATH),
-        parameters=constrained(trajectory=0.105),
+        parameters=constrain(trajectory=0.105),
         plant=FROZEN,
         deviations={"holds_command": True},
     ),

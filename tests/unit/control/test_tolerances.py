@@ -18,7 +18,7 @@ CONSTRAINTS = Constraints(goal_time=0.1, stopped_velocity_tolerance=0.1, joints=
 LOGGER = logging.getLogger("c")
 
 
-def resolved(path=(), goal=(), late_ns: int = 0) -> tuple[list[float], list[float], int]:
+def resolve(path=(), goal=(), late_ns: int = 0) -> tuple[list[float], list[float], int]:
     asked = TrajectoryGoal(Trajectory((), ()), path, goal, late_ns)
     found = goal_tolerances(asked, default_tolerances(CONSTRAINTS, JOINTS), JOINTS, logger=LOGGER)
     return found.path.tolist(), found.goal.tolist(), found.goal_time_ns
@@ -28,19 +28,19 @@ UNCHANGED = ([0.1, 0.1, 0.1], [0.1, 0.1, 0.1], seconds(0.1))
 
 
 def test_a_goal_without_tolerances_has_the_defaults() -> None:
-    assert resolved() == UNCHANGED
+    assert resolve() == UNCHANGED
 
 
 def test_positive_numbers_replace_in_any_order_of_joints() -> None:
     path = [JointTolerance("j3", 0.4), JointTolerance("j1", 0.2), JointTolerance("j2", 0.3)]
     goal = [JointTolerance("j2", 2.1, 0.5, 0.5), JointTolerance("j1", 1.1)]
-    assert resolved(path, goal, seconds(2)) == ([0.2, 0.3, 0.4], [1.1, 2.1, 0.1], seconds(2))
+    assert resolve(path, goal, seconds(2)) == ([0.2, 0.3, 0.4], [1.1, 2.1, 0.1], seconds(2))
 
 
 def test_minus_one_switches_off() -> None:
     off = [JointTolerance(joint, -1.0, -1.0, -1.0) for joint in JOINTS]
-    assert resolved(off, off, seconds(-1)) == ([0, 0, 0], [0, 0, 0], 0)
-    assert resolved([JointTolerance("j1", -1.0 + 1e-8)]) == ([0, 0.1, 0.1], *UNCHANGED[1:])
+    assert resolve(off, off, seconds(-1)) == ([0, 0, 0], [0, 0, 0], 0)
+    assert resolve([JointTolerance("j1", -1.0 + 1e-8)]) == ([0, 0.1, 0.1], *UNCHANGED[1:])
 
 
 ILLEGAL = [
@@ -56,7 +56,7 @@ ILLEGAL = [
 
 @pytest.mark.parametrize(("path", "goal", "late_ns"), ILLEGAL)
 def test_one_illegal_number_or_joint_brings_all_defaults_back(path, goal, late_ns, caplog) -> None:
-    assert resolved(path, goal, late_ns) == UNCHANGED
+    assert resolve(path, goal, late_ns) == UNCHANGED
     (record,) = caplog.records
     assert record.getMessage().endswith("Using default tolerances.")
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 from tests.unit.sweep.columns import in_columns
-from tests.unit.sweep.thrower import collected, configuration, throw
+from tests.unit.sweep.thrower import collect, configuration, throw
 
 from throwcollect.config.schema import Config
 from throwcollect.coordinator.growth import Growth
@@ -21,7 +21,7 @@ def config(trials: int | None = 150, landed: int | None = None) -> Config:
     return configuration(trials=trials, landed=landed, target=None, parameters=FAST)
 
 
-def ended(growth: Growth, trials: Trials) -> None:
+def tell_ends(growth: Growth, trials: Trials) -> None:
     for trial in trials:
         growth.tell(trial.number, ThrowResult(ThrowOutcome.RECAUGHT))
 
@@ -29,9 +29,9 @@ def ended(growth: Growth, trials: Trials) -> None:
 def test_a_round_is_drawn_and_checked_trial_by_trial_once_it_is_due() -> None:
     plan = make_plan(config(landed=100))
     growth = Growth(plan)
-    ended(growth, plan.trials[:63])
+    tell_ends(growth, plan.trials[:63])
     assert growth.step() is None
-    ended(growth, plan.trials[63:64])
+    tell_ends(growth, plan.trials[63:64])
     steps = [growth.step() for _ in range(1 + 22)]
     assert steps == [()] * 23
     assert not growth.over
@@ -46,7 +46,7 @@ def test_trials_of_later_rounds_are_refused_as_those_of_a_plan_made_at_once() ->
     whole = draw_plan(config(landed=100).model_copy(update={"until": None}), directory=Path())
     plan = make_plan(config(landed=100))
     growth = Growth(plan)
-    ended(growth, plan.trials)
+    tell_ends(growth, plan.trials)
     later: list[Trial] = []
     while (trials := growth.step()) is not None:
         later += trials
@@ -54,7 +54,7 @@ def test_trials_of_later_rounds_are_refused_as_those_of_a_plan_made_at_once() ->
     assert 0 < sum(trial.refused is not None for trial in later) < len(later)
 
 
-def resumed(settings: Config, trials: list[Trial], *, lost: Collection[int] = ()) -> Growth:
+def resume(settings: Config, trials: list[Trial], *, lost: Collection[int] = ()) -> Growth:
     """The growth of a plan that an earlier collection has left with the results of all its trials."""
     growth = Growth(Plan(settings, in_columns(trials)), lost=lost)
     for trial in trials:
@@ -76,15 +76,15 @@ def go_on(growth: Growth) -> list[Trial]:
 @pytest.mark.parametrize("rounds", [2, 3, 4, 6])
 def test_a_plan_that_has_rounds_already_goes_on_where_it_was(rounds: int) -> None:
     settings = configuration(trials=500)
-    growth = resumed(settings, collected(settings, rounds=rounds))
-    following = [trial.values for trial in collected(settings)[64 * rounds : 64 * (rounds + 1)]]
+    growth = resume(settings, collect(settings, rounds=rounds))
+    following = [trial.values for trial in collect(settings)[64 * rounds : 64 * (rounds + 1)]]
     assert [trial.values for trial in go_on(growth)] == following
     assert growth.take_wrong() is None
 
 
 def test_a_last_round_that_was_cut_short_is_completed() -> None:
-    growth = resumed(configuration(trials=500), collected(configuration(trials=330)))
-    following = [trial.values for trial in collected(configuration(trials=500))[330:384]]
+    growth = resume(configuration(trials=500), collect(configuration(trials=330)))
+    following = [trial.values for trial in collect(configuration(trials=500))[330:384]]
     assert [trial.values for trial in go_on(growth)] == following
     assert growth.take_wrong() is None
 
@@ -92,9 +92,9 @@ def test_a_last_round_that_was_cut_short_is_completed() -> None:
 def test_rounds_that_the_results_do_not_give_are_found_and_drawn_anew() -> None:
     settings = configuration(trials=500)
     lost = ThrowResult(ThrowOutcome.LOST)
-    planned = collected(settings, throw=lambda trial: lost if trial.number == 3 else throw(trial), rounds=6)
-    growth = resumed(settings, planned, lost=[3])
-    assert [trial.values for trial in go_on(growth)] == [trial.values for trial in collected(settings)[128:192]]
+    planned = collect(settings, throw=lambda trial: lost if trial.number == 3 else throw(trial), rounds=6)
+    growth = resume(settings, planned, lost=[3])
+    assert [trial.values for trial in go_on(growth)] == [trial.values for trial in collect(settings)[128:192]]
     assert growth.take_wrong() == (128, 256)
     assert growth.take_wrong() is None
 
@@ -102,7 +102,7 @@ def test_rounds_that_the_results_do_not_give_are_found_and_drawn_anew() -> None:
 def test_rounds_behind_the_end_are_found() -> None:
     settings = configuration(trials=None, target=None, landed=63)
     lost, landed = ThrowResult(ThrowOutcome.LOST), throw(make_plan(settings).trials[0])
-    planned = collected(settings, throw=lambda trial: lost if trial.number in (3, 4) else landed)
+    planned = collect(settings, throw=lambda trial: lost if trial.number in (3, 4) else landed)
     assert len(planned) == 192
     growth = Growth(Plan(settings, in_columns(planned)))
     for number in range(64):
@@ -115,7 +115,7 @@ def test_rounds_behind_the_end_are_found() -> None:
 
 def test_nothing_is_drawn_before_all_rounds_of_the_earlier_collection_are_confirmed() -> None:
     settings = configuration(trials=500)
-    planned = collected(settings, rounds=4)
+    planned = collect(settings, rounds=4)
     growth = Growth(Plan(settings, in_columns(planned)))
     for trial in planned[1:64]:
         growth.tell(trial.number, throw(trial))

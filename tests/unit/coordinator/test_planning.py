@@ -78,7 +78,7 @@ def test_whoever_wants_is_told_how_far_a_plan_is_and_can_give_it_up(tmp_path: Pa
 
 
 def test_users_are_warned_of_a_robot_in_the_ground(monkeypatch: pytest.MonkeyPatch) -> None:
-    def told(height_m: float) -> list[str]:
+    def list_warnings(height_m: float) -> list[str]:
         listener = Listener()
         config = Config.model_validate({**CONFIG, "trials": 1, "robot": {"base_height_m": height_m}})
         monkeypatch.setattr(prepare, "feasibility_check", lambda _: lambda _: None)
@@ -86,8 +86,8 @@ def test_users_are_warned_of_a_robot_in_the_ground(monkeypatch: pytest.MonkeyPat
         assert listener.said == []
         return listener.warnings
 
-    assert told(0.5) == [
+    assert list_warnings(0.5) == [
         "warning: robot.base_height_m: 0.5: leg_left_6_link is 0.52 m below the ground at the start; "
         "the robot stands on it at 1.020"
     ]
-    assert told(1.015) == told(1.5) == told(1.01927) == []
+    assert list_warnings(1.015) == list_warnings(1.5) == list_warnings(1.01927) == []

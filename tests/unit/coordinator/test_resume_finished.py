@@ -83,7 +83,7 @@ def contents(directory: Path) -> dict[str, bytes]:
     return {path.name: path.read_bytes() for path in directory.iterdir() if path.is_file() and path.name not in others}
 
 
-def deleted(path: Path) -> None:
+def delete(path: Path) -> None:
     path.unlink()
 
 
@@ -91,7 +91,7 @@ def cut(path: Path) -> None:
     path.write_bytes(path.read_bytes()[:-100])
 
 
-def flipped(path: Path) -> None:
+def flip_bit(path: Path) -> None:
     data = bytearray(path.read_bytes())
     data[len(data) - len(data) // 3] ^= 1
     path.write_bytes(data)
@@ -117,7 +117,7 @@ def test_the_configuration_of_an_earlier_version_stays_as_it_is(trials: Trials, 
 
 @pytest.mark.parametrize(
     ("damage", "check", "kept"),
-    [(deleted, False, {0, 1}), (cut, False, {0, 1, 2, 3}), (flipped, True, {0, 1, 2})],
+    [(delete, False, {0, 1}), (cut, False, {0, 1, 2, 3}), (flip_bit, True, {0, 1, 2})],
 )
 def test_a_damaged_recording_is_gone_on_with_to_the_same_bytes(
     trials: Trials, sound: Path, dataset: Path, damage: Callable[[Path], None], check: bool, kept: set[int]
@@ -132,7 +132,7 @@ def test_a_damaged_recording_is_gone_on_with_to_the_same_bytes(
 
 @pytest.mark.parametrize("name", ["throws.parquet", "plan.parquet"])
 def test_damaged_tables_are_written_again(trials: Trials, sound: Path, promised: Path, name: str) -> None:
-    flipped(promised / name)
+    flip_bit(promised / name)
     assert trials.go_on(promised, check=True)[0] == {*range(TRIALS)}
     assert contents(promised) == contents(sound)
 

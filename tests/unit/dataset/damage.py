@@ -17,7 +17,7 @@ FIRST = 3
 """First trial of that shard."""
 
 
-def stored(path: Path, trial: int) -> StoredEpisode:
+def find_stored(path: Path, trial: int) -> StoredEpisode:
     offset = pq.read_table(path.parent / "throws.parquet")["chunk_offset"].to_pylist()[trial]
     with open_mcap(path) as contents:
         return contents.episode(offset)

@@ -33,7 +33,7 @@ class KilledAt:
     def __enter__(self) -> KilledAt:
         self._originals = {name: getattr(os, name) for name in self.NAMES}
         for name, original in self._originals.items():
-            setattr(os, name, self._counted(name, original))
+            setattr(os, name, self._count(name, original))
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: object) -> bool:
@@ -41,7 +41,7 @@ class KilledAt:
             setattr(os, name, original)
         return kind is Killed
 
-    def _counted(self, name: str, original: Callable[..., Any]) -> Callable[..., Any]:
+    def _count(self, name: str, original: Callable[..., Any]) -> Callable[..., Any]:
         def call(*arguments: Any, **options: Any) -> Any:
             if self.died:
                 raise Killed
@@ -76,7 +76,7 @@ class KilledEverywhere:
     def __enter__(self) -> KilledEverywhere:
         self._patch = pytest.MonkeyPatch()
         for name in KilledAt.NAMES:
-            self._patch.setattr(os, name, self._copied(name, getattr(os, name)))
+            self._patch.setattr(os, name, self._copy_before(name, getattr(os, name)))
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -86,7 +86,7 @@ class KilledEverywhere:
         path = self._copies / str(len(self.left))
         self.left.append((Path(shutil.copytree(self._directory, path)), frozenset(self.appended)))
 
-    def _copied(self, name: str, original: Callable[..., Any]) -> Callable[..., Any]:
+    def _copy_before(self, name: str, original: Callable[..., Any]) -> Callable[..., Any]:
         def call(*arguments: Any, **options: Any) -> Any:
             if name != "write":
                 self.copy()

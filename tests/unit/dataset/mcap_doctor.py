@@ -45,7 +45,7 @@ def read(kind: type[Any], body: bytes) -> Any:
     return found
 
 
-def placed(data: bytes, start: int, end: int) -> Iterator[Placed]:
+def place_records(data: bytes, start: int, end: int) -> Iterator[Placed]:
     while start < end:
         opcode, length = struct.unpack_from("<BQ", data, start)
         assert start + 9 + length <= end, f"byte {start}: the record ends behind its section"
@@ -73,7 +73,7 @@ class Examination:
         assert self.data.startswith(MAGIC)
         assert self.data.endswith(MAGIC)
         end = len(self.data) - len(MAGIC)
-        every = list(placed(self.data, len(MAGIC), end))
+        every = list(place_records(self.data, len(MAGIC), end))
         assert [every[0].opcode, every[-1].opcode] == [Opcode.HEADER, Opcode.FOOTER]
         read(records.Header, every[0].body)
         (border,) = [number for number, record in enumerate(every) if record.opcode == Opcode.DATA_END]
@@ -125,7 +125,7 @@ class Examination:
         contents = zstandard.ZstdDecompressor().decompress(chunk.data, max_output_size=chunk.uncompressed_size)
         assert (len(contents), zlib.crc32(contents)) == (chunk.uncompressed_size, chunk.uncompressed_crc)
         stamps = []
-        for inner in placed(contents, 0, len(contents)):
+        for inner in place_records(contents, 0, len(contents)):
             if inner.opcode == Opcode.SCHEMA:
                 self._take_schema(read(records.Schema, inner.body))
                 continue

@@ -112,7 +112,7 @@ def outcomes(directory: Path, scratch: Path, name: str) -> list[Callable[[], Any
     return [lambda: list(scan_whole(directory / name)), *calls] if name.endswith(".mcap") else calls
 
 
-def drawn(source: random.Random) -> list[Mutation]:
+def draw_mutations(source: random.Random) -> list[Mutation]:
     count = source.choice((1, 1, 1, 2, 4))
     return [
         Mutation(source.choice(KINDS), source.random(), int(2 ** source.uniform(0, 12)), source.getrandbits(32))
@@ -137,7 +137,7 @@ def main(count: int, seed: int) -> int:
         names = sorted(path.name for path in original.iterdir() if path.name not in ("README.md", "provenance.json"))
         for number in range(seed, seed + count):
             source = random.Random(number)
-            name, mutations = source.choice(names), drawn(source)
+            name, mutations = source.choice(names), draw_mutations(source)
             directory = Path(shutil.copytree(original, Path(scratch) / "damaged"))
             (directory / name).write_bytes(mutate((original / name).read_bytes(), mutations))
             for call in outcomes(directory, Path(scratch), name):

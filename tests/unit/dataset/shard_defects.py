@@ -11,7 +11,7 @@ from pathlib import Path
 import zstandard
 from mcap.opcode import Opcode
 from tests.unit.dataset.conftest import Collection
-from tests.unit.dataset.damage import SHARD, flip, record_of, stored
+from tests.unit.dataset.damage import SHARD, find_stored, flip, record_of
 
 from throwcollect.config.loader import load
 from throwcollect.dataset.mcap_file import McapFile, episode_run
@@ -23,106 +23,106 @@ from throwcollect.robots.description import full_description
 from throwcollect.robots.talos import TALOS
 
 
-def chunk_contents(directory: Path) -> None:
-    flip(directory / SHARD, stored(directory / SHARD, 4).offset + 2000)
+def damage_chunk_contents(directory: Path) -> None:
+    flip(directory / SHARD, find_stored(directory / SHARD, 4).offset + 2000)
 
 
-def chunk_crc(directory: Path) -> None:
-    flip(directory / SHARD, stored(directory / SHARD, 4).offset + 9 + 24)
+def damage_chunk_crc(directory: Path) -> None:
+    flip(directory / SHARD, find_stored(directory / SHARD, 4).offset + 9 + 24)
 
 
-def chunk_end_time(directory: Path) -> None:
-    flip(directory / SHARD, stored(directory / SHARD, 4).offset + 9 + 8)
+def change_chunk_end_time(directory: Path) -> None:
+    flip(directory / SHARD, find_stored(directory / SHARD, 4).offset + 9 + 8)
 
 
-def message_index(directory: Path) -> None:
-    flip(directory / SHARD, stored(directory / SHARD, 5).chunks[0].indexes[4].offset + 200)
+def damage_message_index(directory: Path) -> None:
+    flip(directory / SHARD, find_stored(directory / SHARD, 5).chunks[0].indexes[4].offset + 200)
 
 
-def stored_digest(directory: Path) -> None:
-    facts = stored(directory / SHARD, 3).facts
+def change_stored_digest(directory: Path) -> None:
+    facts = find_stored(directory / SHARD, 3).facts
     flip(directory / SHARD, facts.offset + facts.data.index(b"digest") + 12)
 
 
-def records_hash(directory: Path) -> None:
-    facts = stored(directory / SHARD, 3).facts
+def change_records_hash(directory: Path) -> None:
+    facts = find_stored(directory / SHARD, 3).facts
     place = facts.offset + facts.data.index(b"records_sha256") + len(b"records_sha256") + 4
     data = bytearray((directory / SHARD).read_bytes())
     data[place] = ord("0") if data[place] != ord("0") else ord("1")
     (directory / SHARD).write_bytes(data)
 
 
-def header_contact(directory: Path) -> None:
-    facts = stored(directory / SHARD, 3).facts
+def change_header_contact(directory: Path) -> None:
+    facts = find_stored(directory / SHARD, 3).facts
     # The contact ends 1 ns later: valid, but not what was hashed.
     flip(directory / SHARD, facts.offset + facts.data.index(b'"end_ns":64400000000') + len('"end_ns":64400000000') - 1)
 
 
-def torn(directory: Path) -> None:
+def tear_file(directory: Path) -> None:
     data = (directory / SHARD).read_bytes()
     (directory / SHARD).write_bytes(data[: len(data) * 2 // 3])
 
 
-def missing_footer(directory: Path) -> None:
+def cut_footer(directory: Path) -> None:
     footer = record_of(directory / SHARD, Opcode.FOOTER)
     (directory / SHARD).write_bytes((directory / SHARD).read_bytes()[: footer.offset])
 
 
-def trailing_bytes(directory: Path) -> None:
+def append_bytes(directory: Path) -> None:
     data = (directory / SHARD).read_bytes()
     (directory / SHARD).write_bytes(data + data[-8:])
 
 
-def statistics(directory: Path) -> None:
+def change_statistics(directory: Path) -> None:
     flip(directory / SHARD, record_of(directory / SHARD, Opcode.STATISTICS).offset + 9)
 
 
-def chunk_index(directory: Path) -> None:
+def change_chunk_index(directory: Path) -> None:
     flip(directory / SHARD, record_of(directory / SHARD, Opcode.CHUNK_INDEX, last=True).offset + 9 + 16)
 
 
-def footer_crc(directory: Path) -> None:
+def change_footer_crc(directory: Path) -> None:
     flip(directory / SHARD, record_of(directory / SHARD, Opcode.FOOTER).offset + 9 + 16)
 
 
-def data_crc(directory: Path) -> None:
+def change_data_crc(directory: Path) -> None:
     flip(directory / SHARD, record_of(directory / SHARD, Opcode.DATA_END).offset + 9)
 
 
-def profile(directory: Path) -> None:
+def change_profile(directory: Path) -> None:
     flip(directory / SHARD, record_of(directory / SHARD, Opcode.HEADER).offset + 9 + 4)
 
 
-def channel_qos(directory: Path) -> None:
+def change_channel_qos(directory: Path) -> None:
     channel = record_of(directory / SHARD, Opcode.CHANNEL, holding=b"/ball/odometry")
     flip(directory / SHARD, channel.offset + channel.data.index(b"depth: 10") + 8)
 
 
-def schema_name(directory: Path) -> None:
+def change_schema_name(directory: Path) -> None:
     schema = record_of(directory / SHARD, Opcode.SCHEMA)
     flip(directory / SHARD, schema.offset + 9 + 2 + 4, bit=0x20)
 
 
-def bag_copy(directory: Path) -> None:
+def change_bag_copy(directory: Path) -> None:
     copy = record_of(directory / SHARD, Opcode.METADATA, holding=b"serialized_metadata")
     flip(directory / SHARD, copy.offset + copy.data.index(b"version: 9") + 9)
 
 
-def shard_gone(directory: Path) -> None:
+def delete_shard(directory: Path) -> None:
     (directory / SHARD).unlink()
 
 
-def shards_swapped(directory: Path) -> None:
+def swap_shards(directory: Path) -> None:
     one, other = (directory / "quick_00000.mcap").read_bytes(), (directory / SHARD).read_bytes()
     (directory / "quick_00000.mcap").write_bytes(other)
     (directory / SHARD).write_bytes(one)
 
 
-def open_shard_left(directory: Path) -> None:
+def leave_open_shard(directory: Path) -> None:
     (directory / "quick_00003.mcap.part").write_bytes(b"")
 
 
-def written(path: Path, episodes: list[Episode]) -> None:
+def write_shard(path: Path, episodes: list[Episode]) -> None:
     """A file of these episodes, in which everything fits."""
     config = load(path.parent / "config.yaml")
     with path.open("wb") as file:
@@ -132,110 +132,110 @@ def written(path: Path, episodes: list[Episode]) -> None:
         mcap.finish(path.name)
 
 
-def episodes_of(directory: Path) -> list[Episode]:
-    return [stored(directory / SHARD, trial).episode for trial in (3, 4, 5)]
+def read_episodes(directory: Path) -> list[Episode]:
+    return [find_stored(directory / SHARD, trial).episode for trial in (3, 4, 5)]
 
 
-def duplicate_episode(directory: Path) -> None:
-    first, second, third = episodes_of(directory)
-    written(directory / SHARD, [first, second, second, third])
+def repeat_episode(directory: Path) -> None:
+    first, second, third = read_episodes(directory)
+    write_shard(directory / SHARD, [first, second, second, third])
 
 
-def episodes_in_another_order(directory: Path) -> None:
-    first, second, third = episodes_of(directory)
-    written(directory / SHARD, [first, third, second])
+def reorder_episodes(directory: Path) -> None:
+    first, second, third = read_episodes(directory)
+    write_shard(directory / SHARD, [first, third, second])
 
 
-def episode_missing(directory: Path) -> None:
-    first, _, third = episodes_of(directory)
-    written(directory / SHARD, [first, third])
+def leave_out_episode(directory: Path) -> None:
+    first, _, third = read_episodes(directory)
+    write_shard(directory / SHARD, [first, third])
 
 
-def episode_of_another_shard(directory: Path) -> None:
-    first, second, _ = episodes_of(directory)
-    written(directory / SHARD, [first, second, stored(directory / "quick_00000.mcap", 1).episode])
+def take_episode_of_another_shard(directory: Path) -> None:
+    first, second, _ = read_episodes(directory)
+    write_shard(directory / SHARD, [first, second, find_stored(directory / "quick_00000.mcap", 1).episode])
 
 
-def episode_of_another_dataset(directory: Path) -> None:
-    first, second, third = episodes_of(directory)
+def take_episode_of_another_dataset(directory: Path) -> None:
+    first, second, third = read_episodes(directory)
     other = Collection({"ball": {"mass_kg": 0.1}, "seed": 1}).episode(4)
     assert other.digest != second.digest
-    written(directory / SHARD, [first, other, third])
+    write_shard(directory / SHARD, [first, other, third])
 
 
-def altered_with_all_hashes_made_to_fit(directory: Path) -> None:
-    first, second, third = episodes_of(directory)
+def change_sample_and_all_hashes(directory: Path) -> None:
+    first, second, third = read_episodes(directory)
     contents = bytearray(second.chunk.decompress())
     contents[31 + joint_states(TALOS.joints).layout.dtype.fields["position"][1] + 6] ^= 1
     data = zstandard.ZstdCompressor(level=1).compress(bytes(contents))
     chunk = replace(second.chunk, data=data, crc=zlib.crc32(contents))
-    written(
+    write_shard(
         directory / SHARD,
         [first, Episode(second.header, RecordedChunk(chunk, hashlib.sha256(contents).hexdigest())), third],
     )
 
 
-def schema_text(directory: Path) -> None:
+def change_schema_text(directory: Path) -> None:
     schema = record_of(directory / SHARD, Opcode.SCHEMA, holding=b"nav_msgs/msg/Odometry")
     flip(directory / SHARD, schema.end - 40)
 
 
-def schema_length(directory: Path) -> None:
+def change_schema_length(directory: Path) -> None:
     schema = record_of(directory / SHARD, Opcode.SCHEMA, holding=b"nav_msgs/msg/Odometry")
     flip(directory / SHARD, schema.offset + 2)
 
 
-def first_magic(directory: Path) -> None:
+def change_first_magic(directory: Path) -> None:
     flip(directory / SHARD, 3)
 
 
-def last_magic(directory: Path) -> None:
+def change_last_magic(directory: Path) -> None:
     flip(directory / SHARD, (directory / SHARD).stat().st_size - 3)
 
 
-def latched_chunk(directory: Path) -> None:
+def damage_latched_chunk(directory: Path) -> None:
     flip(directory / SHARD, record_of(directory / SHARD, Opcode.CHUNK).end - 500)
 
 
-def latched_index(directory: Path) -> None:
+def damage_latched_index(directory: Path) -> None:
     flip(directory / SHARD, record_of(directory / SHARD, Opcode.MESSAGE_INDEX).offset + 15)
 
 
-def chunk_opcode(directory: Path) -> None:
-    flip(directory / SHARD, stored(directory / SHARD, 4).offset, bit=0x10)
+def change_chunk_opcode(directory: Path) -> None:
+    flip(directory / SHARD, find_stored(directory / SHARD, 4).offset, bit=0x10)
 
 
-def chunk_length(directory: Path) -> None:
-    flip(directory / SHARD, stored(directory / SHARD, 4).offset + 2)
+def change_chunk_length(directory: Path) -> None:
+    flip(directory / SHARD, find_stored(directory / SHARD, 4).offset + 2)
 
 
-def index_length(directory: Path) -> None:
-    flip(directory / SHARD, stored(directory / SHARD, 4).chunks[0].indexes[4].offset + 2)
+def change_index_length(directory: Path) -> None:
+    flip(directory / SHARD, find_stored(directory / SHARD, 4).chunks[0].indexes[4].offset + 2)
 
 
-def metadata_name(directory: Path) -> None:
-    flip(directory / SHARD, stored(directory / SHARD, 4).facts.offset + 9 + 4)
+def change_metadata_name(directory: Path) -> None:
+    flip(directory / SHARD, find_stored(directory / SHARD, 4).facts.offset + 9 + 4)
 
 
-def metadata_length(directory: Path) -> None:
-    flip(directory / SHARD, stored(directory / SHARD, 5).facts.offset + 1)
+def change_metadata_length(directory: Path) -> None:
+    flip(directory / SHARD, find_stored(directory / SHARD, 5).facts.offset + 1)
 
 
-def header_json(directory: Path) -> None:
-    facts = stored(directory / SHARD, 4).facts
+def damage_header_json(directory: Path) -> None:
+    facts = find_stored(directory / SHARD, 4).facts
     flip(directory / SHARD, facts.offset + facts.data.index(b'{"trial"'))
 
 
-def zeroed_sector(directory: Path) -> None:
+def zero_sector(directory: Path) -> None:
     data = bytearray((directory / SHARD).read_bytes())
-    start = stored(directory / SHARD, 4).chunks[0].indexes[3].offset - 100
+    start = find_stored(directory / SHARD, 4).chunks[0].indexes[3].offset - 100
     data[start : start + 512] = bytes(512)
     (directory / SHARD).write_bytes(data)
 
 
-def bytes_inserted(directory: Path) -> None:
+def insert_bytes(directory: Path) -> None:
     data = (directory / SHARD).read_bytes()
-    place = stored(directory / SHARD, 4).facts.end
+    place = find_stored(directory / SHARD, 4).facts.end
     (directory / SHARD).write_bytes(data[:place] + b"between" + data[place:])
 
 
@@ -244,96 +244,96 @@ def cut_in_the_header(directory: Path) -> None:
 
 
 def cut_in_the_first_episode(directory: Path) -> None:
-    end = stored(directory / SHARD, 3).chunks[0].record.end
+    end = find_stored(directory / SHARD, 3).chunks[0].record.end
     (directory / SHARD).write_bytes((directory / SHARD).read_bytes()[: end - 100])
 
 
 def cut_after_an_episode(directory: Path) -> None:
-    end = stored(directory / SHARD, 4).facts.end
+    end = find_stored(directory / SHARD, 4).facts.end
     (directory / SHARD).write_bytes((directory / SHARD).read_bytes()[:end])
 
 
-def emptied(directory: Path) -> None:
+def empty_shard(directory: Path) -> None:
     (directory / SHARD).write_bytes(b"")
 
 
-def a_directory_instead(directory: Path) -> None:
+def replace_by_directory(directory: Path) -> None:
     (directory / SHARD).unlink()
     (directory / SHARD).mkdir()
 
 
-def summary_record_missing(directory: Path) -> None:
+def leave_out_summary_record(directory: Path) -> None:
     path = directory / SHARD
     index = record_of(path, Opcode.CHUNK_INDEX, last=True)
     data = path.read_bytes()
     path.write_bytes(data[: index.offset] + data[index.end :])
 
 
-def extra_shard(directory: Path) -> None:
+def add_shard(directory: Path) -> None:
     (directory / "quick_00003.mcap").write_bytes((directory / SHARD).read_bytes())
 
 
 SHARD_DEFECTS: dict[Callable[[Path], None], tuple[str, str, str]] = {
-    chunk_contents: (SHARD, "trial 4", "cannot be decompressed|CRC differs"),
-    chunk_crc: (SHARD, "trial 4", "CRC differs"),
-    chunk_end_time: (SHARD, "trial 4", "times differ"),
-    message_index: (SHARD, "trial 5", "message indexes"),
-    records_hash: (SHARD, "trial 3", "SHA-256 of its records is"),
-    stored_digest: (SHARD, "trial 3", "metadata at byte"),
-    header_contact: (SHARD, "trial 3", "metadata at byte"),
-    torn: (SHARD, "", "cut off|beyond the end"),
-    missing_footer: (SHARD, "summary", "a footer is missing"),
-    trailing_bytes: (SHARD, "", "its records have"),
-    statistics: (SHARD, "byte", "statistics does not fit"),
-    chunk_index: (SHARD, "byte", "chunk_index does not fit"),
-    footer_crc: (SHARD, "byte", "footer does not fit"),
-    data_crc: (SHARD, "byte", "CRC of the data section"),
-    profile: (SHARD, "byte", "profile ros2"),
-    channel_qos: (SHARD, "channels", "/ball/odometry"),
-    schema_name: (SHARD, "schemas", "std_msgs/msg/String is another one"),
-    bag_copy: (SHARD, "byte", "copy of the bag's metadata"),
-    shard_gone: (SHARD, "", "cannot be read"),
-    shards_swapped: (SHARD, "trial 0", "does not place here"),
-    open_shard_left: ("quick_00003.mcap.part", "", "not written to its end"),
-    duplicate_episode: (SHARD, "trial 4", r"byte \d+: the file has an episode of this trial already, at byte \d+"),
-    episodes_in_another_order: (SHARD, "trial 4", "comes after trial 5"),
-    episode_missing: (SHARD, "trial 4", "the file has no whole one"),
-    episode_of_another_shard: (SHARD, "trial 1", "does not place here"),
-    episode_of_another_dataset: (SHARD, "trial 4", "throws.parquet has .* more columns differ"),
-    altered_with_all_hashes_made_to_fit: (SHARD, "trial 4", "throws.parquet has digest"),
-    schema_text: (SHARD, "schemas", "nav_msgs/msg/Odometry is another one"),
-    schema_length: (SHARD, "byte", "beyond the end"),
-    first_magic: (SHARD, "byte 0", "does not begin as an MCAP file does"),
-    last_magic: (SHARD, "byte", "does not end as an MCAP file does"),
-    latched_chunk: (SHARD, "byte", "latched topics: chunk: "),
-    latched_index: (SHARD, "byte", "message indexes of the latched topics"),
-    chunk_opcode: (SHARD, "byte", r"a record 0x16 where .*; the next episode is at byte \d+$"),
-    chunk_length: (SHARD, "byte", r"the next episode is at byte \d+$"),
-    index_length: (SHARD, "byte", r"the next episode is at byte \d+$"),
-    metadata_name: (SHARD, "byte", "where the metadata of an episode should be"),
-    metadata_length: (SHARD, "", "metadata record is not readable|metadata at byte .* do not fit"),
-    header_json: (SHARD, "byte", "episode header: .* Invalid JSON"),
-    zeroed_sector: (SHARD, "byte", "a record 0x00 where"),
-    bytes_inserted: (SHARD, "byte", "beyond the end"),
+    damage_chunk_contents: (SHARD, "trial 4", "cannot be decompressed|CRC differs"),
+    damage_chunk_crc: (SHARD, "trial 4", "CRC differs"),
+    change_chunk_end_time: (SHARD, "trial 4", "times differ"),
+    damage_message_index: (SHARD, "trial 5", "message indexes"),
+    change_records_hash: (SHARD, "trial 3", "SHA-256 of its records is"),
+    change_stored_digest: (SHARD, "trial 3", "metadata at byte"),
+    change_header_contact: (SHARD, "trial 3", "metadata at byte"),
+    tear_file: (SHARD, "", "cut off|beyond the end"),
+    cut_footer: (SHARD, "summary", "a footer is missing"),
+    append_bytes: (SHARD, "", "its records have"),
+    change_statistics: (SHARD, "byte", "statistics does not fit"),
+    change_chunk_index: (SHARD, "byte", "chunk_index does not fit"),
+    change_footer_crc: (SHARD, "byte", "footer does not fit"),
+    change_data_crc: (SHARD, "byte", "CRC of the data section"),
+    change_profile: (SHARD, "byte", "profile ros2"),
+    change_channel_qos: (SHARD, "channels", "/ball/odometry"),
+    change_schema_name: (SHARD, "schemas", "std_msgs/msg/String is another one"),
+    change_bag_copy: (SHARD, "byte", "copy of the bag's metadata"),
+    delete_shard: (SHARD, "", "cannot be read"),
+    swap_shards: (SHARD, "trial 0", "does not place here"),
+    leave_open_shard: ("quick_00003.mcap.part", "", "not written to its end"),
+    repeat_episode: (SHARD, "trial 4", r"byte \d+: the file has an episode of this trial already, at byte \d+"),
+    reorder_episodes: (SHARD, "trial 4", "comes after trial 5"),
+    leave_out_episode: (SHARD, "trial 4", "the file has no whole one"),
+    take_episode_of_another_shard: (SHARD, "trial 1", "does not place here"),
+    take_episode_of_another_dataset: (SHARD, "trial 4", "throws.parquet has .* more columns differ"),
+    change_sample_and_all_hashes: (SHARD, "trial 4", "throws.parquet has digest"),
+    change_schema_text: (SHARD, "schemas", "nav_msgs/msg/Odometry is another one"),
+    change_schema_length: (SHARD, "byte", "beyond the end"),
+    change_first_magic: (SHARD, "byte 0", "does not begin as an MCAP file does"),
+    change_last_magic: (SHARD, "byte", "does not end as an MCAP file does"),
+    damage_latched_chunk: (SHARD, "byte", "latched topics: chunk: "),
+    damage_latched_index: (SHARD, "byte", "message indexes of the latched topics"),
+    change_chunk_opcode: (SHARD, "byte", r"a record 0x16 where .*; the next episode is at byte \d+$"),
+    change_chunk_length: (SHARD, "byte", r"the next episode is at byte \d+$"),
+    change_index_length: (SHARD, "byte", r"the next episode is at byte \d+$"),
+    change_metadata_name: (SHARD, "byte", "where the metadata of an episode should be"),
+    change_metadata_length: (SHARD, "", "metadata record is not readable|metadata at byte .* do not fit"),
+    damage_header_json: (SHARD, "byte", "episode header: .* Invalid JSON"),
+    zero_sector: (SHARD, "byte", "a record 0x00 where"),
+    insert_bytes: (SHARD, "byte", "beyond the end"),
     cut_in_the_header: (SHARD, "byte 8", "cut off"),
     cut_in_the_first_episode: (SHARD, "byte", "beyond the end"),
     cut_after_an_episode: (SHARD, "byte", "cut off"),
-    emptied: (SHARD, "", "has 0 bytes"),
-    a_directory_instead: (SHARD, "", "not a file"),
-    summary_record_missing: (SHARD, "byte", "a metadata_index where a chunk_index should be"),
-    extra_shard: ("quick_00003.mcap", "", "no row of throws"),
+    empty_shard: (SHARD, "", "has 0 bytes"),
+    replace_by_directory: (SHARD, "", "not a file"),
+    leave_out_summary_record: (SHARD, "byte", "a metadata_index where a chunk_index should be"),
+    add_shard: ("quick_00003.mcap", "", "no row of throws"),
 }
 """File, place and problem that are to be named."""
 
 
 SHARD_CONSEQUENCES: dict[Callable[[Path], None], tuple[str, ...]] = {
-    records_hash: ("metadata.yaml",),
-    header_contact: ("metadata.yaml",),
-    duplicate_episode: ("metadata.yaml",),
-    episode_missing: ("metadata.yaml",),
-    episode_of_another_shard: ("metadata.yaml",),
-    episode_of_another_dataset: ("metadata.yaml",),
-    altered_with_all_hashes_made_to_fit: ("metadata.yaml",),
-    shards_swapped: ("quick_00000.mcap", "metadata.yaml"),
+    change_records_hash: ("metadata.yaml",),
+    change_header_contact: ("metadata.yaml",),
+    repeat_episode: ("metadata.yaml",),
+    leave_out_episode: ("metadata.yaml",),
+    take_episode_of_another_shard: ("metadata.yaml",),
+    take_episode_of_another_dataset: ("metadata.yaml",),
+    change_sample_and_all_hashes: ("metadata.yaml",),
+    swap_shards: ("quick_00000.mcap", "metadata.yaml"),
 }
 """Other files that a defect contradicts."""

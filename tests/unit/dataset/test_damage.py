@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from tests.unit.dataset.shard_defects import chunk_contents
+from tests.unit.dataset.shard_defects import damage_chunk_contents
 
 from throwcollect.dataset.reader import Dataset
 from throwcollect.derive.selection import merge
@@ -31,7 +31,7 @@ READERS: dict[str, Callable[[Path], object]] = {
 
 @pytest.mark.parametrize("reader", READERS)
 def test_damage_is_located(reader: str, dataset: Path) -> None:
-    chunk_contents(dataset)
+    damage_chunk_contents(dataset)
     with pytest.raises(DatasetError, match=rf"^{dataset}: trial 4: chunk: ") as found:
         READERS[reader](dataset)
     assert found.value.hint == f"throwcollect dataset verify {dataset}"

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from tests.unit.dataset.conftest import SETTINGS, Change, Collection, throw
-from tests.unit.dataset.damage import flip, stored
+from tests.unit.dataset.damage import find_stored, flip
 
 from throwcollect.config.schema import Config
 from throwcollect.coordinator.prepare import draw_plan, feasibility_check
@@ -86,7 +86,7 @@ def with_goal(**changes: Any) -> Forgery:
     return in_header(goals=lambda header: (replace(header.goals[0], **changes), *header.goals[1:]))
 
 
-def released(by_s: float) -> Forgery:
+def end_contact_later(by_s: float) -> Forgery:
     """The contact with the spoon ends later."""
     return in_header(
         contacts=lambda header: tuple(
@@ -95,19 +95,19 @@ def released(by_s: float) -> Forgery:
     )
 
 
-def swapped(_: Samples, header: EpisodeHeader) -> tuple[Samples, EpisodeHeader]:
+def swap_trials(_: Samples, header: EpisodeHeader) -> tuple[Samples, EpisodeHeader]:
     """The recording of another trial, moved into this one's slot of time."""
     plan = Collection().plan
     return throw(plan.config_of(plan.trials[4]), header.trial)
 
 
-def turned(samples: Samples, header: EpisodeHeader) -> tuple[Samples, EpisodeHeader]:
+def turn_ball(samples: Samples, header: EpisodeHeader) -> tuple[Samples, EpisodeHeader]:
     orientation = samples.ball_orientation_xyzw.copy()
     orientation[FLIGHT:] = orientation[FLIGHT:][:, [1, 0, 3, 2]]
     return replace(samples, ball_orientation_xyzw=orientation), header
 
 
-def succeeded_at_once(samples: Samples, header: EpisodeHeader) -> tuple[Samples, EpisodeHeader]:
+def end_goals_at_once(samples: Samples, header: EpisodeHeader) -> tuple[Samples, EpisodeHeader]:
     goals = tuple(replace(goal, status=4) for goal in header.goals)
     return samples[:40], replace(header, samples=40, goals=goals)
 
@@ -122,7 +122,7 @@ FORGERIES: dict[str, tuple[Forgery, str]] = {
     "cut as rest in flight": (cut("rest"), "ended as rest, but the ball moved at"),
     "cut as rest at the start": (cut("rest", slice(90)), "ended as rest, but the arm moved until"),
     "another end": (in_header(end_reason=lambda _: "timeout"), "although the ball crossed the landing plane"),
-    "swapped trials": (swapped, "departs from the trajectory of the trial by"),
+    "swapped trials": (swap_trials, "departs from the trajectory of the trial by"),
     "other start": (in_samples("position", slice(0, 3), ELBOW, lambda was: was + 0.1), "rad away from the start"),
     "other motion": (in_samples("position", slice(50, 60), ELBOW, lambda was: was + 0.1), "although its torque is"),
     "locked joint moves": (in_samples("position", 50, LOCKED, lambda was: was + 1e-9), "head_1_joint is locked at"),
@@ -134,8 +134,11 @@ FORGERIES: dict[str, tuple[Forgery, str]] = {
     "locked joint has torque": (in_samples("effort", 50, LOCKED, lambda _: 1e-9), "head_1_joint is locked, and"),
     "too much torque": (in_samples("effort", 50, ELBOW, lambda _: 1e3), "of the most that its motor has"),
     "dropped contact": (in_header(contacts=lambda _: ()), "departs from ballistic motion .* where no contact is"),
-    "contact that ends too early": (released(-0.1), "velocity departs from ballistic motion"),
-    "contact that ends too late": (released(0.1), "contact with 'spoon' at 0.000 s: the ball moves as if nothing"),
+    "contact that ends too early": (end_contact_later(-0.1), "velocity departs from ballistic motion"),
+    "contact that ends too late": (
+        end_contact_later(0.1),
+        "contact with 'spoon' at 0.000 s: the ball moves as if nothing",
+    ),
     "invented contact": (with_contact("arm_right_4_link", 0.6, 0.602), "the ball moves as if nothing touched it"),
     "invented lasting contact": (with_contact("torso_2_link", 0.6, None), "the ball moves as if nothing"),
     "unknown body": (with_contact("wall", 0.6, 0.602), "'wall' at 0.600 s: no such body"),
@@ -154,14 +157,14 @@ FORGERIES: dict[str, tuple[Forgery, str]] = {
         "velocity departs from ballistic motion by 1e-06 m/s",
     ),
     "all velocities": (in_samples("ball_linear_velocity", slice(None), 0, lambda was: was + 1e-6), "position departs"),
-    "orientation in flight": (turned, "orientation departs from ballistic motion"),
+    "orientation in flight": (turn_ball, "orientation departs from ballistic motion"),
     "spin in flight": (in_samples("ball_angular_velocity", FLIGHT, 2, lambda _: 1e-6), "spin departs"),
     "no unit quaternion": (in_samples("ball_orientation_xyzw", FLIGHT, 3, lambda was: was + 1e-6), "no unit"),
     "goal of another controller": (with_goal(controller="head_controller"), "the trajectory is sent to"),
     "goal with an unknown status": (with_goal(status=3), "has the unknown status 3"),
     "goal with an unknown error": (with_goal(error_code=-17, status=6), "has the unknown error code -17"),
     "goal that succeeded with an error": (with_goal(error_code=-4, status=4), "an error code all the same"),
-    "goal that succeeded too early": (succeeded_at_once, "before its trajectory"),
+    "goal that succeeded too early": (end_goals_at_once, "before its trajectory"),
 }
 
 
@@ -181,13 +184,13 @@ def problems(collection: Collection, forge: Change | None) -> Iterator[str]:
 
 def test_verify_names_the_trial(collection: Collection, tmp_path: Path) -> None:
     def change(samples: Samples, header: EpisodeHeader) -> tuple[Samples, EpisodeHeader]:
-        return swapped(samples, header) if header.trial == FORGED else (samples, header)
+        return swap_trials(samples, header) if header.trial == FORGED else (samples, header)
 
     (finding,) = verify(collection.collect(tmp_path / "dataset", change=change))
     assert str(finding).startswith("quick_00000.mcap: trial 2: arm_right_4_joint departs from the trajectory")
 
 
-def forged_at_once(samples: Samples, header: EpisodeHeader) -> tuple[Samples, EpisodeHeader]:
+def forge_some(samples: Samples, header: EpisodeHeader) -> tuple[Samples, EpisodeHeader]:
     """Forge some trials, each so that another step of the check finds it."""
     forgeries = {
         0: FORGERIES["infinite position"],
@@ -206,17 +209,17 @@ def test_of_many_forged_episodes_each_is_reported_as_if_it_were_alone(tmp_path: 
     expected = [
         (f"trial {trial}", problem)
         for trial in range(7)
-        for problem in alone.find_content_problems(collection.episode(trial, forged_at_once), channels)
+        for problem in alone.find_content_problems(collection.episode(trial, forge_some), channels)
     ]
     assert list(dict.fromkeys(place for place, _ in expected)) == ["trial 0", "trial 2", "trial 3", "trial 5"]
-    path = collection.collect(tmp_path / "dataset", change=forged_at_once)
+    path = collection.collect(tmp_path / "dataset", change=forge_some)
     assert [(each.place, each.problem) for each in verify(path)] == expected
 
 
 def test_damage_between_forged_episodes_is_reported_between_their_problems(tmp_path: Path) -> None:
     collection = Collection({"record": {"trials_per_shard": 10}})
-    path = collection.collect(tmp_path / "dataset", change=forged_at_once) / "quick_00000.mcap"
-    start = stored(path, 1).offset
+    path = collection.collect(tmp_path / "dataset", change=forge_some) / "quick_00000.mcap"
+    start = find_stored(path, 1).offset
     flip(path, start)
     report = check_shard(path, collection.config, range(7), EpisodeCheck(collection.plan, {}).find_problems)
     places = list(dict.fromkeys(finding.place for finding in report.findings))
@@ -228,7 +231,7 @@ def test_an_error_while_a_file_is_checked_is_reported_after_the_problems_found_b
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     collection = Collection({"record": {"trials_per_shard": 10}})
-    path = collection.collect(tmp_path / "dataset", change=forged_at_once) / "quick_00000.mcap"
+    path = collection.collect(tmp_path / "dataset", change=forge_some) / "quick_00000.mcap"
 
     def plan_motion(config: Config) -> JointTrajectory:
         if config.task.duration_s == collection.plan.trial(3).values["task.duration_s"]:
@@ -242,7 +245,7 @@ def test_an_error_while_a_file_is_checked_is_reported_after_the_problems_found_b
     assert sorted(report.digests) == [0, 1, 2]
 
 
-def replanned(plan: Plan, points: Points, *, seed: int | None = None) -> Plan:
+def draw_other_plan(plan: Plan, points: Points, *, seed: int | None = None) -> Plan:
     """A plan of other points, or of the seeds of another configuration, in which digests and hashes fit."""
     seeds = plan.config if seed is None else plan.config.model_copy(update={"seed": seed})
     drawn = make_trials(seeds, points).seeds
@@ -252,14 +255,14 @@ def replanned(plan: Plan, points: Points, *, seed: int | None = None) -> Plan:
 def test_a_plan_that_the_configuration_does_not_draw_is_found(collection: Collection, tmp_path: Path) -> None:
     points = draw_points(collection.config, directory=tmp_path)
     points.values[5] = 0.9
-    collection.plan = replanned(collection.plan, points)
+    collection.plan = draw_other_plan(collection.plan, points)
     (finding,) = verify(collection.collect(tmp_path / "dataset"))
     assert str(finding).startswith("plan.parquet: trial 5: has task.duration_s = 0.9, the configuration draws")
 
 
 def test_seeds_that_the_configuration_does_not_give_are_found(collection: Collection, tmp_path: Path) -> None:
     points = draw_points(collection.config, directory=tmp_path)
-    plan = replanned(collection.plan, points, seed=8)
+    plan = draw_other_plan(collection.plan, points, seed=8)
     found = list(find_drawing_problems(tmp_path, plan, None))
     assert len(found) == len(plan.trials)
     assert "has seed" in found[0].problem

@@ -59,7 +59,7 @@ def classes(directory: Path) -> Iterator[tuple[str, str, list[range]]]:
     yield from ((f"MCAP {kind}", shard, places) for kind, places in kinds.items())
 
 
-def flipped(data: bytes, byte: int, bit: int) -> bytes:
+def flip_bit(data: bytes, byte: int, bit: int) -> bytes:
     changed = bytearray(data)
     changed[byte] ^= 1 << bit
     return bytes(changed)
@@ -73,7 +73,7 @@ def test_every_flipped_bit_is_seen(derived: Path, tmp_path: Path) -> None:
         whole = (directory / name).read_bytes()
         for number in range(FLIPS_PER_CLASS):
             byte = source.choice(source.choice(places))
-            (directory / name).write_bytes(flipped(whole, byte, source.randrange(8)))
+            (directory / name).write_bytes(flip_bit(whole, byte, source.randrange(8)))
             flips += 1
             assert any(find_manifest_problems(directory, "quick")), (kind, byte)
             if not number:
@@ -89,7 +89,7 @@ def test_a_flip_in_the_footer_of_a_table_is_named_with_its_file(dataset: Path) -
     for name in ("plan.parquet", "throws.parquet"):
         path = dataset / name
         whole = path.read_bytes()
-        path.write_bytes(flipped(whole, whole.index(b"parquet-cpp-arrow") + 3, 0))
+        path.write_bytes(flip_bit(whole, whole.index(b"parquet-cpp-arrow") + 3, 0))
         assert any(finding.file == name and "SHA-256" in finding.problem for finding in verify(dataset))
         path.write_bytes(whole)
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 from mcap.opcode import Opcode
-from tests.unit.dataset.mcap_doctor import MAGIC, Examination, placed
+from tests.unit.dataset.mcap_doctor import MAGIC, Examination, place_records
 
 ALL_TOPICS = ["joint_states", "ball/odometry", "controller_state", "tf", "clock"]
 
@@ -38,7 +38,7 @@ def change(opcode: Opcode, offset: int, *, mend: bool = False) -> Callable[[byte
 
     def spoil(data: bytearray) -> None:
         end = len(data) - len(MAGIC)
-        every = list(placed(bytes(data), len(MAGIC), end))
+        every = list(place_records(bytes(data), len(MAGIC), end))
         record = [record for record in every if record.opcode == opcode][-1]
         data[record.offset + 9 + offset] ^= 1
         if mend:

@@ -51,7 +51,7 @@ def test_the_example_of_the_page_on_functions_runs(collected: Path, tmp_path: Pa
     assert (tmp_path / "short-npz" / "throws.npz").is_file()
 
 
-def test_the_torch_example_runs_with_two_workers(collected: Path, tmp_path: Path) -> None:
+def test_the_torch_example_runs_with_two_processes_that_load(collected: Path, tmp_path: Path) -> None:
     pytest.importorskip("torch")
     printed = run(block_with("num_workers=2"), collected, tmp_path)
     assert re.findall(r"torch\.Size\(\[(\d), 1\]\) torch\.Size\(\[\1, \d+, 3\]\)", printed) == ["4", "3"]

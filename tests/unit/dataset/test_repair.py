@@ -59,38 +59,38 @@ def same_files(one: Path, other: Path) -> bool:
     )
 
 
-def no_summary(directory: Path) -> None:
+def cut_summary(directory: Path) -> None:
     data = (directory / SHARD).read_bytes()
     (directory / SHARD).write_bytes(data[:-300])
 
 
-def damaged_index(directory: Path) -> None:
+def damage_index(directory: Path) -> None:
     with open_mcap(directory / SHARD) as contents:
         index = contents.episode(chunk_of(directory, 4)).chunks[0].indexes[4]
     spoil(directory / SHARD, index.offset + 100)
 
 
-def damaged_latched_topics(directory: Path) -> None:
+def damage_latched_topics(directory: Path) -> None:
     spoil(directory / SHARD, 6000)
 
 
-def swapped(directory: Path) -> None:
+def swap_shards(directory: Path) -> None:
     one, other = (directory / "quick_00000.mcap").read_bytes(), (directory / SHARD).read_bytes()
     (directory / "quick_00000.mcap").write_bytes(other)
     (directory / SHARD).write_bytes(one)
 
 
-def no_tables(directory: Path) -> None:
+def delete_tables(directory: Path) -> None:
     (directory / "throws.parquet").unlink()
     (directory / "metadata.yaml").unlink()
 
 
-def renamed_to_part(directory: Path) -> None:
+def rename_to_part(directory: Path) -> None:
     (directory / SHARD).rename(directory / f"{SHARD}.part")
 
 
 @pytest.mark.parametrize(
-    "damage", [no_summary, damaged_index, damaged_latched_topics, swapped, no_tables, renamed_to_part]
+    "damage", [cut_summary, damage_index, damage_latched_topics, swap_shards, delete_tables, rename_to_part]
 )
 def test_what_can_be_mended_is_as_if_nothing_had_happened(
     collected: Path, dataset: Path, output: Path, damage: Callable[[Path], None]
@@ -176,7 +176,7 @@ def test_an_episode_of_no_trial_of_the_plan_is_left_out(make_collection: Any, da
     assert repaired.lost == ()
 
 
-def forged(samples: Any, header: Any) -> Any:
+def scale_efforts(samples: Any, header: Any) -> Any:
     """Efforts that nothing can tell from those that were."""
     return replace(samples, effort=samples.effort * (1.01 if header.trial == 4 else 1.0)), header
 
@@ -184,7 +184,7 @@ def forged(samples: Any, header: Any) -> Any:
 def test_the_episode_of_the_table_is_taken_wherever_it_lies(
     make_collection: Any, collected: Path, dataset: Path, output: Path
 ) -> None:
-    other = make_collection().collect(dataset.parent / "other", change=forged)
+    other = make_collection().collect(dataset.parent / "other", change=scale_efforts)
     (dataset / SHARD).rename(dataset / "quick_00007.mcap")
     shutil.copy(other / SHARD, dataset / SHARD)
     right, wrong = digest_of(dataset, 4), digest_of(other, 4)
@@ -201,7 +201,7 @@ def test_the_episode_of_the_table_is_taken_wherever_it_lies(
 def test_an_episode_that_is_not_the_one_of_the_table_is_kept_with_a_remark(
     make_collection: Any, dataset: Path, output: Path
 ) -> None:
-    other = make_collection().collect(dataset.parent / "other", change=forged)
+    other = make_collection().collect(dataset.parent / "other", change=scale_efforts)
     shutil.copy(other / SHARD, dataset / SHARD)
     right, wrong = digest_of(dataset, 4), digest_of(other, 4)
     repaired = repair(dataset, output, remake=never)
@@ -215,7 +215,7 @@ def test_an_episode_that_is_not_the_one_of_the_table_is_kept_with_a_remark(
 
 
 def test_without_a_table_no_episode_differs_from_it(make_collection: Any, dataset: Path, output: Path) -> None:
-    other = make_collection().collect(dataset.parent / "other", change=forged)
+    other = make_collection().collect(dataset.parent / "other", change=scale_efforts)
     shutil.copy(other / SHARD, dataset / SHARD)
     (dataset / "throws.parquet").unlink()
     assert repair(dataset, output, remake=never).remarks == ()

@@ -58,7 +58,7 @@ def image(stamp_ns: int, size: int) -> bytes:
     return bytes(serialize(get_message(TYPE)(header=header, format="jpeg", data=data)))
 
 
-def filmed(episode: Episode, change: Callable[[list[records.Message]], None] = lambda _: None) -> Episode:
+def add_images(episode: Episode, change: Callable[[list[records.Message]], None] = lambda _: None) -> Episode:
     """The episode with images of varying size at the camera's rate, and now and then one of the other sensor."""
     start, end = episode.chunk.start_ns, episode.chunk.end_ns
     messages, counts = [], {CAMERA: 0, TOUCH: 0}
@@ -78,7 +78,7 @@ class Filmed(Collection):
     """A collection with a camera."""
 
     def episode(self, trial: int, change: Any = None) -> Episode:
-        return filmed(super().episode(trial, change))
+        return add_images(super().episode(trial, change))
 
 
 @pytest.fixture
@@ -86,7 +86,7 @@ def dataset(tmp_path: Path) -> Path:
     return Filmed().collect(tmp_path / "dataset")
 
 
-def stored(directory: Path, trial: int) -> StoredEpisode:
+def find_stored(directory: Path, trial: int) -> StoredEpisode:
     offset = pq.read_table(directory / "throws.parquet")["chunk_offset"].to_pylist()[trial]
     with open_mcap(directory / SHARD) as contents:
         return contents.episode(offset)
@@ -100,7 +100,7 @@ def flip(path: Path, place: int) -> None:
 
 def test_it_travels_in_the_message_of_its_episode(collection: Collection) -> None:
     signer = Signer(b"key of the run")
-    sent = filmed(collection.episode(2))
+    sent = add_images(collection.episode(2))
     arrived = unpack(pack(Delivery(sent, "", ""), signer), signer).episode
     assert [each.chunk for each in arrived.chunks] == [each.chunk for each in sent.chunks]
     assert arrived.digest == sent.digest == collection.episode(2).digest
@@ -143,7 +143,7 @@ def test_a_sound_dataset_has_no_findings_and_rebuild_changes_nothing(dataset: Pa
 def test_a_damaged_second_chunk_is_found_and_costs_its_episode(
     dataset: Path, tmp_path: Path, begin: int, problem: str
 ) -> None:
-    flip(dataset / SHARD, stored(dataset, 4).chunks[1].record.offset + begin)
+    flip(dataset / SHARD, find_stored(dataset, 4).chunks[1].record.offset + begin)
     fit_manifest(dataset)
     assert any((finding.place, problem in finding.problem) == ("trial 4", True) for finding in verify(dataset))
     assert [lost.trial for lost in repair(dataset, tmp_path / "repaired", remake=no_plan).lost] == [4]
@@ -152,11 +152,11 @@ def test_a_damaged_second_chunk_is_found_and_costs_its_episode(
 
 def test_damaged_indexes_of_a_second_chunk_are_mended(dataset: Path, tmp_path: Path) -> None:
     whole = (dataset / SHARD).read_bytes()
-    flip(dataset / SHARD, stored(dataset, 4).chunks[1].indexes[CAMERA].offset + 30)
+    flip(dataset / SHARD, find_stored(dataset, 4).chunks[1].indexes[CAMERA].offset + 30)
     fit_manifest(dataset)
     (finding,) = (finding for finding in verify(dataset) if finding.file == SHARD and finding.place == "trial 4")
     assert "message indexes" in finding.problem
-    flip(dataset / SHARD, stored(dataset, 4).chunks[1].indexes[CAMERA].offset + 1)
+    flip(dataset / SHARD, find_stored(dataset, 4).chunks[1].indexes[CAMERA].offset + 1)
     repaired = repair(dataset, tmp_path / "repaired", remake=no_plan)
     assert (repaired.lost, (tmp_path / "repaired" / SHARD).read_bytes()) == ((), whole)
 
@@ -169,7 +169,7 @@ def late(messages: list[records.Message]) -> None:
     messages[-1].log_time += 10_000_000_000
 
 
-def swapped(messages: list[records.Message]) -> None:
+def swap_messages(messages: list[records.Message]) -> None:
     messages[2:4] = messages[3:1:-1]
 
 
@@ -186,7 +186,7 @@ def of_joint_states(messages: list[records.Message]) -> None:
     [
         (without_one, "are not numbered from 0"),
         (late, "the trial ends at"),
-        (swapped, "not in order of their times"),
+        (swap_messages, "not in order of their times"),
         (other_stamp, "stamps differ"),
         (of_joint_states, "has the channels"),
     ],
@@ -196,7 +196,7 @@ def test_what_a_sensor_cannot_have_recorded_is_found(
 ) -> None:
     class Changed(Collection):
         def episode(self, trial: int, change_samples: Any = None) -> Episode:
-            return filmed(super().episode(trial), change if trial == 4 else lambda _: None)
+            return add_images(super().episode(trial), change if trial == 4 else lambda _: None)
 
     findings = verify(Changed({"trials": 5}).collect(tmp_path / "dataset"))
     assert findings

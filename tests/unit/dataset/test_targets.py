@@ -41,7 +41,7 @@ def targeted(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return collect_targeted(tmp_path_factory.mktemp("targeted") / "data")
 
 
-def held(samples: Samples, header: EpisodeHeader) -> tuple[Samples, EpisodeHeader]:
+def hold_ball(samples: Samples, header: EpisodeHeader) -> tuple[Samples, EpisodeHeader]:
     return samples, replace(header, end_reason="timeout", contacts=(replace(header.contacts[0], end_ns=None),))
 
 
@@ -73,7 +73,7 @@ def test_throws_have_their_targets_and_miss_them_by_the_distance(targeted: Path)
 
 
 def test_what_did_not_land_misses_nothing(tmp_path: Path) -> None:
-    dataset = Dataset.open(collect_targeted(tmp_path / "data", change=held))
+    dataset = Dataset.open(collect_targeted(tmp_path / "data", change=hold_ball))
     assert {throw.outcome for throw in dataset} == {"not_released"}
     assert [throw.miss_m for throw in dataset] == [None] * 4
     found = info(tmp_path / "data").misses

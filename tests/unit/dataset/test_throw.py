@@ -35,7 +35,7 @@ def tumbled(make_collection: Any, tmp_path_factory: pytest.TempPathFactory) -> P
     return make_collection().collect(tmp_path_factory.mktemp("tumbled") / "dataset", change=tumbling)
 
 
-def rotated(quaternion: Any, vector: Any) -> np.ndarray:
+def rotate(quaternion: Any, vector: Any) -> np.ndarray:
     """A vector turned by the quaternion of a message, by its rotation matrix."""
     x, y, z, w = quaternion.x, quaternion.y, quaternion.z, quaternion.w
     matrix = [
@@ -68,8 +68,8 @@ def test_it_is_what_rosbags_reads_message_by_message(tumbled: Path) -> None:
             assert [point.x, point.y, point.z] == ball.position[row].tolist()
             assert [turn.x, turn.y, turn.z, turn.w] == ball.orientation_xyzw[row].tolist()
             twist = message.twist.twist
-            assert np.allclose(rotated(turn, twist.linear), ball.velocity[row], rtol=0, atol=1e-14)
-            assert np.allclose(rotated(turn, twist.angular), ball.angular_velocity[row], rtol=0, atol=1e-14)
+            assert np.allclose(rotate(turn, twist.linear), ball.velocity[row], rtol=0, atol=1e-14)
+            assert np.allclose(rotate(turn, twist.angular), ball.angular_velocity[row], rtol=0, atol=1e-14)
     assert seen == {"/joint_states": len(joints), "/ball/odometry": len(ball)}
     assert len(ball) == throw.row["samples"]
 

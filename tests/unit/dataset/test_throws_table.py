@@ -19,7 +19,7 @@ from throwcollect.tasks.throw.throw_result import ThrowOutcome, ThrowResult
 from throwcollect.tasks.throw.throw_task import ThrowTask
 
 
-def held(samples: Samples, header: EpisodeHeader) -> tuple[Samples, EpisodeHeader]:
+def hold_ball(samples: Samples, header: EpisodeHeader) -> tuple[Samples, EpisodeHeader]:
     return samples, replace(header, contacts=(Contact("spoon", header.start_ns, None),))
 
 
@@ -30,7 +30,7 @@ def not_finite(samples: Samples, header: EpisodeHeader) -> tuple[Samples, Episod
 def test_results_come_back_from_the_table(collection: Collection) -> None:
     table = ThrowsTable.of(collection.plan)
     outcomes = set()
-    for change in (None, held, not_finite):
+    for change in (None, hold_ball, not_finite):
         result = collection.result(collection.episode(2, change))
         row = table.row(collection.plan.trials[2], result, EpisodePlace("a.mcap", 7, 9, "d"))
         (stored,) = table.table([row]).to_pylist()

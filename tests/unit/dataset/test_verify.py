@@ -16,24 +16,24 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 import zstandard
-from tests.unit.dataset.damage import SHARD, flip, replace_text, stored
+from tests.unit.dataset.damage import SHARD, find_stored, flip, replace_text
 from tests.unit.dataset.mutations import fit_manifest
 from tests.unit.dataset.shard_defects import (
     SHARD_CONSEQUENCES,
     SHARD_DEFECTS,
-    chunk_contents,
-    zeroed_sector,
+    damage_chunk_contents,
+    zero_sector,
 )
 from tests.unit.dataset.table_defects import (
     TABLE_CONSEQUENCES,
     TABLE_DEFECTS,
-    bag_no_yaml,
-    card_gone,
-    config_broken,
-    measured_landing,
-    plan_damaged,
-    plan_seed,
-    table_damaged,
+    break_bag_yaml,
+    break_config,
+    change_landing,
+    change_plan_seed,
+    damage_plan,
+    damage_table,
+    delete_card,
 )
 
 from throwcollect.dataset.creation import create
@@ -61,7 +61,7 @@ def test_several_processes_find_the_same(dataset: Path, monkeypatch: pytest.Monk
             started.append(processes)
 
     monkeypatch.setattr("concurrent.futures.ProcessPoolExecutor", Pool)
-    zeroed_sector(dataset)
+    zero_sector(dataset)
     alone = verify(dataset, processes=2)
     assert (len(alone), started) == (len(verify(dataset)), [])
     monkeypatch.setattr("throwcollect.dataset.verify._MANY_EPISODES", 1)
@@ -85,14 +85,14 @@ def test_a_planted_defect_is_found_and_named(dataset: Path, plant: Callable[[Pat
 
 
 def test_what_is_sound_beside_a_defect_is_not_accused(dataset: Path) -> None:
-    measured_landing(dataset)
+    change_landing(dataset)
     fit_manifest(dataset)
     (finding,) = verify(dataset)
     assert str(finding).startswith("quick_00000.mcap: trial 2: throws.parquet has landing_x_m = 1.25")
 
 
 def test_a_damaged_table_does_not_keep_the_rest_from_being_checked(dataset: Path) -> None:
-    for plant in (chunk_contents, zeroed_sector, bag_no_yaml, table_damaged, plan_seed, card_gone):
+    for plant in (damage_chunk_contents, zero_sector, break_bag_yaml, damage_table, change_plan_seed, delete_card):
         plant(dataset)
     (dataset / "quick_00000.mcap").write_bytes((dataset / "quick_00000.mcap").read_bytes()[:-9])
     found = {(finding.file, finding.place.partition(" ")[0]) for finding in verify(dataset)}
@@ -107,9 +107,9 @@ def test_a_damaged_table_does_not_keep_the_rest_from_being_checked(dataset: Path
 
 
 def test_recordings_are_checked_even_without_plan_and_configuration(dataset: Path) -> None:
-    config_broken(dataset)
-    plan_damaged(dataset)
-    chunk_contents(dataset)
+    break_config(dataset)
+    damage_plan(dataset)
+    damage_chunk_contents(dataset)
     found = {(finding.file, finding.place) for finding in verify(dataset)}
     assert ("config.yaml", "line 1") in found
     assert (SHARD, "trial 4") in found
@@ -117,7 +117,7 @@ def test_recordings_are_checked_even_without_plan_and_configuration(dataset: Pat
 
 
 def test_a_damaged_stretch_is_told_with_its_end_and_hides_nothing_behind_it(dataset: Path) -> None:
-    zeroed_sector(dataset)
+    zero_sector(dataset)
     second, third = (pq.read_table(dataset / "throws.parquet")["chunk_offset"].to_pylist()[trial] for trial in (4, 5))
     flip(dataset / SHARD, third + 2000)
     fit_manifest(dataset)
@@ -129,7 +129,7 @@ def test_a_damaged_stretch_is_told_with_its_end_and_hides_nothing_behind_it(data
 def test_a_changed_sample_is_found_even_if_all_checksums_are_made_to_fit(dataset: Path) -> None:
     """Somebody rewrites one number of a chunk, its CRC and its size: the hash still says so."""
     path = dataset / SHARD
-    episode = stored(path, 4)
+    episode = find_stored(path, 4)
     contents = bytearray(episode.episode.chunk.decompress())
     contents[31 + joint_states(TALOS.joints).layout.dtype.fields["position"][1]] ^= 0x40
     data = zstandard.ZstdCompressor(level=1).compress(bytes(contents))
@@ -142,7 +142,7 @@ def test_a_changed_sample_is_found_even_if_all_checksums_are_made_to_fit(dataset
         digest(dataset)
 
 
-def kicked(samples: Samples, header: EpisodeHeader) -> tuple[Samples, EpisodeHeader]:
+def kick_ball(samples: Samples, header: EpisodeHeader) -> tuple[Samples, EpisodeHeader]:
     """In the middle of the flight the ball gains a micrometre per second, and nothing touches it."""
     if header.trial != 2:
         return samples, header
@@ -152,7 +152,7 @@ def kicked(samples: Samples, header: EpisodeHeader) -> tuple[Samples, EpisodeHea
     return replace(samples, ball_position=position), header
 
 
-def stalled(samples: Samples, header: EpisodeHeader) -> tuple[Samples, EpisodeHeader]:
+def leave_out_a_sample(samples: Samples, header: EpisodeHeader) -> tuple[Samples, EpisodeHeader]:
     """One sample is missing."""
     if header.trial != 2:
         return samples, header
@@ -179,8 +179,8 @@ def early(samples: Samples, header: EpisodeHeader) -> tuple[Samples, EpisodeHead
 @pytest.mark.parametrize(
     ("change", "problem"),
     [
-        (kicked, "departs from ballistic motion by"),
-        (stalled, "not spaced by 1/250 s"),
+        (kick_ball, "departs from ballistic motion by"),
+        (leave_out_a_sample, "not spaced by 1/250 s"),
         (early, "times differ: header"),
         (late, "the trial's slot of time"),
     ],
@@ -221,7 +221,7 @@ def test_random_damage_is_always_found_and_never_raises(make_collection: Any, tm
 
 def test_huge_announced_sizes_are_refused_without_being_believed(dataset: Path) -> None:
     path = dataset / SHARD
-    chunk = stored(path, 4).chunks[0].record
+    chunk = find_stored(path, 4).chunks[0].record
     data = bytearray(path.read_bytes())
     struct.pack_into("<Q", data, chunk.offset + 9 + 16, 1 << 62)
     path.write_bytes(data)

@@ -19,7 +19,7 @@ HALVES = "train=0.5,test=0.5"
 WIDE = ["landing_x_m=0.2"]
 
 
-def held(samples: Samples, header: EpisodeHeader) -> tuple[Samples, EpisodeHeader]:
+def hold_ball(samples: Samples, header: EpisodeHeader) -> tuple[Samples, EpisodeHeader]:
     return samples, replace(header, contacts=(Contact("spoon", header.start_ns, None),))
 
 
@@ -40,7 +40,7 @@ def some(tmp_path_factory: pytest.TempPathFactory) -> Path:
     directory = tmp_path_factory.mktemp("split") / "some"
     writer = DatasetWriter.create(directory, collection.plan)
     collection.fill(writer, range(8))
-    collection.fill(writer, range(8, 12), change=held)
+    collection.fill(writer, range(8, 12), change=hold_ball)
     writer.finish(wall_s=1.0)
     writer.close()
     return directory

@@ -62,14 +62,14 @@ def test_columns_are_those_of_the_rows_that_have_a_number(collection: Collection
 
 
 def test_samples_that_are_not_finite_are_left_out(collection: Collection, tmp_path: Path) -> None:
-    def spoiled(samples: Samples, header: EpisodeHeader) -> tuple[Samples, EpisodeHeader]:
+    def spoil_efforts(samples: Samples, header: EpisodeHeader) -> tuple[Samples, EpisodeHeader]:
         if header.trial != 1:
             return samples, header
         effort = samples.effort.copy()
         effort[5:8, 3] = np.nan
         return replace(samples, effort=effort), header
 
-    collection.collect(tmp_path / "dataset", change=spoiled)
+    collection.collect(tmp_path / "dataset", change=spoil_efforts)
     found = statistics(tmp_path / "dataset")
     assert found.samples_not_finite == 3
     json.dumps(found.as_dict(), allow_nan=False)

@@ -91,7 +91,7 @@ def engine(name: str) -> Iterator[Engine]:
     made.close()
 
 
-def thrown(engine: Engine) -> Watcher:
+def watch_throw(engine: Engine) -> Watcher:
     seen = Watcher()
     assert engine.run(swing(600), seen) == 600
     return seen
@@ -117,18 +117,18 @@ def test_a_world_that_can_be_forked_goes_on_with_the_same_bits(engine: Engine) -
         forked = os.fork()
     if forked == 0:
         try:
-            os.write(writer, hashlib.sha256(repr(thrown(engine)).encode()).digest())
+            os.write(writer, hashlib.sha256(repr(watch_throw(engine)).encode()).digest())
         finally:
             os._exit(0)
     os.close(writer)
     with open(reader, "rb") as there:
         found = there.read()
     os.waitpid(forked, 0)
-    assert found == hashlib.sha256(repr(thrown(engine)).encode()).digest()
+    assert found == hashlib.sha256(repr(watch_throw(engine)).encode()).digest()
 
 
 def test_the_names_of_links_have_no_effect(engine: Engine) -> None:
-    usual = thrown(engine)
+    usual = watch_throw(engine)
     root = re.search(r'<link name="([^"]+)"', SCENE.urdf)
     assert root is not None
     # Most arms of example-robot-data stand on a link of this name.
@@ -137,32 +137,32 @@ def test_the_names_of_links_have_no_effect(engine: Engine) -> None:
     engine.rest(START.tolist(), SEAT)
     engine.run(still(engine, 25), Observer())
     engine.reset(engine.state)
-    assert thrown(engine) == usual
+    assert watch_throw(engine) == usual
 
 
 def test_what_follows_from_a_state_does_not_depend_on_what_was_before(name: str, engine: Engine) -> None:
     settled = begin(engine)
-    first = thrown(engine)
+    first = watch_throw(engine)
     engine.reset(settled)
-    assert thrown(engine) == first
+    assert watch_throw(engine) == first
     engine.place_ball(BodyState((0.0, 0.05, 2.2), (0.0, 0.6, 0.0, 0.8), (0.1, 0.2, 0.3), (1.0, 2.0, 3.0)))
     engine.run(still(engine, 100), Observer())
     begin(engine)
-    assert thrown(engine) == first
+    assert watch_throw(engine) == first
     engine.load(replace(SCENE, ball_radius_m=0.03))
     engine.configure(replace(PHYSICS, gravity_mps2=3.0, ball_mass_kg=0.2))
     engine.rest(END.tolist(), SEAT)
     engine.run(swing(50), Observer())
     begin(engine)
-    assert thrown(engine) == first
+    assert watch_throw(engine) == first
     fresh = load_member("engines", name)()
     begin(fresh)
-    assert thrown(fresh) == first
+    assert watch_throw(fresh) == first
     fresh.close()
 
 
 def test_single_steps_are_the_same_as_many_at_once(engine: Engine) -> None:
-    at_once, one_by_one = thrown(engine), Watcher()
+    at_once, one_by_one = watch_throw(engine), Watcher()
     begin(engine)
     for number in range(600):
         one_by_one.offset = number
@@ -179,7 +179,7 @@ def test_samples_are_those_of_the_steps_that_are_asked_for(engine: Engine) -> No
 
 
 def test_an_observer_can_stop_the_steps_and_have_them_go_on(engine: Engine) -> None:
-    whole = thrown(engine)
+    whole = watch_throw(engine)
     begin(engine)
     seen = Watcher(last=400)
     assert engine.run(swing(600), seen) == 400
@@ -198,7 +198,7 @@ def test_joints_are_where_they_are_wanted_at_the_end_of_each_step(engine: Engine
 
 
 def test_a_throw_leaves_the_tool_and_each_touch_differs_from_the_one_before(engine: Engine) -> None:
-    seen = thrown(engine)
+    seen = watch_throw(engine)
     assert engine.state.touching == frozenset()
     assert seen.touches[-1][1] == frozenset()
     steps = [number for number, _ in seen.touches]

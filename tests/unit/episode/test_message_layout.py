@@ -40,7 +40,7 @@ def by_rosbags(type_name: str, **fields: object) -> bytes:
     return bytes(STORE.serialize_cdr(STORE.types[type_name](**fields), type_name))
 
 
-def stamped(stamp_ns: int, frame: str) -> Any:
+def make_header(stamp_ns: int, frame: str) -> Any:
     sec, nanosec = divmod(stamp_ns, 10**9)
     return STORE.types["std_msgs/msg/Header"](STORE.types["builtin_interfaces/msg/Time"](sec, nanosec), frame)
 
@@ -55,7 +55,7 @@ def test_joint_states_are_the_bytes_that_rosbags_writes(count: int) -> None:
     for row, message in enumerate(messages_of(topic, samples)):
         assert message == by_rosbags(
             topic.type_name,
-            header=stamped(int(stamps[row]), ""),
+            header=make_header(int(stamps[row]), ""),
             name=list(TALOS.joints),
             position=columns[0][row],
             velocity=columns[1][row],
@@ -75,7 +75,7 @@ def test_odometry_is_the_bytes_that_rosbags_writes(sec: int, nanosec: int, numbe
     twist = types["Twist"](types["Vector3"](*numbers[7:10]), types["Vector3"](*numbers[10:]))
     assert message.tobytes() == by_rosbags(
         "nav_msgs/msg/Odometry",
-        header=stamped(sec * 10**9 + nanosec, "world"),
+        header=make_header(sec * 10**9 + nanosec, "world"),
         child_frame_id="ball",
         pose=types["PoseWithCovariance"](pose, np.zeros(36)),
         twist=types["TwistWithCovariance"](twist, np.zeros(36)),

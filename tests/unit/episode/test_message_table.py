@@ -14,7 +14,7 @@ from throwcollect.errors import DatasetError
 LATE_NS = 3_000_000_000
 
 
-def stamped(stamp_ns: int, text: str) -> bytes:
+def make_image(stamp_ns: int, text: str) -> bytes:
     sec, nanosec = divmod(stamp_ns, 1_000_000_000)
     stamp = get_message("builtin_interfaces/msg/Time")(sec=sec, nanosec=nanosec)
     header = get_message("std_msgs/msg/Header")(stamp=stamp, frame_id=text)
@@ -25,7 +25,7 @@ def stamped(stamp_ns: int, text: str) -> bytes:
 def contents() -> bytes:
     times = [5, 1_000_000_000, 1_999_999_999]
     return encode_records(
-        *(Message(100 + n % 2, time, stamped(time, "a" * n * 7), time, n // 2) for n, time in enumerate(times))
+        *(Message(100 + n % 2, time, make_image(time, "a" * n * 7), time, n // 2) for n, time in enumerate(times))
     )
 
 

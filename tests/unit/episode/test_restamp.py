@@ -16,7 +16,7 @@ from throwcollect.robots.talos import TALOS
 EVERYTHING = ["joint_states", "ball/odometry", "controller_state", "tf", "clock"]
 
 
-def recorded(collection: Collection, *, as_trial: int) -> Episode:
+def record_as(collection: Collection, *, as_trial: int) -> Episode:
     """Trial 4 as it is recorded in the slot of another one."""
     samples, header = throw(collection.config, 4)
     by_ns = collection.config.trial_start_ns(as_trial) - header.start_ns
@@ -51,8 +51,8 @@ def test_an_episode_under_another_number_is_what_would_have_been_recorded_there(
     number: int, collection: Collection, restamper: Restamper
 ) -> None:
     moved, expected = (
-        restamper.restamp(recorded(collection, as_trial=4), number),
-        recorded(collection, as_trial=number),
+        restamper.restamp(record_as(collection, as_trial=4), number),
+        record_as(collection, as_trial=number),
     )
     assert moved.header == expected.header
     assert moved.chunk == expected.chunk
@@ -62,7 +62,7 @@ def test_an_episode_under_another_number_is_what_would_have_been_recorded_there(
 
 
 def test_the_episode_itself_stays_as_it_is(collection: Collection, restamper: Restamper) -> None:
-    episode, untouched = recorded(collection, as_trial=4), recorded(collection, as_trial=4)
+    episode, untouched = record_as(collection, as_trial=4), record_as(collection, as_trial=4)
     restamper.restamp(episode, 0)
     assert episode.state.contents == untouched.state.contents
     assert episode.header == untouched.header
@@ -71,7 +71,7 @@ def test_the_episode_itself_stays_as_it_is(collection: Collection, restamper: Re
 def test_an_episode_whose_records_are_not_what_was_hashed_is_refused(
     collection: Collection, restamper: Restamper
 ) -> None:
-    episode = recorded(collection, as_trial=4)
+    episode = record_as(collection, as_trial=4)
     forged = Episode(episode.header, RecordedChunk(episode.chunk, "0" * 64))
     with pytest.raises(DatasetError, match="SHA-256 of its records"):
         restamper.restamp(forged, 0)

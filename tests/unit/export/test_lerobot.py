@@ -78,7 +78,7 @@ def frames_of(source: Path, step: int = 1, rate_hz: int = 250) -> list[Arrays]:
     return episodes
 
 
-def joined(episodes: list[Arrays]) -> Arrays:
+def join(episodes: list[Arrays]) -> Arrays:
     return {name: np.concatenate([episode[name] for episode in episodes]) for name in episodes[0]}
 
 
@@ -113,7 +113,7 @@ def test_frames_are_those_of_the_dataset(rate_hz: int | None, step: int, exporte
     types = {name: pa.list_(pa.float32(), len(names)) for name, names in FLOATS.items()}
     types |= {name: SCALAR_TYPES[kind] for name, kind in SCALARS.items()}
     assert dict(zip(table.schema.names, table.schema.types, strict=True)) == types
-    for name, values in joined(frames_of(source, step, rate_hz or 250)).items():
+    for name, values in join(frames_of(source, step, rate_hz or 250)).items():
         assert np.array_equal(values_of(table[name]), values), name
 
 
@@ -155,7 +155,7 @@ def test_statistics_of_episodes_are_exact(exported: Export, source: Path) -> Non
 
 def test_statistics_of_all_frames_are_exact_but_for_quantiles(exported: Export, source: Path) -> None:
     statistics = json.loads((exported("lerobot") / "meta" / "stats.json").read_text())
-    frames = joined(frames_of(source))
+    frames = join(frames_of(source))
     assert set(statistics) == set(frames)
     for name, stored in frames.items():
         values = stored.reshape(len(stored), -1).astype(float)
@@ -227,7 +227,7 @@ def test_the_library_reads_it(
     library = pytest.importorskip("lerobot.datasets.lerobot_dataset")
     torch = pytest.importorskip("torch")
     root = exported("lerobot", None if rate_hz == 250 else rate_hz)
-    frames = joined(frames_of(source, step, rate_hz))
+    frames = join(frames_of(source, step, rate_hz))
     dataset = library.LeRobotDataset("me/throws", root=root)
     assert (len(dataset), dataset.num_episodes, dataset.fps) == (len(frames["index"]), 4, rate_hz)
     for index in (0, 1, 57, len(dataset) - 1):

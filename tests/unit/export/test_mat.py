@@ -32,7 +32,7 @@ OF_A_DMP: dict[str, Any] = {
 }
 
 
-def opened(directory: Path) -> dict[int, Any]:
+def open_recordings(directory: Path) -> dict[int, Any]:
     """`robot_throws` of each recording and the number of the throw in it, by trial."""
     found = {}
     for path in sorted((directory / "trajectories").iterdir()):
@@ -63,7 +63,7 @@ def motion(dmp: Any, times: np.ndarray) -> np.ndarray:
 def test_measured_series_are_those_of_the_dataset(
     rate_hz: int | None, step: int, exported: Export, source: Path
 ) -> None:
-    found = opened(exported("mat", rate_hz))
+    found = open_recordings(exported("mat", rate_hz))
     moving = moving_columns()
     for trial, signals in throws_of(source, step):
         throws, number = found.pop(trial)
@@ -75,7 +75,7 @@ def test_measured_series_are_those_of_the_dataset(
 
 
 def test_the_path_is_the_commanded_motion_from_rest_to_rest(exported: Export, source: Path) -> None:
-    found = opened(exported("mat"))
+    found = open_recordings(exported("mat"))
     for trial, signals in throws_of(source):
         throws, number = found[trial]
         path = throws["qPath"][0, number]
@@ -91,7 +91,7 @@ def test_the_path_is_the_commanded_motion_from_rest_to_rest(exported: Export, so
 
 
 def test_targets_are_what_the_throws_achieved(exported: Export, source: Path) -> None:
-    found, table = opened(exported("mat")), table_of(source)
+    found, table = open_recordings(exported("mat")), table_of(source)
     for trial, (throws, number) in found.items():
         distance, height, angle = throws["targets"][number]
         assert height == 0.0
@@ -103,7 +103,7 @@ def test_targets_are_what_the_throws_achieved(exported: Export, source: Path) ->
 
 
 def test_a_fitted_dmp_moves_as_commanded_up_to_its_error(exported: Export) -> None:
-    for throws, number in opened(exported("mat")).values():
+    for throws, number in open_recordings(exported("mat")).values():
         dmp, path = throws["DMP"][0, number][0, 0], throws["qPath"][0, number]
         assert list(dmp.dtype.names) == FIELDS
         assert (dmp["N"][0, 0], dmp["fitted"][0, 0]) == (25, 1)
@@ -124,7 +124,7 @@ def test_a_dmp_of_the_configuration_comes_as_it_is(make_collection: Any, tmp_pat
     export(dataset, tmp_path / "out", to="mat")
     swept = table_of(dataset)["task.trajectory.weights.arm_right_4_joint.5"]
     assert Dataset.open(dataset).config.task.trajectory.family == "dmp"
-    for trial, (throws, number) in opened(tmp_path / "out").items():
+    for trial, (throws, number) in open_recordings(tmp_path / "out").items():
         dmp, path = throws["DMP"][0, number][0, 0], throws["qPath"][0, number]
         expected = np.array([*WEIGHTS[:5], swept[trial], *WEIGHTS[6:]])
         assert dmp["fitted"][0, 0] == 0

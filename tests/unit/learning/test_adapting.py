@@ -29,11 +29,11 @@ def off(learned: LearnedMap, found: Adaptation, world) -> float:
     return float(np.median(np.linalg.norm(predicted - world(values), axis=1)))
 
 
-def shifted(values):
+def land_shifted(values):
     return land(values) + OFFSET
 
 
-def biased(values):
+def land_biased(values):
     return land(values + BIAS)
 
 
@@ -43,19 +43,19 @@ def heavy_drag(values):
 
 def test_one_throw_says_how_far_all_end_elsewhere() -> None:
     learned = learn()
-    found = elsewhere(learned, 1, shifted)
+    found = elsewhere(learned, 1, land_shifted)
     assert found.method is Method.OFFSET
     assert found.correction.offset == pytest.approx(OFFSET, abs=0.005)
-    assert off(learned, found, shifted) < 0.005 < found.before[0]
+    assert off(learned, found, land_shifted) < 0.005 < found.before[0]
 
 
 def test_some_throws_say_which_parameters_are_shifted() -> None:
     learned = learn()
-    found = elsewhere(learned, 8, biased)
+    found = elsewhere(learned, 8, land_biased)
     half = np.array([0.2, 0.4, 0.3])
     assert found.method is Method.BIAS
     assert found.correction.bias * half == pytest.approx(BIAS, abs=0.02)
-    assert off(learned, found, biased) < 0.004
+    assert off(learned, found, land_biased) < 0.004
     assert np.median(found.after) < 0.01 < np.median(found.before)
     assert len(found.deviations) == len(KEYS) + 2
 
@@ -92,15 +92,18 @@ def test_with_scatter_more_throws_say_more() -> None:
     learned = learn()
     errors = [
         np.median(
-            [off(learned, elsewhere(learned, count, biased, noise_m=0.02, seed=seed), biased) for seed in range(8)]
+            [
+                off(learned, elsewhere(learned, count, land_biased, noise_m=0.02, seed=seed), land_biased)
+                for seed in range(8)
+            ]
         )
         for count in (3, 20)
     ]
-    assert errors[1] < errors[0] < off(learned, elsewhere(learned, 3, biased, method=Method.NONE), biased)
+    assert errors[1] < errors[0] < off(learned, elsewhere(learned, 3, land_biased, method=Method.NONE), land_biased)
 
 
 def test_of_many_throws_each_is_predicted_by_a_map_of_most_others() -> None:
-    found = elsewhere(learn(), 60, biased)
+    found = elsewhere(learn(), 60, land_biased)
     assert len(found.after) == 60
     assert np.median(found.after) < 0.004 < np.median(found.before)
 

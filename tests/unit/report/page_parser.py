@@ -32,13 +32,15 @@ class Page(HTMLParser):
     def handle_data(self, data: str) -> None:
         self.texts.append((self.open[-1] if self.open else "", data))
 
-    def named(self, tag: str) -> list[dict[str, str | None]]:
+    def find_elements(self, tag: str) -> list[dict[str, str | None]]:
         return [attributes for name, attributes in self.elements if name == tag]
 
     @property
     def plots(self) -> dict[str, dict[str, Any]]:
         """Figures by their name; fails where the JSON does."""
-        scripts = [attributes for attributes in self.named("script") if attributes.get("type") == "application/json"]
+        scripts = [
+            attributes for attributes in self.find_elements("script") if attributes.get("type") == "application/json"
+        ]
         bodies = [text for tag, text in self.texts if tag == "script" and text.startswith('{"data":')]
         assert len(scripts) == len(bodies)
         return {

@@ -43,9 +43,9 @@ def text(collected: Path) -> str:
 
 def test_a_page_has_every_section_and_a_drawing_place_for_every_plot(text: str) -> None:
     page = Page(text)
-    assert [attributes["id"] for attributes in page.named("section")] == SECTIONS
-    assert [attributes["href"] for attributes in page.named("a")] == [f"#{name}" for name in SECTIONS]
-    places = [attributes["id"] for attributes in page.named("div") if attributes.get("class") == "plot"]
+    assert [attributes["id"] for attributes in page.find_elements("section")] == SECTIONS
+    assert [attributes["href"] for attributes in page.find_elements("a")] == [f"#{name}" for name in SECTIONS]
+    places = [attributes["id"] for attributes in page.find_elements("div") if attributes.get("class") == "plot"]
     assert places == list(page.plots)
     assert {name.partition("-")[0] for name in places} >= {"landing", "parameters", "release", "limits", "throws"}
     for name, plot in page.plots.items():
@@ -70,7 +70,7 @@ def test_the_median_direction_at_release_is_above_or_below_the_horizontal_withou
 def test_a_page_needs_nothing_from_elsewhere(text: str) -> None:
     page = Page(text)
     assert not [attributes for tag, attributes in page.elements if "src" in attributes]
-    assert [attributes["href"] for attributes in page.named("link")] == ["data:,"]
+    assert [attributes["href"] for attributes in page.find_elements("link")] == ["data:,"]
     assert text.count(get_plotlyjs()) == 1
     assert not re.search(r"\w+://|url\(|@import", text.replace(get_plotlyjs(), ""))
     assert "default-src 'none'" in text
@@ -85,8 +85,8 @@ def test_what_a_dataset_says_is_never_markup(collection: Any, tmp_path: Path) ->
     assert collected is not None
     write_provenance(directory, replace(collected, host="<img src=x onerror=alert(1)>"))
     page = parse(directory)
-    assert len(page.named("script")) == len(page.plots) + 2
-    assert not page.named("img")
+    assert len(page.find_elements("script")) == len(page.plots) + 2
+    assert not page.find_elements("img")
     assert ("td", hostile) in page.texts
     assert ("code", "<img src=x onerror=alert(1)>") in page.texts
 
@@ -118,10 +118,10 @@ def test_what_a_report_says_does_not_end_the_script_or_the_attribute_that_holds_
     assert "</script " not in text
     page = Page(text)
     assert page.plots["one-key"]["layout"]["title"]["text"] == hostile
-    assert [attributes["aria-label"] for attributes in page.named("div") if attributes.get("class") == "plot"] == [
-        hostile
-    ]
-    assert not page.named("b")
+    assert [
+        attributes["aria-label"] for attributes in page.find_elements("div") if attributes.get("class") == "plot"
+    ] == [hostile]
+    assert not page.find_elements("b")
     assert {tag for tag, said in page.texts if said == hostile} == {"h1", "h2", "h3", "p", "a", "th", "td"}
 
 

@@ -16,7 +16,7 @@ from throwcollect.tasks.throw.throw_result import ThrowOutcome
 RED = (1.0, 0.0, 0.0)
 
 
-def red_pixels(figures: list[go.Figure], path: Path) -> np.ndarray:
+def find_red_pixels(figures: list[go.Figure], path: Path) -> np.ndarray:
     """Where something red was painted, shape ``(height, width)``."""
     panels = [
         Panel(f"panel-{number}", "title", figure, small=len(figures) > 1) for number, figure in enumerate(figures)
@@ -45,15 +45,15 @@ def centre(mask: np.ndarray) -> tuple[float, float]:
 
 def test_points_are_where_their_axes_say(tmp_path: Path) -> None:
     figure = scatter([10.0], [1.0]).update_xaxes(type="log", range=[0, 2]).update_yaxes(range=[0, 10])
-    down, across = centre(red_pixels([figure], tmp_path / "log.png"))
+    down, across = centre(find_red_pixels([figure], tmp_path / "log.png"))
     assert across == pytest.approx(0.5, abs=0.1)  # 10 is half-way between 1 and 100
     assert down > 0.7  # 1 is near the lower end
 
 
 def test_an_axis_begins_at_zero_where_the_figure_wants_that(tmp_path: Path) -> None:
     figure = scatter([8.0, 10.0], [1.0, 1.0])
-    _, before = centre(red_pixels([figure], tmp_path / "before.png"))
-    _, after = centre(red_pixels([figure.update_xaxes(rangemode="tozero")], tmp_path / "after.png"))
+    _, before = centre(find_red_pixels([figure], tmp_path / "before.png"))
+    _, after = centre(find_red_pixels([figure.update_xaxes(rangemode="tozero")], tmp_path / "after.png"))
     assert before == pytest.approx(0.5, abs=0.1)
     assert after > 0.8
 
@@ -61,13 +61,13 @@ def test_an_axis_begins_at_zero_where_the_figure_wants_that(tmp_path: Path) -> N
 def test_a_scale_anchor_makes_a_circle_of_a_circle(tmp_path: Path) -> None:
     angles = np.linspace(0, 2 * np.pi, 100)
     figure = scatter(np.cos(angles).tolist(), np.sin(angles).tolist(), "lines").update_yaxes(scaleanchor="x")
-    rows, columns = np.nonzero(red_pixels([figure], tmp_path / "circle.png"))
+    rows, columns = np.nonzero(find_red_pixels([figure], tmp_path / "circle.png"))
     assert np.ptp(rows) == pytest.approx(np.ptp(columns), abs=3)
 
 
 def test_figures_of_one_picture_stand_below_one_another(tmp_path: Path) -> None:
     figures = [scatter([1.0, 2.0], [0.0, 0.0], "lines"), scatter([1.0, 2.0], [0.0, 0.0], "lines")]
-    rows, columns = np.nonzero(red_pixels(figures, tmp_path / "stack.png"))
+    rows, columns = np.nonzero(find_red_pixels(figures, tmp_path / "stack.png"))
     first, second = rows[rows < rows.mean()], rows[rows > rows.mean()]
     assert second.min() - first.max() > 50
     ends = [(columns[part].min(), columns[part].max()) for part in (rows < rows.mean(), rows > rows.mean())]
@@ -84,7 +84,7 @@ def test_subplots_go_where_their_domains_are(tmp_path: Path) -> None:
         figure.update_layout(
             {f"xaxis{number}": {"domain": [left, left + 0.5]}, f"yaxis{number}": {"domain": [bottom, bottom + 0.5]}}
         )
-    down, across = centre(red_pixels([figure], tmp_path / "grid.png"))
+    down, across = centre(find_red_pixels([figure], tmp_path / "grid.png"))
     assert down < 0.45
     assert across > 0.55
 
@@ -92,7 +92,7 @@ def test_subplots_go_where_their_domains_are(tmp_path: Path) -> None:
 def test_the_legend_shows_line_and_markers_of_a_trace(tmp_path: Path) -> None:
     figure = scatter([1.0, 2.0], [0.0, 0.0], "lines+markers").update_traces(name="red")
     figure.add_scatter(x=[1.0], y=[1.0], mode="lines", line={"color": "#888888", "width": 2}, name="grey")
-    rows, columns = np.nonzero(red_pixels([figure], tmp_path / "legend.png"))
+    rows, columns = np.nonzero(find_red_pixels([figure], tmp_path / "legend.png"))
     entry = rows < rows.max() / 3
     width = np.ptp(columns[entry])
     assert width > 1.2 * np.ptp(rows[entry])  # a dot alone is as high as it is wide

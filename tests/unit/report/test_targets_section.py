@@ -21,7 +21,7 @@ from throwcollect.report.sections import report_dataset
 from throwcollect.report.targets_section import show_targets
 
 
-def held(samples: Samples, header: EpisodeHeader) -> tuple[Samples, EpisodeHeader]:
+def hold_ball(samples: Samples, header: EpisodeHeader) -> tuple[Samples, EpisodeHeader]:
     return samples, replace(header, end_reason="timeout", contacts=(replace(header.contacts[0], end_ns=None),))
 
 
@@ -48,7 +48,7 @@ def test_the_section_shows_targets_misses_and_their_spread(tmp_path: Path) -> No
 
 def test_there_is_no_section_without_targets_and_one_without_misses(tmp_path: Path) -> None:
     assert show_targets(Dataset.open(Collection().collect(tmp_path / "plain"))) == ()
-    (section,) = show_targets(Dataset.open(collect_targeted(tmp_path / "held", change=held)))
+    (section,) = show_targets(Dataset.open(collect_targeted(tmp_path / "held", change=hold_ball)))
     assert section.text == "3 of 4 throws should end at a target. None of them ended anywhere."
     (above,) = section.panels
     assert [trace.name for trace in above.figure.data] == ["throws of the dataset", "targets where no throw landed"]

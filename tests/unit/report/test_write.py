@@ -60,7 +60,7 @@ def test_datasets_with_little_in_them(
     directory = collection.collect(tmp_path / "dataset", trials, lost=lost)
     written = write_report(directory, tmp_path / "page.html", pictures=tmp_path / "pictures")
     page = Page(written.page.read_text(encoding="utf-8"))
-    assert [attributes["id"] for attributes in page.named("section")] == SECTIONS
+    assert [attributes["id"] for attributes in page.find_elements("section")] == SECTIONS
     assert ("No ball crossed the landing plane." in page.words) == bool(lost)
     assert "This dataset has no journal of its collection" in page.words
     assert len(written.pictures) == (2 if lost else 9)

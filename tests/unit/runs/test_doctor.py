@@ -140,23 +140,23 @@ def test_a_docker_engine_and_its_image_are_found(tmp_path: Path, monkeypatch: py
     path = tmp_path / "docker.sock"
     monkeypatch.setenv("DOCKER_HOST", f"unix://{path}")
 
-    def found() -> tuple[str, str]:
+    def check_docker() -> tuple[str, str]:
         check = {check.name: check for check in examine(tmp_path)}["docker"]
         return check.status, check.finding
 
-    assert found() == (
+    assert check_docker() == (
         "note",
         f"no Docker engine answers at unix://{path}: No such file or directory; runs use processes",
     )
     with socketserver.ThreadingUnixStreamServer(str(path), Engine) as server:
         threading.Thread(target=server.serve_forever, daemon=True).start()
         lacking = f"the image {default_tag()} is not there yet; throwcollect image build makes it"
-        assert found() == ("note", f"Docker 27.1 answers at unix://{path}; {lacking}")
+        assert check_docker() == ("note", f"Docker 27.1 answers at unix://{path}; {lacking}")
         monkeypatch.setattr(Engine, "images", (default_tag(),))
-        assert found() == ("ok", f"Docker 27.1 answers at unix://{path}, with the image {default_tag()}")
+        assert check_docker() == ("ok", f"Docker 27.1 answers at unix://{path}, with the image {default_tag()}")
         monkeypatch.setattr(Engine, "sources", "0" * 64)
         outdated = f"the image {default_tag()} was made from other sources than these"
-        status, finding = found()
+        status, finding = check_docker()
         assert (status, finding.partition("; ")[2]) == (
             "note",
             f"{outdated}; throwcollect image build makes it anew",

@@ -74,7 +74,7 @@ def run(engine: Engine, tmp_path: Path) -> OpenRun:
     return run
 
 
-def launched(run: OpenRun, each_look: Callable[[], None] = lambda: None, *, onlooker: Onlooker | None = None) -> None:
+def launch_run(run: OpenRun, each_look: Callable[[], None] = lambda: None, *, onlooker: Onlooker | None = None) -> None:
     def interruptions() -> int:
         each_look()
         return 0
@@ -96,7 +96,7 @@ def test_a_launcher_that_gives_up_says_that_containers_are_left(
             engine.withheld = "."
 
     with pytest.raises(WorkerError, match=r"the Docker engine has not answered for [12] s"):
-        launched(run, silence, onlooker=onlooker)
+        launch_run(run, silence, onlooker=onlooker)
     assert onlooker.warnings == [
         f"containers of this run may be left: throwcollect down --run {run.run} ends them",
     ]
@@ -115,7 +115,7 @@ def test_a_launcher_that_gets_no_answer_at_all_leaves_the_record_of_what_was_the
     run.update(left=True)
     engine.withheld = "."
     with pytest.raises(WorkerError, match="no answer in time"):
-        launched(run)
+        launch_run(run)
     assert status(run) == "abandoned"
 
 
@@ -127,7 +127,7 @@ def test_what_was_left_is_ended_even_if_the_coordinator_has_finished_meanwhile(e
     run.update(left=True)
     # There is no dataset here, which is found out when the coordinator has ended well.
     with pytest.raises(DatasetError, match=r"/data: "):
-        launched(run)
+        launch_run(run)
     assert engine.names() == []
     assert status(run) == "ended"
 

@@ -261,7 +261,7 @@ def test_a_long_run_is_not_forgotten_while_it_lives(state: Path) -> None:
     assert records.ids() == [run.run]
 
 
-def truncated(text: str) -> str:
+def truncate(text: str) -> str:
     return text[: len(text) // 2]
 
 
@@ -272,7 +272,7 @@ def without(key: str) -> Callable[[str], str]:
 @pytest.mark.parametrize(
     ("damage", "message"),
     [
-        (truncated, "the record of the run is damaged"),
+        (truncate, "the record of the run is damaged"),
         (lambda _: "[]", "the record of the run is damaged"),
         (lambda _: "", "the record of the run is damaged"),
         (without("launcher"), "the record of the run is damaged"),

@@ -39,7 +39,7 @@ def find_to_watch(records: Records, named: str) -> Run:
     return find_run_to_watch(records, named, say=print)
 
 
-def watched(records: Records) -> tuple[RunRecord, list[str]]:
+def find_watched(records: Records) -> tuple[RunRecord, list[str]]:
     """The run that is looked at without being named, and what is said of it."""
     said: list[str] = []
     return find_run_to_watch(records, None, say=said.append).record, said
@@ -166,9 +166,9 @@ def test_without_a_name_it_is_the_only_one_that_lives(records: Records, make: Ma
 def test_what_is_looked_at_may_have_ended(records: Records, make: Make) -> None:
     latest = make("a", "ended")
     make("b", "ended", age_h=1)
-    assert watched(records) == (latest, [])
+    assert find_watched(records) == (latest, [])
     living = make("c", "lives", age_h=9)
-    assert watched(records) == (living, [])
+    assert find_watched(records) == (living, [])
 
 
 @pytest.mark.parametrize(
@@ -186,7 +186,7 @@ def test_a_run_of_another_directory_is_not_changed_without_its_name(
         "  try: throwcollect scale 4 --run a-0123, if that one is meant"
     )
     assert find_run_to_change(records, "a", command="scale 4").record == record
-    assert watched(records) == (record, [f"run a-0123, which {origin}"])
+    assert find_watched(records) == (record, [f"run a-0123, which {origin}"])
 
 
 def test_a_run_belongs_to_where_it_was_begun_and_to_where_its_dataset_lies(
@@ -195,7 +195,7 @@ def test_a_run_belongs_to_where_it_was_begun_and_to_where_its_dataset_lies(
     make("a", "lives", begun_in="/other", directory="/other/data")
     begun = make("b", "lives", begun_in=str(tmp_path), directory="/other/more")
     assert find(records, None).record == begun
-    assert watched(records) == (begun, [])
+    assert find_watched(records) == (begun, [])
     make("c", "lives", begun_in="/other")
     with pytest.raises(ConfigError, match=r"2 runs live\n  expected: .-0123, .-0123\n"):
         find(records, None)
@@ -204,14 +204,14 @@ def test_a_run_belongs_to_where_it_was_begun_and_to_where_its_dataset_lies(
 def test_what_ended_here_is_looked_at_before_what_lives_elsewhere(records: Records, make: Make) -> None:
     make("a", "lives", begun_in="/other", directory="/other/data")
     ended = make("b", "ended", age_h=1)
-    assert watched(records) == (ended, [])
+    assert find_watched(records) == (ended, [])
 
 
 def test_a_run_whose_dataset_is_in_a_volume_belongs_to_where_it_was_begun_alone(records: Records, make: Make) -> None:
     record = make("a", "lives", begun_in="/other", volume="v")
     with pytest.raises(ConfigError, match=r"a-0123 was begun in /other"):
         find(records, None)
-    assert watched(records) == (record, ["run a-0123, which was begun in /other"])
+    assert find_watched(records) == (record, ["run a-0123, which was begun in /other"])
 
 
 def test_whose_launcher_died_may_be_ended(records: Records, make: Make) -> None:
@@ -322,23 +322,23 @@ def test_the_record_of_containers_that_are_left_is_kept(records: Records, make: 
 
 
 def test_the_way_on_after_the_death_of_a_launcher_depends_on_where_the_dataset_is(records: Records, make: Make) -> None:
-    def told(record: RunRecord) -> str:
+    def tell_death(record: RunRecord) -> str:
         return str(describe_death(records.get(record.run)))
 
     again = "try: throwcollect resume /b goes on where it ended, or with its containers if they live; throwcollect down"
     # Before there is a plan there is no dataset, but one that is resumed is there from the start.
     for died in (make("d", "died", runtime=""), make("e", "died", kind="session")):
-        assert told(died) == (
+        assert tell_death(died) == (
             f"run {died.run}: its launcher died\n  evidence: the logs are in logs\n"
             f"  try: throwcollect down --run {died.run} cleans up"
         )
     resumed = make("f", "died", runtime="")
     Path(resumed.directory).mkdir()
     (Path(resumed.directory) / "config.yaml").touch()
-    assert f"throwcollect resume {resumed.directory} goes on" in told(resumed)
-    assert again in told(make("a", "died", directory="/b"))
-    assert again in told(make("b", "died", runtime="docker", directory="/b"))
-    assert "resume" not in told(make("c", "died", runtime="docker", volume="v"))
+    assert f"throwcollect resume {resumed.directory} goes on" in tell_death(resumed)
+    assert again in tell_death(make("a", "died", directory="/b"))
+    assert again in tell_death(make("b", "died", runtime="docker", directory="/b"))
+    assert "resume" not in tell_death(make("c", "died", runtime="docker", volume="v"))
 
 
 def test_a_run_that_died_is_told_with_a_dataset_that_is_complete_by_now(

@@ -78,7 +78,7 @@ def until(condition: Callable[[], bool]) -> None:
         time.sleep(0.01)
 
 
-def ended(runtime: LocalNodes) -> NodeExit:
+def wait_for_end(runtime: LocalNodes) -> NodeExit:
     found: list[NodeExit] = []
     until(lambda: bool(found.extend(runtime.exits()) or found))
     return found[0]
@@ -89,7 +89,7 @@ def test_a_node_that_ends_is_reported_once_with_its_code_and_last_lines(runtime:
     for host in (runtime, alone):
         host.start(node(f"import os; print({words}, sep='\\n'); sys.exit(7)"))
         assert host.running() == ("node",)
-        end = ended(host)
+        end = wait_for_end(host)
         assert (end.name, end.code, end.reason) == ("node", 7, "exit code 7")
         assert end.log.splitlines() == [*map(str, range(12, 50)), "42", "7"]
         assert (host.exits(), host.running()) == ([], ())
@@ -98,7 +98,7 @@ def test_a_node_that_ends_is_reported_once_with_its_code_and_last_lines(runtime:
 def test_a_signal_is_named(runtime: LocalNodes) -> None:
     runtime.start(node("import time; time.sleep(60)"))
     runtime.signal("node", signal.SIGKILL)
-    assert ended(runtime).reason == "ended by SIGKILL"
+    assert wait_for_end(runtime).reason == "ended by SIGKILL"
     runtime.signal("node", signal.SIGKILL)  # gone, so left alone
 
 
@@ -107,7 +107,7 @@ def test_what_a_node_has_said_outlives_it(runtime: LocalNodes) -> None:
     runtime.start(node("print('node is ready', flush=True); import time; time.sleep(60)"))
     until(lambda: runtime.ready("node"))
     runtime.signal("node", signal.SIGTERM)
-    ended(runtime)
+    wait_for_end(runtime)
     assert runtime.ready("node")
     assert runtime.log_tail("node") == "node is ready"
 
@@ -150,5 +150,5 @@ def test_the_port_is_kept_until_the_router_needs_it(runtime: LocalNodes) -> None
     with socket.socket() as other, pytest.raises(OSError, match="Address already in use"):
         other.bind((host, port))
     runtime.start(node(f"import socket; socket.create_server(('{host}', {port})); print('bound')", "router"))
-    ended(runtime)
+    wait_for_end(runtime)
     assert runtime.log_tail("router") == "bound"

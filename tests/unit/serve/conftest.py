@@ -131,6 +131,6 @@ def begun(monkeypatch: pytest.MonkeyPatch, remember: Remember) -> list[dict[str,
     return asked
 
 
-def ended(**fields: Any) -> dict[str, Any]:
+def make_end_fields(**fields: Any) -> dict[str, Any]:
     """Fields of a run that has ended."""
     return {"lives": False, "ended": datetime.now(timezone.utc), "exit_code": 0, **fields}

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 from starlette.testclient import TestClient
-from tests.unit.serve.conftest import Remember, ended
+from tests.unit.serve.conftest import Remember, make_end_fields
 
 from throwcollect.serve import dataset_routes
 
@@ -23,7 +23,7 @@ def directory(collected: Path, tmp_path: Path, remember: Remember) -> Path:
     """The dataset of a run that has ended."""
     directory = tmp_path / "datasets" / "a"
     shutil.copytree(collected, directory)
-    remember("a", **ended())
+    remember("a", **make_end_fields())
     return directory
 
 
@@ -140,9 +140,9 @@ def test_without_a_journal_nothing_has_landed(client: TestClient, directory: Pat
 
 def test_what_is_not_finished_is_not_given(client: TestClient, directory: Path, remember: Remember) -> None:
     remember("growing", directory=str(directory))
-    remember("torn", **ended(exit_code=3))
-    remember("session", **ended(kind="session"))
-    remember("volume", **ended(volume="v"))
+    remember("torn", **make_end_fields(exit_code=3))
+    remember("session", **make_end_fields(kind="session"))
+    remember("volume", **make_end_fields(volume="v"))
     for what in ("files", "files/config.yaml", "dataset.tar", "report"):
         found = {name: client.get(f"{URL}/{name}/{what}").status_code for name in ("growing", "torn")}
         assert found == {"growing": 409, "torn": 409}, what

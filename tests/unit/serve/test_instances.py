@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 from starlette.testclient import TestClient
-from tests.unit.serve.conftest import Remember, Served, ended
+from tests.unit.serve.conftest import Remember, Served, make_end_fields
 
 from throwcollect.runs.component_container import ContainerOrder
 from throwcollect.runs.records import Records, Run
@@ -57,7 +57,7 @@ def test_an_id_whose_dataset_is_still_there_is_taken(
 
 
 def test_there_are_never_more_than_may_live(client: TestClient, remember: Remember) -> None:
-    remember("old", **ended(origin=Origin("throws")))
+    remember("old", **make_end_fields(origin=Origin("throws")))
     assert [put(client, name).status_code for name in ("a", "b", "c")] == [202, 202, 409]
     # Those of another component, and runs that commands have begun, do not count.
     remember("by-hand")
@@ -69,9 +69,9 @@ def test_a_resumed_collection_counts(client: TestClient, remember: Remember, tmp
     directory = tmp_path / "datasets" / "old"
     directory.mkdir(parents=True)
     (directory / "config.yaml").write_text("name: small\n")
-    remember("old", **ended(origin=Origin("throws")))
-    remember("none", **ended(origin=Origin("throws")))
-    remember("session", **ended(kind="session"))
+    remember("old", **make_end_fields(origin=Origin("throws")))
+    remember("none", **make_end_fields(origin=Origin("throws")))
+    remember("session", **make_end_fields(kind="session"))
     resume = lambda name: client.post(f"/api/v1/collections/{name}/resume").status_code  # noqa: E731
     assert resume("old") == 202
     assert [resume(name) for name in ("nobody", "none", "session", "resumed-1")] == [404, 409, 409, 409]
@@ -82,16 +82,16 @@ def test_a_resumed_collection_counts(client: TestClient, remember: Remember, tmp
 def test_a_dataset_that_another_run_goes_on_with_is_not_resumed(
     client: TestClient, remember: Remember, tmp_path: Path
 ) -> None:
-    def told() -> bool:
+    def list_resumable() -> bool:
         return {each["id"]: each for each in client.get("/api/v1/state").json()["instances"]}["old"]["can_be_resumed"]
 
     directory = tmp_path / "datasets" / "old"
     directory.mkdir(parents=True)
     (directory / "config.yaml").write_text("name: small\n")
-    remember("old", **ended(origin=Origin("throws"), exit_code=130))
-    assert told()
+    remember("old", **make_end_fields(origin=Origin("throws"), exit_code=130))
+    assert list_resumable()
     remember("again", directory=str(directory))
-    assert not told()
+    assert not list_resumable()
     said = client.post("/api/v1/collections/old/resume")
     assert (said.status_code, said.json()["title"]) == (409, "run again collects into the dataset of run old")
 
@@ -101,7 +101,7 @@ def test_a_complete_collection_is_not_resumed(
 ) -> None:
     directory = tmp_path / "datasets" / "old"
     shutil.copytree(collected, directory)
-    remember("old", **ended(origin=Origin("throws"), directory=str(directory)))
+    remember("old", **make_end_fields(origin=Origin("throws"), directory=str(directory)))
     said = client.post("/api/v1/collections/old/resume")
     assert (said.status_code, said.json()["title"]) == (409, "the dataset of run old is complete")
     assert said.headers["content-type"] == "application/problem+json"
@@ -114,7 +114,7 @@ def test_a_complete_collection_is_not_resumed(
 def test_what_can_be_resumed_is_told(
     client: TestClient, begun: list[dict[str, Any]], collected: Path, remember: Remember, tmp_path: Path
 ) -> None:
-    def told() -> dict[str, bool]:
+    def list_resumable() -> dict[str, bool]:
         listed = {each["id"]: each["can_be_resumed"] for each in client.get("/api/v1/state").json()["instances"]}
         assert {name: client.get(f"{URL}/{name}").json()["can_be_resumed"] for name in listed} == listed
         return listed
@@ -124,18 +124,18 @@ def test_what_can_be_resumed_is_told(
     shutil.copytree(collected, left)
     (left / "metadata.yaml").unlink()
     remember("died", lives=False, directory=str(directory))
-    remember("stopped", **ended(directory=str(directory), exit_code=130))
-    remember("left", **ended(directory=str(left), exit_code=130))
-    remember("finished", **ended(directory=str(directory)))
-    remember("unplanned", **ended(exit_code=2))
-    remember("session", **ended(kind="session", exit_code=130))
+    remember("stopped", **make_end_fields(directory=str(directory), exit_code=130))
+    remember("left", **make_end_fields(directory=str(left), exit_code=130))
+    remember("finished", **make_end_fields(directory=str(directory)))
+    remember("unplanned", **make_end_fields(exit_code=2))
+    remember("session", **make_end_fields(kind="session", exit_code=130))
     remember("alive")
-    resumable = told()
+    resumable = list_resumable()
     assert {name for name, can in resumable.items() if can} == {"left"}
     # A later run finishes the one dataset; the other loses a file.
     shutil.copy(collected / "metadata.yaml", left)
     next(directory.glob("*.mcap")).unlink()
-    resumable = told()
+    resumable = list_resumable()
     assert {name for name, can in resumable.items() if can} == {"died", "stopped"}
     for name in sorted(resumable.keys() - {"alive", "finished"}):
         assert client.post(f"/api/v1/collections/{name}/resume").status_code == (202 if resumable[name] else 409), name
@@ -212,7 +212,7 @@ def test_some_keys_are_the_operators_alone(
 
 
 def test_what_has_ended_cannot_be_stopped_or_scaled(client: TestClient, remember: Remember) -> None:
-    remember("over", **ended())
+    remember("over", **make_end_fields())
     remember("dead", lives=False)
     for name, status in (("over", 409), ("dead", 503), ("nobody", 404)):
         assert client.delete(f"{URL}/{name}").status_code == status
@@ -244,14 +244,14 @@ def test_all_that_clients_have_begun_are_stopped_and_nothing_else(
     monkeypatch.setattr(instances_module.control, "stop", lambda run, **_: told.append(run.id))
     monkeypatch.setattr(instances_module, "_LONGEST_STOP_S", 0.0)
     remember("begun", origin=Origin("throws"))
-    remember("over", origin=Origin("throws"), **ended())
+    remember("over", origin=Origin("throws"), **make_end_fields())
     remember("of-a-command")
     answer = client.delete(URL)
     assert (answer.status_code, answer.json(), told) == (202, ["begun"], ["begun"])
 
 
 def test_records_that_cannot_be_read_are_told_of(client: TestClient, state: Path, remember: Remember) -> None:
-    remember("newer", **ended())
+    remember("newer", **make_end_fields())
     path = state / "runs" / "newer.json"
     path.write_text(json.dumps({**json.loads(path.read_text()), "version": 2}))
     (state / "runs" / "torn.json").write_text('{"run": "to')
@@ -267,12 +267,12 @@ def test_records_that_cannot_be_read_are_told_of(client: TestClient, state: Path
 
 def test_the_state_tells_of_all_that_live_and_the_latest_that_are_over(client: TestClient, remember: Remember) -> None:
     for number in range(103):
-        remember(f"over-{number}", **ended())
+        remember(f"over-{number}", **make_end_fields())
     nodes = (NodeState("router", "running", 0, "1", ""), NodeState("sim_0", "running", 0, "2", ""))
     remember("living", origin=Origin("throws"), nodes=nodes)
     remember("lost", lives=False, nodes=(NodeState("sim_0", "running", 0, "2", ""),))
     remember("left", lives=False, runtime="docker", nodes=(NodeState("sim_0", "running", 0, "2", ""),))
-    remember("failed", **ended(exit_code=2, failure=RunFailure("no plan", hint="mend it")))
+    remember("failed", **make_end_fields(exit_code=2, failure=RunFailure("no plan", hint="mend it")))
     found = client.get("/api/v1/state").json()
     assert [each["status"] for each in found["instances"]][:3] == ["running", "ended", "died"]
     assert len(found["instances"]) == 101

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
-from tests.unit.serve.conftest import CONFIG, Remember, ended
+from tests.unit.serve.conftest import CONFIG, Remember, make_end_fields
 
 from throwcollect.errors import NotFoundError, WorkerError
 from throwcollect.runs.records import Records, Run
@@ -124,7 +124,7 @@ def test_one_that_was_not_slowed_down_is_let_go_of(
 
 def test_only_simulations_that_run_are_slowed_down(remember: Remember, tmp_path: Path, simulation: Simulation) -> None:
     run = make(remember, tmp_path)
-    over = make(remember, tmp_path, "over", **ended())
+    over = make(remember, tmp_path, "over", **make_end_fields())
     for each, name in ((run, "sim_1"), (run, "../key"), (run, ""), (over, "sim_0")):
         with pytest.raises(NotFoundError, match="no simulation"):
             take(each, name)

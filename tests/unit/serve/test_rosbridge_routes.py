@@ -6,7 +6,7 @@ from typing import NoReturn
 
 import pytest
 from starlette.websockets import WebSocketDisconnect
-from tests.unit.serve.conftest import Remember, Served, ended
+from tests.unit.serve.conftest import Remember, Served, make_end_fields
 
 from throwcollect.errors import ConflictError
 from throwcollect.serve import bridges, rosbridge_routes
@@ -25,7 +25,7 @@ def test_a_client_of_no_run_is_told_why(served: Served) -> None:
 
 
 def test_a_client_of_a_run_that_is_over_does_not_wait_for_good(served: Served, remember: Remember) -> None:
-    remember("over", **ended())
+    remember("over", **make_end_fields())
     assert end_of(served, "/rosbridge/over") == (4404, "run over has ended")
 
 

@@ -116,7 +116,7 @@ def test_watching_changes_nothing() -> None:
     assert positions[0] == positions[1]
 
 
-def stopped(**options: object) -> tuple[np.ndarray, np.ndarray]:
+def stop_swing(**options: object) -> tuple[np.ndarray, np.ndarray]:
     """Command and measured elbow, before and after a cancelled swing of an arm that lags."""
     world = Simulation(Config.model_validate({"controllers": options, "robot": {"effort_scale": 0.2}}))
     world.submit(ARM, 1, goal(0.4, elbow=-0.3))
@@ -129,7 +129,7 @@ def stopped(**options: object) -> tuple[np.ndarray, np.ndarray]:
 
 
 def test_a_cancelled_goal_leaves_the_joints_where_they_are_measured_or_commanded() -> None:
-    measured, command = stopped(), stopped(hold="command")
+    measured, command = stop_swing(), stop_swing(hold="command")
     lag = abs(measured[0, 0] - measured[0, 1])
     assert lag > 0.01
     assert measured[1, 0] == pytest.approx(measured[0, 1], abs=1e-9)

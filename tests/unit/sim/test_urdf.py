@@ -19,7 +19,7 @@ def model(text, read_mesh=no_mesh):
     return read_model(text, read_mesh)
 
 
-def written(text):
+def write_model(text):
     return ElementTree.fromstring(model(text).urdf)  # noqa: S314 - written by ourselves
 
 
@@ -36,7 +36,7 @@ LIMIT = '<limit lower="-1" upper="1" effort="1" velocity="1"/>'
 
 
 def inertia(text):
-    given = written(text).find("link/inertial/inertia").attrib
+    given = write_model(text).find("link/inertial/inertia").attrib
     return [float(given[key]) for key in ("ixx", "iyy", "izz")]
 
 
@@ -63,7 +63,7 @@ def test_only_what_is_understood_is_passed_on():
     text = robot(
         "<link name='a'><visual/><plugin/><collision><geometry><sphere radius='1'/></geometry></collision></link>"
     )
-    tags = [element.tag for element in written(text).iter()]
+    tags = [element.tag for element in write_model(text).iter()]
     inertial, collision = ["inertial", "mass", "inertia"], ["collision", "origin", "geometry", "sphere"]
     assert tags == ["robot", "link", *inertial, *collision]
 
@@ -94,7 +94,7 @@ def test_moments_of_inertia_become_those_of_a_body():
 
 def test_limits_without_bounds_become_numbers_that_the_engine_can_take():
     endless = pendulum(limit='<limit lower="-1e16" upper="1e16" effort="3" velocity="inf"/>')
-    limit = written(endless).find("joint/limit").attrib
+    limit = write_model(endless).find("joint/limit").attrib
     assert limit == {"lower": "-1000000.0", "upper": "1000000.0", "effort": "3.0", "velocity": "1000000.0"}
 
 

@@ -55,25 +55,25 @@ def elf(*needed: str) -> bytes:
 
 
 def test_needed_libraries_are_those_that_the_loader_reports(library: bytes) -> None:
-    from elf import needed
+    from elf import list_needed
 
-    assert needed(elf("libb.so.1", "libc.so.6")) == ["libb.so.1", "libc.so.6"]
-    assert "libc.so.6" in needed(library)
+    assert list_needed(elf("libb.so.1", "libc.so.6")) == ["libb.so.1", "libc.so.6"]
+    assert "libc.so.6" in list_needed(library)
 
 
 def test_a_stripped_library_is_shorter_and_still_loads(library: bytes, tmp_path: Path) -> None:
-    from elf import needed, stripped
+    from elf import list_needed, strip
 
-    shorter = stripped(library)
+    shorter = strip(library)
     assert len(shorter) < len(library) / 10
-    assert needed(shorter) == needed(library)
+    assert list_needed(shorter) == list_needed(library)
     path = tmp_path / "stripped.so"
     path.write_bytes(shorter)
     # Its functions call Python's, so it is loaded into a Python of its own.
     code = "import ctypes, sys; print(ctypes.PyDLL(sys.argv[1]).PyInit_pybullet is not None)"
     ended = subprocess.run([sys.executable, "-c", code, str(path)], capture_output=True, text=True, check=True)
     assert ended.stdout == "True\n"
-    assert stripped(shorter) == shorter
+    assert strip(shorter) == shorter
 
 
 @pytest.mark.parametrize(
@@ -114,21 +114,21 @@ def test_a_stripped_library_is_shorter_and_still_loads(library: bytes, tmp_path:
     ],
 )
 def test_a_file_stays_if_a_node_may_load_it(path: str, stays: bool) -> None:
-    from slim import kept
+    from slim import is_kept
 
-    assert kept(path) is stays
+    assert is_kept(path) is stays
 
 
 def test_every_file_of_our_own_packages_stays_but_what_type_checkers_read() -> None:
-    from slim import kept
+    from slim import is_kept
 
     source = ROOT / "src"
-    gone = [path for path in source.rglob("*.*") if not kept(path.relative_to(source).as_posix())]
+    gone = [path for path in source.rglob("*.*") if not is_kept(path.relative_to(source).as_posix())]
     assert {path.suffix for path in gone} == {".pyi"}
 
 
 def test_of_libraries_those_stay_that_a_module_loads_by_whatever_way() -> None:
-    from slim import unreached
+    from slim import find_unreached
 
     files = {
         EXTENSION: elf("liba.so.1", "libc.so.6"),
@@ -139,12 +139,12 @@ def test_of_libraries_those_stay_that_a_module_loads_by_whatever_way() -> None:
         "other.libs/libe.so": elf("libd.so"),
         "pkg/libscript.so": b"INPUT(-lc)",
     }
-    superfluous = unreached({name: (lambda content=content: content) for name, content in files.items()})
+    superfluous = find_unreached({name: (lambda content=content: content) for name, content in files.items()})
     assert superfluous == {"cmeel.prefix/lib/liba.so.1.2.3", "other.libs/libd.so", "other.libs/libe.so"}
 
 
 def test_libraries_that_ros_loads_by_name_stay_with_what_they_need() -> None:
-    from slim import unreached
+    from slim import find_unreached
 
     files = {
         "data/lib/libtf2_msgs__rosidl_typesupport_fastrtps_c.so": elf("libstd_msgs__rosidl_typesupport_fastrtps_c.so"),
@@ -153,12 +153,12 @@ def test_libraries_that_ros_loads_by_name_stay_with_what_they_need() -> None:
         "data/lib/libfastcdr.so": elf(),
         "data/lib/libfastcdr.so.2": elf(),
     }
-    superfluous = unreached({name: (lambda content=content: content) for name, content in files.items()})
+    superfluous = find_unreached({name: (lambda content=content: content) for name, content in files.items()})
     assert superfluous == {"data/lib/libtf2_msgs__rosidl_typesupport_introspection_cpp.so", "data/lib/libfastcdr.so"}
 
 
 def test_of_libraries_that_several_wheels_of_ros_hold_one_copy_stays() -> None:
-    from slim import repeated
+    from slim import find_repeated
 
     files = [
         "ros_rcl.libs/libssl-60.so.1",
@@ -166,7 +166,7 @@ def test_of_libraries_that_several_wheels_of_ros_hold_one_copy_stays() -> None:
         "ros_a.libs/libx.so",
         "numpy.libs/libssl-60.so.1",
     ]
-    assert repeated(files) == {"ros_rcl.libs/libssl-60.so.1"}
+    assert find_repeated(files) == {"ros_rcl.libs/libssl-60.so.1"}
 
 
 def test_an_environment_with_ros_is_slimmed_beside_its_packages_too(tmp_path: Path) -> None:

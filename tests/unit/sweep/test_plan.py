@@ -17,7 +17,7 @@ from throwcollect.sweep.trials import Trial
 PARAMETERS = {"ball.mass_kg": Range(min=0.01, max=1, scale="log"), "task.duration_s": Range(min=1, max=3)}
 
 
-def swept(trials: int = 8, *, seed: int = 0, name: str = "throws") -> Config:
+def make_config(trials: int = 8, *, seed: int = 0, name: str = "throws") -> Config:
     return Config(name=name, seed=seed, trials=trials, sweep=SweepConfig(parameters=PARAMETERS))
 
 
@@ -26,7 +26,7 @@ def heavy(config: Config) -> str | None:
 
 
 def test_trials_are_numbered_from_zero_and_differ():
-    plan = make_plan(swept())
+    plan = make_plan(make_config())
     assert [trial.number for trial in plan.trials] == list(range(8))
     assert plan.keys == ("ball.mass_kg", "task.duration_s")
     assert len({trial.digest for trial in plan.trials}) == len({trial.seed for trial in plan.trials}) == 8
@@ -34,7 +34,7 @@ def test_trials_are_numbered_from_zero_and_differ():
 
 
 def test_the_configuration_of_a_trial_has_its_values_and_nothing_else_changed():
-    plan = make_plan(swept())
+    plan = make_plan(make_config())
     trial = plan.trials[3]
     config = plan.config_of(trial)
     assert (config.ball.mass_kg, config.task.duration_s) == tuple(trial.values.values())
@@ -43,18 +43,18 @@ def test_the_configuration_of_a_trial_has_its_values_and_nothing_else_changed():
 
 
 def test_seeds_depend_on_root_seed_and_number_alone():
-    seeds = [trial.seed for trial in make_plan(swept(4)).trials]
-    assert [trial.seed for trial in make_plan(swept(8)).trials][:4] == seeds
-    assert not set(seeds) & {trial.seed for trial in make_plan(swept(4, seed=1)).trials}
+    seeds = [trial.seed for trial in make_plan(make_config(4)).trials]
+    assert [trial.seed for trial in make_plan(make_config(8)).trials][:4] == seeds
+    assert not set(seeds) & {trial.seed for trial in make_plan(make_config(4, seed=1)).trials}
     assert seeds == [int(child.generate_state(1, np.uint64)[0]) for child in np.random.SeedSequence(0).spawn(4)]
 
 
 def test_more_trials_keep_the_earlier_ones():
-    assert make_plan(swept(11)).trials[:5] == make_plan(swept(5)).trials
+    assert make_plan(make_config(11)).trials[:5] == make_plan(make_config(5)).trials
 
 
 def test_the_check_refuses_single_trials_with_its_reason():
-    plan = make_plan(swept(), check=heavy)
+    plan = make_plan(make_config(), check=heavy)
     refused = [trial for trial in plan.trials if trial.refused]
     assert 0 < len(refused) < 8
     for trial in plan.trials:
@@ -67,7 +67,7 @@ def test_a_configuration_error_of_the_check_is_a_reason_too():
             raise ConfigError(reason)
         return None
 
-    assert make_plan(swept(), check=check) == make_plan(swept(), check=heavy)
+    assert make_plan(make_config(), check=check) == make_plan(make_config(), check=heavy)
 
 
 def test_a_plan_of_refused_trials_is_an_error_that_lists_the_commonest_reasons():
@@ -110,20 +110,20 @@ def test_a_plan_comes_back_from_disk_as_it_was(tmp_path_factory, rows):
         Trial(number, {"ball.mass_kg": mass, "task.duration_s": duration}, seed, f"{number:064x}", refused)
         for number, (mass, duration, seed, refused) in enumerate(rows)
     ]
-    plan = Plan(swept(), in_columns(trials))
+    plan = Plan(make_config(), in_columns(trials))
     plan.write(path)
-    assert Plan.read(path, swept()) == plan
+    assert Plan.read(path, make_config()) == plan
 
 
 def test_equal_plans_are_equal_bytes_and_nothing_else_is_left_behind(tmp_path):
     for name in ("a", "b"):
-        make_plan(swept(), check=heavy).write(tmp_path / name)
+        make_plan(make_config(), check=heavy).write(tmp_path / name)
     assert (tmp_path / "a").read_bytes() == (tmp_path / "b").read_bytes()
     assert sorted(os.listdir(tmp_path)) == ["a", "b"]
 
 
 def test_the_file_has_one_column_per_swept_key(tmp_path):
-    plan = make_plan(swept(), check=heavy)
+    plan = make_plan(make_config(), check=heavy)
     plan.write(tmp_path / "plan.parquet")
     table = pq.read_table(tmp_path / "plan.parquet")
     kinds = {field.name: str(field.type) for field in table.schema}
@@ -140,16 +140,16 @@ def test_the_file_has_one_column_per_swept_key(tmp_path):
 
 def test_a_plan_may_be_read_for_another_way_of_running_but_not_for_another_configuration(tmp_path):
     path = tmp_path / "plan.parquet"
-    make_plan(swept()).write(path)
-    other_run = swept().model_copy(update={"run": RunConfig(simulations=9)})
+    make_plan(make_config()).write(path)
+    other_run = make_config().model_copy(update={"run": RunConfig(simulations=9)})
     assert len(Plan.read(path, other_run).trials) == 8
     with pytest.raises(DatasetError, match=r"plan\.parquet: the plan belongs to another configuration$"):
-        Plan.read(path, swept(seed=1))
+        Plan.read(path, make_config(seed=1))
 
 
 def test_a_missing_plan_is_an_error(tmp_path):
     with pytest.raises(DatasetError, match=r"plan\.parquet: is missing$"):
-        Plan.read(tmp_path / "plan.parquet", swept())
+        Plan.read(tmp_path / "plan.parquet", make_config())
 
 
 def test_a_plan_that_may_not_be_read_is_not_called_damaged(tmp_path, monkeypatch):
@@ -163,23 +163,23 @@ def test_a_plan_that_may_not_be_read_is_not_called_damaged(tmp_path, monkeypatch
 
 def test_a_plan_that_cannot_be_written_is_an_error(tmp_path):
     with pytest.raises(DatasetError, match=r"nowhere/plan\.parquet: cannot be written: No such file"):
-        make_plan(swept()).write(tmp_path / "nowhere" / "plan.parquet")
+        make_plan(make_config()).write(tmp_path / "nowhere" / "plan.parquet")
 
 
 def test_cuts_are_noticed_and_so_are_flipped_bits_that_matter(tmp_path):
     path = tmp_path / "plan.parquet"
-    plan = make_plan(swept(), check=heavy)
+    plan = make_plan(make_config(), check=heavy)
     plan.write(path)
     content = path.read_bytes()
     for length in range(0, len(content), 97):
         path.write_bytes(content[:length])
         with pytest.raises(DatasetError, match=r"plan\.parquet: is damaged: "):
-            Plan.read(path, swept())
+            Plan.read(path, make_config())
     noticed = 0
     for position in range(0, len(content), 7):
         path.write_bytes(content[:position] + bytes([content[position] ^ 1]) + content[position + 1 :])
         try:
-            assert Plan.read(path, swept()) == plan
+            assert Plan.read(path, make_config()) == plan
         except DatasetError:
             noticed += 1
     assert noticed > 100
@@ -191,20 +191,20 @@ def test_foreign_tables_are_no_plans(tmp_path):
     with pytest.raises(
         DatasetError, match=r"not a plan that this version reads\n  expected: plan format 1\n.*got none"
     ):
-        Plan.read(path, swept())
-    plan = make_plan(swept())
+        Plan.read(path, make_config())
+    plan = make_plan(make_config())
     plan.write(path)
     table = pq.read_table(path)
     pq.write_table(table.drop_columns("seed"), path)
     with pytest.raises(DatasetError, match="not a plan that this version reads"):
-        Plan.read(path, swept())
+        Plan.read(path, make_config())
     numbered = table.set_column(1, table.schema.field("digest"), [[f"{number:064X}" for number in range(3, 11)]])
     pq.write_table(numbered, path)
     with pytest.raises(DatasetError, match="trial 7: is damaged: has a digest that is no SHA-256"):
-        Plan.read(path, swept())
+        Plan.read(path, make_config())
     pq.write_table(table.slice(1), path)
     with pytest.raises(DatasetError, match=r"the trials are not numbered from 0 without gaps$"):
-        Plan.read(path, swept())
+        Plan.read(path, make_config())
 
 
 def test_values_to_choose_from_are_planned_as_well():
@@ -215,8 +215,8 @@ def test_values_to_choose_from_are_planned_as_well():
 @pytest.mark.parametrize("text", [b"9", b"\xff", b"2/2"])
 def test_a_plan_that_is_no_slice_of_any_is_damaged(tmp_path, text):
     path = tmp_path / "plan.parquet"
-    make_plan(swept()).write(path)
+    make_plan(make_config()).write(path)
     table = pq.read_table(path)
     pq.write_table(table.replace_schema_metadata(table.schema.metadata | {b"throwcollect.slice": text}), path)
     with pytest.raises(DatasetError, match=r"plan\.parquet: is damaged: .*slice"):
-        Plan.read(path, swept())
+        Plan.read(path, make_config())

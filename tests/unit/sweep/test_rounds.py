@@ -5,7 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from tests.unit.sweep.thrower import collected, configuration, go_on, throw
+from tests.unit.sweep.thrower import collect, configuration, go_on, throw
 
 from throwcollect.errors import PlanError
 from throwcollect.sweep.plan import make_plan, make_trials
@@ -93,7 +93,7 @@ def test_no_round_follows_when_enough_have_landed_without_those_of_the_round_bef
 @pytest.mark.parametrize("sampler", ["sobol", "uniform", "latin_hypercube"])
 def test_until_serves_the_points_of_the_sampler_in_whole_rounds(sampler: str) -> None:
     config = configuration(trials=2000, target=None, landed=300, sampler=sampler)
-    trials = collected(config)
+    trials = collect(config)
     assert len(trials) % 64 == 0
     landings = [throw(trial).outcome is ThrowOutcome.LANDED for trial in trials]
     assert sum(landings) >= 300
@@ -103,9 +103,9 @@ def test_until_serves_the_points_of_the_sampler_in_whole_rounds(sampler: str) ->
 
 
 def test_until_ends_when_trials_are_used_up() -> None:
-    trials = collected(configuration(trials=200, target=None, landed=5000))
+    trials = collect(configuration(trials=200, target=None, landed=5000))
     assert [trial.number for trial in trials] == list(range(200))
-    assert len(collected(configuration(trials=None, target=None, landed=20), throw=lambda _: FAILED)) == 200
+    assert len(collect(configuration(trials=None, target=None, landed=20), throw=lambda _: FAILED)) == 200
 
 
 def test_a_grid_until_enough_have_landed_has_no_more_than_its_points() -> None:
@@ -114,7 +114,7 @@ def test_a_grid_until_enough_have_landed_has_no_more_than_its_points() -> None:
         "ball.friction": {"values": [0.1 * i for i in range(10)]},
     }
     config = configuration(trials=None, target=None, landed=5000, sampler="grid", parameters=axes)
-    assert len(collected(config, throw=lambda _: FAILED)) == 150
+    assert len(collect(config, throw=lambda _: FAILED)) == 150
 
 
 def test_target_needs_a_number_of_trials() -> None:
@@ -125,39 +125,39 @@ def test_target_needs_a_number_of_trials() -> None:
 @pytest.mark.parametrize("options", [{}, {"trials": None, "landed": 300}])
 def test_the_order_in_which_trials_end_does_not_matter(options: dict[str, int]) -> None:
     config = configuration(**options)  # type: ignore[arg-type]
-    expected = collected(config)
+    expected = collect(config)
 
-    def shuffled(trials: list[Trial]) -> list[Trial]:
+    def shuffle(trials: list[Trial]) -> list[Trial]:
         return random.Random(len(trials)).sample(trials, len(trials))
 
-    assert collected(config, order=shuffled) == expected
-    assert collected(config, order=reversed) == expected
+    assert collect(config, order=shuffle) == expected
+    assert collect(config, order=reversed) == expected
 
 
 @pytest.mark.parametrize("rounds", [2, 3, 4, 7])
 def test_a_collection_that_is_left_goes_on_as_if_it_had_not_been(rounds: int) -> None:
     config = configuration(trials=500)
-    left = collected(config, rounds=rounds)
+    left = collect(config, rounds=rounds)
     assert len(left) == 64 * rounds
-    assert go_on(config, left) == collected(config)
+    assert go_on(config, left) == collect(config)
 
 
 def test_a_collection_may_go_on_beyond_its_last_round_which_was_cut_short() -> None:
     few, more = configuration(trials=330), configuration(trials=500)
-    begun = collected(few)
+    begun = collect(few)
     assert len(begun) == 330
-    assert go_on(more, begun) == collected(more)
+    assert go_on(more, begun) == collect(more)
 
 
 def test_a_collection_that_was_shorter_than_two_rounds_may_go_on_as_well() -> None:
-    begun = collected(configuration(trials=30))
+    begun = collect(configuration(trials=30))
     assert len(begun) == 30
-    assert go_on(configuration(trials=330), begun) == collected(configuration(trials=330))
+    assert go_on(configuration(trials=330), begun) == collect(configuration(trials=330))
 
 
 def test_trials_of_later_rounds_are_numbered_seeded_and_hashed_as_any_other() -> None:
     config = configuration(trials=300)
-    trials = collected(config)
+    trials = collect(config)
     assert [trial.number for trial in trials] == list(range(300))
     assert len({trial.seed for trial in trials}) == len({trial.digest for trial in trials}) == 300
     again = configuration(trials=300, target=None)

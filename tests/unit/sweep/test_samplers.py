@@ -25,7 +25,7 @@ parameters = st.one_of(
 )
 
 
-def drawn(parameters, *, sampler="sobol", trials=64, seed=0):
+def draw(parameters, *, sampler="sobol", trials=64, seed=0):
     config = Config(seed=seed, trials=trials, sweep=SweepConfig(sampler=sampler, parameters=parameters))
     return draw_points(config, directory=HERE).values
 
@@ -40,7 +40,7 @@ def test_the_configuration_names_these_samplers_and_two_more():
     st.lists(parameters, min_size=1, max_size=3), st.integers(1, 70), st.integers(0, 2**32 - 1), st.sampled_from(NAMES)
 )
 def test_points_are_inside_what_they_are_drawn_from(declared, trials, seed, sampler):
-    values = drawn(dict(zip(KEYS, declared, strict=False)), sampler=sampler, trials=trials, seed=seed)
+    values = draw(dict(zip(KEYS, declared, strict=False)), sampler=sampler, trials=trials, seed=seed)
     assert values.shape == (trials, len(declared))
     for parameter, column in zip(declared, values.T, strict=True):
         if isinstance(parameter, Range):
@@ -57,30 +57,30 @@ SPREAD = {"task.duration_s": Range(min=1, max=3), "ball.mass_kg": Range(min=0.01
 def test_more_trials_keep_the_earlier_ones(few, more, sampler):
     few, more = sorted((few, more))
     np.testing.assert_array_equal(
-        drawn(SPREAD, sampler=sampler, trials=more)[:few], drawn(SPREAD, sampler=sampler, trials=few)
+        draw(SPREAD, sampler=sampler, trials=more)[:few], draw(SPREAD, sampler=sampler, trials=few)
     )
 
 
 @pytest.mark.parametrize("sampler", NAMES)
 def test_the_root_seed_decides(sampler):
-    np.testing.assert_array_equal(drawn(SPREAD, sampler=sampler, seed=3), drawn(SPREAD, sampler=sampler, seed=3))
-    assert (drawn(SPREAD, sampler=sampler, seed=3) != drawn(SPREAD, sampler=sampler, seed=4)).all()
+    np.testing.assert_array_equal(draw(SPREAD, sampler=sampler, seed=3), draw(SPREAD, sampler=sampler, seed=3))
+    assert (draw(SPREAD, sampler=sampler, seed=3) != draw(SPREAD, sampler=sampler, seed=4)).all()
 
 
 @pytest.mark.parametrize("sampler", ["sobol", "latin_hypercube"])
 def test_each_of_as_many_strips_as_trials_holds_one_point(sampler):
-    strips = np.floor((drawn(SPREAD, sampler=sampler, trials=32)[:, 0] - 1) / 2 * 32)
+    strips = np.floor((draw(SPREAD, sampler=sampler, trials=32)[:, 0] - 1) / 2 * 32)
     assert sorted(strips) == list(range(32))
 
 
 @pytest.mark.parametrize("sampler", ["sobol", "latin_hypercube"])
 def test_values_to_choose_from_get_equal_shares(sampler):
-    column = drawn({"ball.mass_kg": Values(values=[0.1, 0.2, 0.3, 0.4])}, sampler=sampler, trials=64)[:, 0]
+    column = draw({"ball.mass_kg": Values(values=[0.1, 0.2, 0.3, 0.4])}, sampler=sampler, trials=64)[:, 0]
     assert np.unique(column, return_counts=True)[1].tolist() == [16, 16, 16, 16]
 
 
 def test_a_logarithmic_scale_spreads_the_logarithm():
-    column = drawn({"ball.mass_kg": Range(min=0.01, max=1, scale="log")}, trials=64)[:, 0]
+    column = draw({"ball.mass_kg": Range(min=0.01, max=1, scale="log")}, trials=64)[:, 0]
     assert (column < 0.1).sum() == 32
 
 
@@ -88,7 +88,7 @@ def test_a_logarithmic_scale_spreads_the_logarithm():
 def test_numbers_that_are_no_power_of_two_cause_no_warning(trials):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        assert len(drawn(SPREAD, trials=trials)) == trials
+        assert len(draw(SPREAD, trials=trials)) == trials
 
 
 GRID = {
@@ -99,46 +99,46 @@ GRID = {
 
 
 def test_a_grid_holds_all_combinations_with_the_last_key_fastest():
-    values = drawn(GRID, sampler="grid", trials=None)
+    values = draw(GRID, sampler="grid", trials=None)
     assert len(values) == 18
     np.testing.assert_allclose(values[:4], [[0.3, 1, 1], [0.3, 1, 10], [0.3, 1, 100], [0.3, 1.5, 1]], rtol=1e-14)
     assert values[-1].tolist() == [0.1, 2.0, 100.0]
 
 
 def test_trials_take_the_first_points_of_a_grid():
-    np.testing.assert_array_equal(drawn(GRID, sampler="grid", trials=5), drawn(GRID, sampler="grid", trials=None)[:5])
+    np.testing.assert_array_equal(draw(GRID, sampler="grid", trials=5), draw(GRID, sampler="grid", trials=None)[:5])
 
 
 def test_the_first_points_of_an_endless_grid_need_no_endless_memory():
     endless = {key: Range(min=1, max=2, count=10**6) for key in KEYS}
-    assert drawn(endless, sampler="grid", trials=2)[1].tolist() == [1, 1, 1 + 1 / (10**6 - 1)]
+    assert draw(endless, sampler="grid", trials=2)[1].tolist() == [1, 1, 1 + 1 / (10**6 - 1)]
     with pytest.raises(
         PlanError, match=r"^sweep\.parameters: the grid has 1000000000000000000 points\n  expected: at most"
     ):
-        drawn(endless, sampler="grid", trials=None)
+        draw(endless, sampler="grid", trials=None)
 
 
 def test_a_grid_beyond_all_numbers_of_points_still_has_first_ones():
     endless = {f"ball.{key}": Range(min=0.01, max=0.02, count=10**7) for key in ("mass_kg", "radius_m", "friction")}
-    assert drawn(endless, sampler="grid", trials=2)[0].tolist() == [0.01, 0.01, 0.01]
+    assert draw(endless, sampler="grid", trials=2)[0].tolist() == [0.01, 0.01, 0.01]
     with pytest.raises(PlanError, match="the grid has 1000000000000000000000 points"):
-        drawn(endless, sampler="grid", trials=None)
+        draw(endless, sampler="grid", trials=None)
 
 
 def test_more_trials_than_a_grid_has_are_an_error():
     with pytest.raises(PlanError, match=r"^trials: should be at most 18, as the sweep has no more points, got 19$"):
-        drawn(GRID, sampler="grid", trials=19)
+        draw(GRID, sampler="grid", trials=19)
 
 
 @pytest.mark.parametrize("sampler", ["sobol", "grid"])
 def test_nothing_to_sweep_is_an_error(sampler):
     with pytest.raises(PlanError, match=r"^sweep\.parameters: nothing is swept\n  expected: at least one key"):
-        drawn({}, sampler=sampler)
+        draw({}, sampler=sampler)
 
 
 def test_drawing_needs_a_number_of_trials():
     with pytest.raises(PlanError, match=r"^trials: missing; the sampler uniform draws any number of trials$"):
-        drawn(SPREAD, sampler="uniform", trials=None)
+        draw(SPREAD, sampler="uniform", trials=None)
 
 
 @pytest.mark.parametrize("seed", [0, 7])

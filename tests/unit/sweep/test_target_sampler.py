@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
-from tests.unit.sweep.thrower import DISTANCE, HIT_ANGLE, PARAMETERS, TARGET, collected, configuration, throw
+from tests.unit.sweep.thrower import DISTANCE, HIT_ANGLE, PARAMETERS, TARGET, collect, configuration, throw
 
 from throwcollect.config.sweep import TargetConfig
 from throwcollect.sweep.plan import make_plan
@@ -40,7 +40,7 @@ def evenness(counted: NDArray[np.int64]) -> float:
 
 @pytest.fixture(scope="module")
 def spread() -> list[Trial]:
-    return collected(configuration(trials=TRIALS))
+    return collect(configuration(trials=TRIALS))
 
 
 @pytest.fixture(scope="module")
@@ -70,7 +70,7 @@ def test_cells_out_of_reach_do_not_eat_the_budget(reachable: NDArray[np.bool_]) 
     near = np.zeros((48, 8), dtype=bool)
     near[:12] = reachable.reshape(12, 8)
     assert near.mean() < 0.2
-    trials = collected(configuration(trials=TRIALS, target=wide))
+    trials = collect(configuration(trials=TRIALS, target=wide))
     assert evenness(counts(trials, wide)[near.ravel()]) > 0.93
 
 
@@ -84,7 +84,7 @@ def test_throws_at_the_same_cells_differ_in_their_parameters(spread: list[Trial]
 
 def test_heights_are_targets_too() -> None:
     target = {"distance_m": {**DISTANCE, "bins": 6}, "height_m": {"min": 0.0, "max": 0.5, "bins": 4}}
-    counted = counts(collected(configuration(trials=512, target=target)), target).reshape(6, 4)
+    counted = counts(collect(configuration(trials=512, target=target)), target).reshape(6, 4)
     sobol = counts(make_plan(configuration(trials=512, target=None)).trials, target).reshape(6, 4)
     assert evenness(counted.ravel()) > 0.97 > evenness(sobol.ravel())
     assert counted.min() > 2 * sobol.min()
@@ -97,7 +97,7 @@ def test_sets_of_values_and_fixed_ranges_may_take_part() -> None:
         "scene.landing_height_m": {"min": 0.2, "max": 0.2},
     }
     config = configuration(trials=320, target={"distance_m": DISTANCE}, parameters=parameters)
-    trials = collected(config)
+    trials = collect(config)
     assert {trial.values["ball.friction"] for trial in trials[128:]} == {0.1, 0.4, 0.9}
     assert {trial.values["scene.landing_height_m"] for trial in trials} == {0.2}
 
@@ -116,7 +116,7 @@ def test_while_almost_nothing_lands_sobol_goes_on() -> None:
         return throw(trial) if trial.number < 5 else ThrowResult(ThrowOutcome.RECAUGHT)
 
     sobol = make_plan(configuration(trials=320, target=None)).trials
-    assert collected(config, throw=unlucky) == list(sobol)
+    assert collect(config, throw=unlucky) == list(sobol)
 
 
 def test_trials_are_those_of_every_version(spread: list[Trial]) -> None:
@@ -126,15 +126,15 @@ def test_trials_are_those_of_every_version(spread: list[Trial]) -> None:
 
 def test_another_seed_gives_other_trials(spread: list[Trial]) -> None:
     config = configuration(trials=192)
-    assert collected(config)[128:] == spread[128:192]
-    other = collected(config.model_copy(update={"seed": 2}))
+    assert collect(config)[128:] == spread[128:192]
+    other = collect(config.model_copy(update={"seed": 2}))
     assert not {trial.digest for trial in other} & {trial.digest for trial in spread}
 
 
 def test_another_process_draws_the_same(spread: list[Trial]) -> None:
     script = (
-        "from tests.unit.sweep.thrower import collected, configuration\n"
-        "print(collected(configuration(trials=192))[-1].digest)"
+        "from tests.unit.sweep.thrower import collect, configuration\n"
+        "print(collect(configuration(trials=192))[-1].digest)"
     )
     printed = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True).stdout
     assert printed.strip() == spread[191].digest
@@ -165,26 +165,26 @@ def thinness(**known: list[int]) -> Thinness:
     return Thinness(**each, randomness=np.random.default_rng(0))
 
 
-def chosen(count: int, **known: list[int]) -> list[int]:
+def choose(count: int, **known: list[int]) -> list[int]:
     return thinness(**known).take(count).tolist()
 
 
 def test_the_thinnest_cells_come_first_and_throws_under_way_count() -> None:
-    assert chosen(1, landed=[3, 0, 1, 3]) == [1]
-    assert sorted(chosen(2, landed=[3, 0, 1, 3], asked=[0, 1, 0, 0])) == [1, 2]
-    assert chosen(3, landed=[3, 0, 3, 3]) == [1, 1, 1]
-    assert 1 not in chosen(3, landed=[3, 0, 3, 3], asked=[0, 9, 0, 0])
+    assert choose(1, landed=[3, 0, 1, 3]) == [1]
+    assert sorted(choose(2, landed=[3, 0, 1, 3], asked=[0, 1, 0, 0])) == [1, 2]
+    assert choose(3, landed=[3, 0, 3, 3]) == [1, 1, 1]
+    assert 1 not in choose(3, landed=[3, 0, 3, 3], asked=[0, 9, 0, 0])
 
 
 def test_each_further_miss_doubles_the_wait() -> None:
-    assert 0 in chosen(4, missed=[1, 0, 0, 0])
-    assert 0 not in chosen(20, missed=[4, 0, 0, 0])
-    assert 0 in chosen(3 * 7 + 4, missed=[4, 0, 0, 0])
-    assert 0 not in chosen(1000, missed=[2000, 0, 0, 0])
+    assert 0 in choose(4, missed=[1, 0, 0, 0])
+    assert 0 not in choose(20, missed=[4, 0, 0, 0])
+    assert 0 in choose(3 * 7 + 4, missed=[4, 0, 0, 0])
+    assert 0 not in choose(1000, missed=[2000, 0, 0, 0])
 
 
 def test_the_edge_of_what_is_reached_comes_before_what_lies_beyond() -> None:
-    assert sorted(chosen(3, away=[1, 5, 0, 1])) == [0, 2, 3]
+    assert sorted(choose(3, away=[1, 5, 0, 1])) == [0, 2, 3]
 
 
 def test_a_cell_that_is_doubted_waits_as_if_missed_four_times_and_is_doubted_once() -> None:
@@ -205,6 +205,6 @@ def test_rounds_that_run_at_the_same_time_do_not_throw_at_the_same_cells() -> No
         return ThrowResult(ThrowOutcome.LANDED, landing=landing, hit_angle_rad=0.785)
 
     cells = Cells(TargetConfig.model_validate(line))
-    trials = collected(configuration(trials=256, target=line), throw=straight)
+    trials = collect(configuration(trials=256, target=line), throw=straight)
     found = cells.cells_of(np.array([cells.place(trial.values, straight(trial)) for trial in trials]))
     assert len(set(found[128:192]) & set(found[192:])) < 20

@@ -85,5 +85,5 @@ def go_on(
         grown.add(added)
 
 
-def collected(config: Config, **options: Any) -> list[Trial]:
+def collect(config: Config, **options: Any) -> list[Trial]:
     return go_on(config, list(make_plan(config).trials), **options)

@@ -14,7 +14,7 @@ ELBOW = "arm_right_4_joint"
 PLAIN = DynamicMovementPrimitive(family="dmp")
 
 
-def rolled(times, *, weights, family=PLAIN, tau=0.8, refinement=1):
+def roll(times, *, weights, family=PLAIN, tau=0.8, refinement=1):
     return roll_out(
         times, start=np.array([-1.9, 0.2]), goal=np.array([-0.5, 0.2]), weights=weights, tau=tau, family=family,
         refinement=refinement,
@@ -30,7 +30,7 @@ def demonstration(gamma=1.2, samples=401):
 
 def test_without_weights_a_dmp_is_a_critically_damped_spring():
     times = np.linspace(0, 1, 51)
-    positions, velocities, accelerations = rolled(times, weights=np.zeros((2, 20)))
+    positions, velocities, accelerations = roll(times, weights=np.zeros((2, 20)))
     rate = 48 / 2 / 0.8
     decay = np.exp(-rate * times)
     assert positions[:, 0] == pytest.approx(-0.5 - 1.4 * (1 + rate * times) * decay, abs=1e-6)
@@ -46,7 +46,7 @@ def test_halving_the_step_does_not_move_the_curve(count, tau, alpha_z):
     # Weights that bend the path by about a radian.
     weights = np.random.default_rng(count).uniform(-1, 1, (2, count)) * alpha_z**2 / 4
     times = np.linspace(0, 1.5 * tau, 31)
-    coarse, fine = (rolled(times, weights=weights, family=family, tau=tau, refinement=r)[0] for r in (1, 2))
+    coarse, fine = (roll(times, weights=weights, family=family, tau=tau, refinement=r)[0] for r in (1, 2))
     scale = np.ptp(fine)
     assert np.abs(coarse - fine).max() < 2e-6 * scale
 
@@ -54,15 +54,15 @@ def test_halving_the_step_does_not_move_the_curve(count, tau, alpha_z):
 def test_error_falls_with_the_fourth_power_of_the_step():
     weights = np.random.default_rng(3).uniform(-500, 500, (2, 20))
     times = np.linspace(0, 1, 26)
-    exact = rolled(times, weights=weights, refinement=16)[0]
-    errors = [np.abs(rolled(times, weights=weights, refinement=r)[0] - exact).max() for r in (1, 2)]
+    exact = roll(times, weights=weights, refinement=16)[0]
+    errors = [np.abs(roll(times, weights=weights, refinement=r)[0] - exact).max() for r in (1, 2)]
     assert 10 < errors[0] / errors[1] < 25
 
 
 def test_velocity_and_acceleration_are_derivatives_of_the_path():
     weights = np.random.default_rng(1).uniform(-300, 300, (2, 20))
     times = np.linspace(0, 1, 4001)
-    positions, velocities, accelerations = rolled(times, weights=weights)
+    positions, velocities, accelerations = roll(times, weights=weights)
     assert np.gradient(positions, times, axis=0)[1:-1] == pytest.approx(velocities[1:-1], abs=1e-3)
     assert np.gradient(velocities, times, axis=0)[1:-1] == pytest.approx(accelerations[1:-1], abs=0.05)
 

@@ -24,7 +24,7 @@ SECTIONS = [*(load_member("tasks", name) for name in names_of("tasks")), ReachCo
 of_every_task = pytest.mark.parametrize("section", SECTIONS, ids=lambda section: section.model_fields["name"].default)
 
 
-def filled(section: type[TaskConfig]) -> TaskConfig:
+def fill(section: type[TaskConfig]) -> TaskConfig:
     """The section as `throwcollect init` fills it, as a task need not have a motion by default."""
     if section is ReachConfig:
         return section()  # its package is not installed, so no configuration can name it
@@ -32,26 +32,26 @@ def filled(section: type[TaskConfig]) -> TaskConfig:
     return section(start=start, end=end, duration_s=duration_s)
 
 
-def described(section: type[TaskConfig]) -> Task:
+def make_task(section: type[TaskConfig]) -> Task:
     """The task in a configuration, as if its package were installed."""
-    return task_of(Config().model_copy(update={"task": filled(section)}))
+    return task_of(Config().model_copy(update={"task": fill(section)}))
 
 
 @of_every_task
 def test_it_has_the_outcomes_that_all_tasks_have_and_its_success(section: type[TaskConfig]) -> None:
-    words = {each.value for each in described(section).outcomes}
-    assert {LIMIT_VIOLATED, TRACKING_FAILED, LOST, filled(section).success} <= words
+    words = {each.value for each in make_task(section).outcomes}
+    assert {LIMIT_VIOLATED, TRACKING_FAILED, LOST, fill(section).success} <= words
 
 
 @of_every_task
 def test_it_is_found_by_the_name_in_the_table(section: type[TaskConfig]) -> None:
-    assert section.model_fields["name"].default == filled(section).name
-    assert isinstance(described(section), Task)
+    assert section.model_fields["name"].default == fill(section).name
+    assert isinstance(make_task(section), Task)
 
 
 @of_every_task
 def test_every_measure_of_its_results_has_columns(section: type[TaskConfig]) -> None:
-    task = described(section)
+    task = make_task(section)
     columns = [column.name for column in task.columns.columns]
     assert len(set(columns)) == len(columns)
     for each in fields(task.results):
@@ -62,7 +62,7 @@ def test_every_measure_of_its_results_has_columns(section: type[TaskConfig]) -> 
 
 @of_every_task
 def test_targets_are_wanted_of_what_it_measures_or_is_given(section: type[TaskConfig]) -> None:
-    measured = {column.name: column.kind for column in described(section).columns.columns}
+    measured = {column.name: column.kind for column in make_task(section).columns.columns}
     for each in section.target_columns:
         assert is_target(each.name)
         assert measured.get(each.of) == "number" or each.of in section.given, each
@@ -74,7 +74,7 @@ def test_targets_are_wanted_of_what_it_measures_or_is_given(section: type[TaskCo
 
 @of_every_task
 def test_results_come_back_from_their_columns(section: type[TaskConfig]) -> None:
-    task = described(section)
+    task = make_task(section)
     lost = task.lose("nobody did it")
     assert isinstance(lost, Result)
     assert task.columns.read(lost.outcome, lost.reason, task.columns.write(lost)) == lost
@@ -82,7 +82,7 @@ def test_results_come_back_from_their_columns(section: type[TaskConfig]) -> None
 
 @of_every_task
 def test_the_motion_ends_where_the_configuration_says(section: type[TaskConfig]) -> None:
-    task = described(section)
+    task = make_task(section)
     trajectory = task.trajectory()
     assert dict(zip(trajectory.joints, trajectory.positions[-1].tolist(), strict=True)) == task.config.task.end
 
@@ -90,5 +90,5 @@ def test_the_motion_ends_where_the_configuration_says(section: type[TaskConfig])
 @of_every_task
 def test_what_it_adds_to_a_report_can_be_loaded(section: type[TaskConfig]) -> None:
     pytest.importorskip("plotly")
-    if path := described(section).report:
+    if path := make_task(section).report:
         assert callable(load_object(path))

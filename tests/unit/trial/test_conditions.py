@@ -52,7 +52,7 @@ def test_differences_are_named(changes: dict[str, object], said: list[str]) -> N
     assert list(replace(WANTED, **changes).differences(WANTED)) == said
 
 
-def changed(key: str, value: object) -> Config:
+def change(key: str, value: object) -> Config:
     section, _, name = key.rpartition(".")
     holder = getattr(CONFIG, section)
     return CONFIG.model_copy(update={section: holder.model_copy(update={name: value})})
@@ -60,7 +60,7 @@ def changed(key: str, value: object) -> Config:
 
 @pytest.mark.parametrize("key", WITHOUT_EFFECT)
 def test_settings_leave_out_what_simulations_do_not_heed(key: str) -> None:
-    assert Settings(changed(key, WITHOUT_EFFECT[key])).digest == Settings(CONFIG).digest
+    assert Settings(change(key, WITHOUT_EFFECT[key])).digest == Settings(CONFIG).digest
 
 
 @pytest.mark.parametrize(
@@ -83,7 +83,7 @@ def test_settings_leave_out_what_simulations_do_not_heed(key: str) -> None:
 def test_settings_cover_what_simulations_heed(key: str, value: object) -> None:
     before = values_by_key(CONFIG)
     assert before.get(key) != value
-    assert Settings(changed(key, value)).digest != Settings(CONFIG).digest
+    assert Settings(change(key, value)).digest != Settings(CONFIG).digest
 
 
 def test_what_a_trial_replaces_is_named_key_by_key() -> None:

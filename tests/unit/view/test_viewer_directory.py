@@ -251,14 +251,14 @@ def test_the_same_throws_give_the_same_bytes(collected: Path, written: View, tmp
     assert again.recording.read_bytes() == written.recording.read_bytes()
 
 
-def held(samples: Samples, header: EpisodeHeader) -> tuple[Samples, EpisodeHeader]:
+def hold_ball(samples: Samples, header: EpisodeHeader) -> tuple[Samples, EpisodeHeader]:
     """The spoon keeps the ball."""
     contact = replace(header.contacts[0], end_ns=None)
     return samples, replace(header, contacts=(contact,), end_reason="timeout")
 
 
 def test_a_throw_that_was_not_released_has_no_points(make_collection: Any, tmp_path: Path) -> None:
-    dataset = make_collection({"trials": 1}).collect(tmp_path / "dataset", change=held)
+    dataset = make_collection({"trials": 1}).collect(tmp_path / "dataset", change=hold_ball)
     shown = messages_of(view(dataset, tmp_path / "view").recording)
     (_, array), (_, facts) = shown["/view/throw"][0], shown["/view/facts"][0]
     assert [marker.ns for marker in array.markers] == ["", "ball", "path"]

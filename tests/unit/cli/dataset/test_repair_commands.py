@@ -21,7 +21,7 @@ def source(tmp_path: Path) -> Path:
     return Collection({"trials": 3}).collect(tmp_path / "source")
 
 
-def spoiled(path: Path, place: int) -> None:
+def spoil_byte(path: Path, place: int) -> None:
     data = bytearray(path.read_bytes())
     data[place] ^= 1
     path.write_bytes(data)
@@ -111,7 +111,7 @@ def test_rebuild_says_what_is_judged_otherwise(run: Run, source: Path, capsys: p
 def test_rebuild_of_a_damaged_dataset_hints_at_repair(
     run: Run, source: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    spoiled(source / "quick_00000.mcap", 20_000)
+    spoil_byte(source / "quick_00000.mcap", 20_000)
     assert run("dataset", "rebuild", source) == 4
     assert f"try: throwcollect dataset repair {source} OUTPUT" in capsys.readouterr().err
 
@@ -130,7 +130,7 @@ def test_repair_without_losses_ends_with_0(
 def test_repair_lists_what_is_lost_and_ends_with_5(
     run: Run, source: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    spoiled(source / "quick_00000.mcap", 20_000)
+    spoil_byte(source / "quick_00000.mcap", 20_000)
     output = tmp_path / "output"
     assert run("dataset", "repair", source, output) == 5
     told = capsys.readouterr()
@@ -147,10 +147,10 @@ def test_repair_lists_what_is_lost_and_ends_with_5(
 def test_repair_that_keeps_another_episode_than_the_tables_ends_with_5(
     run: Run, source: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    def forged(samples: Samples, header: EpisodeHeader) -> tuple[Samples, EpisodeHeader]:
+    def scale_efforts(samples: Samples, header: EpisodeHeader) -> tuple[Samples, EpisodeHeader]:
         return replace(samples, effort=samples.effort * 1.01), header
 
-    other = Collection({"trials": 3}).collect(tmp_path / "other", change=forged)
+    other = Collection({"trials": 3}).collect(tmp_path / "other", change=scale_efforts)
     (source / "quick_00000.mcap").write_bytes((other / "quick_00000.mcap").read_bytes())
     output = tmp_path / "output"
     assert run("dataset", "repair", source, output) == 5

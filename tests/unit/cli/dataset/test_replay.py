@@ -31,12 +31,12 @@ def chosen(monkeypatch: pytest.MonkeyPatch) -> list[int]:
         episode=lambda _: None,
     )
 
-    def replayed(_: Path, wanted: Sequence[int]) -> Iterator[Comparison]:
+    def replay(_: Path, wanted: Sequence[int]) -> Iterator[Comparison]:
         trials.extend(wanted)
         yield from (DIFFERENT if trial == 5 else Comparison(trial, "aa", "aa", ()) for trial in wanted)
 
     monkeypatch.setattr(reader, "Dataset", SimpleNamespace(open=lambda _: dataset))
-    monkeypatch.setattr(audit, "replay_throws", replayed)
+    monkeypatch.setattr(audit, "replay_throws", replay)
     return trials
 
 

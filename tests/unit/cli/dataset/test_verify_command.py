@@ -23,11 +23,11 @@ def replays(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     """Trials that are replayed; trial 1 comes out otherwise."""
     trials: list[int] = []
 
-    def replayed(_: Path, wanted: Sequence[int]) -> Iterator[Comparison]:
+    def replay(_: Path, wanted: Sequence[int]) -> Iterator[Comparison]:
         trials.extend(wanted)
         yield from (Comparison(trial, "aa", "bb", ("effort: otherwise",) * (trial == 1)) for trial in wanted)
 
-    monkeypatch.setattr("throwcollect.replay.verification.replay_throws", replayed)
+    monkeypatch.setattr("throwcollect.replay.verification.replay_throws", replay)
     return trials
 
 

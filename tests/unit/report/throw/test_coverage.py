@@ -10,7 +10,7 @@ from throwcollect.report.throw.landings import Landings
 from throwcollect.report.throw.throw_figures import draw_coverage_map
 
 
-def landed(distance: list[float], angle: list[float]) -> Landings:
+def make_landings(distance: list[float], angle: list[float]) -> Landings:
     count, zero = len(distance), np.zeros(len(distance))
     trials = np.arange(count)
     return Landings(trials, np.array(distance), zero, np.array(distance), np.array(angle), zero, zero, trials * 0)
@@ -25,7 +25,7 @@ def test_cells_are_those_of_the_targets() -> None:
         }
     )
     throws = pa.table({"scene.landing_height_m": [0.2, 0.7, 1.0, 0.1]})
-    found = count_throws(landed([1.2, 1.2, 2.0, 2.1], [0.5, 0.5, 1.0, 0.5]), throws, target=target)
+    found = count_throws(make_landings([1.2, 1.2, 2.0, 2.1], [0.5, 0.5, 1.0, 0.5]), throws, target=target)
     assert found is not None
     assert found.counts.tolist() == [[[1, 1]], [[0, 1]]]  # distance, hit angle, height
     assert (found.hit, found.throws, found.counts.size) == (3, 4, 4)
@@ -39,13 +39,13 @@ def test_cells_are_those_of_the_targets() -> None:
 
 
 def test_cells_without_targets_are_of_round_numbers() -> None:
-    found = count_throws(landed([1.0, 1.34, 2.4], [1.2, 1.21, 1.3]), pa.table({}), target=None)
+    found = count_throws(make_landings([1.0, 1.34, 2.4], [1.2, 1.21, 1.3]), pa.table({}), target=None)
     assert found is not None
     distance, angle = found.axes
     assert distance.edges == pytest.approx(np.arange(1.0, 2.5001 + 0.1, 0.1)[: len(distance.edges)])
     assert np.diff(angle.edges) == pytest.approx(0.5)
     assert found.counts.sum() == 3
-    assert count_throws(landed([], []), pa.table({}), target=None) is None
+    assert count_throws(make_landings([], []), pa.table({}), target=None) is None
 
 
 @pytest.mark.parametrize(("most", "mark"), [(1, 1), (8, 1), (9, None)])

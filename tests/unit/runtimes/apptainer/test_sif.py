@@ -223,24 +223,24 @@ def test_a_sif_of_another_version_or_of_other_sources_is_told_from_ours(apptaine
     sif.write_bytes(SIF)
     own = {VERSION_LABEL: throwcollect.__version__, SOURCES_LABEL: digest_sources(source_root())}
 
-    def inspected(labels: object) -> None:
+    def write_inspection(labels: object) -> None:
         (apptainer / "inspected").write_text(
             json.dumps({"data": {"attributes": {"labels": labels}}, "type": "container"})
         )
 
     for labels in (own, {}, None, {SOURCES_LABEL: "unknown", VERSION_LABEL: "unknown"}):
-        inspected(labels)
+        write_inspection(labels)
         check_sif(sif)
-    inspected(own | {VERSION_LABEL: "0.0.9"})
+    write_inspection(own | {VERSION_LABEL: "0.0.9"})
     with pytest.raises(
         ConfigError, match=rf"holds throwcollect 0\.0\.9, and this is {throwcollect.__version__}"
     ) as caught:
         check_sif(sif)
     assert f"image sif -o {sif}" in str(caught.value.hint)
-    inspected(own | {SOURCES_LABEL: "0" * 64})
+    write_inspection(own | {SOURCES_LABEL: "0" * 64})
     with pytest.raises(ConfigError, match="was made from other sources than these"):
         check_sif(sif)
-    inspected(own)
+    write_inspection(own)
     assert read_labels(sif)[VERSION_LABEL] == throwcollect.__version__
 
 

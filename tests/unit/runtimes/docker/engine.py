@@ -76,7 +76,7 @@ class Engine:
                 name = query.get("name", ["without-name"])[0]
                 return 201, {"Id": self.create(name, body["Labels"]), "Warnings": []}
             case "GET", "containers", "json":
-                return 200, [self._listed(each) for each in self.containers.values()]
+                return 200, [self._list_entry(each) for each in self.containers.values()]
             case _, "containers", key, *action:
                 return self._on_container(method, key, action)
         return 404, {"message": f"no {method} {path}"}
@@ -95,7 +95,7 @@ class Engine:
         }
         return key
 
-    def _listed(self, container: dict[str, Any]) -> dict[str, Any]:
+    def _list_entry(self, container: dict[str, Any]) -> dict[str, Any]:
         labels, state = container["Config"]["Labels"], container["State"]["Status"]
         return {"Id": container["Id"], "Names": [f"/{container['Name']}"], "Labels": labels, "State": state}
 

@@ -113,11 +113,11 @@ def test_a_slow_answer_is_waited_for_with_a_word(
 def test_an_engine_is_listened_to_even_if_nobody_hears_of_it(
     engine: Engine, make: Callable[[], DockerNodes], warnings: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def gone(_: str) -> None:
+    def break_pipe(_: str) -> None:
         raise BrokenPipeError
 
     runtime = make()
-    monkeypatch.setattr(runtime._clock, "_warn", gone)
+    monkeypatch.setattr(runtime._clock, "_warn", break_pipe)
     engine.withheld = "."
     with pytest.raises(WorkerError, match="has not answered for 1 s"):
         until(lambda: False, runtime=runtime)

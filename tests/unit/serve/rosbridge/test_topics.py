@@ -214,14 +214,14 @@ def test_messages_come_as_cbor_with_typed_arrays_or_as_they_are(party: Party, no
         wait_for(lambda: not publisher.get_subscription_count())
 
 
-def heard_by(node: Node, kind: Any, topic: str, qos: Any = 10) -> list[Any]:
+def listen_by(node: Node, kind: Any, topic: str, qos: Any = 10) -> list[Any]:
     heard: list[Any] = []
     node.create_subscription(kind, topic, heard.append, qos)
     return heard
 
 
 def test_messages_are_published_in_json_and_cbor_and_what_is_left_out_has_defaults(party: Party, node: Node) -> None:
-    heard = heard_by(node, Image, "/image")
+    heard = listen_by(node, Image, "/image")
     wait_for(lambda: "/image" in party.call("rosapi/topics")["topics"])
     party.ask(op="advertise", topic="image", type="sensor_msgs/Image")
     party.ask(op="publish", topic="image", msg={"data": "AQID", "header": {"stamp": {"secs": 7, "nsecs": 8}}})
@@ -236,7 +236,7 @@ def test_messages_are_published_in_json_and_cbor_and_what_is_left_out_has_defaul
 
 
 def test_whoever_publishes_without_announcing_it_publishes_what_the_topic_has(party: Party, node: Node) -> None:
-    heard = heard_by(node, PointStamped, "/target")
+    heard = listen_by(node, PointStamped, "/target")
     wait_for(lambda: "/target" in party.call("rosapi/topics")["topics"])
     party.ask(op="publish", topic="/target", msg={"point": {"x": 1, "y": None}})
     wait_for(lambda: heard)
@@ -247,7 +247,7 @@ def test_a_latched_message_reaches_who_comes_late_until_it_is_withdrawn(party: P
     party.ask(op="advertise", topic="/map", type="std_msgs/String", latch=True)
     party.ask(op="publish", topic="/map", msg={"data": "here"})
     party.call("rosapi/get_time")
-    heard = heard_by(node, String, "/map", LATCHED)
+    heard = listen_by(node, String, "/map", LATCHED)
     wait_for(lambda: heard)
     assert node.count_publishers("/map") == 1
     party.ask(op="unadvertise", topic="/map")

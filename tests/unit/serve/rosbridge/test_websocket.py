@@ -125,7 +125,7 @@ def test_what_waits_to_be_sent_is_bounded_in_number_and_in_bytes(monkeypatch: py
     monkeypatch.setattr(websocket, "MOST_FRAMES", 10)
     monkeypatch.setattr(websocket, "MOST_BYTES", 1200)
 
-    async def left_of(frames: list[str]) -> list[str]:
+    async def find_left(frames: list[str]) -> list[str]:
         outbox = Outbox(asyncio.get_running_loop())
         for frame in [*frames, "end"]:
             outbox.put(frame)
@@ -135,6 +135,6 @@ def test_what_waits_to_be_sent_is_bounded_in_number_and_in_bytes(monkeypatch: py
         return [frame for frame in found if "the oldest are dropped" not in frame]
 
     numbers = [f"{number:04}" for number in range(30)]
-    assert asyncio.run(left_of(numbers)) == [*numbers[-9:], "end"]
+    assert asyncio.run(find_left(numbers)) == [*numbers[-9:], "end"]
     long = [f"{number:0300}" for number in range(5)]
-    assert asyncio.run(left_of(long)) == [*long[-3:], "end"]
+    assert asyncio.run(find_left(long)) == [*long[-3:], "end"]

@@ -25,13 +25,13 @@ GRIPPER = TALOS.joints.index("gripper_left_joint")
 RADIUS = Config().ball.radius_m
 
 
-def judged(samples, header, config=None):
+def judge(samples, header, config=None):
     task = task_of(config or Config())
     return task.judge(samples, header, task.trajectory())
 
 
 def test_landed_throw_has_all_its_numbers():
-    result = judged(*episode())
+    result = judge(*episode())
     assert (result.outcome, result.reason) == (ThrowOutcome.LANDED, None)
     assert result.release.time_s == pytest.approx(RELEASE_S, abs=1e-9)
     end = landing_time(RADIUS)
@@ -55,22 +55,22 @@ def test_landed_throw_has_all_its_numbers():
 def test_a_joint_with_limits_of_0_that_rests_spoils_no_result(monkeypatch):
     limits = joint_limits(TALOS)
     zero = {name: np.where(np.arange(32) == GRIPPER, 0.0, getattr(limits, name)) for name in ("velocity", "effort")}
-    expected = judged(*episode())
+    expected = judge(*episode())
     monkeypatch.setattr("throwcollect.tasks.joint_measures.joint_limits", lambda _: replace(limits, **zero))
-    assert judged(*episode()) == expected
+    assert judge(*episode()) == expected
 
 
 def test_spin_is_that_of_the_first_sample_after_the_release():
     samples, header = episode()
     spins = np.arange(3.0 * len(samples)).reshape(-1, 3)
-    result = judged(replace(samples, ball_angular_velocity=spins), header)
+    result = judge(replace(samples, ball_angular_velocity=spins), header)
     first = int(np.argmax((samples.stamps_ns - header.start_ns) / 1e9 >= RELEASE_S))
     assert result.release_spin == tuple(spins[first])
 
 
 def test_judging_leaves_the_samples_as_they_are():
     (samples, header), (untouched, _) = episode(), episode()
-    judged(samples, header)
+    judge(samples, header)
     assert all((column == getattr(untouched, name)).all() for name, column in vars(samples).items())
 
 
@@ -84,7 +84,7 @@ def test_ball_at_release_lies_between_its_neighbouring_samples():
         ball_position=ORIGIN + VELOCITY * times[:, None] + g * times[:, None] ** 2 / 2,
         ball_linear_velocity=VELOCITY + g * times[:, None],
     )
-    result = judged(samples, header)
+    result = judge(samples, header)
     assert result.release.position == pytest.approx(ORIGIN, abs=1e-12)
     assert result.release.velocity == pytest.approx(VELOCITY, abs=1e-12)
     assert result.release_speed_mps == pytest.approx(np.linalg.norm(VELOCITY), abs=1e-12)
@@ -109,7 +109,7 @@ def test_landing_between_samples_is_exact_for_a_parabola(height, rate, vx, vz):
         ball_linear_velocity=velocity + g * times,
     )
     end = landing_time(height + RADIUS, velocity=velocity)
-    result = judged(samples, header, config)
+    result = judge(samples, header, config)
     assert result.landing.time_s == pytest.approx(end, abs=1e-9)
     assert result.landing.position[2] == pytest.approx(height + RADIUS, abs=1e-9)
     assert result.landing.position[0] == pytest.approx(ORIGIN[0] + vx * (end - RELEASE_S), abs=1e-8)
@@ -118,7 +118,7 @@ def test_landing_between_samples_is_exact_for_a_parabola(height, rate, vx, vz):
 
 
 def test_ball_that_stays_in_the_spoon_is_not_released():
-    result = judged(*episode(contacts=(("spoon", 0.0, None),), end_reason="timeout"))
+    result = judge(*episode(contacts=(("spoon", 0.0, None),), end_reason="timeout"))
     assert result.outcome is ThrowOutcome.NOT_RELEASED
     assert result.reason == "the ball stayed in the spoon"
     assert (result.release, result.apex, result.landing, result.recontacts) == (None, None, None, None)
@@ -127,9 +127,9 @@ def test_ball_that_stays_in_the_spoon_is_not_released():
 
 def test_ball_that_had_left_the_spoon_before_the_start_is_dropped_even_if_the_spoon_hits_it_later():
     lost = "the ball had left the spoon before the start, in the sim.settle_s = 0.05 s for settling"
-    result = judged(*episode(contacts=()))
+    result = judge(*episode(contacts=()))
     assert (result.outcome, result.reason, result.release) == (ThrowOutcome.DROPPED, lost, None)
-    result = judged(*episode(contacts=(("spoon", 0.6, RELEASE_S),)))
+    result = judge(*episode(contacts=(("spoon", 0.6, RELEASE_S),)))
     assert (result.outcome, result.reason) == (ThrowOutcome.DROPPED, lost)
     assert result.landing is not None
 
@@ -138,7 +138,7 @@ def test_ball_on_a_bounce_at_the_start_is_in_the_spoon():
     samples, header = episode(contacts=(("spoon", 0.01, RELEASE_S),))
     samples.ball_position[0] = ToolMotion(Config()).place(samples.position[0])
     samples.ball_position[0, 2] += 0.01
-    assert judged(samples, header).outcome is ThrowOutcome.LANDED
+    assert judge(samples, header).outcome is ThrowOutcome.LANDED
 
 
 def test_ball_that_leaves_a_still_spoon_is_dropped_with_the_evidence_and_keeps_its_landing():
@@ -147,7 +147,7 @@ def test_ball_that_leaves_a_still_spoon_is_dropped_with_the_evidence_and_keeps_i
     config = Config(task=task)
     samples, header = episode(config)
     samples.ball_linear_velocity[samples.stamps_ns < header.start_ns + RELEASE_S * 1e9] = 0.0
-    result = judged(samples, header, config)
+    result = judge(samples, header, config)
     assert result.outcome is ThrowOutcome.DROPPED
     assert result.reason.startswith("the spoon did not throw the ball: it left at 0.637 s with ")
     assert "and the spoon went that way at 0.00 m/s, not 0.20 m/s; until then, the spoon had moved by 0.0 mm" in (
@@ -158,17 +158,17 @@ def test_ball_that_leaves_a_still_spoon_is_dropped_with_the_evidence_and_keeps_i
 
 
 def test_ball_that_leaves_before_the_swing_is_dropped():
-    assert judged(*episode(contacts=(("spoon", 0.0, 0.044),))).outcome is ThrowOutcome.DROPPED
+    assert judge(*episode(contacts=(("spoon", 0.0, 0.044),))).outcome is ThrowOutcome.DROPPED
 
 
 def test_ball_that_leaves_against_the_swing_is_dropped():
-    assert judged(*episode(velocity=-VELOCITY)).outcome is ThrowOutcome.DROPPED
+    assert judge(*episode(velocity=-VELOCITY)).outcome is ThrowOutcome.DROPPED
 
 
 def test_ball_that_leaves_at_rest_is_dropped():
     samples, header = episode(velocity=np.zeros(3))
     samples.velocity[:] = 0.0
-    assert judged(samples, header).outcome is ThrowOutcome.DROPPED
+    assert judge(samples, header).outcome is ThrowOutcome.DROPPED
 
 
 def test_ball_that_rolls_on_over_the_rim_of_a_spoon_that_brakes_is_thrown():
@@ -176,7 +176,7 @@ def test_ball_that_rolls_on_over_the_rim_of_a_spoon_that_brakes_is_thrown():
     times = (samples.stamps_ns - header.start_ns) / 1e9
     for stop, outcome in ((RELEASE_S - 0.01, ThrowOutcome.LANDED), (RELEASE_S - 0.1, ThrowOutcome.DROPPED)):
         samples.velocity[times > stop] = 0.0
-        assert judged(samples, header).outcome is outcome
+        assert judge(samples, header).outcome is outcome
 
 
 def test_ball_that_is_thrown_downwards_is_thrown():
@@ -189,17 +189,17 @@ def test_ball_that_is_thrown_downwards_is_thrown():
     assert down[2] < -0.3
     samples, header = episode(config, velocity=down, origin=ORIGIN - [0.0, 0.0, 0.4])
     samples.ball_position[0] = ORIGIN
-    assert judged(samples, header, config).outcome is ThrowOutcome.LANDED
+    assert judge(samples, header, config).outcome is ThrowOutcome.LANDED
 
 
 @pytest.mark.parametrize(("gap", "released_at"), [(0.0199, 0.65), (0.02, 0.6)])
 def test_hop_shorter_than_the_gap_is_no_release(gap, released_at):
-    result = judged(*episode(contacts=(("spoon", 0.0, 0.6), ("spoon", 0.6 + gap, 0.65))))
+    result = judge(*episode(contacts=(("spoon", 0.0, 0.6), ("spoon", 0.6 + gap, 0.65))))
     assert result.release.time_s == pytest.approx(released_at, abs=1e-9)
 
 
 def test_ball_back_in_the_spoon_is_recaught_at_its_first_release():
-    result = judged(*episode(contacts=(HELD, ("spoon", 0.7, 0.72), ("spoon", 0.8, 0.81))))
+    result = judge(*episode(contacts=(HELD, ("spoon", 0.7, 0.72), ("spoon", 0.8, 0.81))))
     assert result.outcome is ThrowOutcome.RECAUGHT
     assert result.reason == "the spoon touched the ball again at 0.700 s"
     assert result.release.time_s == pytest.approx(RELEASE_S)
@@ -208,23 +208,23 @@ def test_ball_back_in_the_spoon_is_recaught_at_its_first_release():
 
 
 def test_ball_against_a_link_hits_the_robot():
-    result = judged(*episode(contacts=(HELD, ("head_2_link", 0.7, 0.71), ("spoon", 0.8, 0.81))))
+    result = judge(*episode(contacts=(HELD, ("head_2_link", 0.7, 0.71), ("spoon", 0.8, 0.81))))
     assert (result.outcome, result.reason) == (ThrowOutcome.SELF_HIT, "the ball touched head_2_link at 0.700 s")
     assert result.recontacts == 2
 
 
 def test_link_that_is_still_touched_after_the_release_is_hit():
-    assert judged(*episode(contacts=(("arm_right_7_link", 0.6, 0.64), HELD))).outcome is ThrowOutcome.SELF_HIT
-    assert judged(*episode(contacts=(("arm_right_7_link", 0.6, RELEASE_S), HELD))).outcome is ThrowOutcome.LANDED
+    assert judge(*episode(contacts=(("arm_right_7_link", 0.6, 0.64), HELD))).outcome is ThrowOutcome.SELF_HIT
+    assert judge(*episode(contacts=(("arm_right_7_link", 0.6, RELEASE_S), HELD))).outcome is ThrowOutcome.LANDED
 
 
 def test_what_the_ball_touches_after_landing_does_not_count():
     contacts = (HELD, ("ground", landing_time(RADIUS), 1.38), ("leg_left_6_link", 1.39, None))
-    assert judged(*episode(contacts=contacts)).outcome is ThrowOutcome.LANDED
+    assert judge(*episode(contacts=contacts)).outcome is ThrowOutcome.LANDED
 
 
 def test_ball_that_does_not_come_down_in_time_is_a_timeout():
-    result = judged(*episode(duration_s=1.2, end_reason="timeout"))
+    result = judge(*episode(duration_s=1.2, end_reason="timeout"))
     assert result.outcome is ThrowOutcome.TIMEOUT
     assert result.reason == "the ball did not reach the landing plane; the trial ended as timeout"
     assert (result.landing, result.flight_time_s, result.hit_angle_rad) == (None, None, None)
@@ -235,7 +235,7 @@ def test_ball_on_the_ground_below_the_plane_has_not_hit_the_robot():
     origin = np.array([0.0, 0.0, 1.2])
     config = Config(scene={"landing_height_m": 1.5})
     samples, header = episode(config, origin=origin, contacts=(HELD, ("ground", 1.1, None)), end_reason="rest")
-    assert judged(samples, header, config).outcome is ThrowOutcome.TIMEOUT
+    assert judge(samples, header, config).outcome is ThrowOutcome.TIMEOUT
 
 
 @pytest.mark.parametrize("drag", [0.0, 0.47])
@@ -247,22 +247,22 @@ def test_impact_on_the_ground_does_not_bend_the_landing_just_above_it(drag):
     step = 1 / config.sim.physics_hz
     path = ballistic_positions(free.ball_position[end - 1], free.ball_linear_velocity[end - 1], steps=2, config=config)
     free.ball_position[end], free.ball_linear_velocity[end] = path[2], (path[2] - path[1]) / step
-    undisturbed = judged(free, header, config)
+    undisturbed = judge(free, header, config)
     free.ball_position[end, 2], free.ball_linear_velocity[end] = RADIUS, 0.0
     start_ns = int(free.stamps_ns[end]) - round(step * 1e9)
     impact = Contact("ground", start_ns, None)
-    stopped = judged(free, replace(header, contacts=(*header.contacts, impact)), config)
+    stopped = judge(free, replace(header, contacts=(*header.contacts, impact)), config)
     assert stopped.outcome is ThrowOutcome.LANDED
     assert stopped.landing.position == pytest.approx(undisturbed.landing.position, abs=1e-12)
     assert stopped.landing.velocity == pytest.approx(undisturbed.landing.velocity, abs=1e-9)
-    assert judged(free, header, config).landing.time_s != pytest.approx(undisturbed.landing.time_s, abs=1e-5)
+    assert judge(free, header, config).landing.time_s != pytest.approx(undisturbed.landing.time_s, abs=1e-5)
 
 
 def test_crossing_upwards_is_no_landing():
     origin = np.array([0.0, 0.0, 0.9])
     config = Config(scene={"landing_height_m": 1.0})
     velocity = np.array([1.0, 0.0, 4.0])
-    result = judged(*episode(config, duration_s=2.0, origin=origin, velocity=velocity), config)
+    result = judge(*episode(config, duration_s=2.0, origin=origin, velocity=velocity), config)
     assert result.landing.time_s == pytest.approx(landing_time(1.0 + RADIUS, origin, velocity), abs=1e-9)
     assert result.landing.velocity[2] < 0
 
@@ -270,7 +270,7 @@ def test_crossing_upwards_is_no_landing():
 def test_saturated_effort_violates_a_limit_but_keeps_the_landing():
     samples, header = episode()
     samples.effort[100:110, ELBOW] = -joint_limits(TALOS).effort[ELBOW]
-    result = judged(samples, header)
+    result = judge(samples, header)
     assert result.outcome is ThrowOutcome.LIMIT_VIOLATED
     assert "arm_right_4_joint reached 1.000 of its effort limit" in result.reason
     assert result.landing is not None
@@ -280,7 +280,7 @@ def test_saturated_effort_violates_a_limit_but_keeps_the_landing():
 def test_effort_limits_scale_with_the_robot():
     samples, header = episode()
     samples.effort[100, ELBOW] = joint_limits(TALOS).effort[ELBOW]
-    result = judged(samples, header, Config(robot={"effort_scale": 2.0}))
+    result = judge(samples, header, Config(robot={"effort_scale": 2.0}))
     assert result.outcome is ThrowOutcome.LANDED
     assert (result.effort_peak.joint, result.effort_peak.share) == ("arm_right_4_joint", pytest.approx(0.5))
 
@@ -288,7 +288,7 @@ def test_effort_limits_scale_with_the_robot():
 def test_speed_above_the_limit_of_any_joint_violates_it():
     samples, header = episode()
     samples.velocity[5, GRIPPER] = -1.2
-    result = judged(samples, header)
+    result = judge(samples, header)
     assert result.outcome is ThrowOutcome.LIMIT_VIOLATED
     assert result.reason == "gripper_left_joint moved at 1.200 of its velocity limit"
 
@@ -296,7 +296,7 @@ def test_speed_above_the_limit_of_any_joint_violates_it():
 def test_moving_joint_beyond_its_range_violates_it():
     samples, header = episode()
     samples.position[5, ELBOW] = 0.05
-    result = judged(samples, header)
+    result = judge(samples, header)
     assert result.outcome is ThrowOutcome.LIMIT_VIOLATED
     assert result.reason.startswith("arm_right_4_joint left its range")
     assert result.tracking_error_rad["arm_right_4_joint"] == pytest.approx(0.05 + 1.9, abs=1e-3)
@@ -305,7 +305,7 @@ def test_moving_joint_beyond_its_range_violates_it():
 def test_held_joint_may_rest_beyond_the_end_of_its_range():
     samples, header = episode()
     samples.position[:, GRIPPER] = 1e-3
-    assert judged(samples, header).outcome is ThrowOutcome.LANDED
+    assert judge(samples, header).outcome is ThrowOutcome.LANDED
 
 
 @pytest.mark.parametrize(
@@ -313,7 +313,7 @@ def test_held_joint_may_rest_beyond_the_end_of_its_range():
 )
 def test_goal_that_was_not_carried_out_is_a_tracking_failure(status, outcome):
     goal = GoalOutcome("arm_right_controller", status, -4, "path tolerance of arm_right_4_joint")
-    result = judged(*episode(goals=(goal,)))
+    result = judge(*episode(goals=(goal,)))
     assert result.outcome.value == outcome
     if result.outcome is ThrowOutcome.TRACKING_FAILED:
         assert result.reason.endswith("its goal: path tolerance of arm_right_4_joint")
@@ -323,7 +323,7 @@ def test_goal_that_was_not_carried_out_is_a_tracking_failure(status, outcome):
 def test_tracking_error_is_that_of_each_moving_joint():
     samples, header = episode()
     samples.position[200, ELBOW] += 0.0125
-    errors = judged(samples, header).tracking_error_rad
+    errors = judge(samples, header).tracking_error_rad
     assert errors["arm_right_4_joint"] == pytest.approx(0.0125)
     assert errors["arm_right_2_joint"] < 1e-12
     assert set(errors) == set(Config().task.end)
@@ -332,19 +332,19 @@ def test_tracking_error_is_that_of_each_moving_joint():
 def test_outcomes_come_in_their_documented_order():
     samples, header = episode(contacts=(HELD, ("head_2_link", 0.7, 0.71)), duration_s=1.2, end_reason="rest")
     samples.effort[100, ELBOW] = 1e3
-    assert judged(samples, header).outcome is ThrowOutcome.SELF_HIT
+    assert judge(samples, header).outcome is ThrowOutcome.SELF_HIT
     later = header.contacts[1].start_ns
     header = replace(header, contacts=header.contacts[:1])
-    assert judged(samples, header).outcome is ThrowOutcome.TIMEOUT
+    assert judge(samples, header).outcome is ThrowOutcome.TIMEOUT
     still = replace(samples, velocity=0 * samples.velocity)
-    assert judged(still, replace(header, contacts=(*header.contacts, Contact("head_2_link", later, None)))).outcome is (
+    assert judge(still, replace(header, contacts=(*header.contacts, Contact("head_2_link", later, None)))).outcome is (
         ThrowOutcome.DROPPED
     )
     lasting = (replace(header.contacts[0], end_ns=None),)
-    assert judged(still, replace(header, contacts=lasting)).outcome is ThrowOutcome.NOT_RELEASED
-    assert judged(samples, replace(header, contacts=())).outcome is ThrowOutcome.DROPPED
+    assert judge(still, replace(header, contacts=lasting)).outcome is ThrowOutcome.NOT_RELEASED
+    assert judge(samples, replace(header, contacts=())).outcome is ThrowOutcome.DROPPED
     goal = GoalOutcome("torso_controller", 6, -5, "")
-    result = judged(samples, replace(header, contacts=(), goals=(goal,)))
+    result = judge(samples, replace(header, contacts=(), goals=(goal,)))
     assert result.outcome is ThrowOutcome.TRACKING_FAILED
     assert result.reason == "torso_controller aborted its goal with error code -5"
 
@@ -353,7 +353,7 @@ def test_outcomes_come_in_their_documented_order():
 def test_diverged_simulation_is_a_tracking_failure_without_numbers(field):
     samples, header = episode()
     getattr(samples, field)[300, 0] = np.nan
-    result = judged(samples, header)
+    result = judge(samples, header)
     assert result.outcome is ThrowOutcome.TRACKING_FAILED
     assert result.landing is None
     assert result.velocity_peak is None
@@ -372,7 +372,7 @@ def test_diverged_simulation_is_a_tracking_failure_without_numbers(field):
 )
 def test_any_contacts_give_an_outcome_without_nan(contacts):
     spans = [(body, start, None if length is None else min(start + length, 1.4)) for body, start, length in contacts]
-    result = judged(*episode(contacts=tuple(spans)))
+    result = judge(*episode(contacts=tuple(spans)))
     assert (result.reason is None) == (result.outcome is ThrowOutcome.LANDED)
     assert result.release is not None or result.outcome in (ThrowOutcome.NOT_RELEASED, ThrowOutcome.DROPPED)
     if result.release is not None:

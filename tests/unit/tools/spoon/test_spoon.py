@@ -54,7 +54,7 @@ def test_the_walls_close_the_rim():
     assert first.placement.act(corner) == pytest.approx(second.placement.act(other))
 
 
-def tilted(tilt, azimuth=0.0):
+def tilt_up(tilt, azimuth=0.0):
     return np.array([np.cos(tilt), np.sin(tilt) * np.cos(azimuth), np.sin(tilt) * np.sin(azimuth)])
 
 
@@ -62,11 +62,11 @@ def tilted(tilt, azimuth=0.0):
 @pytest.mark.parametrize("radius", [0.006, 0.025, 0.07, 0.09])
 def test_a_cup_is_left_between_two_walls_when_it_is_tilted_by_the_slope_of_the_upright_one(walls, turn, radius):
     tool = Spoon(SpoonConfig(cup_walls=walls))
-    slope = tool.way_out(radius, tilted(0.0))
+    slope = tool.way_out(radius, tilt_up(0.0))
     # The way between two walls rises away from the axis, so a tilt away from it lowers it.
     for tilt in (0.1, slope, slope + 0.1):
-        assert tool.way_out(radius, tilted(tilt, turn + np.pi)) == pytest.approx(slope - tilt, abs=1e-9)
-    assert tool.way_out(radius, tilted(slope, turn + np.pi / walls)) > 0
+        assert tool.way_out(radius, tilt_up(tilt, turn + np.pi)) == pytest.approx(slope - tilt, abs=1e-9)
+    assert tool.way_out(radius, tilt_up(slope, turn + np.pi / walls)) > 0
 
 
 def test_the_normals_of_the_walls_bound_the_tilts_at_which_the_ball_stays():
@@ -75,13 +75,13 @@ def test_the_normals_of_the_walls_bound_the_tilts_at_which_the_ball_stays():
     normals = [-wall.placement.rotation[:, 1] for wall in tool.boxes[1:]]
     for azimuth in np.linspace(0, 2 * np.pi, 37):
         for tilt in (0.3, 0.55, 0.58, 0.61, 0.66, 0.7):
-            up = tilted(tilt, azimuth)
+            up = tilt_up(tilt, azimuth)
             inside = all(np.linalg.det([normals[i], normals[(i + 1) % 6], up]) > 0 for i in range(6))
             assert (tool.way_out(0.025, up) > 0) == inside
 
 
 def test_a_deeper_cup_and_a_ball_on_a_narrower_rim_hold_differently():
-    upright = tilted(0.0)
+    upright = tilt_up(0.0)
     assert Spoon(SpoonConfig(cup_depth_m=0.05)).way_out(0.025, upright) > Spoon(SpoonConfig()).way_out(0.025, upright)
     assert Spoon(SpoonConfig()).way_out(0.1, upright) < Spoon(SpoonConfig()).way_out(0.025, upright)
     assert Spoon(SpoonConfig(cup_floor_radius_m=0.024)).way_out(0.025, upright) > Spoon(SpoonConfig()).way_out(
