@@ -16,6 +16,7 @@ from pydantic import JsonValue
 
 from throwcollect.config.containers import ContainerSpec
 from throwcollect.config.loader import load
+from throwcollect.config.values import operator_keys
 from throwcollect.dataset.creation import refuse_taken
 from throwcollect.dataset.directory import config_path
 from throwcollect.errors import ConfigError, ConflictError, NotFoundError, Problem, WorkerError
@@ -33,8 +34,6 @@ from throwcollect.serve.resumption import check_resumption
 from throwcollect.serve.robot_files import description_of
 from throwcollect.serve.state import simulations_of
 
-_OPERATOR_KEYS = ("run", "containers", "cluster", "sweep.file")
-"""Keys of a configuration that only the operator sets, because they name files and resources of this machine."""
 _KEY = r"[A-Za-z0-9_-]+(\.[A-Za-z0-9_-]+)*"
 _LOCK = "instances.lock"
 _LOOK_S = 0.02
@@ -309,7 +308,7 @@ def _overrides(origin: Origin) -> list[str]:
         *(
             Problem("is the operator's alone; a request may not set it", key=kept)
             for key, value in origin.changes.items()
-            for kept in _OPERATOR_KEYS
+            for kept in operator_keys()
             if _sets(key, value, kept)
         ),
     ]
@@ -325,7 +324,6 @@ def _sets(key: str, value: JsonValue, kept: str) -> bool:
     """Whether setting a key to a value also sets another key: the same, one above it, or one inside the value."""
     if key == kept or key.startswith(f"{kept}."):
         return True
-    first, _, rest = kept.partition(".")
-    if not rest or not isinstance(value, dict):
+    if not kept.startswith(f"{key}.") or not isinstance(value, dict):
         return False
-    return key == first and any(_sets(each, inner, rest) for each, inner in value.items())
+    return any(_sets(each, inner, kept.removeprefix(f"{key}.")) for each, inner in value.items())
