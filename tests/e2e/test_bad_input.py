@@ -55,6 +55,10 @@ def small(tmp_path: Path) -> Path:
         (["foo"], "No such command 'foo'.\n  try: throwcollect --help"),
         (["up", "--foo"], "No such option: --foo\n  try: throwcollect up --help"),
         (["up", "--set"], "Option '--set' requires an argument.\n  try: throwcollect --help"),
+        (
+            ["wait", "nope"],
+            "Got unexpected extra argument(s) (nope)\n  try: throwcollect wait --run RUN, or throwcollect wait --help",
+        ),
         (["up", "a.yaml", "b.yaml"], "Got unexpected extra argument(s) (b.yaml)\n  try: throwcollect up --help"),
         (
             ["up", "-n", "0", "small.yaml"],
