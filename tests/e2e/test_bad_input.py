@@ -324,6 +324,12 @@ def test_answers_for_programs_are_one_document_and_silence(
     assert told.items() <= dataset[1].items()
 
 
+def test_a_trial_that_is_not_in_the_plan_is_told(say: Callable[..., Said], small: Path, tmp_path: Path) -> None:
+    assert say("plan", str(small), "--output", "planned").code == 0
+    said = say("simulate", "planned", "0", "999")
+    assert said == (2, "", "throwcollect: planned/plan.parquet: no trial 999\n  expected: 0 to 1\n")
+
+
 @pytest.mark.parametrize("arguments", [["plan", "small.yaml"], ["config", "small.yaml"], ["--help"]])
 def test_a_reader_that_leaves_is_no_error(arguments: list[str], small: Path) -> None:
     reading, writing = os.pipe()
