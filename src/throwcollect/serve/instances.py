@@ -25,7 +25,7 @@ from throwcollect.runs import control
 from throwcollect.runs.background import begin_container, begin_run
 from throwcollect.runs.component_container import ContainerOrder
 from throwcollect.runs.records import Records, Run
-from throwcollect.runs.run_record import Origin
+from throwcollect.runs.run_record import Origin, RunRecord
 from throwcollect.runs.run_selection import require_living
 from throwcollect.runs.state_directory import state_directory
 from throwcollect.serve.catalogue import NAME, Catalogue, Component
@@ -134,15 +134,16 @@ class Instances:
     def stop(self, instance: str, *, force: bool = False) -> None:
         """Ask an instance to finish its running trials and end; by force, end it at once, and forget it.
 
-        To ask once more does not hurry it.
+        To ask once more does not hurry it. One whose launcher died cannot be asked: what is left of it is ended, and it
+        is forgotten.
 
         Raises:
             NotFoundError: If there is no such run.
             ConflictError: If it has ended.
-            WorkerError: If its launcher died, or something cannot be ended.
+            WorkerError: If its launcher dies meanwhile, or something cannot be ended.
         """
         run = self.get(instance)
-        if force:
+        if force or run.status == "died":
             control.down(run)
         elif not (run.lives and run.record.stopping):
             with _one_at_a_time():
@@ -166,12 +167,13 @@ class Instances:
 
         Raises:
             NotFoundError: If there is no such run.
-            ConflictError: If it has ended.
+            ConflictError: If it has ended, or its launcher died.
             ConfigError: If it cannot be scaled.
-            WorkerError: If its launcher died, or does not answer.
+            WorkerError: If its launcher does not answer.
         """
         run = self.get(instance)
         _check_simulations(run)
+        _require_living(run)
         control.scale(run, simulations)
         return run.now()
 
@@ -180,7 +182,7 @@ class Instances:
 
         Raises:
             NotFoundError: If there is no such run.
-            ConflictError: If it has ended or has no simulation that runs, or more than what is seen differs from the
+            ConflictError: If it has ended, died or has no simulation that runs, or more than what is seen differs from the
                 description of the configuration.
             ConfigError: If the text is no URDF.
             WorkerError: If a simulation does not answer.
@@ -190,7 +192,7 @@ class Instances:
         own = description_of(run)
         if urdf is not None:
             check_appearance(own, urdf)
-        record = require_living(run)
+        record = _require_living(run)
         config = load(config_path(run.place.directory))
         nodes = [name_node(config, name) for name in simulations_of(record.nodes)]
         if not nodes:
@@ -198,6 +200,18 @@ class Instances:
         for result in control.set_parameter(run, nodes, "robot_description", urdf or own):
             if not result.successful:
                 raise ConflictError(f"run {run.id}: {result.reason}")
+
+
+def _require_living(run: Run) -> RunRecord:
+    """The record of a run, which has to live; one that died is no failure of the server, but what the client asks of.
+
+    Raises:
+        ConflictError: If it has ended, or its launcher died.
+    """
+    try:
+        return require_living(run)
+    except WorkerError as error:
+        raise ConflictError(error.message, hint=error.hint) from error
 
 
 def _stop_once(run: Run) -> None:
