@@ -182,8 +182,8 @@ class Instances:
 
         Raises:
             NotFoundError: If there is no such run.
-            ConflictError: If it has ended, died or has no simulation that runs, or more than what is seen differs from the
-                description of the configuration.
+            ConflictError: If it has ended, died or has no simulation that runs, or more than what is seen differs from
+                the description of the configuration.
             ConfigError: If the text is no URDF.
             WorkerError: If a simulation does not answer.
         """
