@@ -133,7 +133,8 @@ class SceneConfig(Section):
     air_density_kgpm3: Annotated[float, Field(ge=0, le=10)] = 1.2
     """Density of the air, for the ball's drag."""
     spoon_friction: Annotated[float, Field(ge=0, le=2)] = 0.5
-    """Coulomb friction of the spoon, the robot's links and the ground [-]."""
+    """Coulomb friction of all that the ball may touch, whatever the tool is [-]: the tool, the robot's links and the
+    ground. It is multiplied with `ball.friction`."""
 
 
 class SimConfig(Section):
