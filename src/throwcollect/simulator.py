@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import TracebackType
 
 import numpy as np
@@ -150,8 +150,8 @@ class Simulator:
             The throws, in the order of their points.
 
         Raises:
-            ConfigError: As `throw`, when it is the turn of that throw.
-            PlanError: As `throw`, when it is the turn of that throw.
+            ConfigError: As `throw`, when it is the turn of that throw; its problems name the index of the point.
+            PlanError: As `throw`, likewise.
             ConflictError: If the simulator is closed.
             WorkerError: If the physics engine of a process does not start, or a process is killed.
         """
@@ -160,12 +160,26 @@ class Simulator:
         self._require_open()
         if processes == 1:
             for trial, point in enumerate(points):
-                yield self.throw(point, trial=trial)
+                yield self._throw_numbered((trial, point))
             return
         pieces = tuple(enumerate(points))
         yield from work_side_by_side(
             pieces, _begin, (self.config, self._source), processes=processes, doing="simulates"
         )
+
+    def _throw_numbered(self, numbered: tuple[int, Point]) -> Throw:
+        """Simulate the throw of a point of a list, given after its index there, which an error then names."""
+        index, point = numbered
+        try:
+            return self.throw(point, trial=index)
+        except ConflictError:
+            raise
+        except ConfigError as error:
+            raise type(error)(
+                [_locate(problem, index, point) for problem in error.problems],
+                expected=error.expected,
+                hint=error.hint,
+            ) from error
 
     def _require_open(self) -> None:
         """Refuse to simulate after the end.
@@ -184,6 +198,17 @@ class Simulator:
         # The row is made without a place in a shard, from which these two come in a dataset.
         row |= {"samples": episode.header.samples, "digest": episode.digest}
         return Throw(table.table([row]), 0, keys, _Simulated(episode), self._source)
+
+
+def _locate(problem: Problem, index: int, point: Point) -> Problem:
+    """Name the point of a list that has a problem: its index and, where the problem names no key, all its values."""
+    place = f"points[{index}]"
+    if problem.argument:
+        return replace(problem, key=place)
+    if problem.key:
+        return replace(problem, key=f"{place}.{problem.key}", argument=True)
+    values = ", ".join(f"{key}={show_value(value)}" for key, value in (point or {}).items())
+    return Problem(f"{problem.message} ({values or 'with no value of its own'})", place, argument=True)
 
 
 def _row(values: Point) -> NDArray[np.float64]:
@@ -220,9 +245,4 @@ def _begin(config: Config, source: str) -> Callable[[tuple[int, Point]], Throw]:
     """Make the simulator of a process of `Simulator.throw_many`, without the file, which may have changed by then."""
     simulator = Simulator.__new__(Simulator)
     simulator._start(config, source)
-
-    def throw(numbered: tuple[int, Point]) -> Throw:
-        trial, point = numbered
-        return simulator.throw(point, trial=trial)
-
-    return throw
+    return simulator._throw_numbered

@@ -55,6 +55,10 @@ def small(tmp_path: Path) -> Path:
         (["foo"], "No such command 'foo'.\n  try: throwcollect --help"),
         (["up", "--foo"], "No such option: --foo\n  try: throwcollect up --help"),
         (["up", "--set"], "Option '--set' requires an argument.\n  try: throwcollect --help"),
+        (
+            ["wait", "nope"],
+            "Got unexpected extra argument(s) (nope)\n  try: throwcollect wait --run RUN, or throwcollect wait --help",
+        ),
         (["up", "a.yaml", "b.yaml"], "Got unexpected extra argument(s) (b.yaml)\n  try: throwcollect up --help"),
         (
             ["up", "-n", "0", "small.yaml"],
@@ -318,6 +322,12 @@ def test_answers_for_programs_are_one_document_and_silence(
         assert json.loads(said.out)
     told = json.loads(say("dataset", "info", str(dataset[0]), "--json").out)
     assert told.items() <= dataset[1].items()
+
+
+def test_a_trial_that_is_not_in_the_plan_is_told(say: Callable[..., Said], small: Path, tmp_path: Path) -> None:
+    assert say("plan", str(small), "--output", "planned").code == 0
+    said = say("simulate", "planned", "0", "999")
+    assert said == (2, "", "throwcollect: planned/plan.parquet: no trial 999\n  expected: 0 to 1\n")
 
 
 @pytest.mark.parametrize("arguments", [["plan", "small.yaml"], ["config", "small.yaml"], ["--help"]])

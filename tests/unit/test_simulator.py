@@ -101,7 +101,7 @@ def test_several_processes_give_the_same_throws_whatever_becomes_of_the_file(tmp
     assert [throw.row for throw in together] == alone
     assert together[0].ball.position.shape == (alone[0]["samples"], 3)
     # They come before the error, as those of this process do.
-    with pytest.raises(PlanError, match=TOO_FAST):
+    with pytest.raises(PlanError, match=r"^points\[3\]: .*" + TOO_FAST):
         next(throws)
     simulator.close()
 
@@ -110,6 +110,23 @@ def test_the_throws_before_one_that_is_refused_are_given_out(simulator: Simulato
     throws = simulator.throw_many([{}, REFUSED])
     assert next(throws).trial == 0
     with pytest.raises(PlanError, match=TOO_FAST):
+        next(throws)
+
+
+@pytest.mark.parametrize(
+    ("point", "message"),
+    [
+        (REFUSED, r"points\[1\]: .*" + TOO_FAST + r".* \(task\.duration_s=0\.2\)"),
+        ({"ball.mass_kg": -1.0}, r"points\[1\]\.ball\.mass_kg: should be a number above 0"),
+        (3, r"points\[1\]: got 3\n  expected: a mapping, such as {'task\.duration_s': 1\.1}"),
+    ],
+)
+def test_of_many_points_the_one_that_is_wrong_is_named(
+    simulator: Simulator, point: dict[str, float], message: str
+) -> None:
+    throws = simulator.throw_many([{}, point])
+    next(throws)
+    with pytest.raises(ConfigError, match=f"^{message}"):
         next(throws)
 
 

@@ -20,6 +20,7 @@ from throwcollect.cli.terminal import display
 from throwcollect.cluster.cluster_run import ClusterRun, ProgressOfSlices, SlicesLook, find_queued, follow
 from throwcollect.dataset.inspect import info
 from throwcollect.errors import ConfigError, Interrupted, ThrowcollectError
+from throwcollect.runtimes.node_logs import Tail
 from throwcollect.wording import command, format_count
 
 _Described = TypeVar("_Described")
@@ -39,17 +40,26 @@ def follow_to_the_end(directory: Path, *, as_json: bool) -> None:
     print_collected(info(directory), directory, as_json=as_json)
 
 
-def print_logs(run: ClusterRun, tasks: list[str]) -> None:
-    """Print the logs of tasks; of all tasks if none is named."""
-    logs = run.logs
+def print_logs(run: ClusterRun, tasks: list[str], *, on: bool = False) -> None:
+    """Print the logs of tasks; of all tasks if none is named. With `on`, go on until the run ends."""
     numbers = [*map(str, range(run.submission.tasks))]
-    for text in tasks or logs:
+    for text in tasks:
         if text not in numbers:
             raise ConfigError(f"{run.directory}: has no task {text!r}", expected=f"0 to {numbers[-1]}")
-        if text not in logs:
+        if not on and text not in run.logs:
             raise ConfigError(f"{run.directory}: task {text} has printed nothing yet")
-        for line in logs[text].read_text(encoding="utf-8", errors="replace").splitlines():
-            typer.echo(f"{text:>{len(str(len(numbers)))}} | {line}")
+    tails: dict[Path, Tail] = {}
+
+    def print_new(*, last: bool) -> None:
+        for text, path in run.logs.items():
+            if not tasks or text in tasks:
+                for line in tails.setdefault(path, Tail(path)).lines(torn=last):
+                    typer.echo(f"{text:>{len(str(len(numbers)))}} | {line}")
+
+    for _ in follow(run, keep_on=has_reader) if on else ():
+        print_new(last=False)
+    # The tasks may have printed since the last look.
+    print_new(last=True)
 
 
 def print_events(run: ClusterRun, *, as_json: bool) -> None:

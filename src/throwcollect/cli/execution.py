@@ -81,6 +81,13 @@ def _name_options(error: ConfigError) -> ConfigError:
     return type(error)(problems, expected=error.expected, hint=error.hint)
 
 
+def _name_run(context: typer.Context) -> str:
+    """Say how a command without arguments is told its run, as other programs take such a name without an option."""
+    has_run = any(each.name == "run" for each in context.command.params)
+    has_arguments = any(each.param_type_name == "argument" for each in context.command.params)
+    return f"{context.command_path} --run RUN, or " if has_run and not has_arguments else ""
+
+
 def _describe(error: Exception) -> tuple[str, int]:
     """Message and exit code of an error."""
     if isinstance(error, ConfigError):
@@ -89,9 +96,10 @@ def _describe(error: Exception) -> tuple[str, int]:
         return str(error), error.exit_code
     if isinstance(error, TyperException):
         message = error.format_message()
-        command = getattr(getattr(error, "ctx", None), "command_path", "throwcollect")
+        context: typer.Context | None = getattr(error, "ctx", None)
+        usage = f"{_name_run(context)}{context.command_path} --help" if context else "throwcollect --help"
         # The message is empty if there was no argument: typer has printed the help then.
-        return (f"{message}\n  try: {command} --help" if message else ""), error.exit_code
+        return (f"{message}\n  try: {usage}" if message else ""), error.exit_code
     if isinstance(error, OSError) and error.errno in _WRONG_PATHS and error.filename is not None:
         return f"{error.filename}: {error.strerror}", ConfigError.exit_code
     where = "  try: THROWCOLLECT_DEBUG=1 shows where; please report it"

@@ -11,7 +11,7 @@ import typer
 from throwcollect.cli.options import ConfigArgument, DatasetArgument
 from throwcollect.cli.streams import only_log
 from throwcollect.config.default_path import DEFAULT_CONFIG
-from throwcollect.errors import LossError
+from throwcollect.errors import LossError, NotFoundError
 from throwcollect.wording import format_count
 
 
@@ -94,6 +94,9 @@ def simulate(directory: DatasetArgument, trials: list[int]) -> None:
     from throwcollect.sweep.plan import Plan
 
     plan = Plan.read(directory / PLAN, load(directory / CONFIG))
+    known = range(plan.trials.first, plan.trials.first + len(plan.trials))
+    if strange := [trial for trial in trials if trial not in known]:
+        raise NotFoundError(f"{directory / PLAN}: no trial {strange[0]}", expected=f"{known[0]} to {known[-1]}")
     replayer = Replayer(plan.config)
     for trial in trials:
         print(json.dumps({"trial": trial, "digest": replayer.run(plan.trial(trial)).digest}), flush=True)

@@ -1,4 +1,4 @@
-"""The annotation of configuration keys: their effect, and whether a sweep may vary them.
+"""The annotation of configuration keys: their effect, and who or what may set them or vary them.
 
 It stands on the field, and nowhere else. A section annotates all keys below it, and a key may differ from that::
 
@@ -46,11 +46,15 @@ class Key:
         swept: Whether a sweep may vary the value from trial to trial, if it is a number that may have decimals.
         later: Whether the key was added after datasets had been published. Digests leave it out where it has its
             default, so that older digests hold.
+        operator: Whether only the operator of a server sets the value, as it names files or resources of its machine.
+        grows: Whether a dataset may be gone on with where more trials follow from the value.
     """
 
     effect: Effect | None = None
     swept: bool | None = None
     later: bool | None = None
+    operator: bool | None = None
+    grows: bool | None = None
 
     @property
     def determines_samples(self) -> bool:

@@ -138,7 +138,8 @@ def _check(values: dict[str, Any]) -> tuple[Config | None, list[KeyProblem], int
         # Two parts are a key in a section; three are a swept key, so that the others stay.
         places = {finding.location[: 3 if finding.location[:2] == _PARAMETERS else 2] for finding in fresh}
         removed = {place for place in places if _remove(values, place)}
-        replaced |= places
+        # Of a key that was written under a wrong name, the value is a default from now on, or is missing.
+        replaced |= places | {(*finding.location[:-1], finding.meant) for finding in fresh if finding.meant}
         # Without a known robot, each joint would be reported.
         if not removed or robot is None:
             break

@@ -38,7 +38,7 @@ class KeyProblem:
         location: The key, which need not exist.
         sentence: Says what is wrong, which value was given and which would be right.
         unknown: Whether the key itself is wrong, and not its value.
-        meant: Name of the key that is most like an unknown one; empty if none is.
+        meant: Name of the key that stands for an unknown one: the most like it, or the only one there; empty if none.
     """
 
     location: Location
@@ -98,7 +98,7 @@ def findings(
         # A union reports the errors of every branch. The deepest is of the branch that the user meant.
         found.pop(location, None)
     unknown = [finding for finding in found.values() if finding.unknown]
-    # A misspelt key is also missing under its right name, which is no second mistake.
+    # A misspelt or mistaken key is also missing under its right name, which is no second mistake.
     meant = {(*finding.location[:-1], finding.meant) for finding in unknown}
     rest = [finding for finding in found.values() if not finding.unknown and finding.location not in meant]
     return [*unknown, *rest]
@@ -112,7 +112,9 @@ def _findings(details: ErrorDetails, values: Any, above: Location, expected: Val
     if kind == "extra_forbidden":
         name, known = str(location[-1]), list(section.keys)
         refused = section.refused.get(name)
-        meant = "" if refused else _find_nearest(name, known)
+        # Where a section has a single key, that is meant whatever is written.
+        only = known[0] if len(known) == 1 else ""
+        meant = "" if refused else _find_nearest(name, known) or only
         if name.isdecimal() and value is None:
             # YAML takes what follows a comma for the next key.
             refused = "unknown key; if it is the end of a number, decimals are written with a point, as in 1.5"

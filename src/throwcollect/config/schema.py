@@ -133,7 +133,8 @@ class SceneConfig(Section):
     air_density_kgpm3: Annotated[float, Field(ge=0, le=10)] = 1.2
     """Density of the air, for the ball's drag."""
     spoon_friction: Annotated[float, Field(ge=0, le=2)] = 0.5
-    """Coulomb friction of the spoon, the robot's links and the ground [-]."""
+    """Coulomb friction of all that the ball may touch, whatever the tool is [-]: the tool, the robot's links and the
+    ground. It is multiplied with `ball.friction`."""
 
 
 class SimConfig(Section):
@@ -189,10 +190,10 @@ class Config(Section):
     """Name of the collection and of its files."""
     seed: Annotated[int, Field(ge=0, lt=2**32), Key(Effect.PLAN)] = 0
     """Root of all randomness."""
-    trials: Annotated[Annotated[int, Field(ge=1, le=MOST_TRIALS)] | None, Key(Effect.PLAN)] = None
+    trials: Annotated[Annotated[int, Field(ge=1, le=MOST_TRIALS)] | None, Key(Effect.PLAN, grows=True)] = None
     """Number of trials, with `until` the largest one; none means all points for `grid` and `list`, ten for each throw
     that should land with `until`."""
-    until: Annotated[AnyUntil | None, Key(Effect.PLAN, later=True)] = None
+    until: Annotated[AnyUntil | None, Key(Effect.PLAN, later=True, grows=True)] = None
     """Collects until enough throws have landed, or `trials` are used up."""
     robot: Annotated[RobotConfig, Key(Effect.PHYSICS)] = RobotConfig()
     """The robot."""
@@ -212,11 +213,11 @@ class Config(Section):
     """What varies from trial to trial."""
     record: Annotated[RecordConfig, Key(Effect.PHYSICS)] = RecordConfig()
     """What is recorded."""
-    run: Annotated[RunConfig, Key(Effect.RUN)] = RunConfig()
+    run: Annotated[RunConfig, Key(Effect.RUN, operator=True)] = RunConfig()
     """How it is run."""
-    containers: Annotated[ContainersConfig, Key(Effect.RUN)] = ContainersConfig()
+    containers: Annotated[ContainersConfig, Key(Effect.RUN, operator=True)] = ContainersConfig()
     """Runs in containers."""
-    cluster: Annotated[ClusterConfig, Key(Effect.RUN)] = ClusterConfig()
+    cluster: Annotated[ClusterConfig, Key(Effect.RUN, operator=True)] = ClusterConfig()
     """Runs on a cluster."""
 
     def _find_contradictions(self) -> Iterator[tuple[str, str]]:

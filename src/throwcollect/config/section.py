@@ -9,7 +9,8 @@ from collections.abc import Callable, Iterator, Mapping
 from functools import cache, reduce
 from itertools import pairwise
 from operator import or_
-from typing import Annotated, Any
+from types import UnionType
+from typing import Annotated, Any, Union, get_args, get_origin
 
 from pydantic import BaseModel, ConfigDict, Discriminator, GetJsonSchemaHandler, Tag, model_validator
 from pydantic_core import CoreSchema
@@ -75,6 +76,20 @@ def any_of(sections: Mapping[str, type[Section]], choose: Callable[[Any], Any]) 
         return _tag_of(sections[name]) if isinstance(name, str) and name in sections else None
 
     return Annotated[reduce(or_, [Annotated[kind, Tag(_tag_of(kind))] for kind in kinds]), Discriminator(find_tag)]
+
+
+def sections_within(kind: Any) -> Iterator[type[Section]]:
+    """List the sections that a value of some type may be; those that are items of it are left out.
+
+    Args:
+        kind: The type, such as that of a field; with `any_of`, it has several.
+    """
+    if isinstance(kind, type):
+        if issubclass(kind, Section):
+            yield kind
+    elif get_origin(kind) in (Annotated, Union, UnionType):
+        for each in get_args(kind):
+            yield from sections_within(each)
 
 
 def _tag_of(section: type[Section]) -> str:

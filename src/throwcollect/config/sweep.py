@@ -113,7 +113,7 @@ class SweepConfig(Section):
     """How points are drawn; `list` reads them from `file`."""
     parameters: dict[str, Parameter] = {}
     """Dotted configuration keys (`task.duration_s`, `ball.mass_kg`, ...) and what they range over."""
-    file: str | None = None
+    file: Annotated[str | None, Key(operator=True)] = None
     """CSV or Parquet file with one row a trial and dotted keys as columns, perhaps targets, too; for the sampler
     `list`.
 

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import cache
 from typing import Any, TypeVar
 
 from pydantic import ValidationError
 
-from throwcollect.config.key import Effect, Key, overlay
+from throwcollect.config.key import Effect, Key, key_of_field, overlay
 from throwcollect.config.problems import Location, findings, join_key, unknown_key
 from throwcollect.config.schema import Config
-from throwcollect.config.section import Section
+from throwcollect.config.section import Section, sections_within
 from throwcollect.config.shape import index_or_key
 from throwcollect.errors import ConfigError, Problem
 
@@ -80,6 +81,12 @@ def sweepable_keys(config: Config, effect: Effect | None = None) -> list[str]:
     ]
 
 
+@cache
+def operator_keys() -> tuple[str, ...]:
+    """List the dotted keys that only the operator of a server sets, without those that lie below another of them."""
+    return tuple(_operator_keys(Config))
+
+
 def reason_not_sweepable(config: Config, key: str) -> str | None:
     """Say why a sweep may not vary a key; None when it may.
 
@@ -101,6 +108,16 @@ def _find_obstacle(config: Config, leaf: Leaf) -> str | None:
     if joint != leaf.name and joint not in config.task.end:
         return f"cannot vary from trial to trial, as task.end does not name {joint}"
     return None
+
+
+def _operator_keys(section: type[Section]) -> Iterator[str]:
+    for name, field in section.model_fields.items():
+        if key_of_field(section, name).operator:
+            yield name
+            continue
+        # Sections of members may have the same key.
+        inner = dict.fromkeys(key for each in sections_within(field.annotation) for key in _operator_keys(each))
+        yield from (f"{name}.{key}" for key in inner)
 
 
 def _leaves(value: Any, location: Location, key: Key, default: Any) -> Iterator[Leaf]:

@@ -11,7 +11,7 @@ import numpy as np
 from throwcollect.config.loader import dump_yaml, load, load_locating_errors
 from throwcollect.config.problems import quote
 from throwcollect.config.schema import Config
-from throwcollect.config.values import differences
+from throwcollect.config.values import differences, leaves
 from throwcollect.coordinator.onlooker import SILENT, Onlooker
 from throwcollect.coordinator.prepare import (
     check_room,
@@ -37,7 +37,6 @@ from throwcollect.sweep.points import Points
 from throwcollect.tasks.result import LOST
 from throwcollect.wording import command
 
-_MAY_GROW = ("trials", "until")
 _MUCH_BYTES = 50_000_000
 """A core takes a second to look through so many bytes."""
 
@@ -247,10 +246,11 @@ def refuse_changes(directory: Path, stored: Config, config: Config) -> None:
         ConfigError: If it differs in anything else than how it is run, or how far its plan may grow.
     """
     changed = differences(stored.without_run(), config.without_run())
+    may_grow = {leaf.name for config in (stored, config) for leaf in leaves(config) if leaf.key.grows}
     problems = [
         Problem(f"{directory} was begun with {quote(before)}, got {quote(after)}", key=key)
         for key, (before, after) in changed.items()
-        if key.partition(".")[0] not in _MAY_GROW or not _grows(before, after, config)
+        if key not in may_grow or not _grows(before, after, config)
     ]
     if problems:
         same = "the same configuration, but for `run`, `containers`, `cluster` and more `trials`"

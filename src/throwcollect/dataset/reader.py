@@ -12,7 +12,7 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from throwcollect.arguments import read_list
+from throwcollect.arguments import check_whole_number, read_list
 from throwcollect.config.schema import Config
 from throwcollect.config.sweep import Range
 from throwcollect.dataset.bag import read_bag_metadata
@@ -330,9 +330,12 @@ class Dataset(Sequence[Throw]):
             threads: How many of them work; None for one a core, up to 4.
 
         Raises:
-            ConfigError: If there is no such column or joint, or columns or joints are no list of names.
+            ConfigError: If there is no such column or joint, columns or joints are no list of names, or `threads` is no
+                number of them.
             DatasetError: If an episode is not where the table says, or it is damaged; CRCs are compared.
         """
+        if threads is not None:
+            check_whole_number("threads", threads, least=1)
         trials, known = self.throws["trial"].to_pylist(), self.joints
         chosen = known if joints is None else read_list("joints", joints, "names")
         for joint in chosen:

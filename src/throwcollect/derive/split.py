@@ -20,7 +20,7 @@ from typing import Any, cast
 import pyarrow as pa
 from pydantic import TypeAdapter, ValidationError
 
-from throwcollect.arguments import as_float, check_mapping, read_list, refuse_argument
+from throwcollect.arguments import as_float, check_mapping, check_whole_number, read_list, refuse_argument
 from throwcollect.config.kinds import Name
 from throwcollect.dataset.expression import Expression
 from throwcollect.dataset.reader import Dataset
@@ -91,12 +91,13 @@ def split(
         fractions: Names of the parts and their shares of the cells: ``train=0.8,test=0.2``, or a mapping of them.
         cells: Axes of the space that is cut into cells: an expression on columns of the table of throws (see
             `dataset.expression`) and the width of the cells along it, each: ``landing_x_m=0.05``.
-        seed: Seed of the choice.
+        seed: Seed of the choice, 0 or more.
 
     Raises:
-        ConfigError: If fractions or cells are wrong, a part gets no trial, or the directory cannot be used.
+        ConfigError: If fractions, cells or seed are wrong, a part gets no trial, or the directory cannot be used.
         DatasetError: If the dataset is damaged, or a part cannot be written.
     """
+    check_whole_number("seed", seed, least=0)
     dataset = Dataset.open(directory)
     everything = source(dataset)
     members = assign(everything, fractions=fractions, cells=cells, seed=seed)

@@ -16,6 +16,7 @@ from pydantic import JsonValue
 
 from throwcollect.config.containers import ContainerSpec
 from throwcollect.config.loader import load
+from throwcollect.config.values import operator_keys
 from throwcollect.dataset.creation import refuse_taken
 from throwcollect.dataset.directory import config_path
 from throwcollect.errors import ConfigError, ConflictError, NotFoundError, Problem, WorkerError
@@ -24,7 +25,7 @@ from throwcollect.runs import control
 from throwcollect.runs.background import begin_container, begin_run
 from throwcollect.runs.component_container import ContainerOrder
 from throwcollect.runs.records import Records, Run
-from throwcollect.runs.run_record import Origin
+from throwcollect.runs.run_record import Origin, RunRecord
 from throwcollect.runs.run_selection import require_living
 from throwcollect.runs.state_directory import state_directory
 from throwcollect.serve.catalogue import NAME, Catalogue, Component
@@ -33,8 +34,6 @@ from throwcollect.serve.resumption import check_resumption
 from throwcollect.serve.robot_files import description_of
 from throwcollect.serve.state import simulations_of
 
-_OPERATOR_KEYS = ("run", "containers", "cluster", "sweep.file")
-"""Keys of a configuration that only the operator sets, because they name files and resources of this machine."""
 _KEY = r"[A-Za-z0-9_-]+(\.[A-Za-z0-9_-]+)*"
 _LOCK = "instances.lock"
 _LOOK_S = 0.02
@@ -135,15 +134,16 @@ class Instances:
     def stop(self, instance: str, *, force: bool = False) -> None:
         """Ask an instance to finish its running trials and end; by force, end it at once, and forget it.
 
-        To ask once more does not hurry it.
+        To ask once more does not hurry it. One whose launcher died cannot be asked: what is left of it is ended, and it
+        is forgotten.
 
         Raises:
             NotFoundError: If there is no such run.
             ConflictError: If it has ended.
-            WorkerError: If its launcher died, or something cannot be ended.
+            WorkerError: If its launcher dies meanwhile, or something cannot be ended.
         """
         run = self.get(instance)
-        if force:
+        if force or run.status == "died":
             control.down(run)
         elif not (run.lives and run.record.stopping):
             with _one_at_a_time():
@@ -167,12 +167,13 @@ class Instances:
 
         Raises:
             NotFoundError: If there is no such run.
-            ConflictError: If it has ended.
+            ConflictError: If it has ended, or its launcher died.
             ConfigError: If it cannot be scaled.
-            WorkerError: If its launcher died, or does not answer.
+            WorkerError: If its launcher does not answer.
         """
         run = self.get(instance)
         _check_simulations(run)
+        _require_living(run)
         control.scale(run, simulations)
         return run.now()
 
@@ -181,8 +182,8 @@ class Instances:
 
         Raises:
             NotFoundError: If there is no such run.
-            ConflictError: If it has ended or has no simulation that runs, or more than what is seen differs from the
-                description of the configuration.
+            ConflictError: If it has ended, died or has no simulation that runs, or more than what is seen differs from
+                the description of the configuration.
             ConfigError: If the text is no URDF.
             WorkerError: If a simulation does not answer.
         """
@@ -191,7 +192,7 @@ class Instances:
         own = description_of(run)
         if urdf is not None:
             check_appearance(own, urdf)
-        record = require_living(run)
+        record = _require_living(run)
         config = load(config_path(run.place.directory))
         nodes = [name_node(config, name) for name in simulations_of(record.nodes)]
         if not nodes:
@@ -199,6 +200,18 @@ class Instances:
         for result in control.set_parameter(run, nodes, "robot_description", urdf or own):
             if not result.successful:
                 raise ConflictError(f"run {run.id}: {result.reason}")
+
+
+def _require_living(run: Run) -> RunRecord:
+    """The record of a run, which has to live; one that died is no failure of the server, but what the client asks of.
+
+    Raises:
+        ConflictError: If it has ended, or its launcher died.
+    """
+    try:
+        return require_living(run)
+    except WorkerError as error:
+        raise ConflictError(error.message, hint=error.hint) from error
 
 
 def _stop_once(run: Run) -> None:
@@ -309,7 +322,7 @@ def _overrides(origin: Origin) -> list[str]:
         *(
             Problem("is the operator's alone; a request may not set it", key=kept)
             for key, value in origin.changes.items()
-            for kept in _OPERATOR_KEYS
+            for kept in operator_keys()
             if _sets(key, value, kept)
         ),
     ]
@@ -325,7 +338,6 @@ def _sets(key: str, value: JsonValue, kept: str) -> bool:
     """Whether setting a key to a value also sets another key: the same, one above it, or one inside the value."""
     if key == kept or key.startswith(f"{kept}."):
         return True
-    first, _, rest = kept.partition(".")
-    if not rest or not isinstance(value, dict):
+    if not kept.startswith(f"{key}.") or not isinstance(value, dict):
         return False
-    return key == first and any(_sets(each, inner, rest) for each, inner in value.items())
+    return any(_sets(each, inner, kept.removeprefix(f"{key}.")) for each, inner in value.items())

@@ -7,9 +7,10 @@ from collections.abc import Iterable, Iterator, Mapping
 from throwcollect.config.default_path import DEFAULT_CONFIG
 from throwcollect.config.loader import value_as_yaml
 from throwcollect.config.shape import root
+from throwcollect.config.task_config import TaskConfig
 from throwcollect.errors import ConfigError
 from throwcollect.extras import has_wheel
-from throwcollect.members import names_of
+from throwcollect.members import load_member, names_of
 from throwcollect.tasks.first_motion import Motion, find_first_motion
 
 POINTS = "throws.csv"
@@ -69,9 +70,10 @@ def _lines(
     yield f"  name: {robot} # {_choices(names_of('robots'))}"
     yield "task:"
     yield f"  name: {task} # {_choices(names_of('tasks'))}"
-    yield f"  duration_s: {duration_s:g} # how long the arm swings"
+    yield f"  duration_s: {duration_s:g} # how long the motion takes"
     yield f"  start: {value_as_yaml(dict(start))}"
     yield f"  end: {value_as_yaml(dict(end))} # the joints that move"
+    yield from (f"  {line}" for line in _own_keys(load_member("tasks", task)))
     if not has_wheel("pybullet"):
         yield "sim:"
         yield "  engine: mujoco # bullet, the default, has no wheel for this Python"
@@ -85,6 +87,14 @@ def _lines(
     count = ", count: 20" if sampler == "grid" else ""
     for number, (key, (low, high)) in enumerate(ranges.items()):
         yield f"    {key}: {{min: {low:g}, max: {high:g}{', count: 10' if count and number else count}}}"
+
+
+def _own_keys(section: type[TaskConfig]) -> Iterator[str]:
+    """Write the keys that a task has beside those of every task, with their defaults, and what they mean."""
+    for key, node in section.model_json_schema()["properties"].items():
+        if key not in TaskConfig.model_fields and "default" in node:
+            meaning = node.get("description", "").partition("\n\n")[0].replace("\n", " ").rstrip(".")
+            yield f"{key}: {value_as_yaml(node['default'])}{f' # {meaning}' if meaning else ''}"
 
 
 def _choices(names: Iterable[str]) -> str:

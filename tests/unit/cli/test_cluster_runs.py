@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -68,6 +69,35 @@ def test_a_task_that_there_is_not_is_refused(named: str) -> None:
     run: Any = SimpleNamespace(directory="data", logs={}, submission=SimpleNamespace(tasks=2))
     with pytest.raises(ConfigError, match=f"data: has no task '{named}'"):
         cluster_runs.print_logs(run, [named])
+
+
+def test_logs_are_followed_until_the_run_ends(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    logs: dict[str, Path] = {}
+    run: Any = SimpleNamespace(directory="data", logs=logs, submission=SimpleNamespace(tasks=2))
+    first, second = tmp_path / "7_0.log", tmp_path / "7_1.log"
+
+    def follow(_run: Any, **_: Any) -> Iterator[SlicesLook]:
+        yield look()
+        logs["0"] = first
+        first.write_text("begins\nhal")
+        yield look()
+        logs["1"] = second
+        first.write_text("begins\nhalf\n")
+        second.write_text("ends")
+        yield look()
+
+    monkeypatch.setattr(cluster_runs, "follow", follow)
+    cluster_runs.print_logs(run, [], on=True)
+    assert capsys.readouterr().out.splitlines() == ["0 | begins", "0 | half", "1 | ends"]
+    # A task that is named may still wait for a node.
+    logs.clear()
+    cluster_runs.print_logs(run, ["1"], on=True)
+    assert capsys.readouterr().out.splitlines() == ["1 | ends"]
+    logs.clear()
+    with pytest.raises(ConfigError, match="task 1 has printed nothing yet"):
+        cluster_runs.print_logs(run, ["1"])
 
 
 def test_one_run_on_several_nodes_is_told_without_a_number(

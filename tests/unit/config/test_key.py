@@ -1,8 +1,12 @@
+from typing import Annotated
+
 import pytest
 
-from throwcollect.config.key import Effect
+from throwcollect.config import values
+from throwcollect.config.key import Effect, Key
 from throwcollect.config.schema import Config, DynamicMovementPrimitive
-from throwcollect.config.values import leaves, sweepable_keys
+from throwcollect.config.section import Section, any_of
+from throwcollect.config.values import leaves, operator_keys, sweepable_keys
 
 WEIGHTS = {joint: [0.0, 1.0] for joint in Config().task.end}
 LEARNED = Config().task.model_copy(
@@ -57,3 +61,26 @@ def test_a_value_is_told_from_its_default():
     defaults = {leaf.name: leaf.is_default for leaf in leaves(changed)}
     assert defaults["controllers.hold"]
     assert not defaults["task.trajectory.weights.torso_1_joint.1"]
+
+
+def test_keys_that_name_files_or_resources_of_a_machine_are_its_operators():
+    assert operator_keys() == ("sweep.file", "run", "containers", "cluster")
+
+
+def test_a_key_of_the_operator_is_found_in_a_section_of_any_member():
+    class Own(Section):
+        table: Annotated[str, Key(operator=True)] = ""
+
+    class Other(Section):
+        number: float = 0
+
+    class Whole(Section):
+        part: Annotated[any_of({"own": Own, "other": Other}, str), Key(Effect.TASK)] = Own()
+        maybe: Own | None = None
+
+    assert list(values._operator_keys(Whole)) == ["part.table", "maybe.table"]
+
+
+def test_more_trials_may_follow_from_few_keys():
+    grows = Config.model_validate({"until": {"landed": 5}})
+    assert [leaf.name for leaf in leaves(grows) if leaf.key.grows] == ["trials", "until.landed"]

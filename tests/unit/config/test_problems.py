@@ -12,14 +12,18 @@ KNOWN_IN_RUN = (
     "start_timeout_s, grace_s, retries, replay, restarts"
 )
 
-
+MEANT_TRIALS = ": unknown key; did you mean 'trials'?"
 JOINT_LIST = "joint names, each with a number from -6.3 to 6.3 rad"
 
 
 @pytest.mark.parametrize(
     ("text", "messages"),
     [
-        ("trails: 3", ["run.yaml:1: trails: unknown key; did you mean 'trials'?"]),
+        ("trails: 3", [f"run.yaml:1: trails{MEANT_TRIALS}"]),
+        # What is written under a wrong name is not told to be missing under its right one.
+        ("trails: 3\nsweep: {parameters: {ball.mass_kg: {min: 1, max: 2}}}", [f"run.yaml:1: trails{MEANT_TRIALS}"]),
+        ("until: {swung: 5}", ["run.yaml:1: until.swung: unknown key; known keys here: landed"]),
+        ("until: {landd: 5}", ["run.yaml:1: until.landd: unknown key; did you mean 'landed'?"]),
         ("run: {x: 3}", [f"run.yaml:1: run.x: unknown key; known keys here: {KNOWN_IN_RUN}"]),
         (
             "task:\n  trajectory:\n    family: dmp\n    gamma: 1",
@@ -169,7 +173,6 @@ def test_all_problems_are_reported_at_once_and_unknown_keys_first(problems_of):
     assert [problem.split(": ")[1] for problem in found] == [
         "trails",
         "sweep.parameters.task.duraton_s",
-        "trials",
         "seed",
         "ball.mass_kg",
         "ball.radius_m",

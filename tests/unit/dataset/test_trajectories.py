@@ -117,6 +117,12 @@ def test_what_is_not_there_is_named(loaded: Dataset) -> None:
         found[7]
 
 
+@pytest.mark.parametrize(("threads", "told"), [(-1, "-1"), (0, "0"), ("2", "'2'"), (1.5, r"1\.5")])
+def test_a_number_of_threads_is_one(loaded: Dataset, threads: Any, told: str) -> None:
+    with pytest.raises(ConfigError, match=f"^threads: got {told}\n  expected: .*1 or more"):
+        loaded.trajectories(threads=threads)
+
+
 def with_column(dataset: Dataset, name: str, values: list[Any]) -> Dataset:
     index = dataset.throws.schema.get_field_index(name)
     throws = dataset.throws.set_column(index, dataset.throws.schema.field(name), pa.array(values))

@@ -1,6 +1,7 @@
 import math
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pyarrow.parquet as pq
 import pytest
@@ -143,6 +144,12 @@ def test_wrong_cells_are_explained(some: Path, tmp_path: Path, axis: str, messag
 def test_one_axis_is_no_list_of_axes(some: Path, tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match=r"^cells: 'trial=1' is a text\n .*: \['trial=1'\]"):
         split(some, tmp_path / "parts", fractions=HALVES, cells="trial=1")
+
+
+@pytest.mark.parametrize(("seed", "told"), [(-1, "-1"), (1.5, r"1\.5"), ("1", "'1'"), (None, "None")])
+def test_a_seed_is_a_whole_number(some: Path, tmp_path: Path, seed: Any, told: str) -> None:
+    with pytest.raises(ConfigError, match=f"^seed: got {told}\n  expected: .*0 or more"):
+        split(some, tmp_path / "parts", fractions=HALVES, seed=seed)
 
 
 def test_shares_may_be_a_mapping(some: Path) -> None:

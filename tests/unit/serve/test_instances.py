@@ -213,11 +213,19 @@ def test_some_keys_are_the_operators_alone(
 
 def test_what_has_ended_cannot_be_stopped_or_scaled(client: TestClient, remember: Remember) -> None:
     remember("over", **make_end_fields())
-    remember("dead", lives=False)
-    for name, status in (("over", 409), ("dead", 503), ("nobody", 404)):
+    for name, status in (("over", 409), ("nobody", 404)):
         assert client.delete(f"{URL}/{name}").status_code == status
         assert client.patch(f"{URL}/{name}", json={"simulations": 1}).status_code == status
     assert client.patch(f"{URL}/over", json={"simulations": 257}).status_code == 422
+
+
+def test_one_whose_launcher_died_is_cleared_but_not_changed(client: TestClient, remember: Remember) -> None:
+    remember("dead", lives=False)
+    told = client.patch(f"{URL}/dead", json={"simulations": 1})
+    assert (told.status_code, told.headers["content-type"]) == (409, "application/problem+json")
+    assert told.json()["title"].startswith("run dead: its launcher died")
+    assert client.delete(f"{URL}/dead").status_code == 202
+    assert [client.get(f"{URL}/dead").status_code, client.delete(f"{URL}/dead").status_code] == [404, 404]
 
 
 def test_a_run_that_is_stopping_is_not_told_again(

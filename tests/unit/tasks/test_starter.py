@@ -62,6 +62,26 @@ def test_a_robot_of_another_package_moves_from_its_posture_at_rest(tmp_path: Pat
     assert "name: planar_arm # one of talos, planar_arm" in (tmp_path / DEFAULT_CONFIG).read_text(encoding="utf-8")
 
 
+def test_keys_that_only_the_task_has_are_written_with_what_they_mean(tmp_path: Path) -> None:
+    text = make_starter("talos", "throw", "sobol")[str(DEFAULT_CONFIG)]
+    meaning = "The ball counts as released when it has been out of the spoon for this long"
+    assert f"  recatch_gap_s: 0.02 # {meaning}\n" in text
+    path = os.pathsep.join([str(PLUGINS), os.environ.get("PYTHONPATH", "")])
+    for command in (("init", "--task", "reach"), ("config",)):
+        done = subprocess.run(
+            [sys.executable, "-m", "throwcollect", *command],
+            cwd=tmp_path,
+            env={**os.environ, "PYTHONPATH": path},
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+    assert "  tolerance_rad: 0.01\n" in done.stdout
+    lines = (tmp_path / DEFAULT_CONFIG).read_text(encoding="utf-8").splitlines()
+    assert "  tolerance_rad: 0.01 # How far a joint may be from its end in the last sample" in lines
+    assert not [line for line in lines if "recatch_gap_s" in line]
+
+
 def test_no_file_says_how_to_have_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     with pytest.raises(ConfigError, match="throwcollect init writes one"):

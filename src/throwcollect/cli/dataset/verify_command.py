@@ -10,8 +10,9 @@ import typer
 from throwcollect.cli.options import DatasetArgument, JsonOption
 from throwcollect.cli.printing import print_result
 from throwcollect.cli.terminal import display
+from throwcollect.engine_packages import require_engine
 from throwcollect.errors import DatasetError
-from throwcollect.extras import install_command
+from throwcollect.extras import MissingExtraError, install_command, require
 from throwcollect.side_by_side import count_cores
 from throwcollect.wording import command, format_count
 
@@ -47,15 +48,20 @@ def verify_dataset(
 
 
 def _describe_unchecked(dataset: Dataset, replay: int | None) -> str:
-    """Say what was not checked in a dataset in which nothing is wrong, and which command checks it."""
+    """Say what was not checked in a dataset in which nothing is wrong, and which command checks it or what it needs."""
     from throwcollect.dataset.verify_plan import CHECKED_AGAIN
     from throwcollect.robots.description import is_available
 
     if replay is not None:
         text = f"replayed: {format_count(min(replay, len(dataset.recorded)), 'throw')}, the same bit for bit"
     else:
-        more = command("dataset", "verify", dataset.directory, "--replay", _SUGGESTED)
-        text = f"not checked: whether the simulation gives the same throws again ({more})"
+        text = "not checked: whether the simulation gives the same throws again"
+        try:
+            require("pinocchio")
+            require_engine(dataset.config.sim.engine)
+            text += f" ({command('dataset', 'verify', dataset.directory, '--replay', _SUGGESTED)})"
+        except MissingExtraError as error:
+            text += f" ({error.message})"
     run = len(dataset.plan.trials) - len(dataset.plan.trials.refused)
     if run > CHECKED_AGAIN and is_available(dataset.config):
         text += f"; whether the robot can do them was checked of {CHECKED_AGAIN} of {run} trials"

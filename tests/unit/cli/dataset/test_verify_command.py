@@ -38,6 +38,16 @@ def test_what_only_a_replay_tells_is_said_with_the_command(source: Path, capsys:
     assert f"throwcollect dataset verify '{source}' --replay 100" in second
 
 
+def test_where_nothing_can_be_simulated_no_command_is_named_but_what_is_missing(
+    source: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("throwcollect.extras.is_installed", lambda package: package != "pybullet")
+    verify_dataset(source, replay=None, json=False)
+    _, second = capsys.readouterr().out.splitlines()
+    assert "whether the simulation gives the same throws again (this needs pybullet, which is not installed" in second
+    assert "--replay" not in second
+
+
 def test_a_throw_that_comes_out_otherwise_is_a_finding(
     source: Path, replays: list[int], capsys: pytest.CaptureFixture[str]
 ) -> None:
