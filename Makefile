@@ -101,7 +101,7 @@ define twice
 $(1) -o cache_dir=.pytest_cache/$@ || $(1) -o cache_dir=.pytest_cache/$@ --last-failed --last-failed-no-failures none
 endef
 
-# Each group is one process: those of pytest-xdist would each find and import the tests of all groups. There are three groups, so
+# Each group is one process: several of pytest-xdist would each find and import the tests of all groups. There are three groups, so
 # that two cores have something to do while a test waits, for a client that never reads or for a pause.
 DATA := $(addprefix tests/unit/,coordinator dataset)
 FACES := $(addprefix tests/unit/,cli derive export learning report runs serve view)
