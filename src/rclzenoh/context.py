@@ -8,6 +8,7 @@ import signal
 import threading
 import weakref
 from collections.abc import Callable
+from contextlib import suppress
 from functools import cache
 from itertools import count
 from types import FrameType
@@ -24,6 +25,8 @@ from rclzenoh.session_config import environment_config
 _T = TypeVar("_T")
 
 _open: weakref.WeakSet[Context] = weakref.WeakSet()
+_ARRIVAL_S = 1.0
+"""A subscriber that reads nothing must not keep a session from its end for longer."""
 
 
 class Context:
@@ -126,7 +129,21 @@ class Context:
         self._on_shutdown.clear()
         _open.discard(self)
         if session is not None:
-            session.close()  # type: ignore[no-untyped-call]
+            try:
+                _let_messages_arrive(session, self._domain_id)
+            finally:
+                session.close()  # type: ignore[no-untyped-call]
+
+
+def _let_messages_arrive(session: zenoh.Session, domain_id: int) -> None:
+    """Wait until the router has read all messages that were sent, for a second at most.
+
+    When a session closes, Zenoh 1.10 breaks off the message that it is writing, and goes on with what withdraws tokens,
+    which a subscriber then gets as the end of that message. A query is read after all that was sent before it, and the
+    router answers this one itself, as nobody else has its key.
+    """
+    with suppress(zenoh.ZError):
+        list(session.get(f"{domain_id}/@arrived", timeout=_ARRIVAL_S))
 
 
 def _require_initialized(value: _T | None) -> _T:

@@ -1,5 +1,6 @@
 """Publishers and subscriptions, through a real router."""
 
+import socket
 import threading
 import time
 
@@ -9,8 +10,10 @@ import zenoh
 import zenoh.ext
 
 from rclzenoh.attachment import Attachment, unpack
+from rclzenoh.context import Context
 from rclzenoh.interfaces import get_message, serialize, type_hash
 from rclzenoh.keys import data_key
+from rclzenoh.session_config import client_config, router_config
 from throwcollect.ros import DurabilityPolicy, HistoryPolicy, QoSProfile
 
 String = get_message("std_msgs/msg/String")
@@ -118,3 +121,32 @@ def test_garbage_on_a_topic_is_logged_once_and_does_not_stop_the_node(rig, capsy
         lambda: session.put(key, last, attachment=attachment) or (heard and heard[-1].position.tolist() == [2.0])
     )
     assert capsys.readouterr().err.count("/t: ignored") == 1
+
+
+def test_all_messages_have_arrived_whole_when_a_session_closes(rig):
+    with socket.create_server(("127.0.0.1", 0)) as probe:
+        # Sockets that hold so little are full until the end, as the subscriber below is slow.
+        endpoint = f"tcp/127.0.0.1:{probe.getsockname()[1]}#so_sndbuf=16384;so_rcvbuf=16384"
+    heard = []
+
+    def hear_slowly(sample):
+        time.sleep(0.0005)
+        heard.append(sample.payload.to_bytes())
+
+    with zenoh.open(router_config(endpoint)), zenoh.open(client_config(endpoint)) as listening:
+        talking = Context()
+        talking.init(config=client_config(endpoint))
+        node = rig.node("talker", context=talking)
+        key = data_key(talking.get_domain_id(), "/t", String.TYPE, type_hash(String.TYPE))
+        listening.declare_subscriber(key, zenoh.handlers.Callback(hear_slowly, indirect=False))
+        publisher = node.create_publisher(String, "t", QoSProfile(history=HistoryPolicy.KEEP_ALL))
+        assert rig.spin(lambda: publisher.publish(String(data="first")) or heard)
+        messages = [serialize(String(data=f"{number:04}" * 400)) for number in range(700)]
+        for message in messages:
+            publisher.publish(message)
+        node.destroy_node()
+        talking.shutdown()
+        deadline = time.monotonic() + 10
+        while heard[-1] != messages[-1] and time.monotonic() < deadline:
+            time.sleep(0.01)
+        assert heard[-len(messages) :] == messages
