@@ -55,7 +55,7 @@ def _strings(data: bytes, at: int, count: int, memory: list[tuple[bytes, tuple[s
 
 
 class _Reader(FunctionWriter):
-    """Writes a function that reads at position ``at``; operands are what values are given to."""
+    """Writes a function that reads at position ``at``; operands are the places that take what is read."""
 
     def __init__(self) -> None:
         super().__init__(frombuffer=np.frombuffer, new=object.__new__, strings=_strings)

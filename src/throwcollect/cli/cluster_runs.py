@@ -40,13 +40,13 @@ def follow_to_the_end(directory: Path, *, as_json: bool) -> None:
     print_collected(info(directory), directory, as_json=as_json)
 
 
-def print_logs(run: ClusterRun, tasks: list[str], *, on: bool = False) -> None:
-    """Print the logs of tasks; of all tasks if none is named. With `on`, go on until the run ends."""
+def print_logs(run: ClusterRun, tasks: list[str], *, until_end: bool = False) -> None:
+    """Print the logs of tasks; of all tasks if none is named. With `until_end`, go on until the run ends."""
     numbers = [*map(str, range(run.submission.tasks))]
     for text in tasks:
         if text not in numbers:
             raise ConfigError(f"{run.directory}: has no task {text!r}", expected=f"0 to {numbers[-1]}")
-        if not on and text not in run.logs:
+        if not until_end and text not in run.logs:
             raise ConfigError(f"{run.directory}: task {text} has printed nothing yet")
     tails: dict[Path, Tail] = {}
 
@@ -56,7 +56,7 @@ def print_logs(run: ClusterRun, tasks: list[str], *, on: bool = False) -> None:
                 for line in tails.setdefault(path, Tail(path)).lines(torn=last):
                     typer.echo(f"{text:>{len(str(len(numbers)))}} | {line}")
 
-    for _ in follow(run, keep_on=has_reader) if on else ():
+    for _ in follow(run, keep_on=has_reader) if until_end else ():
         print_new(last=False)
     # The tasks may have printed since the last look.
     print_new(last=True)

@@ -105,7 +105,7 @@ def logs(
     if (submitted := _find_submitted(run)) is not None:
         from throwcollect.cli.cluster_runs import print_logs
 
-        print_logs(submitted, nodes or [], on=follow)
+        print_logs(submitted, nodes or [], until_end=follow)
         return
     from throwcollect.runs.following import read_logs
 

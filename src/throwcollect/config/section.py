@@ -78,7 +78,7 @@ def any_of(sections: Mapping[str, type[Section]], choose: Callable[[Any], Any]) 
     return Annotated[reduce(or_, [Annotated[kind, Tag(_tag_of(kind))] for kind in kinds]), Discriminator(find_tag)]
 
 
-def sections_within(kind: Any) -> Iterator[type[Section]]:
+def list_sections(kind: Any) -> Iterator[type[Section]]:
     """List the sections that a value of some type may be; those that are items of it are left out.
 
     Args:
@@ -89,7 +89,7 @@ def sections_within(kind: Any) -> Iterator[type[Section]]:
             yield kind
     elif get_origin(kind) in (Annotated, Union, UnionType):
         for each in get_args(kind):
-            yield from sections_within(each)
+            yield from list_sections(each)
 
 
 def _tag_of(section: type[Section]) -> str:

@@ -12,7 +12,7 @@ from pydantic import ValidationError
 from throwcollect.config.key import Effect, Key, key_of_field, overlay
 from throwcollect.config.problems import Location, findings, join_key, unknown_key
 from throwcollect.config.schema import Config
-from throwcollect.config.section import Section, sections_within
+from throwcollect.config.section import Section, list_sections
 from throwcollect.config.shape import index_or_key
 from throwcollect.errors import ConfigError, Problem
 
@@ -82,7 +82,7 @@ def sweepable_keys(config: Config, effect: Effect | None = None) -> list[str]:
 
 
 @cache
-def operator_keys() -> tuple[str, ...]:
+def list_operator_keys() -> tuple[str, ...]:
     """List the dotted keys that only the operator of a server sets, without those that lie below another of them."""
     return tuple(_operator_keys(Config))
 
@@ -116,7 +116,7 @@ def _operator_keys(section: type[Section]) -> Iterator[str]:
             yield name
             continue
         # Sections of members may have the same key.
-        inner = dict.fromkeys(key for each in sections_within(field.annotation) for key in _operator_keys(each))
+        inner = dict.fromkeys(key for each in list_sections(field.annotation) for key in _operator_keys(each))
         yield from (f"{name}.{key}" for key in inner)
 
 

@@ -16,7 +16,7 @@ from pydantic import JsonValue
 
 from throwcollect.config.containers import ContainerSpec
 from throwcollect.config.loader import load
-from throwcollect.config.values import operator_keys
+from throwcollect.config.values import list_operator_keys
 from throwcollect.dataset.creation import refuse_taken
 from throwcollect.dataset.directory import config_path
 from throwcollect.errors import ConfigError, ConflictError, NotFoundError, Problem, WorkerError
@@ -203,7 +203,7 @@ class Instances:
 
 
 def _require_living(run: Run) -> RunRecord:
-    """The record of a run, which has to live; one that died is no failure of the server, but what the client asks of.
+    """The record of a run, which has to live; if it died, the request is in conflict, and the server has not failed.
 
     Raises:
         ConflictError: If it has ended, or its launcher died.
@@ -322,7 +322,7 @@ def _overrides(origin: Origin) -> list[str]:
         *(
             Problem("is the operator's alone; a request may not set it", key=kept)
             for key, value in origin.changes.items()
-            for kept in operator_keys()
+            for kept in list_operator_keys()
             if _sets(key, value, kept)
         ),
     ]

@@ -89,11 +89,11 @@ def test_logs_are_followed_until_the_run_ends(
         yield look()
 
     monkeypatch.setattr(cluster_runs, "follow", follow)
-    cluster_runs.print_logs(run, [], on=True)
+    cluster_runs.print_logs(run, [], until_end=True)
     assert capsys.readouterr().out.splitlines() == ["0 | begins", "0 | half", "1 | ends"]
     # A task that is named may still wait for a node.
     logs.clear()
-    cluster_runs.print_logs(run, ["1"], on=True)
+    cluster_runs.print_logs(run, ["1"], until_end=True)
     assert capsys.readouterr().out.splitlines() == ["1 | ends"]
     logs.clear()
     with pytest.raises(ConfigError, match="task 1 has printed nothing yet"):

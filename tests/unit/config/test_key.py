@@ -6,7 +6,7 @@ from throwcollect.config import values
 from throwcollect.config.key import Effect, Key
 from throwcollect.config.schema import Config, DynamicMovementPrimitive
 from throwcollect.config.section import Section, any_of
-from throwcollect.config.values import leaves, operator_keys, sweepable_keys
+from throwcollect.config.values import leaves, list_operator_keys, sweepable_keys
 
 WEIGHTS = {joint: [0.0, 1.0] for joint in Config().task.end}
 LEARNED = Config().task.model_copy(
@@ -64,7 +64,7 @@ def test_a_value_is_told_from_its_default():
 
 
 def test_keys_that_name_files_or_resources_of_a_machine_are_its_operators():
-    assert operator_keys() == ("sweep.file", "run", "containers", "cluster")
+    assert list_operator_keys() == ("sweep.file", "run", "containers", "cluster")
 
 
 def test_a_key_of_the_operator_is_found_in_a_section_of_any_member():

@@ -46,19 +46,25 @@ def test_a_file_that_is_there_stays(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     assert [path.read_text() for path in tmp_path.iterdir()] == ["mine"]
 
 
-def test_a_robot_of_another_package_moves_from_its_posture_at_rest(tmp_path: Path) -> None:
+def init_with_plugins(directory: Path, *options: str) -> str:
+    """Write a starter where packages of the tests are installed, and print the whole configuration that it makes."""
     paths = os.pathsep.join([str(PLUGINS), os.environ.get("PYTHONPATH", "")])
-    for command in (("init", "--robot", "planar_arm"), ("config",)):
+    for command in (("init", *options), ("config",)):
         done = subprocess.run(
             [sys.executable, "-m", "throwcollect", *command],
-            cwd=tmp_path,
+            cwd=directory,
             env={**os.environ, "PYTHONPATH": paths},
             capture_output=True,
             text=True,
             check=True,
         )
-    assert "name: planar_arm" in done.stdout
-    assert "arm_right" not in done.stdout
+    return done.stdout
+
+
+def test_a_robot_of_another_package_moves_from_its_posture_at_rest(tmp_path: Path) -> None:
+    printed = init_with_plugins(tmp_path, "--robot", "planar_arm")
+    assert "name: planar_arm" in printed
+    assert "arm_right" not in printed
     assert "name: planar_arm # one of talos, planar_arm" in (tmp_path / DEFAULT_CONFIG).read_text(encoding="utf-8")
 
 
@@ -66,17 +72,7 @@ def test_keys_that_only_the_task_has_are_written_with_what_they_mean(tmp_path: P
     text = make_starter("talos", "throw", "sobol")[str(DEFAULT_CONFIG)]
     meaning = "The ball counts as released when it has been out of the spoon for this long"
     assert f"  recatch_gap_s: 0.02 # {meaning}\n" in text
-    path = os.pathsep.join([str(PLUGINS), os.environ.get("PYTHONPATH", "")])
-    for command in (("init", "--task", "reach"), ("config",)):
-        done = subprocess.run(
-            [sys.executable, "-m", "throwcollect", *command],
-            cwd=tmp_path,
-            env={**os.environ, "PYTHONPATH": path},
-            capture_output=True,
-            text=True,
-            check=True,
-        )
-    assert "  tolerance_rad: 0.01\n" in done.stdout
+    assert "  tolerance_rad: 0.01\n" in init_with_plugins(tmp_path, "--task", "reach")
     lines = (tmp_path / DEFAULT_CONFIG).read_text(encoding="utf-8").splitlines()
     assert "  tolerance_rad: 0.01 # How far a joint may be from its end in the last sample" in lines
     assert not [line for line in lines if "recatch_gap_s" in line]
