@@ -297,7 +297,7 @@ def test_a_directory_into_which_containers_may_still_collect_is_refused_while_th
 ) -> None:
     make("a", "died", runtime="docker")
     engine.withheld = "."
-    monkeypatch.setattr(docker_engine, "PATIENCE_S", 0.1)
+    monkeypatch.setitem(docker_engine.connect.__kwdefaults__, "timeout_s", 0.1)
     with pytest.raises(
         WorkerError, match=r"/a: containers of run a-0123 may still collect into it: .*no answer in time"
     ):
