@@ -63,7 +63,11 @@ def teller() -> Iterator[Teller]:
 
 
 def test_who_never_reads_is_waited_for_and_holds_up_nobody(teller: Teller) -> None:
-    with connect(teller.url, max_queue=1, max_size=None), connect(teller.url, max_size=None) as quick:
+    # Nobody reads the rest of the frames, for which closing would wait ten seconds.
+    with (
+        connect(teller.url, max_queue=1, max_size=None, close_timeout=0.1),
+        connect(teller.url, max_size=None, close_timeout=0.1) as quick,
+    ):
         for _ in range(200):
             assert quick.recv(timeout=20) == FRAME
         # What the buffers of the connection hold, of the kernel as well.

@@ -101,7 +101,7 @@ def test_memory_for_who_never_reads_is_bounded(url: str, node: Node) -> None:
     publisher = node.create_publisher(String, "/much", WHOLE)
     subscribe = json.dumps({"op": "subscribe", "topic": "/much", "type": "std_msgs/String"})
     process, text, memory = psutil.Process(), "x" * 2**20, []
-    with connect(url, max_queue=1, max_size=None) as stalled, connect(url, max_size=None) as quick:
+    with connect(url, max_queue=1, max_size=None, close_timeout=0.1) as stalled, connect(url, max_size=None) as quick:
         stalled.send(subscribe)
         quick.send(subscribe)
 
