@@ -60,7 +60,7 @@ def is_document(name: str) -> bool:
     return name in DOCUMENTS or name.rpartition(".")[2] in DOCUMENTS
 
 
-def test_rooms_give_each_other_types() -> None:
+def test_functions_that_other_rooms_import_have_precise_types() -> None:
     modules = parse_modules()
     shared = find_imported_elsewhere(modules)
     found = {
@@ -74,7 +74,7 @@ def test_rooms_give_each_other_types() -> None:
     assert found == set()
 
 
-def test_the_rule_sees_what_it_should() -> None:
+def test_the_rule_finds_loosely_typed_functions_and_fields() -> None:
     code = """
 def read() -> dict[str, Any]: ...
 def write(entries: Iterable[Mapping[str, object]]) -> None: ...

@@ -53,7 +53,7 @@ def test_functions_are_verbs() -> None:
     assert {path: names for path, names in found.items() if names} == {}
 
 
-def test_the_rule_sees_what_it_should() -> None:
+def test_the_rule_finds_functions_that_are_participles() -> None:
     code = """
 def checked_plan() -> Plan: ...
 def _found(): ...
