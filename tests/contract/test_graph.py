@@ -10,7 +10,7 @@ Int32 = get_message(INT32)
 Trigger = get_service(TRIGGER)
 
 
-def test_nodes_see_what_others_have_as_soon_as_they_exist(rig):
+def test_a_node_sees_topics_services_and_clients_of_other_nodes(rig):
     node = rig.node("a", namespace="/ns")
     node.create_publisher(String, "topic", 10)
     node.create_subscription(Int32, "~/other", lambda _: None, 10)
@@ -34,7 +34,7 @@ def test_nodes_see_what_others_have_as_soon_as_they_exist(rig):
     assert seen.count_publishers("/ns/topic") == 0
 
 
-def test_each_endpoint_of_a_topic_is_known_as_a_genuine_node_shows_it(rig):
+def test_endpoint_infos_of_a_topic_look_like_those_of_genuine_nodes(rig):
     node = rig.node("a", namespace="/ns")
     qos = QoSProfile(depth=3, durability=DurabilityPolicy.TRANSIENT_LOCAL)
     node.create_publisher(String, "t", qos)
@@ -77,7 +77,7 @@ def test_endpoints_match_by_name_and_type(rig):
     assert rig.spin(lambda: publisher.get_subscription_count() == 1)
 
 
-def test_other_domains_are_invisible(rig, monkeypatch):
+def test_a_node_does_not_see_nodes_of_another_domain(rig, monkeypatch):
     rig.node("a")
     monkeypatch.setenv("ROS_DOMAIN_ID", "232")
     assert names_of(rig.node("b")) == ["b"]

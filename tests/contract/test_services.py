@@ -37,7 +37,7 @@ def test_many_requests_at_once_get_their_own_answers(rig, pair):
     assert [rig.result(future).success for future in futures] == [bool(i % 3) for i in range(10)]
 
 
-def test_a_coroutine_callback_does_not_hold_up_others(rig, pair):
+def test_a_waiting_coroutine_callback_blocks_others_only_on_rclpy(rig, pair):
     server, _, client = pair
     gate, order = Future(), []
 
@@ -97,7 +97,7 @@ def test_an_error_in_a_callback_ends_spinning(rig, pair):
         rig.rest(5)
 
 
-def test_a_callback_that_returns_no_response_is_a_mistake(rig, pair):
+def test_a_callback_that_returns_no_response_is_a_type_error(rig, pair):
     server, _, client = pair
     server.create_service(SetBool, "~/set", lambda _request, _response: None)
     client.wait_for_service(5)
@@ -120,7 +120,7 @@ def test_a_destroyed_client_sends_nothing(rig, pair):
         client.call_async(SetBool.Request())
 
 
-def test_a_destroyed_service_is_not_offered_any_more(rig, pair):
+def test_clients_do_not_find_a_destroyed_service(rig, pair):
     server, _, client = pair
     service = server.create_service(SetBool, "~/set", answer)
     assert client.wait_for_service(5)

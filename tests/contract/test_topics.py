@@ -35,7 +35,7 @@ def test_nodes_of_one_session_hear_each_other(rig):
     assert heard == [String(data="hello")]
 
 
-def test_bytes_are_published_and_received_as_they_are(rig):
+def test_raw_bytes_are_published_and_received_unchanged(rig):
     node = rig.node("node")
     heard = []
     node.create_subscription(String, "t", heard.append, 10, raw=True)
@@ -61,7 +61,7 @@ def test_messages_of_another_type_are_not_published(rig):
 @pytest.mark.parametrize(
     "reliability", [ReliabilityPolicy.RELIABLE] + ([] if ON_RCLPY else [ReliabilityPolicy.BEST_EFFORT])
 )
-def test_who_joins_late_gets_the_last_messages_of_a_transient_local_topic(rig, reliability):
+def test_a_late_subscriber_gets_the_last_messages_of_a_transient_local_topic(rig, reliability):
     qos = QoSProfile(depth=2, durability=DurabilityPolicy.TRANSIENT_LOCAL, reliability=reliability)
     talker, listener = rig.node("talker"), rig.node("listener")
     publisher = talker.create_publisher(String, "t", qos)
@@ -87,7 +87,7 @@ def test_a_late_publisher_of_a_transient_local_topic_is_heard_once(rig):
     assert heard == ["a"]
 
 
-def test_the_oldest_messages_make_room_when_nobody_spins(rig):
+def test_a_full_subscription_drops_its_oldest_messages(rig):
     node, talker = rig.node("listener"), rig.node("talker")
     heard, marks = [], []
     node.create_subscription(String, "t", lambda m: heard.append(m.data), 3)

@@ -74,7 +74,7 @@ def run(environment: dict[str, str], *arguments: str | Path, cwd: Path = ROOT) -
 @pytest.mark.parametrize(
     ("environment", "simulations"), [("v2", "1"), ("1.29", "2")], indirect=["environment"], ids=["v2", "1.29"]
 )
-def test_the_files_are_those_of_processes_for_any_number(
+def test_compose_collects_the_files_of_one_process(
     environment: dict[str, str], simulations: str, tmp_path: Path
 ) -> None:
     """Other tests compare what two and four simulations make on v2."""

@@ -57,7 +57,9 @@ def containers_of(client: docker.DockerClient, directory: Path) -> dict[str, doc
     return {each.labels["throwcollect.node"]: each for each in client.containers.list(filters=filters)}
 
 
-def test_chaos(engine: docker.DockerClient, tmp_path: Path) -> None:
+def test_resume_completes_a_collection_after_kills_and_pauses_at_random(
+    engine: docker.DockerClient, tmp_path: Path
+) -> None:
     """Simulations, router and coordinator are killed, one is paused, then the launcher dies; resuming completes it."""
     # So slowly that the collection outlives all of them on a fast machine, too.
     config = write_config(tmp_path, trials=48, sim=f"{FAST}, real_time_factor: 2")
@@ -88,7 +90,9 @@ def test_chaos(engine: docker.DockerClient, tmp_path: Path) -> None:
     assert fingerprints(directory) == fingerprints(tmp_path / "undisturbed")
 
 
-def test_what_a_killed_launcher_leaves_is_cleaned_up(config: Path, engine: docker.DockerClient, tmp_path: Path) -> None:
+def test_down_removes_the_containers_of_a_killed_launcher(
+    config: Path, engine: docker.DockerClient, tmp_path: Path
+) -> None:
     directory = tmp_path / "data"
     running = start(config, directory, 1, "--runtime", "docker")
     running.wait_until(lambda: len(containers_of(engine, directory)) == 3)
@@ -99,7 +103,7 @@ def test_what_a_killed_launcher_leaves_is_cleaned_up(config: Path, engine: docke
     assert not containers_of(engine, directory)
 
 
-def test_containers_get_nothing_that_they_do_not_need_and_the_files_are_those_of_processes(
+def test_containers_have_few_privileges_and_collect_the_usual_files(
     config: Path, expected: dict[str, str], engine: docker.DockerClient, tmp_path: Path
 ) -> None:
     directory = tmp_path / "data"
