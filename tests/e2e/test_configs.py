@@ -13,7 +13,7 @@ WHOLE = {"reference": 2}
 """Trials of those that have as many as their points, and few of them."""
 
 
-def test_there_are_configurations() -> None:
+def test_the_project_comes_with_the_known_configurations() -> None:
     assert {path.stem for path in CONFIGS} >= {"dmp", "grid", "quickstart", "randomised", "reference", "targets"}
 
 

@@ -87,17 +87,17 @@ def as_derived(directory: Path) -> dict[str, str]:
     return {name: digest for name, digest in fingerprints(directory).items() if name not in OF_DERIVED_ONLY}
 
 
-def test_a_merged_dataset_is_what_a_collection_of_its_trials_gives(home: Path, tmp_path: Path) -> None:
+def test_a_merged_dataset_equals_a_collection_of_its_trials(home: Path, tmp_path: Path) -> None:
     assert verify(home / "both") == []
     assert as_derived(home / "both") == collect_anew(home / "both", tmp_path / "anew")
 
 
-def test_a_filtered_dataset_is_what_a_collection_of_its_trials_gives(home: Path) -> None:
+def test_a_filtered_dataset_equals_a_collection_of_its_trials(home: Path) -> None:
     assert len(fingerprints(home / "short")) > 1
     assert as_derived(home / "short") == as_derived(home / "again")
 
 
-def test_all_derived_datasets_are_whole(home: Path) -> None:
+def test_verify_finds_nothing_wrong_in_derived_datasets(home: Path) -> None:
     derived = [path.parent for path in home.rglob("sources.parquet")]
     assert {str(path.relative_to(home)) for path in derived} == {
         *("both", "short", "few"),
@@ -107,7 +107,7 @@ def test_all_derived_datasets_are_whole(home: Path) -> None:
         assert verify(directory) == []
 
 
-def test_the_python_of_the_page_works(home: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_python_program_of_the_page_runs(home: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (python,) = re.findall(r"```python\n(.*?)```", PAGE, flags=re.DOTALL)
     monkeypatch.chdir(home.parent)
     names: dict[str, Any] = {}

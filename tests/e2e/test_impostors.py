@@ -81,9 +81,7 @@ def graph(monkeypatch: pytest.MonkeyPatch) -> Iterator[ros.Context]:
         context.try_shutdown()
 
 
-def test_a_dataset_is_that_of_its_configuration_whoever_poses_as_a_simulation(
-    graph: ros.Context, tmp_path: Path
-) -> None:
+def test_impostor_simulations_do_not_change_the_dataset(graph: ros.Context, tmp_path: Path) -> None:
     config = write_config(tmp_path, trials=TRIALS, sim=FAST)
     # Every trial is simulated again at the end, so it is known that all are right.
     config.write_text(config.read_text().replace("replay: 0", f"replay: {TRIALS}, trial_timeout_s: 3"))

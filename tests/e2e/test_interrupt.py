@@ -116,7 +116,9 @@ def events(directory: Path) -> list[dict[str, Any]]:
     return journal(directory)
 
 
-def test_ctrl_c_before_any_simulation_is_ready(config: Path, tmp_path: Path, started: list[Running]) -> None:
+def test_ctrl_c_before_any_simulation_is_ready_ends_the_run_and_its_nodes(
+    config: Path, tmp_path: Path, started: list[Running]
+) -> None:
     # A busy machine may look for the nodes only when trials run; in real time it is then not too late.
     running, nodes = begin(started, config, tmp_path / "data", "--set", "sim.real_time_factor=1")
     running.process.send_signal(signal.SIGINT)
@@ -135,7 +137,7 @@ _HANGUP = pytest.param(
 
 
 @pytest.mark.parametrize(("number", "share"), [(signal.SIGINT, 0.3), _HANGUP])
-def test_an_interruption_finishes_what_runs(
+def test_an_interruption_finishes_the_running_trials(
     number: signal.Signals, share: float, config: Path, reference: Path, tmp_path: Path, started: list[Running]
 ) -> None:
     running, nodes = begin(started, config, tmp_path / "data")
@@ -155,7 +157,7 @@ def test_an_interruption_finishes_what_runs(
     assert_goes_on(tmp_path / "data", reference)
 
 
-def test_what_runs_gets_the_grace_of_the_configuration(
+def test_an_interrupted_trial_gets_the_configured_grace_time(
     config: Path, reference: Path, tmp_path: Path, started: list[Running]
 ) -> None:
     running, nodes = begin(started, config, tmp_path / "data", "--set", "run.grace_s=0.5")
@@ -191,7 +193,7 @@ def test_a_second_ctrl_c_does_not_wait_for_trials(
     assert len(episodes(tmp_path / "data" / "small_00000.mcap.part")) > 0
 
 
-def test_a_killed_launcher_takes_its_nodes_along(
+def test_a_killed_launcher_ends_its_nodes_and_the_dataset_can_be_resumed(
     config: Path, reference: Path, tmp_path: Path, started: list[Running]
 ) -> None:
     running, nodes = begin(started, config, tmp_path / "data")
@@ -203,7 +205,7 @@ def test_a_killed_launcher_takes_its_nodes_along(
     assert_goes_on(tmp_path / "data", reference, untold=1)
 
 
-def test_a_killed_coordinator_is_started_again_and_takes_in_what_is_there(
+def test_a_restarted_coordinator_recovers_the_recorded_episodes(
     config: Path, reference: Path, tmp_path: Path, started: list[Running]
 ) -> None:
     running, _ = begin(started, config, tmp_path / "data", "--set", "run.trial_timeout_s=5")
@@ -231,7 +233,7 @@ def test_a_finished_dataset_whose_recording_was_cut_goes_on_to_the_same_files(
     assert fingerprints(directory) == fingerprints(reference)
 
 
-def test_a_power_cut_costs_what_had_not_reached_the_disk(
+def test_resuming_after_a_power_cut_keeps_the_episodes_on_the_disk(
     config: Path, reference: Path, tmp_path: Path, started: list[Running]
 ) -> None:
     running, nodes = begin(started, config, tmp_path / "data")
@@ -250,7 +252,9 @@ def test_a_power_cut_costs_what_had_not_reached_the_disk(
     assert next(event["episodes"] for event in events(tmp_path / "data") if event["event"] == "recovered") == kept > 0
 
 
-def test_a_killed_router_costs_nothing(config: Path, reference: Path, tmp_path: Path, started: list[Running]) -> None:
+def test_a_killed_router_is_restarted_and_the_dataset_stays_the_same(
+    config: Path, reference: Path, tmp_path: Path, started: list[Running]
+) -> None:
     running, nodes = begin(started, config, tmp_path / "data", "--set", "run.trial_timeout_s=5")
     in_the_middle(running, whole=reference)
     next(node for node in nodes if "router" in words_of(node)).kill()

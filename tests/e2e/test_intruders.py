@@ -187,7 +187,7 @@ def _ways(endpoint: str, home: Path) -> dict[str, str]:
     }
 
 
-def test_nobody_else_hears_says_or_asks_anything(scene: Scene) -> None:
+def test_another_user_gets_no_session_with_the_router(scene: Scene) -> None:
     """Not even a session is had, in which they could."""
     said = scene.as_nobody(ATTEMPT, json.dumps(scene.ways))
     assert len(said.stdout.splitlines()) == len(scene.ways) == 5, said
@@ -195,7 +195,7 @@ def test_nobody_else_hears_says_or_asks_anything(scene: Scene) -> None:
         assert ": Unable to connect to any of " in line, said
 
 
-def test_whoever_is_let_in_hears_says_and_asks(scene: Scene) -> None:
+def test_a_client_with_the_key_can_listen_publish_and_call(scene: Scene) -> None:
     """So that the test above does not pass because there is nothing to be heard."""
     with_key = client_override(scene.record.endpoint or "", scene.key)
     said = subprocess.run(
@@ -208,7 +208,7 @@ def test_whoever_is_let_in_hears_says_and_asks(scene: Scene) -> None:
     assert re.match("owner: HAS A SESSION, heard [1-9].* messages, was answered 1 times\n", said.stdout), said
 
 
-def test_nobody_else_poses_as_a_node(scene: Scene) -> None:
+def test_another_user_cannot_start_a_node_in_the_run(scene: Scene) -> None:
     """A simulation that would be given trials, a coordinator that would give some: neither finds the router."""
     (scene.home / "other.yaml").write_text((scene.running.directory.parent / "small.yaml").read_text())
     for node in (["sim", "other.yaml", "--name", "evil"], ["coordinator", "data", "--config", "other.yaml"]):
@@ -217,7 +217,7 @@ def test_nobody_else_poses_as_a_node(scene: Scene) -> None:
         assert re.search(r"no Zenoh session within [\d.]+ s; connecting to", said.stderr), said
 
 
-def test_nobody_else_reads_the_key_or_lists_the_runs(scene: Scene) -> None:
+def test_another_user_cannot_read_the_key_or_list_the_runs(scene: Scene) -> None:
     assert scene.key.exists
     places = (scene.key.private_key, scene.key.certificate, scene.key.directory, scene.key.directory.parents[1])
     said = scene.as_nobody(LOOK, *map(str, places))
@@ -227,14 +227,14 @@ def test_nobody_else_reads_the_key_or_lists_the_runs(scene: Scene) -> None:
     assert re.match("thief: the key of the run cannot be read: .*/key.pem: Permission denied\n", said.stdout), said
 
 
-def test_nobody_else_sees_the_key_in_what_the_system_tells_of_processes(scene: Scene) -> None:
+def test_arguments_and_environment_of_nodes_do_not_show_the_key(scene: Scene) -> None:
     secret = scene.key.private_key.read_text().splitlines()[1]
     for node in (scene.running.process.pid, *(int(node.handle or 0) for node in scene.record.nodes)):
         for told in ("cmdline", "environ"):
             assert secret not in Path(f"/proc/{node}/{told}").read_text(errors="replace")
 
 
-def test_whoever_evaluates_one_line_has_joined(scene: Scene) -> None:
+def test_a_shell_that_evaluates_ros_env_has_joined_the_run(scene: Scene) -> None:
     """The owner, in a shell; the next process there is any node, of which this is the smallest."""
     throwcollect = f"{sys.executable} -m throwcollect"
     script = f'eval "$({throwcollect} ros env)"; {throwcollect} ros node list; printenv RMW_IMPLEMENTATION'
@@ -244,13 +244,13 @@ def test_whoever_evaluates_one_line_has_joined(scene: Scene) -> None:
     assert said.stdout.endswith("rmw_zenoh_cpp\n")
 
 
-def test_the_owner_changes_the_run_as_ever(scene: Scene) -> None:
+def test_the_owner_can_scale_the_run(scene: Scene) -> None:
     assert call("scale", "3").returncode == 0
     (listed,) = json.loads(call("ps", "--json").stdout)
     assert (listed["run"], listed["simulations"]) == (scene.record.run, 3)
 
 
-def test_what_is_collected_is_what_would_have_been(scene: Scene) -> None:
+def test_the_attacks_do_not_change_the_collected_trials(scene: Scene) -> None:
     """Comes last: it ends the collection."""
     assert call("stop").returncode == 0
     code, out, _ = scene.running.finish()

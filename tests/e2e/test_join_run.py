@@ -188,7 +188,7 @@ def processes() -> Iterator[list[subprocess.Popen[str]]]:
 
 
 @needs_machines
-def test_machines_come_and_go_and_the_files_are_the_same(
+def test_machines_can_join_and_leave_without_changing_the_files(
     tmp_path: Path, machines: list[Machine], processes: list[subprocess.Popen[str]]
 ) -> None:
     running, token, port = listen(tmp_path, "--set", SLOW)
@@ -233,7 +233,7 @@ print("HAS A SESSION")
 
 
 @needs_machines
-def test_nobody_gets_in_without_the_token(tmp_path: Path, machines: list[Machine]) -> None:
+def test_a_machine_without_the_token_cannot_join(tmp_path: Path, machines: list[Machine]) -> None:
     running, _, port = listen(tmp_path)
     machine = machines[0]
     own = RunKey(tmp_path / "own")
@@ -260,7 +260,7 @@ def test_nobody_gets_in_without_the_token(tmp_path: Path, machines: list[Machine
     running.finish()
 
 
-def test_other_sources_are_refused_with_a_clear_word(tmp_path: Path) -> None:
+def test_joining_with_other_sources_is_refused_with_the_reason(tmp_path: Path) -> None:
     from throwcollect.runs.token import JoinToken
 
     token = JoinToken("many-1234", "tls/127.0.0.1:1", "11" * 32, 0, "bullet", build="another").encode()
@@ -270,7 +270,7 @@ def test_other_sources_are_refused_with_a_clear_word(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("word", ["", "tc2.", "tc2.e30", "x" * 50, "tc2.!!!"])
-def test_what_is_no_token_is_refused(word: str) -> None:
+def test_a_malformed_token_is_refused(word: str) -> None:
     done = call_here("join-run", word)
     assert done.returncode == 2
     assert "this is no token of a run, or not a whole one" in done.stderr
@@ -298,7 +298,7 @@ def test_waiting_for_a_token_can_be_interrupted() -> None:
             waiting.kill()
 
 
-def test_a_token_is_written_for_its_owner_alone(tmp_path: Path) -> None:
+def test_only_the_owner_can_read_the_file_of_the_token(tmp_path: Path) -> None:
     path = tmp_path / "small.yaml"
     path.write_text(CONFIG.format(trials=1) + f"sim: {{{FAST}}}\n")
     with socket.create_server(("", 0)) as free:

@@ -29,7 +29,7 @@ def reference(config: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return directory
 
 
-def test_a_collection_is_whole(reference: Path) -> None:
+def test_a_collection_has_all_files_and_verify_finds_nothing_wrong(reference: Path) -> None:
     assert verify(reference) == []
     promised = {
         "metadata.yaml",
@@ -42,7 +42,7 @@ def test_a_collection_is_whole(reference: Path) -> None:
     assert set(fingerprints(reference)) == promised
 
 
-def test_stored_throws_come_out_of_the_simulation_again(reference: Path) -> None:
+def test_replayed_throws_equal_the_stored_ones_bit_for_bit(reference: Path) -> None:
     said = call_here("dataset", "replay", reference, "--all", "--sample", "5")
     assert (said.returncode, said.stderr) == (0, "")
     assert said.stdout == f"{reference}: 5 throws replayed, the same bit for bit\n"

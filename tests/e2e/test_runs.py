@@ -113,7 +113,7 @@ def assert_gone(processes: dict[str, psutil.Process]) -> None:
     assert alive == []
 
 
-def test_a_run_goes_on_by_itself_and_is_waited_for_elsewhere(
+def test_another_command_can_wait_for_a_detached_run(
     config: Path, reference: Path, records: Records, tmp_path: Path
 ) -> None:
     said = call("up", "-d", config, "--output", tmp_path / "data")
@@ -174,7 +174,7 @@ def test_scaling_and_losses_do_not_change_the_dataset(config: Path, records: Rec
     assert told.index("sim_2 ready") < told.index("sim_2 removed")
 
 
-def test_stopping_drains_as_ctrl_c_does(config: Path, records: Records, tmp_path: Path) -> None:
+def test_stop_ends_a_run_as_ctrl_c_does(config: Path, records: Records, tmp_path: Path) -> None:
     run = detach(config, tmp_path / "data", "-n", "1", *UNTIL_STOPPED)
     in_the_middle(records, run)
     processes = nodes(records, run)
@@ -203,7 +203,7 @@ def test_down_ends_everything_and_keeps_the_directory(config: Path, records: Rec
     assert (tmp_path / "data" / "small_00000.mcap.part").stat().st_size > 0
 
 
-def test_a_killed_launcher_takes_its_processes_along_and_is_told(
+def test_a_killed_launcher_ends_its_nodes_and_commands_report_its_death(
     config: Path, records: Records, tmp_path: Path
 ) -> None:
     run = detach(config, tmp_path / "data", "-n", "1", *UNTIL_STOPPED)
@@ -226,7 +226,7 @@ def test_a_killed_launcher_takes_its_processes_along_and_is_told(
     assert records.ids() == []
 
 
-def test_a_run_in_the_foreground_is_a_run_like_any_other(config: Path, records: Records, tmp_path: Path) -> None:
+def test_other_commands_see_and_control_a_run_in_the_foreground(config: Path, records: Records, tmp_path: Path) -> None:
     running = start(config, tmp_path / "data", 2, *UNTIL_STOPPED)
     running.wait_until(lambda: bool(records.ids()))
     (run,) = records.ids()
@@ -276,7 +276,7 @@ def test_a_run_whose_record_cannot_be_written_goes_on(config: Path, records: Rec
     assert err.count("what happens in this run is not written down any more: ") == 1
 
 
-def test_ctrl_c_leaves_a_run_that_is_only_watched(config: Path, records: Records, tmp_path: Path) -> None:
+def test_ctrl_c_on_wait_does_not_end_the_run(config: Path, records: Records, tmp_path: Path) -> None:
     run = detach(config, tmp_path / "data", "-n", "1", *UNTIL_STOPPED)
     watchers = [start_command("wait") for _ in range(2)]
     for watcher in watchers:
@@ -313,7 +313,7 @@ def test_logs_follow_a_run_to_its_end(config: Path, records: Records, tmp_path: 
     assert (tmp_path / "data" / "logs" / "launcher.log").read_text() == ""
 
 
-def test_mistakes_are_seen_in_the_foreground_and_leave_nothing_behind(
+def test_up_detached_reports_mistakes_at_once_and_leaves_nothing_behind(
     config: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
@@ -331,7 +331,7 @@ def test_mistakes_are_seen_in_the_foreground_and_leave_nothing_behind(
     assert not (tmp_path / "datasets").exists()
 
 
-def test_a_launcher_that_cannot_start_its_nodes_is_told_by_the_command_that_started_it(
+def test_up_detached_reports_a_launcher_that_cannot_start_its_nodes(
     config: Path, records: Records, tmp_path: Path
 ) -> None:
     # A log that is a directory cannot be written.
@@ -355,7 +355,7 @@ def test_a_launcher_that_cannot_start_its_nodes_is_told_by_the_command_that_star
     assert (run.status, run.record.exit_code) == ("ended", 3)
 
 
-def test_a_failure_is_told_to_whoever_waits(config: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_wait_reports_the_failure_of_a_run(config: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     # Whoever starts the run is gone by then.
     (tmp_path / "pybullet.py").write_text("import time\ntime.sleep(1)\nraise ImportError('broken pybullet')")
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
@@ -366,7 +366,7 @@ def test_a_failure_is_told_to_whoever_waits(config: Path, tmp_path: Path, monkey
     assert "broken pybullet" in waited.stderr
 
 
-def test_ctrl_c_while_a_run_is_being_started_ends_it(config: Path, records: Records, tmp_path: Path) -> None:
+def test_ctrl_c_during_the_start_ends_a_detached_run(config: Path, records: Records, tmp_path: Path) -> None:
     starting = start_command("up", "-d", config, "--output", tmp_path / "data")
     log = tmp_path / "data" / "logs" / "launcher.log"
     until(log.exists)
@@ -377,7 +377,7 @@ def test_ctrl_c_while_a_run_is_being_started_ends_it(config: Path, records: Reco
     assert [run.status for run in records.all() if run.lives] == []
 
 
-def test_among_several_runs_one_must_be_named(records: Records, tmp_path: Path) -> None:
+def test_commands_need_the_name_of_a_run_when_there_are_several(records: Records, tmp_path: Path) -> None:
     started = datetime.now(timezone.utc)
     runs = [records.new(name) for name in ("first", "second")]
     for run in runs:
@@ -391,7 +391,7 @@ def test_among_several_runs_one_must_be_named(records: Records, tmp_path: Path) 
         run.close()
 
 
-def test_without_any_run_every_verb_says_so() -> None:
+def test_commands_report_that_there_is_no_run() -> None:
     for verb in (["wait"], ["stop"], ["scale", "2"], ["down"], ["logs"], ["events"]):
         code, out, err = say(*verb)
         assert (verb, code, out) == (verb, 2, "")
@@ -401,7 +401,7 @@ def test_without_any_run_every_verb_says_so() -> None:
     assert (code, out.split()) == (0, ["RUN", "RUNTIME", "SIMULATIONS", "THROWS", "STATUS", "DATASET"])
 
 
-def test_a_run_whose_plan_is_being_made_tells_how_far_it_is(records: Records) -> None:
+def test_ps_shows_the_progress_of_planning(records: Records) -> None:
     run, started = records.new("large"), datetime.now(timezone.utc)
     record = RunRecord(run.run, "large", "", "/data", None, "/data/logs", 0, started, os.getpid(), 2)
     run.write(replace(record, planning=Planning(1200, 30000)))

@@ -153,7 +153,7 @@ def server(place: Place, first: Server) -> Iterator[Server]:
         again.kill()
 
 
-def test_clients_who_ask_at_once_never_get_one_too_many(server: Server) -> None:
+def test_concurrent_clients_get_at_most_max_instances(server: Server) -> None:
     wish = {"component": "throws", "simulations": 1, "set": SLOWLY}
     with ThreadPoolExecutor(4) as pool:
         answers = list(pool.map(lambda name: server.ask("PUT", f"/instances/{name}", wish), ("a", "b", "c", "d")))
@@ -176,7 +176,7 @@ def test_clients_who_ask_at_once_never_get_one_too_many(server: Server) -> None:
         assert server.ask("DELETE", f"/instances/{name}")[0] == 409
 
 
-def test_what_the_preparation_fails_of_is_told(server: Server) -> None:
+def test_an_instance_reports_why_its_preparation_failed(server: Server) -> None:
     # Faster than the robot can move, which only the plan finds out.
     wish = {"component": "throws", "set": {"sweep.parameters": {"task.duration_s": {"min": 0.1, "max": 0.12}}}}
     assert server.ask("PUT", "/instances/hasty", wish)[0] == 202
@@ -185,7 +185,7 @@ def test_what_the_preparation_fails_of_is_told(server: Server) -> None:
     assert "trials, all refused: " in end["message"]
 
 
-def test_an_id_whose_dataset_was_left_is_refused(place: Place, server: Server) -> None:
+def test_an_id_with_an_existing_dataset_directory_is_refused(place: Place, server: Server) -> None:
     taken = place.directory / "datasets" / "taken"
     taken.mkdir(parents=True)
     (taken / "mine").touch()
@@ -213,7 +213,7 @@ def never_read(server: Server, path: str) -> socket.socket:
     return client
 
 
-def test_a_run_is_watched_outlives_its_server_is_stopped_and_resumed(
+def test_a_watched_run_outlives_its_server_and_can_be_stopped_and_resumed(
     place: Place, first: Server, tmp_path: Path
 ) -> None:
     # Enough to go on for as long as a server takes to start on a busy machine.
@@ -274,7 +274,7 @@ def read_factor(name: str) -> float:
         ros.shutdown(context=context)
 
 
-def test_a_session_serves_clients_and_is_slow_as_long_as_somebody_watches(place: Place, server: Server) -> None:
+def test_a_session_runs_in_real_time_as_long_as_a_client_watches(place: Place, server: Server) -> None:
     assert server.ask("PUT", "/instances/talos", {"component": "talos", "simulations": 1})[0] == 202
     assert server.ask("PUT", "/instances/other", {"component": "talos"})[0] == 409
     begun = server.wait_until("talos", "running")
@@ -309,7 +309,7 @@ def test_a_session_serves_clients_and_is_slow_as_long_as_somebody_watches(place:
     again.kill()
 
 
-def test_a_server_that_is_told_to_end_does_so_whoever_listens(server: Server, place: Place) -> None:
+def test_a_terminated_server_ends_despite_connected_listeners(server: Server, place: Place) -> None:
     other = place.serve("--datasets", "elsewhere")
     assert place.address()["url"] == server.address["url"]
     with server.open("/state") as state, closing(never_read(server, "/state")):
@@ -323,7 +323,7 @@ def test_a_server_that_is_told_to_end_does_so_whoever_listens(server: Server, pl
     other.kill()
 
 
-def test_view_starts_one_server(place: Place, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_view_starts_only_one_server(place: Place, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(place.directory)
     pids = set()
     try:
@@ -345,7 +345,7 @@ def test_view_starts_one_server(place: Place, monkeypatch: pytest.MonkeyPatch) -
         psutil.Process(place.address()["pid"]).kill()
 
 
-def test_what_nobody_can_be_served_at_is_told_in_one_message(place: Place, tmp_path: Path) -> None:
+def test_an_unusable_address_or_certificate_gives_one_message(place: Place, tmp_path: Path) -> None:
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
         taken.listen()

@@ -101,9 +101,7 @@ def over() -> Iterator[tuple[str, str]]:
 
 
 @pytest.mark.skipif(chromium() is None, reason="needs Chromium: apt-get install chromium")
-def test_the_address_names_the_run_that_is_seen_also_in_a_tab_that_has_the_page(
-    address: str, over: tuple[str, str]
-) -> None:
+def test_the_page_shows_the_run_that_its_address_names(address: str, over: tuple[str, str]) -> None:
     watched = "window.throwcollect?.watching.id"
     with browse(f"{address}&run={over[0]}", width=390, height=800) as tab:
         load(tab)
@@ -133,7 +131,7 @@ def died(tmp_path: Path) -> Iterator[tuple[str, str]]:
 
 
 @pytest.mark.skipif(chromium() is None, reason="needs Chromium: apt-get install chromium")
-def test_only_what_is_not_complete_can_be_resumed_by_the_page(died: tuple[str, str], address: str) -> None:
+def test_the_page_offers_to_resume_only_incomplete_collections(died: tuple[str, str], address: str) -> None:
     with browse(address, width=800, height=600) as tab:
         load(tab)
         button = "document.querySelector('[aria-label=\"Resume {}\"]')"
@@ -143,7 +141,7 @@ def test_only_what_is_not_complete_can_be_resumed_by_the_page(died: tuple[str, s
 
 
 @pytest.mark.skipif(chromium() is None, reason="needs Chromium: apt-get install chromium")
-def test_a_model_is_seen_and_aims_where_somebody_clicks(address: str) -> None:
+def test_a_click_on_the_map_aims_with_the_chosen_model(address: str) -> None:
     with browse(address, width=390, height=800) as tab:
         load(tab)
         tab.wait_for("!document.querySelector('#model-box').hidden")

@@ -191,7 +191,7 @@ def turn(left: float, up: float) -> str:
     return f"{cos_left * sin_up}, {sin_left * cos_up}, {-sin_left * sin_up}, {cos_left * cos_up}"
 
 
-def test_a_target_is_set_by_hand_and_collected_for(server: dict[str, Any], emulator: str) -> None:
+def test_a_hand_can_set_a_target_and_start_a_collection_for_it(server: dict[str, Any], emulator: str) -> None:
     still = {"prefers-reduced-motion": "reduce"}
     with browse(server["page"], width=640, height=400, features=still, script=emulator) as tab:
         load(tab)
@@ -217,7 +217,7 @@ def test_a_target_is_set_by_hand_and_collected_for(server: dict[str, Any], emula
         assert find_own_errors(tab) == []
 
 
-def test_a_room_that_is_left_while_it_is_entered_stays_left(server: dict[str, Any], emulator: str) -> None:
+def test_leaving_a_room_while_entering_it_restores_the_page(server: dict[str, Any], emulator: str) -> None:
     with browse(server["page"], width=640, height=400, script=emulator) as tab:
         load(tab)
         before = tab.evaluate(_PAGE)
