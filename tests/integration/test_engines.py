@@ -26,7 +26,7 @@ def test_goals_are_carried_out(kinematic: Robot) -> None:
     assert kinematic.joint("arm_right_4_joint") == pytest.approx(-0.5, abs=1e-9)
 
 
-def test_nothing_can_be_spawned_and_the_features_say_so(kinematic: Robot) -> None:
+def test_spawning_is_refused_and_missing_in_the_features(kinematic: Robot) -> None:
     features = kinematic.call("get_simulator_features").features
     assert Features.SPAWNING not in features.features
     assert Features.STEP_SIMULATION_ACTION in features.features

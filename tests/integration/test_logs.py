@@ -27,7 +27,7 @@ def settle(robot: Robot) -> None:
         robot.state()
 
 
-def test_a_refused_goal_is_one_line_that_names_where_it_was_refused(robot: Robot) -> None:
+def test_a_refused_goal_logs_one_line_with_its_place_in_the_sources(robot: Robot) -> None:
     with robot.listening(Log, "/rosout") as heard:
         for _ in range(3):
             assert not robot.send(goal(ARM, 0.0)).accepted
@@ -52,7 +52,7 @@ def test_speeds_that_are_refused_do_not_flood_the_log(robot: Robot) -> None:
     assert (Path(lines[0].file).name, lines[0].function) == ("controller.py", "scale_speed")
 
 
-def test_what_cannot_take_effect_is_said_once_for_one_request(robot: Robot) -> None:
+def test_an_ineffective_parameter_is_logged_once_per_request(robot: Robot) -> None:
     wanted = [Parameter("cmd_timeout", value=0.1)]
     wanted += [Parameter(f"constraints.arm_right_{number}_joint.goal", value=0.03) for number in range(1, 8)]
     with robot.listening(Log, "/rosout") as heard:

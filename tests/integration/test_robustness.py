@@ -102,7 +102,7 @@ def hostile(type_name: str, sample: Any, chance: random.Random) -> Iterator[tupl
 
 
 @embedded_alone
-def test_garbage_on_every_key_is_survived(running: tuple[Command, Robot]) -> None:
+def test_a_simulation_survives_garbage_on_every_key(running: tuple[Command, Robot]) -> None:
     process, robot = running
     chance = random.Random(SEED)
     session, domain = robot.node.context.session, robot.node.context.get_domain_id()
@@ -177,7 +177,7 @@ def assert_works(robot: Robot) -> None:
 
 
 @embedded_alone
-def test_tokens_of_odd_forms_are_survived(running: tuple[Command, Robot], endpoint: str) -> None:
+def test_a_simulation_survives_malformed_tokens(running: tuple[Command, Robot], endpoint: str) -> None:
     process, robot = running
     chance = random.Random(SEED)
     session, domain = robot.node.context.session, robot.node.context.get_domain_id()
@@ -255,7 +255,7 @@ def start_router(listen: str) -> tuple[subprocess.Popen[str], str]:
     return process, process.stdout.readline().split()[-1]
 
 
-def test_a_simulation_goes_on_while_its_router_is_away_and_is_all_there_when_it_is_back(tmp_path: Path) -> None:
+def test_a_simulation_survives_the_loss_of_its_router_and_reconnects(tmp_path: Path) -> None:
     router, endpoint = start_router("tcp/127.0.0.1:0")
     simulation = start_simulation(tmp_path, endpoint, OWN)
     try:
