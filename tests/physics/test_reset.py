@@ -77,7 +77,7 @@ def test_mixed_trials_in_any_order_equal_the_same_trials_in_a_new_world(trials, 
         assert digest(one, trials[number]) == alone[number], f"trial {number} depends on what was before"
 
 
-def test_throws_of_one_ball_leave_no_order_of_contacts(trials, thrower):
+def test_throws_of_the_same_ball_do_not_depend_on_their_order(trials, thrower):
     """A world that stays the same keeps pairs of shapes that once came close, unless they are forgotten."""
     bouncy = {"ball": {"restitution": 0.8}, "scene": {"landing_height_m": 1.0}, "sim": {"max_trial_s": 3}}
     throws = [
@@ -88,7 +88,7 @@ def test_throws_of_one_ball_leave_no_order_of_contacts(trials, thrower):
     assert [digest(one, throws[number]) for number in reversed(range(TRIALS))] == alone[::-1]
 
 
-def test_other_tools_and_locked_joints_in_between_leave_no_trace(trials, thrower):
+def test_trials_with_another_tool_or_posture_leave_no_trace(trials, thrower):
     one = thrower()
     before = digest(one, trials[0])
     one.throw(Config.model_validate({"tool": {"cup_walls": 8}, "robot": {"posture": {"torso_2_joint": 0.1}}}))
@@ -96,7 +96,7 @@ def test_other_tools_and_locked_joints_in_between_leave_no_trace(trials, thrower
     assert digest(one, trials[0]) == before
 
 
-def test_the_full_robot_starts_anew_as_well(trials, thrower):
+def test_a_robot_with_unlocked_joints_starts_anew_as_well(trials, thrower):
     full = {"robot": {"locked": "none"}, "sim": {"max_trial_s": 1.0}}
     one = thrower(**full)
     wild = Config.model_validate({**full, "ball": {"radius_m": 0.03}}), trials[1][1]

@@ -122,7 +122,7 @@ def beside(going_on: Running, tmp_path_factory: pytest.TempPathFactory) -> dict[
     return fingerprints(directory / "data")
 
 
-def test_the_trial_of_a_simulation_that_was_killed_is_given_to_another_though_the_router_is_killed_too(
+def test_a_killed_simulation_gives_up_its_trial_even_if_the_router_dies_too(
     reference: dict[str, str], records: Records, tmp_path: Path
 ) -> None:
     """A discovery server that comes back too soon is never told of the nodes that are there."""
@@ -152,7 +152,7 @@ def test_the_trial_of_a_simulation_that_was_killed_is_given_to_another_though_th
         assert collected[name] == reference[name]
 
 
-def test_a_coordinator_that_sees_no_simulation_is_told_of_after_a_while(
+def test_a_coordinator_that_sees_no_simulation_ends_the_run_with_an_error(
     records: Records, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """As behind a firewall: every simulation lives in another domain than the rest of its run.
@@ -190,9 +190,7 @@ def test_the_dataset_does_not_depend_on_the_backend(reference: dict[str, str], b
     assert beside == reference
 
 
-def test_who_does_not_know_the_port_sees_nothing_and_whoever_evaluates_one_line_takes_part(
-    going_on: Running, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_only_a_shell_that_evaluates_ros_env_sees_the_run(going_on: Running, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(STATE_VARIABLE, str(going_on.directory.parent / "state"))
     plain = {name: value for name, value in os.environ.items() if not name.startswith(("THROWCOLLECT", "FASTRTPS"))}
     for way in ({}, {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}):
