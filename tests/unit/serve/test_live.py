@@ -58,7 +58,7 @@ def notes(state: Path, name: str = "a") -> list[str]:
 SLOW, FAST = ("/sim_0/sim_0", 1.0), ("/sim_0/sim_0", 0.0)
 
 
-def test_the_last_who_leaves_gives_the_speed_back(
+def test_the_last_watcher_restores_the_speed(
     remember: Remember, tmp_path: Path, state: Path, simulation: Simulation
 ) -> None:
     run = make(remember, tmp_path)
@@ -76,13 +76,15 @@ def test_the_last_who_leaves_gives_the_speed_back(
     assert simulation.asked[3:] == [SLOW, FAST]
 
 
-def test_the_speed_is_that_of_the_configuration(remember: Remember, tmp_path: Path, simulation: Simulation) -> None:
+def test_the_restored_speed_is_that_of_the_configuration(
+    remember: Remember, tmp_path: Path, simulation: Simulation
+) -> None:
     run = make(remember, tmp_path, more="sim: {real_time_factor: 3.0}\nrun: {simulations: 1, root_namespace: true}\n")
     take(run, "sim_0").let_go()
     assert simulation.asked == [("/sim_0", 1.0), ("/sim_0", 3.0)]
 
 
-def test_the_successor_of_a_killed_server_lets_go(
+def test_the_next_server_restores_speeds_after_a_killed_one(
     remember: Remember, tmp_path: Path, state: Path, simulation: Simulation
 ) -> None:
     # Its locks went with it.
@@ -92,7 +94,7 @@ def test_the_successor_of_a_killed_server_lets_go(
     assert notes(state) == []
 
 
-def test_what_does_not_answer_is_tried_again(
+def test_restoring_the_speed_is_tried_again_if_a_simulation_does_not_answer(
     remember: Remember, tmp_path: Path, state: Path, simulation: Simulation
 ) -> None:
     hold = take(make(remember, tmp_path), "sim_0")
@@ -108,7 +110,7 @@ def test_what_does_not_answer_is_tried_again(
 
 
 @pytest.mark.parametrize("way", ["silent", "unwilling"])
-def test_one_that_was_not_slowed_down_is_let_go_of(
+def test_the_speed_is_restored_even_if_slowing_down_failed(
     remember: Remember, tmp_path: Path, state: Path, simulation: Simulation, way: str
 ) -> None:
     run = make(remember, tmp_path)
@@ -122,7 +124,9 @@ def test_one_that_was_not_slowed_down_is_let_go_of(
     assert notes(state) == []
 
 
-def test_only_simulations_that_run_are_slowed_down(remember: Remember, tmp_path: Path, simulation: Simulation) -> None:
+def test_only_running_simulations_can_be_slowed_down(
+    remember: Remember, tmp_path: Path, simulation: Simulation
+) -> None:
     run = make(remember, tmp_path)
     over = make(remember, tmp_path, "over", **make_end_fields())
     for each, name in ((run, "sim_1"), (run, "../key"), (run, ""), (over, "sim_0")):
@@ -131,7 +135,7 @@ def test_only_simulations_that_run_are_slowed_down(remember: Remember, tmp_path:
     assert simulation.asked == []
 
 
-def test_a_run_that_vanishes_while_it_is_watched_needs_nothing(
+def test_a_vanished_run_is_not_asked_to_restore_its_speed(
     remember: Remember, tmp_path: Path, simulation: Simulation
 ) -> None:
     directory = tmp_path / "datasets" / "a"

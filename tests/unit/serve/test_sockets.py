@@ -62,7 +62,7 @@ def teller() -> Iterator[Teller]:
     thread.join(20)
 
 
-def test_who_never_reads_is_waited_for_and_holds_up_nobody(teller: Teller) -> None:
+def test_a_client_that_never_reads_does_not_block_others(teller: Teller) -> None:
     with connect(teller.url, max_queue=1, max_size=None), connect(teller.url, max_size=None) as quick:
         for _ in range(200):
             assert quick.recv(timeout=20) == FRAME

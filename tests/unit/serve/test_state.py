@@ -25,7 +25,7 @@ _HEIGHT = "scene.landing_height_m: {min: 0, max: 0.5}"
         ),
     ],
 )
-def test_a_collection_tells_what_its_throws_can_be_aimed_at(tmp_path: Path, sweep: str, targets: list[str]) -> None:
+def test_the_state_lists_the_possible_targets_of_a_collection(tmp_path: Path, sweep: str, targets: list[str]) -> None:
     config = tmp_path / "small.yaml"
     config.write_text(CONFIG + sweep)
     catalogue = tmp_path / "catalogue.yaml"

@@ -28,7 +28,7 @@ def hear(socket: ClientConnection) -> Any:
     return json.loads(socket.recv(PATIENCE_S))
 
 
-def test_topics_are_listed_heard_and_services_called(url: str, node: Node) -> None:
+def test_a_client_lists_and_hears_topics_and_calls_services(url: str, node: Node) -> None:
     def switch(_request: Any, response: Any) -> Any:
         response.success, response.message = True, "on"
         return response
@@ -71,7 +71,7 @@ def test_a_frame_that_is_too_long_ends_the_connection(url: str) -> None:
             hear(socket)
 
 
-def test_who_does_not_read_loses_the_oldest_frames_and_holds_up_nobody(url: str, node: Node) -> None:
+def test_a_slow_client_loses_the_oldest_frames_and_does_not_block_others(url: str, node: Node) -> None:
     publisher = node.create_publisher(String, "/many", WHOLE)
     subscribe = json.dumps({"op": "subscribe", "topic": "/many", "type": "std_msgs/String"})
     with connect(url, max_queue=1) as slow, connect(url) as quick:
@@ -96,7 +96,7 @@ def test_who_does_not_read_loses_the_oldest_frames_and_holds_up_nobody(url: str,
         assert "the oldest are dropped" in statuses[0]
 
 
-def test_memory_for_who_never_reads_is_bounded(url: str, node: Node) -> None:
+def test_memory_for_a_client_that_never_reads_is_bounded(url: str, node: Node) -> None:
     """Far more is published than may wait; this process is publisher, bridge and both clients."""
     publisher = node.create_publisher(String, "/much", WHOLE)
     subscribe = json.dumps({"op": "subscribe", "topic": "/much", "type": "std_msgs/String"})
@@ -121,7 +121,7 @@ def test_memory_for_who_never_reads_is_bounded(url: str, node: Node) -> None:
         assert max(memory) - max(memory[:100]) < 2**25, [each >> 20 for each in memory[::25]]
 
 
-def test_what_waits_to_be_sent_is_bounded_in_number_and_in_bytes(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_outbox_is_bounded_in_frames_and_in_bytes(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(websocket, "MOST_FRAMES", 10)
     monkeypatch.setattr(websocket, "MOST_BYTES", 1200)
 
