@@ -26,7 +26,7 @@ def test_contacts_are_ordered_by_start_then_by_name():
     )
 
 
-def test_the_bodies_that_press_now_are_known():
+def test_the_log_knows_the_bodies_that_touch_now():
     log = ContactLog()
     log.update(frozenset(["spoon", "head_2_link"]), 1)
     assert sorted(log.bodies) == ["head_2_link", "spoon"]
