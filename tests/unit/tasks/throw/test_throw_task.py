@@ -30,7 +30,7 @@ def judge(samples, header, config=None):
     return task.judge(samples, header, task.trajectory())
 
 
-def test_landed_throw_has_all_its_numbers():
+def test_a_landed_throw_has_all_its_measures():
     result = judge(*episode())
     assert (result.outcome, result.reason) == (ThrowOutcome.LANDED, None)
     assert result.release.time_s == pytest.approx(RELEASE_S, abs=1e-9)
@@ -218,7 +218,7 @@ def test_link_that_is_still_touched_after_the_release_is_hit():
     assert judge(*episode(contacts=(("arm_right_7_link", 0.6, RELEASE_S), HELD))).outcome is ThrowOutcome.LANDED
 
 
-def test_what_the_ball_touches_after_landing_does_not_count():
+def test_contacts_after_the_landing_do_not_count():
     contacts = (HELD, ("ground", landing_time(RADIUS), 1.38), ("leg_left_6_link", 1.39, None))
     assert judge(*episode(contacts=contacts)).outcome is ThrowOutcome.LANDED
 
@@ -258,7 +258,7 @@ def test_impact_on_the_ground_does_not_bend_the_landing_just_above_it(drag):
     assert judge(free, header, config).landing.time_s != pytest.approx(undisturbed.landing.time_s, abs=1e-5)
 
 
-def test_crossing_upwards_is_no_landing():
+def test_crossing_the_landing_plane_upwards_is_no_landing():
     origin = np.array([0.0, 0.0, 0.9])
     config = Config(scene={"landing_height_m": 1.0})
     velocity = np.array([1.0, 0.0, 4.0])
