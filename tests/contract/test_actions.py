@@ -134,7 +134,7 @@ def test_the_result_of_an_unknown_goal_is_unknown(rig, controller, client):
     assert rig.result(service.call_async(request)).status == GoalStatus.STATUS_UNKNOWN
 
 
-def test_a_goal_is_cancelled(rig, controller, client):
+def test_a_client_can_cancel_a_goal(rig, controller, client):
     theirs, ours = send(rig, controller, client, "a")
     response = rig.result(theirs.cancel_goal_async())
     assert response.return_code == CancelGoal.Response.ERROR_NONE

@@ -20,7 +20,7 @@ def pair(rig):
     return server, client, client.create_client(SetBool, "/server/set")
 
 
-def test_a_request_is_answered(rig, pair):
+def test_a_service_answers_a_request(rig, pair):
     server, _, client = pair
     assert not client.wait_for_service(timeout_sec=0.05)
     server.create_service(SetBool, "~/set", answer)

@@ -131,7 +131,9 @@ def test_containers_have_few_privileges_and_collect_the_usual_files(
     assert {path.stat().st_uid for path in directory.rglob("*")} == {os.getuid()}
 
 
-def test_ctrl_c_leaves_nothing_behind(config: Path, engine: docker.DockerClient, tmp_path: Path) -> None:
+def test_ctrl_c_leaves_no_containers_networks_or_keys_behind(
+    config: Path, engine: docker.DockerClient, tmp_path: Path
+) -> None:
     running: Running = start(config, tmp_path / "data", 1, "--runtime", "docker", "--trials", "40")
     running.wait_until(lambda: running.count_bytes() > 0)
     running.process.send_signal(signal.SIGINT)

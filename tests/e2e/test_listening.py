@@ -110,7 +110,7 @@ def test_every_message_heard_is_in_the_dataset_byte_for_byte(listened: tuple[Pat
         assert not strange, f"{topic}: {len(strange)} of {len(everything)} messages are not in the dataset"
 
 
-def test_whole_trials_are_heard(listened: tuple[Path, dict[str, Messages]]) -> None:
+def test_a_listener_gets_all_messages_of_some_trials(listened: tuple[Path, dict[str, Messages]]) -> None:
     directory, heard = listened
     messages = read_recorded(directory)
     complete = []

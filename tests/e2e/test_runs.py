@@ -422,7 +422,7 @@ def test_a_damaged_record_is_named_and_can_be_forgotten(tmp_path: Path) -> None:
     assert not path.exists()
 
 
-def test_a_state_directory_that_cannot_be_used_is_named(
+def test_an_unusable_state_directory_is_an_error_that_names_it(
     config: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "file").write_text("")

@@ -21,7 +21,7 @@ def kinematic(tmp_path_factory: pytest.TempPathFactory, endpoint: str, session: 
         yield robot
 
 
-def test_goals_are_carried_out(kinematic: Robot) -> None:
+def test_a_simulation_on_the_ballistic_engine_carries_out_goals(kinematic: Robot) -> None:
     assert kinematic.outcome(kinematic.send(swing(0.3)))[1] == 0
     assert kinematic.joint("arm_right_4_joint") == pytest.approx(-0.5, abs=1e-9)
 

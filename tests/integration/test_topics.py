@@ -37,7 +37,7 @@ def time_of(message: Any) -> int:
 
 
 @pytest.mark.parametrize("topic", KINDS)
-def test_a_listener_hears_every_sample_of_a_stretch_of_time(topic: str, robot: Robot) -> None:
+def test_a_listener_gets_every_sample_in_order(topic: str, robot: Robot) -> None:
     robot.put_into(PAUSED)
     with robot.listening(KINDS[topic], topic) as heard:
         robot.step(50)

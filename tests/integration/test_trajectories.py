@@ -59,7 +59,7 @@ def with_last_point(**fields: Any) -> Any:
     return wish
 
 
-def test_a_goal_is_reached_and_says_so(robot: Robot) -> None:
+def test_a_goal_succeeds_with_the_joint_at_its_position(robot: Robot) -> None:
     handle = robot.send(goal(ARM, 1.0, arm_right_4_joint=-0.9))
     assert handle.accepted
     assert robot.outcome(handle) == REACHED
@@ -138,9 +138,7 @@ def test_feedback_is_sent_only_when_time_goes_on(robot: Robot) -> None:
         (goal(ARM, arm_right_5_joint=0.4), "arm_right_5_joint is locked at 0 rad (robot.locked)"),
     ],
 )
-def test_a_goal_that_cannot_be_carried_out_is_rejected_and_the_log_says_why(
-    wish: Any, reason: str, robot: Robot
-) -> None:
+def test_an_impossible_goal_is_rejected_and_the_log_says_why(wish: Any, reason: str, robot: Robot) -> None:
     with robot.listening("rcl_interfaces/msg/Log", "/rosout") as log:
         assert not robot.send(wish).accepted
         robot.wait_until(lambda: any(reason in message.msg for message in log), f"{reason!r} in {log}")

@@ -51,7 +51,7 @@ def test_without_drag_horizontal_velocity_and_spin_stay_constant(thrower):
     assert np.ptp(samples.ball_angular_velocity[first : last + 1], axis=0) == pytest.approx([0, 0, 0], abs=1e-9)
 
 
-def test_thin_air_carries_further(thrower):
+def test_a_ball_with_drag_flies_farther_in_thinner_air(thrower):
     reach = [
         thrower(ball={"drag_coefficient": 0.5}, scene={"air_density_kgpm3": density}).throw().ball_position[-1, 0]
         for density in (0.0, 1.2, 5.0)

@@ -73,7 +73,7 @@ def test_as_float_returns_nan_for_a_value_that_is_no_number() -> None:
     assert all(math.isnan(as_float(each)) for each in ("a", None, [1], 10**400))
 
 
-def test_whole_numbers_have_bounds() -> None:
+def test_a_number_that_is_not_whole_or_out_of_bounds_is_refused() -> None:
     for given in (1, 3, np.int64(2)):
         check_whole_number("processes", given, least=1, most=3)
     for given, expected in (

@@ -58,7 +58,7 @@ def test_a_missing_extra_is_an_import_error(without_scipy) -> None:
     assert issubclass(MissingExtraError, ThrowcollectError)
 
 
-def test_a_missing_module_that_no_extra_brings_is_not_explained_away() -> None:
+def test_a_missing_module_of_no_extra_stays_an_import_error() -> None:
     with pytest.raises(ModuleNotFoundError, match="throwcollect_of_tomorrow") as raised, explain_missing():
         import throwcollect_of_tomorrow  # noqa: F401
     assert not isinstance(raised.value, MissingExtraError)

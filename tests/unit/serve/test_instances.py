@@ -141,7 +141,7 @@ def test_the_state_says_which_collections_can_be_resumed(
         assert client.post(f"/api/v1/collections/{name}/resume").status_code == (202 if resumable[name] else 409), name
 
 
-def test_a_container_may_join_a_run(
+def test_a_container_can_join_a_run(
     served: Served, remember: Remember, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     orders: list[ContainerOrder] = []

@@ -95,6 +95,6 @@ def test_after_a_rest_or_a_reset_pace_is_kept_from_the_present_time(
     )
 
 
-def test_slow_motion_takes_longer(clock: Clock) -> None:
+def test_a_time_slice_in_slow_motion_takes_longer(clock: Clock) -> None:
     began_s = clock.now
     assert run(Pace(), clock, since_ns=0, work_s=0.0, factor=0.1) == pytest.approx(began_s + 0.040)

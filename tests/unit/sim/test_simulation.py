@@ -189,7 +189,7 @@ def test_while_paused_steps_advance_the_clock_exactly(simulation: Simulation) ->
     assert simulation.now_ns == 10 * 10**9 // CONFIG.sim.physics_hz
 
 
-def test_steps_that_are_asked_for_are_taken_slice_by_slice(simulation: Simulation) -> None:
+def test_requested_steps_are_taken_slice_by_slice(simulation: Simulation) -> None:
     simulation.set_state(StateCode.PAUSED)
     request = simulation.request_steps(60)
     assert simulation.running

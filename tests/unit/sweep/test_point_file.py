@@ -254,7 +254,7 @@ def test_problems_of_targets_in_a_parquet_file_name_their_rows(parquet):
     assert problems(text) == ["list.parquet: target_x_m: should be a column of numbers, got string"]
 
 
-def test_a_task_without_targets_takes_none(csv, monkeypatch):
+def test_columns_of_targets_are_refused_for_a_task_without_targets(csv, monkeypatch):
     monkeypatch.setattr(ThrowConfig, "target_columns", ())
     assert problems(csv(TARGETED + "1,1,1\n")) == [
         "list.csv:1: target_y_m: the task throw has no such target; it has none",

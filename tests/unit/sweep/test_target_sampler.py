@@ -90,7 +90,7 @@ def test_throws_are_spread_over_heights_as_well() -> None:
     assert counted.min() > 2 * sobol.min()
 
 
-def test_sets_of_values_and_fixed_ranges_may_take_part() -> None:
+def test_lists_of_values_and_fixed_ranges_can_be_swept_as_well() -> None:
     parameters = {
         **PARAMETERS,
         "ball.friction": {"values": [0.1, 0.4, 0.9]},

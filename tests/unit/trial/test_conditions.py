@@ -22,7 +22,7 @@ WITHOUT_EFFECT = {
 }
 
 
-def test_conditions_travel_as_text() -> None:
+def test_conditions_survive_the_way_through_json() -> None:
     assert conditions_from_json(WANTED.to_json()) == WANTED
 
 

@@ -38,7 +38,7 @@ def test_a_lease_signed_with_another_key_is_refused() -> None:
     assert not LEASE.is_signed(Signer(b"another key"))
 
 
-def test_leases_travel_as_text() -> None:
+def test_leases_survive_the_way_through_json() -> None:
     leases = (LEASE, Lease.make("/sim_0", 7, {"task.duration_s": 0.1 + 0.2}, SIGNER))
     assert leases_from_json(leases_to_json(leases)) == leases
     assert leases_from_json("[]") == ()

@@ -66,7 +66,7 @@ def test_every_record_of_the_recording_is_sound(written: View) -> None:
     assert examined.times[-1] - examined.times[0] == round(written.duration_s * 1e9)
 
 
-def test_the_directory_is_a_bag(written: View) -> None:
+def test_the_view_directory_is_a_rosbag(written: View) -> None:
     with Reader(written.recording.parent) as bag:
         counts = {connection.topic: connection.msgcount for connection in bag.connections}
     assert sum(counts.values()) == written.messages

@@ -73,7 +73,7 @@ def test_two_concurrent_callers_collect_the_wheels_once(
         assert (first.result(10), second.result(10)) == (True, False)
 
 
-def test_a_collection_that_fails_is_begun_anew_next_time(
+def test_a_failed_collection_of_wheels_is_tried_again(
     wheels: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def fail(*_: object, **__: object) -> None:

@@ -56,7 +56,7 @@ def send(party: Party, *joints: str, number: str = "g", **more: Any) -> None:
     party.ask(op="send_action_goal", **fields)
 
 
-def test_a_goal_is_sent_and_its_feedback_and_result_come_back(party: Party, arm: Arm) -> None:
+def test_a_client_sends_a_goal_and_gets_feedback_and_result(party: Party, arm: Arm) -> None:
     send(party, "a", feedback=True)
     feedback = party.next(op="action_feedback")
     assert (feedback["id"], feedback["action"], feedback["values"]["joint_names"]) == ("g", "follow", ["a"])

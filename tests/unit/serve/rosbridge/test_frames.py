@@ -116,7 +116,7 @@ def test_any_frame_is_read_or_refused(frame: str | bytes) -> None:
         return
 
 
-def test_status_messages_come_from_the_level_on_that_is_asked_for(party: Party) -> None:
+def test_status_messages_come_from_the_requested_level_on(party: Party) -> None:
     for level in ("none", "error"):
         party.ask(op="set_level", level=level)
         party.ask(op="nothing")

@@ -52,7 +52,7 @@ def test_a_landed_throw_has_all_its_measures():
     assert result.velocity_peak.share == pytest.approx(0.686, abs=2e-3)
 
 
-def test_a_joint_with_limits_of_0_that_rests_spoils_no_result(monkeypatch):
+def test_a_resting_joint_with_limits_of_0_does_not_spoil_the_result(monkeypatch):
     limits = joint_limits(TALOS)
     zero = {name: np.where(np.arange(32) == GRIPPER, 0.0, getattr(limits, name)) for name in ("velocity", "effort")}
     expected = judge(*episode())
@@ -125,7 +125,7 @@ def test_ball_that_stays_in_the_spoon_is_not_released():
     assert result.velocity_peak is not None
 
 
-def test_ball_that_had_left_the_spoon_before_the_start_is_dropped_even_if_the_spoon_hits_it_later():
+def test_ball_that_left_the_spoon_before_the_start_is_dropped():
     lost = "the ball had left the spoon before the start, in the sim.settle_s = 0.05 s for settling"
     result = judge(*episode(contacts=()))
     assert (result.outcome, result.reason, result.release) == (ThrowOutcome.DROPPED, lost, None)
