@@ -1,4 +1,4 @@
-"""The figures of the architecture: what scripts draw, and the rooms and imports that there are."""
+"""The figures of the architecture show the rooms and imports of the sources, as the scripts draw them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Rules of the house that no linter knows."""
+"""Rules of this project that no linter checks."""
 
 import ast
 import re
@@ -85,7 +85,7 @@ def search_repeated_classes(trees: dict[str, ast.Module]) -> set[str]:
 
 
 def test_no_two_modules_or_classes_share_a_name() -> None:
-    """Those of the ROS client have the names that rclpy gives them, so some of these are ours, too."""
+    """The ROS client is left out: it has the names of rclpy, some of which throwcollect uses, too."""
     paths = sorted(SOURCE.rglob("*.py"))
     assert search_repeated(paths) == set()
     assert search_repeated_classes({name(path): parse(path.read_text(encoding="utf-8")) for path in paths}) == set()
@@ -118,7 +118,7 @@ def is_named_after_a_module(test: Path) -> bool:
 
 
 def test_a_unit_test_file_is_named_after_a_module_or_has_a_docstring() -> None:
-    """What several modules do together, for example, has a name of its own."""
+    """A test of several modules together, for example, is named freely, and its docstring says what it tests."""
     tests = sorted(UNITS.rglob("test_*.py"))
     folders = {test.parent.relative_to(UNITS) for test in tests}
     assert {str(folder) for folder in folders if not (SOURCE / folder).is_dir()} == OUTSIDE_SOURCE
@@ -149,7 +149,7 @@ def test_the_rule_about_clocks_finds_each_way_to_set_the_clock() -> None:
 
 
 def unfold(statement: ast.stmt) -> list[ast.stmt]:
-    """What stands in both branches of `if TYPE_CHECKING`, or else the statement itself."""
+    """Give the statements in both branches of `if TYPE_CHECKING`, or else the statement itself."""
     if isinstance(statement, ast.If) and ast.unparse(statement.test) == "TYPE_CHECKING":
         return [*statement.body, *statement.orelse]
     return [statement]

@@ -1,4 +1,4 @@
-"""The site is built without a warning, and loads nothing from other servers; what is cited is this version."""
+"""The site is built without warnings and loads nothing from other servers; the citation names this version."""
 
 from __future__ import annotations
 

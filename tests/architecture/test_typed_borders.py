@@ -1,4 +1,4 @@
-"""What one room gives another has a type: a dictionary of anything hides which facts there are."""
+"""Functions that other rooms import have precise types, as a dictionary of anything hides which facts it holds."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Functions are verbs: a participle leaves open whether something is looked up, made or changed."""
+"""Names of functions are verbs: a participle leaves open whether a function looks up, makes or changes something."""
 
 from __future__ import annotations
 

@@ -76,13 +76,13 @@ def finish(process: subprocess.Popen[str]) -> str:
 
 
 def files_of(user: str) -> set[str]:
-    """All files of a user in places that users share, apart from directories of tests, be it of others just now."""
+    """All files of a user in directories that users share, apart from the directories of running tests."""
     own = ("-user", user)
-    # In what is another's and not open to all, nobody can have written; to walk through it may take half a minute.
+    # The user cannot write into closed directories of others, and to walk through them may take half a minute.
     closed = ("-type", "d", "-not", *own, "-not", "-perm", "-o=w", "-prune")
     tests = ("-name", f"{SHARED}*", "-prune", "-o", *closed, "-o", *own, "-not", "-type", "d", "-print")
     words = ("find", *(place for place in PLACES if Path(place).exists()), "-mindepth", "1", *tests)
-    # It complains of what others remove meanwhile.
+    # `find` complains of files that other processes remove meanwhile.
     return set(subprocess.run(words, capture_output=True, text=True, check=False).stdout.splitlines())
 
 

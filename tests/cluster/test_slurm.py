@@ -1,4 +1,4 @@
-"""The Slurm of the tests loses nodes, and gets them back, as those of clusters do."""
+"""The Slurm of the tests can lose nodes and get them back, as the Slurm of a real cluster does."""
 
 import os
 import time

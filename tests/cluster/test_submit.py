@@ -45,14 +45,14 @@ def configure(directory: Path, *, trials: int, shards: int = 2 * TASKS) -> Path:
 
 
 def collect_whole(config: Path, directory: Path) -> dict[str, str]:
-    """What one collection makes of a configuration."""
+    """Collect a configuration in one run; returns the fingerprints of its files."""
     with runs.prepare(config, overrides=["run.runtime=inprocess"], output=directory) as run:
         run.collect()
     return fingerprints(directory)
 
 
 def recordings(files: dict[str, str]) -> dict[str, str]:
-    """What stays the same whatever the configuration says of the speed: recordings, and what came of the trials."""
+    """The files that do not depend on the configured speed: the recordings, and the table of outcomes."""
     return {name: each for name, each in files.items() if name.endswith(".mcap") or name == "throws.parquet"}
 
 
@@ -174,7 +174,7 @@ def test_a_run_is_listed_and_can_be_stopped(slurm: Slurm, tmp_path: Path) -> Non
 def test_no_trial_is_lost_when_nodes_die_and_array_tasks_are_preempted(
     slurm: Slurm, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    # The runs of tasks that are killed stay remembered; those of the user are not to be found among them.
+    # Records of killed array tasks stay behind; here, they do not mix with those of the user.
     monkeypatch.setenv(STATE_VARIABLE, str(tmp_path / "state"))
     config = configure(tmp_path, trials=60)
     whole = recordings(collect_whole(config, tmp_path / "whole"))
@@ -205,7 +205,7 @@ def test_another_user_can_submit_the_printed_script_with_an_image(
     said = call(slurm, *arguments, "--set", "cluster.memory=1G", "--set", f"cluster.image={sif}")
     begin = said.index("#!")
     (shared / "collect.sh").write_text(said[begin:])
-    # What has to be done besides is told beside the script.
+    # The lines before the script name the other commands to run.
     plan, logs, join = (shlex.split(line.rpartition(": ")[2]) for line in said[:begin].splitlines())
     inside = ("apptainer", "--quiet", "exec", str(sif))
     slurm.run(*inside, *plan, user=USER, cwd=shared)
@@ -221,7 +221,7 @@ def test_a_plan_that_grows_is_collected_by_one_run_on_several_nodes(slurm: Slurm
     with runs.prepare(config, overrides=["run.runtime=inprocess", *grows], output=tmp_path / "whole") as run:
         run.collect()
     data = tmp_path / "with blank" / "data"
-    # So slowly that machines which join find something to do, however busy this one is.
+    # Slow enough that joining machines find trials left, even if this one is busy.
     slowly = "sim.real_time_factor=4"
     settings = [word for setting in ("cluster.memory=1G", slowly, *grows) for word in ("--set", setting)]
     arguments = ("submit", config, "--output", data, "--tasks", "3", "--mode", "live", *settings)
@@ -230,7 +230,7 @@ def test_a_plan_that_grows_is_collected_by_one_run_on_several_nodes(slurm: Slurm
     assert recordings(fingerprints(data)) == recordings(fingerprints(tmp_path / "whole"))
     printed = call(slurm, "logs", "--run", data)
     assert printed.count("1 simulation of this machine will join") == 2
-    # The simulations that joined end some seconds later, and the script after them.
+    # The joined simulations end some seconds later, and then the script ends.
     wait_until(lambda: not (data / "cluster" / "token").exists())
     assert "nothing is left to submit" in call(slurm, "resume", data)
 

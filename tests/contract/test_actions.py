@@ -148,7 +148,7 @@ def test_a_client_can_cancel_a_goal(rig, controller, client):
 def test_a_server_can_refuse_to_cancel_a_goal(rig, controller, client):
     theirs, ours = send(rig, controller, client, "stubborn")
     response = rig.result(theirs.cancel_goal_async())
-    # rclpy leaves the code as it was, rclcpp and the embedded backend tell that all have refused.
+    # rclpy leaves the code unchanged; rclcpp and the embedded backend set it if all goals refuse.
     code = CancelGoal.Response.ERROR_NONE if ON_RCLPY else CancelGoal.Response.ERROR_REJECTED
     assert (response.return_code, response.goals_canceling) == (code, [])
     assert ours.status == GoalStatus.STATUS_EXECUTING
@@ -211,7 +211,7 @@ def test_an_execute_callback_that_fails_aborts_the_goal(rig):
     assert client.wait_for_server(5)
     future = client.send_goal_async(goal("a"))
     if not ON_RCLPY:
-        # rclpy logs it and goes on; the embedded backend treats it like that of any other callback.
+        # rclpy logs the exception and goes on; the embedded backend raises it, as for every callback.
         with pytest.raises(LookupError, match="callback failed"):
             rig.rest(5)
     handle = rig.result(future)

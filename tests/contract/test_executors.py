@@ -42,7 +42,7 @@ def test_spinning_once_calls_one_callback(node, executor):
     executor.create_task(calls.append, 2)
     while not calls:
         executor.spin_once(timeout_sec=1)
-    # rclpy calls the latest of tasks first.
+    # rclpy calls the latest task first.
     order = [2, 1] if ON_RCLPY else [1, 2]
     assert calls == order[:1]
     executor.spin_once(timeout_sec=1)
@@ -144,7 +144,7 @@ def test_shutting_the_context_down_ends_spinning(node, executor):
     threading.Timer(0.05, node.context.shutdown).start()
     with pytest.raises(ExternalShutdownException, match=choose_words(embedded="shut down", rclpy="^$")):
         executor.spin()
-    # rclpy has nothing to wait with any more, and says so.
+    # rclpy raises another error, as its wait set is gone after the shutdown.
     with pytest.raises(Exception if ON_RCLPY else ExternalShutdownException, match=r"shut down|rcl_shutdown\(\)"):
         executor.spin_once(timeout_sec=0)
 
@@ -152,5 +152,5 @@ def test_shutting_the_context_down_ends_spinning(node, executor):
 def test_shutting_the_executor_down_ends_spinning(node, executor):
     threading.Timer(0.05, executor.shutdown).start()
     executor.spin()
-    # On rclpy, nodes remember the last executor they were in.
+    # On rclpy, a node still refers to its last executor.
     assert ON_RCLPY or node.executor is None

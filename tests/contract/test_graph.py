@@ -1,4 +1,4 @@
-"""What nodes see of each other."""
+"""Topics, services and nodes that a node sees of other nodes."""
 
 from rclzenoh.interfaces import type_hash
 from tests.contract.rig import ON_DDS, names_of
@@ -40,7 +40,7 @@ def test_endpoint_infos_of_a_topic_look_like_those_of_genuine_nodes(rig):
     node.create_publisher(String, "t", qos)
     node.create_subscription(String, "t", print, QoSProfile(depth=5, reliability=ReliabilityPolicy.BEST_EFFORT))
     seen = rig.node("b", namespace="/ns")
-    # DDS tells whose an endpoint is after it has told of the endpoint.
+    # DDS announces the node of an endpoint later than the endpoint itself.
     assert rig.sees(lambda: [info.node_name for info in seen.get_publishers_info_by_topic("t")] == ["a"])
     assert rig.sees(lambda: seen.count_subscribers("t") == 1)
     (info,) = seen.get_publishers_info_by_topic("t")
@@ -54,7 +54,7 @@ def test_endpoint_infos_of_a_topic_look_like_those_of_genuine_nodes(rig):
         f"GID: {gid.hex('.')}",
         "QoS profile:",
         "  Reliability: RELIABLE",
-        # DDS does not tell others of it.
+        # DDS does not announce the history of an endpoint.
         f"  History (Depth): {'UNKNOWN' if ON_DDS else 'KEEP_LAST (3)'}",
         "  Durability: TRANSIENT_LOCAL",
         "  Lifespan: Infinite",
@@ -69,7 +69,7 @@ def test_endpoint_infos_of_a_topic_look_like_those_of_genuine_nodes(rig):
 def test_endpoints_match_by_name_and_type(rig):
     node, other = rig.node("a"), rig.node("b")
     publisher = node.create_publisher(String, "t", 10)
-    # Not of the same session: there, DDS has one type for each name.
+    # This node has another session, as DDS allows one type for each topic name of a session.
     other.create_subscription(Int32, "t", lambda _: None, 10)
     assert rig.spin(lambda: node.count_subscribers("t") == 1)
     assert publisher.get_subscription_count() == 0

@@ -1,4 +1,4 @@
-"""What a node is called, what it logs, and how it ends."""
+"""Names, log messages and the end of a node."""
 
 import re
 from pathlib import Path
@@ -44,7 +44,7 @@ def test_log_messages_go_to_standard_error_and_rosout(rig, capfd):
     assert lines[0].endswith("[talos.sim]: careful")
 
 
-# rclpy knows of other nodes of its own process alone, and warns that what both log takes one way.
+# rclpy warns only of nodes in the same process, because they share a logger.
 WARNING = choose_words(embedded="there is another node /ns/twin", rclpy="node name: 'twin'.*'ns.twin'")
 
 

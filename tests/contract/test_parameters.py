@@ -43,7 +43,7 @@ def test_declaring_twice_and_using_undeclared_parameters_is_refused(node):
 
 
 def test_a_parameter_has_a_type_or_is_typed_dynamically(node):
-    # rclpy warns of it yet, as it is deprecated.
+    # rclpy only warns of a declaration without a type, as that is deprecated.
     with pytest.warns(match="deprecated") if ON_RCLPY else pytest.raises(ValueError, match="dynamic_typing"):
         node.declare_parameter("no_type")
     node.declare_parameter("a", descriptor=ParameterDescriptor(dynamic_typing=True))
@@ -59,7 +59,7 @@ def test_a_parameter_has_a_type_or_is_typed_dynamically(node):
 
 
 def plain(value):
-    """Without rclpy's arrays of numbers."""
+    """Turn an array of numbers, as rclpy returns it, into a list."""
     return list(value) if isinstance(value, array) else value
 
 
@@ -206,7 +206,7 @@ def test_requests_with_unknown_names_and_types_are_answered(rig, node):
         Parameter("use_sim_time", value=True).to_parameter_msg(),
     )
     odd.value.type = 77
-    # `spin_once` of rclpy ends at a type that there is not; `spin_some` does not, as the next test shows.
+    # An unknown type ends `spin_once` of rclpy, but not `spin_some`, as the next test shows.
     wanted = [absent] if ON_RCLPY else [absent, odd]
     results = remote.call("SetParameters", parameters=wanted).results
     assert [result.successful for result in results] == [False] * len(wanted)

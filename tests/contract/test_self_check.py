@@ -1,4 +1,4 @@
-"""Whether a node finds out that nobody can reach it."""
+"""A node checks whether other nodes can reach it."""
 
 import pytest
 

@@ -57,7 +57,7 @@ def test_messages_of_another_type_are_not_published(rig):
         publisher.publish(JointState())
 
 
-# On DDS, only those get them that asked for reliable ones.
+# On DDS, only reliable late subscribers get earlier messages.
 @pytest.mark.parametrize(
     "reliability", [ReliabilityPolicy.RELIABLE] + ([] if ON_RCLPY else [ReliabilityPolicy.BEST_EFFORT])
 )
@@ -67,7 +67,7 @@ def test_a_late_subscriber_gets_the_last_messages_of_a_transient_local_topic(rig
     publisher = talker.create_publisher(String, "t", qos)
     for text in "abc":
         publisher.publish(String(data=text))
-    rig.rest()  # What is still on its way would be heard as well.
+    rig.rest()  # Otherwise, a message still on its way would be heard as well.
     heard = []
     listener.create_subscription(String, "t", lambda m: heard.append(m.data), qos)
     assert rig.spin(lambda: len(heard) == 2)
@@ -98,7 +98,7 @@ def test_a_full_subscription_drops_its_oldest_messages(rig):
         publisher.publish(String(data=str(i)))
     end.publish(String())
     time.sleep(0.2)
-    # On DDS, what one publisher sends may overtake what another one sent before.
+    # On DDS, messages of one publisher may overtake earlier ones of another publisher.
     assert rig.spin(lambda: marks and "19" in heard)
     rig.rest(0.05)
     assert heard == ["17", "18", "19"]

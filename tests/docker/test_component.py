@@ -1,4 +1,4 @@
-"""Containers of the catalogue of a real engine, which join a run and hear it."""
+"""Containers of the catalogue, on a real engine: they join a run and hear its topics."""
 
 from __future__ import annotations
 

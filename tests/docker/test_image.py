@@ -1,4 +1,4 @@
-"""The image as it is: what it can do in a container that may do next to nothing, and what is not in it."""
+"""The built image: what runs in a container with hardly any privileges, and which tools are not in it."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ def test_the_labels_of_the_image_name_its_title_version_and_revision(client: Doc
     assert labels["org.opencontainers.image.title"] == "throwcollect"
     assert labels["org.opencontainers.image.version"] == throwcollect.__version__
     assert labels["org.opencontainers.image.revision"]
-    # The path of a clone on this machine would tell nobody else where the sources are.
+    # The path of a clone on this machine would be useless to other people.
     assert not labels.get("org.opencontainers.image.source", "").startswith("/")
 
 

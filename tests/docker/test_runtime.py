@@ -76,14 +76,14 @@ def container(client: DockerClient, collection: Collection, node: str) -> Contai
 def list_what_is_left(client: DockerClient, label: str) -> list[Any]:
     filters = {"label": label}
     containers, networks = client.containers.list(all=True, filters=filters), client.networks.list(filters=filters)
-    # The volume of a dataset stays, if there is one.
+    # The volume of a dataset may stay, so only volumes of keys count here.
     return [*containers, *networks, *client.volumes.list(filters={"label": [label, KEY_LABEL]})]
 
 
 def test_a_collection_in_containers_yields_the_dataset_of_one_in_processes(
     client: DockerClient, tmp_path: Path, digest: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    caller = os.getuid() or 4242  # root may be anybody
+    caller = os.getuid() or 4242  # root can give files to any user
     monkeypatch.setattr(os, "getuid", lambda: caller)
     run = new_run()
     prepared = tmp_path / "dataset"
@@ -225,13 +225,13 @@ def test_a_run_whose_launcher_vanished_is_taken_over(client: DockerClient, tmp_p
     with collecting(client, tmp_path, run=run, found=nodes) as collection:
         assert collection.finish() == digest
     assert [line for line in collection.news if "sim_1 was lost (ended by SIGKILL)" in line]
-    # What the first launcher has copied already is not copied again.
+    # The second launcher does not copy log lines that the first one has copied.
     assert (dataset / "logs" / "sim_0.log").read_text().count("sim_0 is ready") == 1
 
 
 @pytest.fixture
 def bare(client: DockerClient, tmp_path: Path) -> Any:
-    """Makes runtimes without a dataset, for nodes that need none."""
+    """A function that makes runtimes without a dataset, for nodes that need none."""
     made: list[tuple[DockerNodes, str]] = []
 
     def make(*overrides: str, through: DockerClient = client) -> DockerNodes:
@@ -261,7 +261,7 @@ def test_a_node_that_the_engine_cannot_start_or_kills_ends_with_the_reason(bare:
 
 
 def test_an_ended_node_has_its_exit_code_and_last_log_lines(monkeypatch: pytest.MonkeyPatch, bare: Any) -> None:
-    monkeypatch.setattr(docker_watch, "_LOOK_EVERY_S", 3600.0)  # the engine's events are enough
+    monkeypatch.setattr(docker_watch, "_LOOK_EVERY_S", 3600.0)  # so that only events of the engine report the end
     runtime = bare()
     runtime.start(NodeSpec("sim_0", ("sim", "/data/nothing.yaml"), NodeRole.EXPENDABLE))
     end = wait_for_end(runtime)
@@ -309,7 +309,7 @@ def test_a_node_gets_the_key_as_private_files_that_the_engine_does_not_show(
     router = client.containers.get(runtime.handle(ROUTER))
     script = "stat -c '%a %u' /key/*; touch /key/new; cat /key/key.pem"
     said = router.exec_run(["sh", "-c", script]).output.decode()
-    # The engine may tell what stands in one stream before what was printed earlier into the other.
+    # The engine may deliver the two output streams in another order than they were printed.
     assert "400 4242\n400 4242\n" in said
     assert "/key/new': Read-only file system" in said
     assert key in said

@@ -73,7 +73,7 @@ INPROCESS = ("--runtime", "inprocess")
 
 
 def words_of(process: psutil.Process) -> list[str]:
-    """Words of a command line, as `ps` shows it: psutil gives a node's in one piece, and free room behind it."""
+    """Words of a command line, as `ps` shows it: psutil returns that of a forked node as one padded text."""
     return " ".join(process.cmdline()).split()
 
 
@@ -91,7 +91,7 @@ class Running:
     directory: Path
 
     def nodes(self) -> list[psutil.Process]:
-        """Its nodes: what was forked by the process that has imported their libraries."""
+        """Nodes of the run: the children of the process that has imported their libraries."""
         return [node for server in psutil.Process(self.process.pid).children() for node in server.children()]
 
     def node(self, *words: str) -> psutil.Process:

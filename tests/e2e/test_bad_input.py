@@ -1,4 +1,4 @@
-"""What a clumsy user meets: one clear message, the right exit code, nothing left behind, never a traceback."""
+"""Each mistake of a user gives one clear message and the right exit code, no files and no traceback."""
 
 import contextlib
 import json
@@ -263,13 +263,13 @@ def test_a_collection_on_a_full_disk_ends_with_an_error_and_can_be_resumed(
     moment: str, small: Path, tmp_path: Path, dataset: tuple[Path, dict[str, object]]
 ) -> None:
     shard = (dataset[0] / "small_00000.mcap").stat().st_size
-    # The finished shard is larger than that in order of arrival by its summary, which is some kilobytes.
+    # The finished shard is some kilobytes larger than the part file, because it has a summary.
     limit, file = {
         "plan": (1000, "config.yaml"),
         "collection": (shard // 2, "small_00000.mcap.part"),
         "finish": (shard - 100, "small_00000.mcap"),
     }[moment]
-    # The coordinator, a node of its own, finds it out while it collects.
+    # In a collection by nodes, it is the coordinator that runs into the full disk.
     runtime = ("-n", "1") if moment == "collection" else INPROCESS
     said = call("up", *runtime, small, "--output", tmp_path / "data", restrictions=Restrictions(file_bytes=limit))
     assert said.stdout == ""
@@ -374,7 +374,7 @@ def test_a_collection_goes_on_when_its_output_pipe_is_closed(lost: str, small: P
 
 
 def test_ctrl_c_while_libraries_are_loaded_prints_no_traceback(small: Path, tmp_path: Path) -> None:
-    # What the command line is made of, in which Ctrl-C arrives while it is loaded.
+    # This stands in for the library of the command line: Ctrl-C arrives while it is imported.
     (tmp_path / "typer.py").write_text("import os, signal, time\nos.kill(os.getpid(), signal.SIGINT)\ntime.sleep(9)\n")
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")])}
     said = subprocess.run(
@@ -414,7 +414,7 @@ def test_progress_is_a_bar_on_a_terminal(small: Path, tmp_path: Path) -> None:
     running = start_command(*words, stdout=subprocess.DEVNULL, stderr=own_end, **screen)
     os.close(own_end)
     shown = b""
-    with contextlib.suppress(OSError):  # the terminal's end is an error on Linux
+    with contextlib.suppress(OSError):  # on Linux, reading at the end of a terminal is an error
         while piece := os.read(terminal, 65536):
             shown += piece
     os.close(terminal)

@@ -1,4 +1,4 @@
-"""What docs/cluster.md says of other schedulers is what happens."""
+"""The script that docs/cluster.md shows for other schedulers works."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A derived dataset is the dataset that a collection of its trials gives, and docs/deriving.md is true."""
+"""A derived dataset equals a collection of its trials, and the commands of docs/deriving.md work."""
 
 import re
 import shlex
@@ -67,7 +67,7 @@ def home(tmp_path_factory: pytest.TempPathFactory) -> Path:
             assert program == "throwcollect"
             if command == "up":
                 config, *_, output = arguments
-                # The two that the page begins with are those from above, which differ more.
+                # The first two datasets of the page are those made above, which differ more from each other.
                 if not (directory / output).exists():
                     collect_here(directory / config, directory / output)
             else:

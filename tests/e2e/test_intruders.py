@@ -133,7 +133,7 @@ class Scene:
 
 @pytest.fixture(scope="module")
 def scene() -> Iterator[Scene]:
-    # Not among pytest's directories, which others cannot even enter.
+    # Other users cannot enter the directories of pytest, so the scene is elsewhere.
     with tempfile.TemporaryDirectory() as directory:
         Path(directory).chmod(0o755)
         yield from _scene_in(Path(directory))
@@ -141,11 +141,11 @@ def scene() -> Iterator[Scene]:
 
 def _scene_in(directory: Path) -> Iterator[Scene]:
     state = directory / "state"
-    # Others may read in it, as in most directories.
+    # Other users can read this directory, as most directories.
     state.mkdir(mode=0o755)
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv(STATE_VARIABLE, str(state))
-        # Runs of others on an engine of this machine are none of these tests' business.
+        # Without an engine, no runs of other users on this machine are seen.
         patch.setenv("DOCKER_HOST", f"unix://{directory}/none.sock")
         config = write_config(directory, trials=TRIALS, sim=FAST)
         running = start(config, directory / "data", 2, *UNTIL_STOPPED)
@@ -167,7 +167,7 @@ def _ways(endpoint: str, home: Path) -> dict[str, str]:
     """Ways to the router for somebody who knows where it is, and can make keys."""
     forged = RunKey(home / "forged")
     forged.create()
-    # Any server shows its certificate to everybody; that makes the router trusted, but not the one who comes.
+    # Every client can get the router's certificate; with it, the client trusts the router, but not the reverse.
     shown = RunKey(home / "shown")
     shutil.copytree(forged.directory, shown.directory)
     host, _, port = endpoint.partition("/")[2].rpartition(":")
@@ -188,7 +188,7 @@ def _ways(endpoint: str, home: Path) -> dict[str, str]:
 
 
 def test_another_user_gets_no_session_with_the_router(scene: Scene) -> None:
-    """Not even a session is had, in which they could."""
+    """Without a session, a user can neither hear nor send anything."""
     said = scene.as_nobody(ATTEMPT, json.dumps(scene.ways))
     assert len(said.stdout.splitlines()) == len(scene.ways) == 5, said
     for line in said.stdout.splitlines():
@@ -196,7 +196,7 @@ def test_another_user_gets_no_session_with_the_router(scene: Scene) -> None:
 
 
 def test_a_client_with_the_key_can_listen_publish_and_call(scene: Scene) -> None:
-    """So that the test above does not pass because there is nothing to be heard."""
+    """This shows that the test above does not pass only because the run is silent."""
     with_key = client_override(scene.record.endpoint or "", scene.key)
     said = subprocess.run(
         [sys.executable, "-c", ATTEMPT.replace(BECOME_NOBODY, ""), json.dumps({"owner": with_key})],
@@ -209,7 +209,7 @@ def test_a_client_with_the_key_can_listen_publish_and_call(scene: Scene) -> None
 
 
 def test_another_user_cannot_start_a_node_in_the_run(scene: Scene) -> None:
-    """A simulation that would be given trials, a coordinator that would give some: neither finds the router."""
+    """Neither a simulation nor a coordinator of another user connects to the router."""
     (scene.home / "other.yaml").write_text((scene.running.directory.parent / "small.yaml").read_text())
     for node in (["sim", "other.yaml", "--name", "evil"], ["coordinator", "data", "--config", "other.yaml"]):
         said = scene.as_nobody(POSE, *node)
@@ -235,7 +235,7 @@ def test_arguments_and_environment_of_nodes_do_not_show_the_key(scene: Scene) ->
 
 
 def test_a_shell_that_evaluates_ros_env_has_joined_the_run(scene: Scene) -> None:
-    """The owner, in a shell; the next process there is any node, of which this is the smallest."""
+    """In a shell of the owner, `ros node list` stands for any node that is started after `ros env`."""
     throwcollect = f"{sys.executable} -m throwcollect"
     script = f'eval "$({throwcollect} ros env)"; {throwcollect} ros node list; printenv RMW_IMPLEMENTATION'
     said = subprocess.run(["bash", "-c", script], capture_output=True, text=True, timeout=60, check=False)
@@ -251,7 +251,7 @@ def test_the_owner_can_scale_the_run(scene: Scene) -> None:
 
 
 def test_the_attacks_do_not_change_the_collected_trials(scene: Scene) -> None:
-    """Comes last: it ends the collection."""
+    """This test has to be the last one, as it ends the collection."""
     assert call("stop").returncode == 0
     code, out, _ = scene.running.finish()
     assert (code, "run.open" in out) == (130, False)

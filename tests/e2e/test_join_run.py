@@ -46,7 +46,7 @@ class Machine:
 
     def __init__(self) -> None:
         self.name = f"tc{secrets.token_hex(4)}"
-        # Drawn, so that tests that run at the same time have wires of their own.
+        # The network is drawn at random, so that tests at the same time have wires of their own.
         network = f"10.{secrets.randbelow(64) + 190}.{secrets.randbelow(256)}"
         self.gateway, self.address = f"{network}.1", f"{network}.2"
         self.wire = f"{self.name}w"
@@ -61,7 +61,7 @@ class Machine:
         return self
 
     def __exit__(self, *_: object) -> None:
-        # The wire goes with the namespace, but only when the last process in there has ended.
+        # The namespace would remove the wire only after the end of its last process.
         ip("link", "del", self.wire)
         ip("netns", "del", self.name)
 
@@ -133,7 +133,7 @@ def listen(directory: Path, *options: str) -> tuple[Running, str, int]:
         "--listen", f"tcp/0.0.0.0:{port}", *options,
     )  # fmt: skip
     assert running.process.stderr is not None
-    # Nobody else would end what prints no token.
+    # A run that prints no token would otherwise never end.
     late = threading.Timer(60, running.process.kill)
     late.start()
     try:
@@ -198,7 +198,7 @@ def test_machines_can_join_and_leave_without_changing_the_files(
         join(gone, move_endpoint(token, gone.gateway, port)),
     ]
     wait_for(100_000, running, processes)
-    gone.cut()  # so that nothing can be said any more
+    gone.cut()  # so that its simulation cannot announce its end
     processes[1].kill()
     wire = SlowWire(late.gateway, port)
     processes.append(join(late, move_endpoint(token, late.gateway, wire.port)))
@@ -216,7 +216,7 @@ def test_machines_can_join_and_leave_without_changing_the_files(
     whole, joined = fingerprints(tmp_path / "whole"), fingerprints(tmp_path / "data")
     same = [name for name in whole if name.endswith(".mcap") or name == "throws.parquet"]
     assert len(same) == 2
-    # What the configuration says of the speed stands in the other files.
+    # The other files hold the configured speed, which differs.
     assert {name: joined[name] for name in same} == {name: whole[name] for name in same}
 
 
@@ -286,7 +286,7 @@ def test_waiting_for_a_token_can_be_interrupted() -> None:
     with subprocess.Popen(
         command("join-run", "-"), stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     ) as waiting:
-        # It has loaded its libraries by then, and reads.
+        # Once the process waits at the pipe, it has loaded its libraries.
         wchan = Path(f"/proc/{waiting.pid}/wchan")
         deadline = time.monotonic() + 30
         while "pipe" not in wchan.read_text() and time.monotonic() < deadline:

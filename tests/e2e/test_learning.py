@@ -59,9 +59,9 @@ def test_the_commands_of_the_page_work_in_their_order(tmp_path: Path, monkeypatc
     Path("configs").mkdir()
     Path("configs", "quickstart.yaml").write_text(text + "\nsim: {engine: ballistic}\nrun: {replay: 0}\n")
     fewer = PAGE.replace("--trials 1024", "--trials 200").replace("--targets 20  ", "--targets 3 --seeds 1  ")
-    # In process, there is one simulation.
+    # The runtime `inprocess` has only one simulation.
     fewer = fewer.replace("up -n 2 ", "up ")
-    # This engine throws elsewhere.
+    # The ballistic engine throws to other places.
     fewer = fewer.replace("--at 1.3,-0.1", "--at 1.31,-0.05")
     lines = "".join(re.findall(r"```bash\n(.*?)```", fewer, flags=re.DOTALL)).splitlines()
     lines += re.findall(r"^    (throwcollect .*)$", fewer, flags=re.MULTILINE)
@@ -69,7 +69,7 @@ def test_the_commands_of_the_page_work_in_their_order(tmp_path: Path, monkeypatc
     said = ""
     for line in lines:
         if "measured.csv" in line:
-            # Whoever has the robot writes it.
+            # With a real robot, people write this file from their measurements.
             throws = throwcollect.load("datasets/aimed")
             keys = [*throws.parameters.names, "landing_x_m", "landing_y_m"]
             rows = [",".join(repr(float(throw[key])) for key in keys) for throw in throws]

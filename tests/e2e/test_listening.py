@@ -1,4 +1,4 @@
-"""Who listens during a collection hears what the dataset will hold, and changes nothing."""
+"""A listener during a collection gets the messages that the dataset will hold, and does not change it."""
 
 import socket
 from collections import Counter, defaultdict
@@ -63,7 +63,7 @@ def is_open(port: int) -> bool:
 
 
 def during_trials(messages: Messages) -> Messages:
-    """Without those of time 0: where a simulation stands before its first trial."""
+    """Leave out messages of time 0, which simulations send before their first trial."""
     return {topic: [data for data in found if any(data[_STAMP])] for topic, found in messages.items()}
 
 
@@ -85,7 +85,7 @@ def listened(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, 
     directory = tmp_path_factory.mktemp("listened")
     port = free_port()
     config = write_config(directory, trials=TRIALS, sim=FAST)
-    # Open, so that anybody may listen.
+    # An open run lets listeners in without a key.
     running = start(config, directory / "data", 2, "--set", f"run.router_port={port}", "--set", "run.open=true")
     running.wait_until(lambda: is_open(port))
     with listener(port) as ears:

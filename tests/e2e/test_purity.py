@@ -74,7 +74,7 @@ def test_every_file_is_the_same_for_any_number_of_simulations(
 def test_every_file_is_the_same_when_trials_end_in_another_order(config: Path, reference: Path, tmp_path: Path) -> None:
     running = start(config, tmp_path / "data", 2)
     running.wait_until(lambda: running.count_bytes() > 100_000)
-    # Frozen in the middle of a trial, it hands it in long after those that follow.
+    # A simulation that is frozen in the middle of a trial hands it in long after later trials.
     frozen = running.node("--name", "sim_0")
     frozen.suspend()
     before = running.count_bytes()

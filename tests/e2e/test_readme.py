@@ -1,4 +1,4 @@
-"""What the README shows is true."""
+"""The examples of the README work as they are shown."""
 
 import re
 from pathlib import Path

@@ -54,9 +54,9 @@ def reference(config: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(autouse=True)
 def records(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Records]:
-    """Where the runs of one test are remembered; whatever it leaves running is ended."""
+    """Records of the runs of one test; runs that it leaves are ended afterwards."""
     monkeypatch.setenv(STATE_VARIABLE, str(tmp_path / "state"))
-    # Runs of others on an engine of this machine are none of these tests' business.
+    # Without an engine, no runs of other users on this machine are seen.
     monkeypatch.setenv("DOCKER_HOST", f"unix://{tmp_path}/none.sock")
     records = Records()
     yield records
@@ -72,7 +72,7 @@ def say(*arguments: str | Path) -> tuple[int, str, str]:
 
 
 def detach(config: Path, directory: Path, *options: str) -> str:
-    """A run by itself; its id."""
+    """Start a detached run; returns its id."""
     said = call_here("up", "-d", config, "--output", directory, *options)
     assert said.returncode == 0, said.stderr
     return said.stdout.strip()
@@ -121,7 +121,7 @@ def test_another_command_can_wait_for_a_detached_run(
     assert re.fullmatch(r"small-[0-9a-f]{4}", run)
     assert f"follow it: throwcollect wait --run {run}" in said.stderr
     record = records.get(run).record
-    # It belongs to no terminal's session, so that nothing ends it when one is closed.
+    # The launcher has a session of its own, so that closing a terminal does not end it.
     assert os.getsid(record.launcher) == record.launcher
     assert [node.name for node in record.nodes] == ["router", "sim_0", "sim_1", "coordinator"]
     waited = call("wait")
@@ -133,7 +133,7 @@ def test_another_command_can_wait_for_a_detached_run(
     assert list_runs() == []
     (ended,) = list_runs("-a")
     assert (ended["run"], ended["status"], ended["exit_code"], ended["progress"]["ended"]) == (run, "ended", 0, TRIALS)
-    # Whoever comes late gets the same answer.
+    # Waiting for a run that is over gives the same answer.
     again = call_here("wait", "--run", tmp_path / "data", "--json")
     assert (again.returncode, again.stderr) == (0, "")
     assert (
@@ -157,7 +157,7 @@ def test_scaling_and_losses_do_not_change_the_dataset(config: Path, records: Rec
     assert_gone({"sim_2": removed})
     waited = call_here("wait")
     assert waited.returncode == 0, waited.stderr
-    # On standard error, too, unless it was over by then.
+    # Standard error has this as well, unless the run was over before `wait` began.
     assert re.search(r"^trials +24: 24 landed$", waited.stdout, re.MULTILINE)
     assert fingerprints(tmp_path / "data") == fingerprints(tmp_path / "reference")
     told = [re.sub(r": \d+$", "", line.split("  ", 1)[1]) for line in call_here("events").stdout.splitlines()]
@@ -237,7 +237,7 @@ def test_other_commands_see_and_control_a_run_in_the_foreground(config: Path, re
         f"throwcollect: {tmp_path / 'data'}: run {run} collects into it\n"
         f"  try: throwcollect wait --run {run} follows it\n"
     )
-    # Somebody whose records do not have the run is kept out as well, before anything is changed.
+    # A command with other records is refused as well, before it changes anything.
     plan = (tmp_path / "data" / "plan.parquet").read_bytes()
     elsewhere = {STATE_VARIABLE: str(tmp_path / "other")}
     third = call("resume", tmp_path / "data", "--trials", str(MANY + 1), **elsewhere)
@@ -265,7 +265,7 @@ def test_a_run_whose_record_cannot_be_written_goes_on(config: Path, records: Rec
     in_the_way = tmp_path / "state" / "runs" / f"{records.ids()[0]}.json.new"
 
     def stands() -> bool:
-        # For a moment, a record may just be written there.
+        # The launcher may just be writing a record there.
         with suppress(FileExistsError):
             in_the_way.mkdir()
         return in_the_way.is_dir()
@@ -334,7 +334,7 @@ def test_up_detached_reports_mistakes_at_once_and_leaves_nothing_behind(
 def test_up_detached_reports_a_launcher_that_cannot_start_its_nodes(
     config: Path, records: Records, tmp_path: Path
 ) -> None:
-    # A log that is a directory cannot be written.
+    # The router cannot be started, because a directory is in the place of its log.
     site = tmp_path / "site"
     site.mkdir()
     (site / "sitecustomize.py").write_text(
@@ -356,7 +356,7 @@ def test_up_detached_reports_a_launcher_that_cannot_start_its_nodes(
 
 
 def test_wait_reports_the_failure_of_a_run(config: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    # Whoever starts the run is gone by then.
+    # The failure comes so late that the starting command has ended by then.
     (tmp_path / "pybullet.py").write_text("import time\ntime.sleep(1)\nraise ImportError('broken pybullet')")
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
     detach(config, tmp_path / "data", "--set", "run.restarts=0", "--set", "sim.engine=bullet")

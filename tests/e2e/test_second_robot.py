@@ -1,4 +1,4 @@
-"""The robot of another package, `tests/plugins`, from its configuration to what is made of its datasets."""
+"""The robot of another package, `tests/plugins`, from its configuration to derived and exported datasets."""
 
 from __future__ import annotations
 
@@ -94,13 +94,13 @@ def arm(process: ProcessPoolExecutor, tmp_path_factory: pytest.TempPathFactory) 
 
 @pytest.fixture
 def say(process: ProcessPoolExecutor) -> Say:
-    """The command where the package of the robot is installed."""
+    """A function that calls throwcollect where the package of the robot is installed."""
     return lambda *arguments: process.submit(call_here, *arguments).result()
 
 
 @pytest.fixture
 def run(process: ProcessPoolExecutor, arm: Path, tmp_path: Path) -> Run:
-    """What a program finds that knows of the dataset and of a directory for what it makes of it."""
+    """A function that runs a program which knows the dataset, and a directory for its results."""
     return lambda program: process.submit(run_program, program, directory=arm, scratch=tmp_path).result()
 
 

@@ -1,4 +1,4 @@
-"""What starting a collection does, and what it leaves alone."""
+"""Processes and imports at the start of a collection."""
 
 import contextlib
 import os
@@ -67,7 +67,7 @@ def test_a_collection_starts_one_interpreter_and_forks_its_nodes(on_terminal, ya
     ) as running:
         os.close(writer)
         said = b""
-        # Whoever writes to a terminal that nobody reads waits. On Linux, its end is an error.
+        # A process that writes to an unread terminal would block. On Linux, reading at its end is an error.
         with contextlib.suppress(OSError):
             while piece := os.read(reader, 65536):
                 said += piece

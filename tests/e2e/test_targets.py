@@ -32,7 +32,7 @@ def config(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def undisturbed(config: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
-    """A collection with one simulation, and what was said meanwhile."""
+    """The directory of a collection with one simulation, and its messages."""
     directory = tmp_path_factory.mktemp("undisturbed") / "data"
     done = call_here("up", *INPROCESS, config, "--output", directory)
     assert done.returncode == 0, done.stderr
