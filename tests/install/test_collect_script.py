@@ -1,4 +1,4 @@
-"""What `compose/collect.sh` does where something fails, with an engine that only writes down what it is asked."""
+"""Failures of `compose/collect.sh`, with a stand-in for the engine that only records how it is called."""
 
 import os
 import shutil
@@ -129,7 +129,7 @@ def test_only_a_collection_that_began_leaves_an_output_directory(
     (tmp_path / "bad.yaml").write_text("nonsense: 1\n")
     output = tmp_path / "my data"
     variables = {"OUTPUT": str(output), "TOLD": str(tmp_path / "told"), "BEGUN": begun, "SIGNAL": signal}
-    # Of an .env file or a machine on which other datasets are made.
+    # A variable of this name may come from an .env file, or from other datasets on the machine.
     variables["DATASET"] = "mnist"
     environment = {**os.environ, **variables, "PATH": f"{tmp_path}:{os.environ['PATH']}"}
     done = subprocess.run(

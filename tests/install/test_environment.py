@@ -15,7 +15,7 @@ SCRIPT = ROOT / "packaging" / "environment.sh"
 
 @pytest.fixture
 def commands(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """The only directory with commands; each is a script that writes down what it was called with."""
+    """The only directory in the path; each command in it is a script that prints its arguments."""
     directory = tmp_path / "commands"
     directory.mkdir()
     (directory / "sh").symlink_to(shutil.which("sh") or "/bin/sh")
@@ -212,7 +212,7 @@ def test_make_runs_the_environment_script_first(target: str, tmp_path: Path) -> 
     said = subprocess.run(
         ["make", "-n", target, "PYTHON=python3.12"],
         cwd=tmp_path,
-        # Not as a part of the `make` that may run the tests.
+        # This `make` must not count as part of the one that may run the tests.
         env={name: value for name, value in os.environ.items() if not name.startswith("MAKE")},
         capture_output=True,
         text=True,
@@ -251,7 +251,7 @@ def test_an_environment_with_another_python_than_the_named_one_is_not_used(tmp_p
     refused = make_up("PYTHON=./other")
     assert (refused.returncode != 0, refused.stdout) == (True, "")
     assert refused.stderr.startswith(".venv has Python 3.11.2, not that of ./other: rm -r .venv, then make up")
-    # Nobody is told to take an environment away for a Python that would be refused afterwards.
+    # The advice to remove .venv would be wrong for a Python that would then be refused.
     for unfit in ("./old", "./nowhere"):
         refused = make_up(f"PYTHON={unfit}")
         assert (refused.returncode != 0, refused.stdout) == (True, "")

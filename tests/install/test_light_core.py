@@ -109,7 +109,7 @@ for line in sys.stdin:
 """
 
     def __init__(self, environment: Path, directory: Path) -> None:
-        # The directory of a program is where Python looks first, and this one has nothing else in it.
+        # Python looks first in the directory of a program, so this one has nothing else in it.
         program = directory / "throwcollect"
         program.write_text(self.PROGRAM)
         self._streams = [directory.with_name(f"{directory.name}-{name}") for name in ("stdout", "stderr")]

@@ -1,4 +1,4 @@
-"""What `make` does on machines that are not as ours are; what it installs and calls is replaced."""
+"""`make` on machines that differ from ours, with stand-ins for the programs that it installs and calls."""
 
 import os
 import shutil
@@ -32,7 +32,7 @@ def put(path: Path, lines: str) -> None:
 
 
 def make(directory: Path, target: str) -> subprocess.CompletedProcess[str]:
-    # Another make may run the tests.
+    # This `make` must not count as part of the one that may run the tests.
     variables = {name: value for name, value in os.environ.items() if not name.startswith(("MAKE", "MFLAGS"))}
     variables["PATH"] = "/usr/bin:/bin"
     return subprocess.run(

@@ -1,4 +1,4 @@
-"""What viewers draw may be changed while a simulation runs; what is simulated may not."""
+"""A running simulation accepts another appearance of the robot for viewers, but no other physics."""
 
 import xml.etree.ElementTree as ElementTree
 

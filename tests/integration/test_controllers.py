@@ -1,4 +1,4 @@
-"""Controllers as nodes of their own: their list, parameters, services and speed, and what can be set otherwise."""
+"""Controllers as nodes of their own: their list, parameters, services and speed, and their configurable behaviour."""
 
 import re
 from collections.abc import Iterator
@@ -73,7 +73,7 @@ def test_controllers_are_listed_as_the_controller_manager_does(robot: Robot) -> 
         assert each.claimed_interfaces == each.required_command_interfaces == positions
         assert each.required_state_interfaces == positions
         assert (each.is_async, each.is_chainable, each.is_chained) == (False, False, False)
-    # Clients stop a motion when the answer changes.
+    # Some clients stop a motion when this answer changes.
     assert robot.result(robot.ask("controller_manager_msgs/srv/ListControllers", service)).controller == listed
 
 
@@ -218,7 +218,7 @@ def test_a_refused_goal_is_one_line_in_the_log_of_its_controller(robot: Robot) -
 
 @pytest.fixture(scope="module")
 def other(endpoint: str, session: Context, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Robot]:
-    """A simulation with everything that can be set otherwise."""
+    """A simulation in which every configurable behaviour of controllers differs from its default."""
     options = ControllersConfig(names="ros1", hold="decelerate", topic_aborts_goal=True, refused_goals="abort")
     config = CONFIG.model_copy(update={"controllers": options})
     with running_simulation(tmp_path_factory.mktemp("other"), endpoint, session, "sim_1", config) as robot:

@@ -1,4 +1,4 @@
-"""A simulation on an engine that knows robot, ground and ball alone."""
+"""A simulation on an engine that knows only robot, ground and ball."""
 
 from collections.abc import Iterator
 

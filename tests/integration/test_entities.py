@@ -1,4 +1,4 @@
-"""Services about entities: which there are, where, how large, what is said about them."""
+"""Services about entities: their names, states, bounds and infos."""
 
 from typing import Any
 
@@ -220,7 +220,7 @@ def test_bounds_enclose_an_entity_in_its_own_frame(robot: Robot) -> None:
     assert (upper.x, upper.y, upper.z) == pytest.approx((0.025,) * 3, abs=1e-6)
     assert (lower.x, lower.y, lower.z) == pytest.approx((-0.025,) * 3, abs=1e-6)
     upper, lower = robot.call("get_entity_bounds", entity="talos").bounds.points
-    # Its base is a metre above the ground.
+    # The base of the robot is a metre above the ground.
     assert lower.z == pytest.approx(-1.02, abs=0.03)
     assert 0.6 < upper.z < 1.2
 

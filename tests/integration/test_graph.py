@@ -1,4 +1,4 @@
-"""What a simulation offers, as `ros2 node info` and late subscribers see it."""
+"""Topics, services and actions of a simulation, as `ros2 node info` and late subscribers see them."""
 
 import xml.etree.ElementTree as ET
 from pathlib import Path
@@ -70,7 +70,7 @@ def tokens(robot: Robot, *kinds: EntityKind) -> list[Token]:
 
 
 def visible(names_and_types: list[tuple[str, list[str]]]) -> dict[str, str]:
-    """Without what makes up actions, which ROS hides, and the descriptions of types that nodes of rclpy offer."""
+    """Leave out the hidden topics and services of actions, and the type descriptions that nodes of rclpy offer."""
     hidden = ("/_action/", "/get_type_description")
     return {name: kind for name, (kind,) in names_and_types if not any(part in name for part in hidden)}
 

@@ -1,4 +1,4 @@
-"""What a simulation says on /rosout: from where, and how often."""
+"""Log messages of a simulation on /rosout: their place in the sources, and how often they come."""
 
 import signal
 from pathlib import Path
@@ -22,7 +22,7 @@ def find_logged(heard: list[Any], words: str) -> list[Any]:
 
 
 def settle(robot: Robot) -> None:
-    """What was logged before an answer has been heard after a few more."""
+    """Wait for a few more answers: everything logged before the first one has then arrived."""
     for _ in range(5):
         robot.state()
 

@@ -80,7 +80,7 @@ class PlayMotion:
         }
 
     def play(self, motion: Motion) -> list[tuple[int, int, str]]:
-        """Results of the goals that the motion was divided into."""
+        """Play a motion; returns the results of the goals into which it was divided."""
         joints, points = motion
         first_s, first = next(iter(points.items()))
         now = self.joint_states()

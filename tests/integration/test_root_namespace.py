@@ -1,4 +1,4 @@
-"""A simulation in the root namespace, where nodes look that know the real Talos."""
+"""A simulation in the root namespace, where clients of the real Talos look for it."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -14,7 +14,7 @@ _NAMES = ("/clock", "/tf", "/tf_static", "/joint_states", "/robot_description", 
 
 @pytest.fixture(scope="module")
 def endpoint() -> Iterator[str]:
-    """A router of this module's own: the other simulations shall not meet this one."""
+    """A router of this module's own, so that this simulation does not meet the others."""
     with router("tcp/127.0.0.1:0") as endpoint:
         yield endpoint
 

@@ -149,7 +149,7 @@ def test_a_reset_of_states_goes_back_to_the_start_while_time_goes_on(robot: Robo
     assert robot.call("reset_simulation", scope=Reset.SCOPE_STATE).result.result == Result.RESULT_OK
     assert robot.now_ns() == later > 0
     assert robot.call("get_entity_state", entity="ball").state.pose == start.pose
-    # Nothing goes back to what was held before.
+    # The joints stay at the start posture and do not return to where they were held before.
     robot.step(100)
     assert robot.joint(ELBOW) == pytest.approx(POSTURE[ELBOW], abs=1e-3)
     assert robot.now_ns() == later + 100 * STEP_NS
@@ -164,9 +164,9 @@ def test_a_reset_of_states_aborts_goals(robot: Robot) -> None:
 
 
 def test_a_pause_in_the_middle_of_a_goal_does_not_change_the_motion(robot: Robot) -> None:
-    # Whether the first sample is heard, and how far an idle simulation goes on, are no part of the motion.
+    # The first sample and the samples after the motion are left out, as whether they are heard depends on chance.
     moments = set(range(2 * SAMPLE_NS, 600_000_001, SAMPLE_NS))
-    # A busy machine may drop messages of samples, and then nine tenths of them show the same.
+    # A busy machine may drop some messages, so nine tenths of the samples are enough.
     enough = len(moments) * 9 // 10
 
     def motion(*, pause: bool) -> dict[int, list[float]]:

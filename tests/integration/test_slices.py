@@ -64,7 +64,7 @@ for change in range(1, 1000):
 
 
 class Listener(runs.Onlooker):
-    """Keeps what it is told."""
+    """Keeps the messages that it gets."""
 
     def __init__(self) -> None:
         self.lines: list[str] = []
@@ -81,7 +81,7 @@ def config(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def whole(config: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The dataset as one collection makes it."""
+    """The dataset of a single collection, to compare with."""
     directory = tmp_path_factory.mktemp("whole") / "data"
     with runs.prepare(config, overrides=INPROCESS, output=directory) as run:
         run.collect()
@@ -142,7 +142,7 @@ def test_an_interrupted_slice_goes_on_with_its_recordings(frozen: Path, whole: P
 
 
 def test_a_repeated_attempt_takes_over_the_largest_stopped_one(frozen: Path, whole: Path) -> None:
-    """However often a task is queued again: its files do not become more, and what is recorded does not become less."""
+    """A task that is requeued again and again does not gather files, and does not lose recordings."""
     slice = Slice(0, 2)
     sizes = []
     for size in (50_000, 100_000, 150_000):
@@ -150,7 +150,7 @@ def test_a_repeated_attempt_takes_over_the_largest_stopped_one(frozen: Path, who
         assert find_attempts(frozen, slice) == [attempt]
         sizes.append(sum(path.stat().st_size for path in attempt.glob("*.mcap*")))
     assert sizes == sorted(sizes)
-    # Beside one that died with less.
+    # This attempt died with less, and lies beside the other one.
     dead = make_attempt(frozen, slice)
     (dead / "small_00000.mcap.part").write_bytes((attempt / "small_00000.mcap").read_bytes()[:1000])
     early = frozen / SLICES / "0-of-2.attempt-a"
@@ -205,7 +205,7 @@ def test_joining_can_be_repeated_after_a_kill_at_any_point(frozen: Path, whole: 
     killed = subprocess.run([sys.executable, "-c", KILLED_ANYWHERE, frozen, tmp_path / "killed"], check=False)
     assert killed.returncode == 0
     states = sorted((tmp_path / "killed").iterdir())
-    # It dies with all shards in their slices, with some of them moved, and when only slices are left to be removed.
+    # Joining is killed before, while and after it moves the shards out of their slices.
     assert {len(list(each.glob("*.mcap"))) for each in states} == set(range(7))
     assert any((each / METADATA).exists() and (each / SLICES).exists() for each in states)
     for each in states:
@@ -246,7 +246,7 @@ def test_overrides_that_would_change_the_dataset_are_refused(frozen: Path) -> No
 
 
 def test_slices_need_no_locks(config: Path, whole: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Some file systems of clusters have none; what one run collects needs them all the same."""
+    """Some file systems of clusters have no locks; slices work without them, but a run of one collection does not."""
 
     def refuse(descriptor: int, _: int) -> None:
         if str(tmp_path) in os.readlink(f"/proc/self/fd/{descriptor}"):

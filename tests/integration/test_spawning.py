@@ -1,4 +1,4 @@
-"""Putting entities into a simulation and taking them out again, and what that does to throws."""
+"""Spawning and deleting entities in a simulation, and their effect on throws."""
 
 import hashlib
 from pathlib import Path
@@ -263,7 +263,7 @@ def test_a_reset_of_time_and_state_moves_spawned_entities_back(robot: Robot) -> 
 def test_spawned_entities_change_their_trial_and_no_later_one(robot: Robot) -> None:
     alone = episode(robot)
     assert episode(robot) == alone
-    # In the way of the arm and of the ball.
+    # Both entities are in the way of the arm or of the ball.
     spawn_successfully(robot, "wall", resource_string=box("0.1 3.0 4.0", mass=0), initial_pose=pose(0.9, 0.0, 0.0))
     spawn_successfully(robot, "crate", initial_pose=pose(0.5, -0.4, 1.6))
     among = episode(robot, Reset.SCOPE_TIME | Reset.SCOPE_STATE)

@@ -112,13 +112,13 @@ def test_the_step_action_gives_feedback_on_each_step_and_ends_paused(robot: Robo
     def take(message: Any) -> None:
         told.append((int(message.feedback.completed_steps), int(message.feedback.remaining_steps)))
 
-    # The simulation hears of the subscription before it hears of the goal.
+    # A goal of zero steps comes first, so that the simulation knows of the subscription before the real goal.
     end(robot, begin(robot, action, 0, feedback_callback=take))
     robot.state()
     handle = begin(robot, action, 60, feedback_callback=take)
     assert end(robot, handle) == (SUCCEEDED, Result.RESULT_OK, "")
     robot.wait_until(lambda: bool(told) and told[-1] == (60, 0), "the last feedback")
-    # A client keeps the last ten that it had no time to look at.
+    # The queue of a client keeps only the last ten messages.
     assert len(told) >= 10
     assert told == [(step, 60 - step) for step, _ in sorted(told)]
     assert robot.now_ns() == 60 * STEP_NS

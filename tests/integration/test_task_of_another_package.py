@@ -1,4 +1,4 @@
-"""A task that only moves, in a package of its own (`tests/plugins/reach`), goes all the way that a throw goes."""
+"""A task without a throw, in a package of its own (`tests/plugins/reach`), works from plan to report."""
 
 import json
 import shutil
@@ -61,7 +61,7 @@ def process() -> Iterator[ProcessPoolExecutor]:
 
 @pytest.fixture(scope="module")
 def throwcollect(process: ProcessPoolExecutor) -> Command:
-    """A command that has to succeed, where the package of the task is installed; returns what it prints."""
+    """A function that calls throwcollect with the task installed; the command must succeed; returns its output."""
 
     def run(*arguments: str | Path) -> str:
         done = process.submit(call_here, *arguments).result()
@@ -73,7 +73,7 @@ def throwcollect(process: ProcessPoolExecutor) -> Command:
 
 @pytest.fixture
 def refusal(process: ProcessPoolExecutor) -> Command:
-    """A command that has to be refused; returns why it is."""
+    """A function that calls throwcollect with the task installed; the command must fail; returns its error."""
 
     def run(*arguments: str | Path) -> str:
         done = process.submit(call_here, *arguments).result()
@@ -93,7 +93,7 @@ def reached(throwcollect: Command, tmp_path_factory: pytest.TempPathFactory) -> 
 
 @pytest.fixture(scope="module")
 def few(throwcollect: Command, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A configuration of few trials, and beside it what was collected of it, as long as the task had done its work."""
+    """A configuration of few trials, beside the dataset that was collected of it while the task still worked."""
     directory = tmp_path_factory.mktemp("few")
     (directory / "reach.yaml").write_text(FEW)
     throwcollect("up", directory / "reach.yaml", "--runtime", "inprocess", "--output", directory / "data")
@@ -102,7 +102,7 @@ def few(throwcollect: Command, tmp_path_factory: pytest.TempPathFactory) -> Path
 
 def test_until_counts_the_success_outcome_of_the_task(throwcollect: Command, reached: Path) -> None:
     info: dict[str, Any] = json.loads(throwcollect("dataset", "info", reached, "--json"))
-    assert info["trials"] == 128  # of 200: two rounds hold more than the 30 that were wanted
+    assert info["trials"] == 128  # of 200 possible ones: two rounds already had more than the 30 wanted successes
     assert info["outcomes"]["reached"] >= info["wanted"] == 30
     assert set(info["outcomes"]) == {"reached", "missed"}
     assert (info["success"], info["noun"], info["landing"]) == ("reached", "trial", None)

@@ -45,7 +45,7 @@ def test_a_listener_gets_every_sample_in_order(topic: str, robot: Robot) -> None
     times = [time_of(message) for message in heard]
     assert times == sorted(set(times))
     if topic == "clock":
-        # Besides, it tells where a slice of the steps has ended.
+        # The clock also shows where slices of the steps end, between samples.
         times = [time for time in times if time % SAMPLE_NS == 0]
     assert times == list(range(times[0], 50 * STEP_NS + 1, SAMPLE_NS))
     assert times[0] in (0, SAMPLE_NS)
@@ -64,7 +64,7 @@ def test_samples_in_real_time_are_sent_at_their_time(robot: Robot) -> None:
     assert robot.outcome(robot.send(swing(1.0)))[1] == 0
     robot.node.destroy_subscription(subscription)
     gaps = [later - before for before, later in pairwise(left)]
-    # Most of them were less than 0.1 ms where the samples of a slice of 50 ms left together.
+    # If all samples of a slice of 50 ms were sent together, most gaps would be below 0.1 ms.
     assert statistics.median(gaps) == pytest.approx(SAMPLE_NS, rel=0.5)
 
 

@@ -158,7 +158,7 @@ def test_an_arm_too_weak_to_arrive_breaks_the_tolerance_of_the_goal(robot: Robot
     status, code, text = robot.outcome(robot.send(swing()))
     assert (status, code) == (ABORTED, FollowJointTrajectory.Result.GOAL_TOLERANCE_VIOLATED)
     assert code == -5
-    # 0.6 s are those of PAL's configuration; it is over in the first period after them.
+    # PAL's configuration allows 0.6 s; the goal ends in the first period after that.
     assert text.startswith("Aborted due to goal_time_tolerance exceeding by 0.602000 seconds: ")
     assert f"joint {ELBOW} has position error" in text
 

@@ -1,4 +1,4 @@
-"""Whatever the simulation records, in whatever settings, is nothing that `dataset verify` takes for a forgery."""
+"""`dataset verify` takes no episode of a simulation for a forgery, whatever its settings are."""
 
 from __future__ import annotations
 

@@ -70,7 +70,7 @@ def test_mixed_trials_in_any_order_equal_the_same_trials_in_a_new_world(trials, 
 
     rng = random.Random(6)
     one = thrower()
-    # Some several times in a row: then the start state comes from what was kept of the trial before.
+    # Some trials come several times in a row: they then start from the kept state of the trial before.
     order = [number for number in range(TRIALS) for _ in range(rng.choice([1, 1, 3]))]
     rng.shuffle(order)
     for number in [*order, *range(TRIALS)]:
@@ -78,7 +78,7 @@ def test_mixed_trials_in_any_order_equal_the_same_trials_in_a_new_world(trials, 
 
 
 def test_throws_of_the_same_ball_do_not_depend_on_their_order(trials, thrower):
-    """A world that stays the same keeps pairs of shapes that once came close, unless they are forgotten."""
+    """A world with the same bodies would keep pairs of shapes that once came close, if a reset did not forget them."""
     bouncy = {"ball": {"restitution": 0.8}, "scene": {"landing_height_m": 1.0}, "sim": {"max_trial_s": 3}}
     throws = [
         (Config.model_validate({**bouncy, "task": {"start": config.task.start}}), motion) for config, motion in trials

@@ -69,7 +69,7 @@ def has(name: str) -> bool:
 
 
 def missing() -> Iterator[str]:
-    """Names that there are not: of what is missing as a whole the whole alone."""
+    """Names of rclpy that the embedded backend lacks; of a missing class only the class, not its members."""
     gone: set[str] = set()
     for line in API.read_text(encoding="utf-8").splitlines():
         if line.startswith("#"):

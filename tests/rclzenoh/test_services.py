@@ -100,7 +100,7 @@ def test_an_error_in_a_callback_ends_spinning_and_the_request(rig, pair):
     )
     with pytest.raises(LookupError, match="callback failed") as caught:
         rig.rest(5)
-    # Even while the traceback keeps everything alive.
+    # The query ends even while the traceback keeps its objects alive.
     assert rig.spin(lambda: replies == [None])
     assert caught.value.args == ("callback failed",)
 
@@ -111,7 +111,7 @@ def test_a_request_that_arrives_while_the_service_is_destroyed_gets_no_response(
     assert client.wait_for_service(5)
 
     def destroy_meanwhile(payload, kind):
-        # As another thread may, while the one that spins has just taken the request.
+        # Another thread may destroy the service just after the spinning thread has taken a request.
         server.destroy_service(service)
         return deserialize(payload, kind)
 

@@ -1,4 +1,4 @@
-"""Where the environment says that the router of a run is."""
+"""The router and the protection that the environment configures for a session."""
 
 import pytest
 
@@ -97,7 +97,7 @@ def test_a_malformed_endpoint_is_refused():
 
 @pytest.mark.parametrize("defaults", ["{}", '{mode: "peer", listen: {endpoints: ["tcp/localhost:0"]}}'])
 def test_a_client_of_a_router_with_a_key_is_protected(monkeypatch, key, tmp_path, defaults):
-    """Also where the override is applied to a configuration like the one that rmw_zenoh_cpp has by default."""
+    """This holds also for a configuration file with the defaults of rmw_zenoh_cpp, to which the override is applied."""
     (tmp_path / "session.json5").write_text(defaults)
     monkeypatch.setenv(CONFIG_FILE_VARIABLE, str(tmp_path / "session.json5"))
     monkeypatch.setenv(OVERRIDE_VARIABLE, client_override(ENDPOINT, key))

@@ -115,7 +115,7 @@ def test_garbage_on_a_topic_is_logged_once_and_does_not_stop_the_node(rig, capsy
         session.put(key, body, attachment=attachment)
         session.put(key, good, attachment=body)
     session.put(key, good)
-    # From the same session, so that it cannot overtake the garbage.
+    # The last message comes from the same session, so it cannot overtake the garbage.
     last = serialize(JointState(position=[2.0]))
     assert rig.spin(
         lambda: session.put(key, last, attachment=attachment) or (heard and heard[-1].position.tolist() == [2.0])
@@ -125,7 +125,7 @@ def test_garbage_on_a_topic_is_logged_once_and_does_not_stop_the_node(rig, capsy
 
 def test_all_messages_arrive_whole_before_a_session_closes(rig):
     with socket.create_server(("127.0.0.1", 0)) as probe:
-        # Sockets that hold so little are full until the end, as the subscriber below is slow.
+        # With such small buffers and the slow subscriber below, the sockets are full until the end.
         endpoint = f"tcp/127.0.0.1:{probe.getsockname()[1]}#so_sndbuf=16384;so_rcvbuf=16384"
     heard = []
 

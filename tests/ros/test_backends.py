@@ -11,7 +11,7 @@ from throwcollect.ros.middleware import EMBEDDED_RMW, RMW_VARIABLE
 
 ROOT = Path(__file__).parents[2]
 
-# Genuine and embedded nodes meet over Zenoh alone; with another RMW, there are no such cases.
+# Genuine and embedded nodes meet only over Zenoh, so another RMW has no mixed cases.
 MIXED = [("rclpy", "embedded"), ("embedded", "rclpy")] if os.environ.get(RMW_VARIABLE) == EMBEDDED_RMW else []
 
 # On Fast DDS those that tell most: the acceptance cases of the controllers, and trials. Others lean on an order of

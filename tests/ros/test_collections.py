@@ -1,4 +1,4 @@
-"""Collections on genuine rclpy: what comes of them, and who sees them."""
+"""Collections on genuine rclpy: their datasets, and which nodes see them."""
 
 from __future__ import annotations
 
@@ -155,7 +155,7 @@ def test_a_killed_simulation_gives_up_its_trial_even_if_the_router_dies_too(
 def test_a_coordinator_that_sees_no_simulation_ends_the_run_with_an_error(
     records: Records, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """As behind a firewall: every simulation lives in another domain than the rest of its run.
+    """Every simulation lives in another domain than the rest of its run, as if it were behind a firewall.
 
     On the embedded backend: to a discovery server of Fast DDS, domains make no difference.
     """
@@ -206,7 +206,7 @@ def test_only_a_shell_that_evaluates_ros_env_sees_the_run(going_on: Running, mon
         check=False,
     )
     assert said.returncode == 0, said.stderr
-    # RMWs print there, too, and Zenoh does when it is closed.
+    # The RMW prints to standard output as well, so only one line is looked for.
     assert "32" in said.stdout.splitlines()
     named = call("ros", "node", "list", "--run", going_on.directory).stdout.splitlines()
     assert {"/coordinator", "/sim_0/sim_0", "/sim_0/arm_right_controller"} <= set(named)
@@ -226,5 +226,5 @@ def python(program: str, environment: dict[str, str]) -> str:
         [sys.executable, "-c", program], env=environment, capture_output=True, text=True, timeout=60, check=False
     )
     assert found.returncode == 0, found.stderr
-    # Fast DDS prints what it cannot do, too.
+    # Fast DDS prints warnings to standard output, so only the last line counts.
     return found.stdout.splitlines()[-1]

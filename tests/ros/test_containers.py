@@ -53,7 +53,7 @@ def test_a_container_with_a_stuck_loop_is_unhealthy(engine: docker.DockerClient,
     assert nodes.keys() == {"router", "sim_0", "coordinator"}
     for node in nodes.values():
         assert look_at(node) == 0, node.name
-    # Its process is stopped, and not the container, so that the launcher takes it for well.
+    # Only the process is suspended, not the container, so that the launcher does not replace the node.
     (stuck,) = psutil.Process(nodes["sim_0"].attrs["State"]["Pid"]).children()
     stuck.suspend()
     try:

@@ -72,7 +72,7 @@ print("all of it works")
 
 @pytest.mark.parametrize("order", list(itertools.permutations(IMPORTS, 2)), ids="-".join)
 def test_all_native_libraries_work_in_one_process(order):
-    # The rest in its own order: what matters is which two are first.
+    # The other imports keep their order: only the first two matter.
     names = [*order, *(name for name in IMPORTS if name not in order)]
     program = "\n".join([*(IMPORTS[name] for name in names), WORK])
     found = subprocess.run(

@@ -35,7 +35,7 @@ def ros2(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Ros2]:
             assert found.returncode == 0, found.stdout + found.stderr
             return found.stdout + found.stderr
 
-        # It waits for the service, and so for the simulation.
+        # This command waits for the service, and so for the simulation.
         state = "simulation_interfaces/srv/GetSimulationState"
         assert "SimulationState(state=1)" in call("service", "call", "/sim_0/get_simulation_state", state)
         yield call

@@ -1,4 +1,4 @@
-"""What programs are told that call a function with a wrong argument."""
+"""Errors for programs that call a function with a wrong argument."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The shop window: what `throwcollect.__all__` lists, what the documents describe, and what importing it costs."""
+"""The public names of throwcollect: their list, their documentation, and the cost of importing them."""
 
 import ast
 import inspect
@@ -39,7 +39,7 @@ def test_functions_have_the_parameters_that_are_described() -> None:
     assert described == {name: list(inspect.signature(getattr(throwcollect, name)).parameters) for name in described}
     described = read_signatures("runs.md")
     assert described["runs.prepare"] == list(inspect.signature(prepare).parameters)
-    # The last one is for the launcher.
+    # The last parameter is for the launcher, and not documented.
     assert described["runs.resume"] == list(inspect.signature(resume).parameters)[:-1]
 
 

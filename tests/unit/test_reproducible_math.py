@@ -37,7 +37,7 @@ def show(name: str, *arrays: object) -> str:
 
 
 def compute() -> Iterator[str]:
-    """Hashes of everything that is computed with numbers before a simulation gets it."""
+    """Hashes of all arrays that are computed before a simulation gets them."""
     for path in sorted((ROOT / "configs").glob("*.yaml")):
         plan = make_plan(load(path), directory=path.parent)
         yield show(path.name, *([*trial.values.values()] for trial in plan.trials[:100]))
@@ -108,6 +108,6 @@ def test_solve_solves_symmetric_positive_definite_systems() -> None:
 
 
 def test_add_up_gives_the_same_sum_on_every_python() -> None:
-    # `sum` gives 1.0 from Python 3.12 on.
+    # `sum` returns 1.0 from Python 3.12 on.
     assert add_up([0.1] * 10) == 0.9999999999999999
     assert add_up(iter(())) == 0.0

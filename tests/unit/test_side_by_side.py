@@ -81,7 +81,7 @@ def test_two_threads_leave_the_processes_of_each_other_alone() -> None:
         return list(work_side_by_side(range(4), begin_nap, (SlowlySent(duration_s),), processes=2, doing="naps"))
 
     with ThreadPoolExecutor(2) as threads:
-        # The one that ends first must not end the other.
+        # The thread that ends first must not end the processes of the other one.
         assert list(threads.map(nap, [0.0, 1.0])) == [[0, 1, 2, 3]] * 2
     assert dict(os.environ) == before
 
@@ -138,7 +138,7 @@ def test_processes_import_no_module_from_the_working_directory(tmp_path: Path) -
         "print(*work_side_by_side(range(4), operator.methodcaller, ('bit_length',), processes=2, doing='counts'))\n"
     )
     words = [sys.executable, "-P", "-c", program]
-    # Python hands this switch on to processes of its own, but a command of ours is started without it.
+    # Python hands -P on to its child processes, but a command of throwcollect starts without it.
     for switch in (words, [sys.executable, "-c", f"import sys; del sys.path[0]\n{program}"]):
         done = subprocess.run(switch, cwd=tmp_path, capture_output=True, text=True, timeout=60, check=False)
         assert (done.stdout, done.stderr) == ("0 1 2 2\n", "")
@@ -160,7 +160,7 @@ def find_tests() -> dict[str, str]:
 @pytest.mark.parametrize("fork", [False, True])
 @pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGKILL])
 def test_all_processes_end_with_their_caller(how: signal.Signals, fork: bool) -> None:
-    # A group of its own, as Ctrl-C reaches all processes of a terminal.
+    # The processes have a group of their own, as Ctrl-C reaches all processes of a terminal.
     with subprocess.Popen(
         [sys.executable, "-c", ASLEEP.format(fork=fork)],
         stdout=subprocess.PIPE,
@@ -182,5 +182,5 @@ def test_all_processes_end_with_their_caller(how: signal.Signals, fork: bool) ->
             assert time.monotonic() < started + 60
             time.sleep(0.02)
         told = asking.stderr.read() if how == signal.SIGINT else ""
-    # No other process has something to say.
+    # Only the caller prints a traceback, and no other process does.
     assert told.count("Traceback") == (how == signal.SIGINT)

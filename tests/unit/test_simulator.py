@@ -1,4 +1,4 @@
-"""Single throws in this process."""
+"""Single throws by `Simulator`, in this process or in several."""
 
 import re
 import subprocess
@@ -100,7 +100,7 @@ def test_several_processes_give_the_same_throws_without_the_file(tmp_path: Path)
     together = [next(throws) for _ in points]
     assert [throw.row for throw in together] == alone
     assert together[0].ball.position.shape == (alone[0]["samples"], 3)
-    # They come before the error, as those of this process do.
+    # The throws come before the error, as they do in one process.
     with pytest.raises(PlanError, match=r"^points\[3\]: .*" + TOO_FAST):
         next(throws)
     simulator.close()

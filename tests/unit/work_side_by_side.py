@@ -30,7 +30,7 @@ def begin_death() -> Callable[[int], None]:
 
 
 class SlowlySent(float):
-    """Takes so long to be sent to a process that several threads start theirs at the same time."""
+    """A value that is so slow to be sent to a process that several threads start theirs at the same time."""
 
     def __reduce__(self) -> tuple[type[float], tuple[float]]:
         time.sleep(0.2)

@@ -1,4 +1,4 @@
-"""Files that scripts have written are those that they would write now."""
+"""Generated files in the repository match the output of their scripts."""
 
 import importlib.util
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Who is let in, and who is not: one test for each way of trying."""
+"""Access to the server by tokens, codes, origins and names of hosts: one test for each way in."""
 
 import logging
 from collections.abc import Iterator
@@ -62,7 +62,7 @@ def test_the_policy_lets_the_page_connect_only_to_this_server(served: Served) ->
         return next(rule for rule in policy.split("; ") if rule.startswith("connect-src"))
 
     assert connections() == f"connect-src 'self' ws://{HOST} wss://{HOST}"
-    # What a stranger names is not repeated.
+    # The policy does not repeat an unknown name of a host.
     assert connections(Host="evil.example; script-src *") == "connect-src 'self'"
 
 
@@ -218,7 +218,7 @@ def test_the_log_line_of_a_request_has_no_query_and_no_token(served: Served, cap
     served.client(read_only).post("/api/v1/codes")
     served.client("").get(STATE)
     with served.socket(f"{STATE}?token={read_only}"):
-        # It is written when the socket is opened, as it may be open for days.
+        # The line is written when a socket opens, as it may stay open for days.
         assert caplog.messages[-1] == "SOCKET /api/v1/state 101 read-only"
     with pytest.raises(WebSocketDenialResponse), served.socket(f"{STATE}?token=guessed"):
         pass

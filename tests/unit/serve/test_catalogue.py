@@ -1,4 +1,4 @@
-"""Catalogues, and what their messages say."""
+"""Catalogues, and messages about mistakes in them."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""What clients get of a dataset, and what they do not."""
+"""Routes by which clients get files, archive and landings of a dataset."""
 
 from __future__ import annotations
 
@@ -101,13 +101,13 @@ def test_too_many_landings_are_thinned_out(
 
 
 def test_landings_of_a_growing_dataset_come_in_parts(client: TestClient, directory: Path, remember: Remember) -> None:
-    """Those of a dataset that grows are the same as those of the finished one, in parts and in order of arrival."""
+    """A growing dataset gives the same landings as the finished one, but in parts and in order of arrival."""
     finished = client.get(f"{URL}/a/landings").json()["landings"]
     remember("growing", directory=str(directory))
     journal = directory / "logs" / "journal.jsonl"
     lines = journal.read_bytes().splitlines(keepends=True)
     commits = [number for number, line in enumerate(lines) if b'"commit"' in line]
-    # The last of the first two lines is being written.
+    # The journal ends within the second commit, as if it was just being written.
     journal.write_bytes(b"".join(lines[: commits[1]]) + lines[commits[1]][:-20])
     first = client.get(f"{URL}/growing/landings").json()
     assert (len(first["landings"]), first["is_finished"], first["has_more"]) == (1, False, False)
@@ -160,7 +160,7 @@ def test_files_of_an_unfinished_dataset_are_refused(client: TestClient, director
 def test_files_of_a_dataset_that_another_run_continues_are_refused(
     client: TestClient, directory: Path, remember: Remember
 ) -> None:
-    """Another run collects into the directory of one that has ended."""
+    """A second run collects into the directory of an ended one."""
     assert client.get(f"{URL}/a/files").status_code == 200
     remember("again", directory=str(directory))
     assert client.get(f"{URL}/a/files").status_code == 409

@@ -1,4 +1,4 @@
-"""How programs find the server that lives, and no other."""
+"""Programs find a living server by its file, and ignore files of dead ones."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def test_a_server_is_found_as_long_as_it_serves(state: Path) -> None:
 
 
 def test_the_file_of_a_killed_server_is_ignored(state: Path) -> None:
-    """Somebody else may have its port by now, or its pid."""
+    """Another process may have the port or the pid of the killed server by now."""
     with answering() as address:
         text = json.dumps(vars(address))
         code = (
@@ -102,7 +102,7 @@ def test_the_second_of_two_servers_is_found_when_the_first_has_ended(state: Path
             with publish(second):
                 assert find_server() == first
             assert find_server() == first
-            # It has left before its turn came, so it is not found afterwards.
+            # The second server has ended before the first one, so it is not found afterwards.
         waiting = replace(second, pid=2)
         with publish(waiting):
             for _ in range(200):

@@ -1,4 +1,4 @@
-"""What clients may say to the routes of instances, in which form, and what they are answered."""
+"""Requests to the routes of instances: their form, and the answers to malformed ones."""
 
 from __future__ import annotations
 

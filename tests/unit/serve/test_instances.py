@@ -1,4 +1,4 @@
-"""What clients may ask of instances, without any process."""
+"""Requests about instances, without any process of a run."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def test_an_id_with_an_existing_dataset_is_refused(
 def test_a_component_never_has_more_than_max_instances(client: TestClient, remember: Remember) -> None:
     remember("old", **make_end_fields(origin=Origin("throws")))
     assert [put(client, name).status_code for name in ("a", "b", "c")] == [202, 202, 409]
-    # Those of another component, and runs that commands have begun, do not count.
+    # Instances of another component and runs of commands do not count.
     remember("by-hand")
     assert client.put(f"{URL}/d", json={"component": "talos"}).status_code == 202
     assert client.put(f"{URL}/e", json={"component": "talos"}).json()["hint"] == "stop one of d"
@@ -106,7 +106,7 @@ def test_a_complete_collection_is_not_resumed(
     assert (said.status_code, said.json()["title"]) == (409, "the dataset of run old is complete")
     assert said.headers["content-type"] == "application/problem+json"
     assert begun == []
-    # A dataset that has lost a file is no complete one.
+    # A dataset that lacks a file is not complete.
     next(directory.glob("*.mcap")).unlink()
     assert client.post("/api/v1/collections/old/resume").status_code == 202
 
@@ -268,7 +268,7 @@ def test_an_unreadable_record_is_an_error_with_a_hint(client: TestClient, state:
         assert answer.status_code == 409
         assert said in answer.json()["title"]
         assert answer.json()["hint"].startswith("throwcollect down --run")
-    # All else goes on.
+    # Other routes still work.
     assert client.get(URL).json() == []
     assert client.get("/api/v1/state").json()["instances"] == []
 
@@ -300,5 +300,5 @@ def test_the_state_shows_the_progress_of_planning(client: TestClient, remember: 
     remember("killed", lives=False, planning=Planning(7, 30000))
     found = {each["id"]: (each["status"], each["planning"]) for each in client.get(URL).json()}
     assert found == {"large": ("planning", {"checked": 1200, "trials": 30000}), "killed": ("died", None)}
-    # It counts as one that lives.
+    # A run that is planning counts as living.
     assert client.get("/api/v1/state").json()["instances"][0]["id"] == "large"

@@ -1,4 +1,4 @@
-"""Simulations that are slowed down to be watched, by several servers, some of which are killed."""
+"""Servers slow simulations down for watchers and restore their speed, even after one of the servers is killed."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ SIM = NodeState("sim_0", "running", 0, "7", "")
 
 
 class Simulation:
-    """A simulation that does not move, and how fast that is."""
+    """A stand-in for a simulation, which records the speeds that it is asked for."""
 
     def __init__(self) -> None:
         self.asked: list[tuple[str, float]] = []
@@ -65,7 +65,7 @@ def test_the_last_watcher_restores_the_speed(
     one, other = take(run, "sim_0"), take(run, "sim_0")
     one.let_go()
     assert simulation.asked == [SLOW, SLOW]
-    # Another server, which begins meanwhile, leaves alone what somebody watches.
+    # Another server that starts meanwhile does not restore the speed of a watched simulation.
     let_go_of_left()
     assert simulation.asked == [SLOW, SLOW]
     assert notes(state) == ["sim_0"]
@@ -87,7 +87,7 @@ def test_the_restored_speed_is_that_of_the_configuration(
 def test_the_next_server_restores_speeds_after_a_killed_one(
     remember: Remember, tmp_path: Path, state: Path, simulation: Simulation
 ) -> None:
-    # Its locks went with it.
+    # Closing the lock stands for the death of the server that held it.
     os.close(take(make(remember, tmp_path), "sim_0").lock)
     let_go_of_left()
     assert simulation.asked == [SLOW, FAST]
@@ -119,7 +119,7 @@ def test_the_speed_is_restored_even_if_slowing_down_failed(
         take(run, "sim_0")
     simulation.answers = simulation.agrees = True
     let_go_of_left()
-    # It may have heard it after all.
+    # The simulation may have slowed down although it did not answer.
     assert simulation.asked[-1] == FAST
     assert notes(state) == []
 

@@ -1,4 +1,4 @@
-"""Models as clients see them."""
+"""Routes by which clients list models and aim with them."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def test_a_model_shows_its_score_once_it_is_written(client: TestClient, models: 
 
 
 def test_a_read_only_client_can_aim_at_a_target(served: Served, models: Path) -> None:
-    # Whoever may only look may aim: it changes nothing.
+    # Aiming changes nothing, so a read-only client may do it.
     found = served.client(served.keys.read_only).get(f"{URL}/quick/aim", params={"at": [0.25, -0.5]}).json()
     assert found["reachable"]
     assert found["parameters"] == pytest.approx({"task.a": 0.25, "task.b": -0.5})

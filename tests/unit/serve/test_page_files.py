@@ -1,4 +1,4 @@
-"""The files of the page: nothing comes from elsewhere, nothing is missing, and libraries are as they were fetched."""
+"""The page names only its own files, none is missing, and its libraries are unchanged."""
 
 from __future__ import annotations
 

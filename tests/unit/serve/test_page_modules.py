@@ -1,4 +1,4 @@
-"""What modules of the page compute and show: messages of the server, replays, coarse meshes, landings, plots."""
+"""Modules of the page: messages of the server, replays, coarse meshes, landings and plots."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def test_the_javascript_tests_of_the_page_pass(tmp_path: Path, script: str) -> N
         struct.pack("<I", len(text)) + text + b"\0" * (-len(text) % 4) + struct.pack(f"<{len(numbers)}f", *numbers)
     )
     (tmp_path / "throw").write_bytes(message)
-    # Without what an installation by hand has node read first.
+    # NODE_OPTIONS may name a module that node would load first.
     environment = {
         **os.environ,
         "PAGE": str(PAGE),

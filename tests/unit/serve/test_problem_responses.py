@@ -1,4 +1,4 @@
-"""Errors as answers."""
+"""Errors become problem responses of the server."""
 
 import json
 

@@ -1,4 +1,4 @@
-"""Whom the sockets of rosbridge turn away, and with which words."""
+"""The sockets of rosbridge turn some clients away, with a code and a reason."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The process that serves, before it does."""
+"""The process of the server fails to start at an unusable address."""
 
 from __future__ import annotations
 

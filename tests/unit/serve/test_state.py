@@ -1,4 +1,4 @@
-"""What the state tells of the catalogue."""
+"""Components of the catalogue in the state of the server."""
 
 from pathlib import Path
 
@@ -32,6 +32,6 @@ def test_the_state_lists_the_possible_targets_of_a_collection(tmp_path: Path, sw
     catalogue.write_text("components: {throws: {config: small.yaml}, talos: {session: small.yaml}}\n")
     lookout = Lookout(Catalogue.read(catalogue))
     assert [each.targets for each in lookout.look().components] == [targets, []]
-    # Its file may get worse, and is then told of when an instance is started.
+    # The file may be damaged later; the error then comes when an instance is started.
     config.write_text("name: [")
     assert lookout.look().components[0].targets == []

@@ -1,4 +1,4 @@
-"""The newest throws, as the page takes them, and the thread that hears them."""
+"""The newest throws, as they are sent to the page, and the thread that listens for them."""
 
 from __future__ import annotations
 
@@ -102,7 +102,7 @@ def test_listeners_share_one_thread_until_the_last_leaves(remember: Remember, li
         async with heard.throws(), heard.throws():
             assert len(threads()) == 1
         assert heard.is_idle
-        # Who comes while the thread ends gets one of its own, and does not keep that one.
+        # A listener that comes while the thread ends gets a new thread.
         async with heard.throws():
             while (len(threads()), len(listeners)) != (1, 2):
                 await asyncio.sleep(0.01)

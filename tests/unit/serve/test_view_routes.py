@@ -1,4 +1,4 @@
-"""What viewers are told of the robot and the scene, and where its meshes come from."""
+"""Routes by which viewers get the scene, and the robot with its meshes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Who is told of what, and when."""
+"""Watchers get the state of the server and each change of it."""
 
 import asyncio
 import json
@@ -15,7 +15,7 @@ from throwcollect.serve.watching import StateWatch
 
 
 class World:
-    """What there is to be seen, and how often somebody has looked."""
+    """A stand-in for instances and records, which counts how often they are read."""
 
     def __init__(self) -> None:
         self.instances = 0
@@ -116,7 +116,7 @@ def test_watching_goes_on_after_records_were_unreadable() -> None:
 
 
 def test_an_older_state_is_never_returned_after_a_newer_one() -> None:
-    """Many ask at once; who has looked late must not be overtaken by who has looked early and takes long."""
+    """Of many concurrent requests, one that read early and takes long must not replace the result of a later one."""
 
     async def scenario(world: World, watch: StateWatch) -> None:
         async def ask() -> int:

@@ -1,4 +1,4 @@
-"""What goals hear of their progress, whenever the action server gets round to making their handles."""
+"""Goals get feedback on their whole course, even if the action server makes their handles late."""
 
 from types import SimpleNamespace
 from typing import Any
@@ -49,7 +49,7 @@ def action(simulation: Simulation, monkeypatch: pytest.MonkeyPatch) -> Controlle
 
 
 def advance(simulation: Simulation, action: ControllerAction) -> None:
-    """A slice of 50 ms, and what is told after it."""
+    """Advance by a slice of 50 ms, and send the feedback that follows."""
     assert action.watched
     simulation.advance(watched=True)
     for _, result in simulation.pop_results():

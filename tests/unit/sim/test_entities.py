@@ -38,7 +38,7 @@ def no_mesh(filename):
 
 @pytest.fixture(scope="module", params=["bullet", "mujoco"])
 def shared(request: pytest.FixtureRequest) -> Iterator[World]:
-    # A world keeps the engine that it began with.
+    # A world keeps the engine with which it was made.
     world = World(Config.model_validate({"sim": {"engine": request.param}}))
     yield world
     world.close()

@@ -1,4 +1,4 @@
-"""Which trial a simulation does next, whatever a coordinator asks for meanwhile."""
+"""The order in which a simulation does leased trials, while a coordinator changes the leases."""
 
 from collections.abc import Mapping
 from typing import Any

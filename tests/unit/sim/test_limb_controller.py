@@ -1,4 +1,4 @@
-"""Limbs of a simulation: how their controllers are set up, and what is told of them."""
+"""Limbs of a simulation: the configuration and the published state of their controllers."""
 
 import numpy as np
 import pytest

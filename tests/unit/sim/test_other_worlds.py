@@ -1,4 +1,4 @@
-"""Robots that differ from the one that somebody believes to have."""
+"""Robots that differ from their nominal model, in joint offsets, clock, motors, spoon or strength."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Slices of time that are as long in simulated as in real time, times a factor."""
+"""Time slices: simulated time goes on at real time times a factor."""
 
 import pytest
 
@@ -7,7 +7,7 @@ from throwcollect.sim.pace import Pace, long_slice_steps, slice_steps
 
 
 class Clock:
-    """Time that passes only when somebody sleeps or works."""
+    """A clock that goes on only when the code under test sleeps or a test works."""
 
     def __init__(self) -> None:
         self.now = 1000.0

@@ -1,4 +1,4 @@
-"""The simulation that is made before the node that takes it is forked off."""
+"""A process makes a simulation ahead, before the node that takes it is forked off."""
 
 from collections.abc import Iterator
 from unittest.mock import Mock

@@ -1,4 +1,4 @@
-"""What a simulation makes of a trial that it is asked for: episode, result and conditions."""
+"""The trial runner turns a leased trial into episode, result and conditions."""
 
 from collections.abc import Iterator
 

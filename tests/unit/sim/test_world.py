@@ -39,7 +39,7 @@ def same(first, second):
 
 @pytest.fixture(scope="module", params=["bullet", "mujoco"])
 def world(request):
-    # A world keeps the engine that it began with.
+    # A world keeps the engine with which it was made.
     made = World(config(sim={"engine": request.param}))
     yield made
     made.close()

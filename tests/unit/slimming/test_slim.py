@@ -1,4 +1,4 @@
-"""What the image's scripts take out of packages, and what they leave."""
+"""The scripts of the image remove unneeded files from packages and keep the others."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def test_a_stripped_library_is_shorter_and_still_loads(library: bytes, tmp_path:
     assert list_needed(shorter) == list_needed(library)
     path = tmp_path / "stripped.so"
     path.write_bytes(shorter)
-    # Its functions call Python's, so it is loaded into a Python of its own.
+    # The library calls functions of Python, so another Python process loads it.
     code = "import ctypes, sys; print(ctypes.PyDLL(sys.argv[1]).PyInit_pybullet is not None)"
     ended = subprocess.run([sys.executable, "-c", code, str(path)], capture_output=True, text=True, check=True)
     assert ended.stdout == "True\n"

@@ -1,4 +1,4 @@
-"""Rounds beside the file of a plan: it is as if they were in it, whatever becomes of who writes them."""
+"""The file of rounds beside a plan counts as part of it, even if its writer died."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def test_a_round_that_was_cut_off_is_left_out(path: Path) -> None:
     data = rounds.read_bytes()
     ends = [place for place, byte in enumerate(data, 1) if byte == ord("\n")]
     assert len(ends) == 2
-    # Around the end of a round every byte counts, and within it one in ten is enough.
+    # Every cut around the end of a round is tested, and every tenth one within it.
     near = {end + by for end in ends for by in (-2, -1, 0, 1)}
     for size in sorted({*range(0, len(data), 10), *near} & {*range(len(data) + 1)}):
         rounds.write_bytes(data[:size])

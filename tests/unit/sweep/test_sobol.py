@@ -13,7 +13,7 @@ def test_points_equal_those_of_scipy_bit_for_bit(dimensions, count, seed):
     randomness = np.random.default_rng(seed)
     # SciPy gives its sequences a generator of their own.
     points = draw_sobol(count, dimensions, randomness.spawn(1)[0])
-    # It warns of lengths that are no power of two; the first points stay the same.
+    # SciPy warns of lengths that are no power of two, so a longer sequence is cut.
     expected = qmc.Sobol(dimensions, seed=np.random.default_rng(seed)).random_base2(math.ceil(math.log2(count)))
     np.testing.assert_array_equal(points, expected[:count])
 

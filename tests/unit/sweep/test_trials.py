@@ -1,4 +1,4 @@
-"""Trials in columns are what they would be one by one."""
+"""Trials in columns behave as a list of single trials."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A configuration to begin with: complete, of what is installed, and nobody's work is lost."""
+"""A starter configuration is complete, names what is installed, and overwrites no file."""
 
 from __future__ import annotations
 

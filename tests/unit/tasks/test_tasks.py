@@ -1,4 +1,4 @@
-"""What holds for every task of the table, and for one of another package."""
+"""Properties of every task in the table, and of one of another package."""
 
 import sys
 from dataclasses import fields
@@ -25,7 +25,7 @@ of_every_task = pytest.mark.parametrize("section", SECTIONS, ids=lambda section:
 
 
 def fill(section: type[TaskConfig]) -> TaskConfig:
-    """The section as `throwcollect init` fills it, as a task need not have a motion by default."""
+    """Fill the section as `throwcollect init` does, since a task need not have a default motion."""
     if section is ReachConfig:
         return section()  # its package is not installed, so no configuration can name it
     start, end, duration_s = find_first_motion(Config().robot.name, section.model_fields["name"].default)

@@ -1,4 +1,4 @@
-"""A throw drawn: as long as it was, with robot, ball and path in the picture, and a sentence where there is none."""
+"""An animation of a throw lasts as long as the throw, and shows robot, ball and path."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def written(collected: Path, tmp_path_factory: pytest.TempPathFactory) -> Animat
 
 @pytest.fixture(scope="module")
 def fast(collected: Path, tmp_path_factory: pytest.TempPathFactory) -> Animation:
-    """Fewer pictures than the whole throw has are drawn in less time."""
+    """A faster animation of the same throw, which has fewer pictures to draw."""
     return render(collected, tmp_path_factory.mktemp("fast") / "throw.GIF", trial=4, slow=0.4)
 
 

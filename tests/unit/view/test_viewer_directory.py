@@ -1,4 +1,4 @@
-"""What viewers are given: each throw as it was recorded, and around it what no viewer could know."""
+"""The directory for viewers: each throw as it was recorded, and the scene and facts around it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Actions whose goals a client sends, and those that it offers."""
+"""Goals that a client sends to actions, and actions that it offers."""
 
 from __future__ import annotations
 
@@ -105,9 +105,9 @@ def test_a_goal_fails_when_its_action_disappears(party: Party, arm: Arm) -> None
 
 @pytest.fixture
 def offer(party: Party, node: Node) -> Callable[[], Any]:
-    """What has a node send a goal to the action that the client offers; gives what came of it."""
+    """A function that lets a node send a goal to the action of the client, and returns the sent goal."""
     client = ActionClient(node, FJT, "/swing")
-    # The party of an earlier test may still be leaving, and a goal to its action is lost.
+    # The client of an earlier test may still be leaving, and a goal to its action would be lost.
     wait_for(lambda: not client.server_is_ready(), "the action of an earlier test is seen no more")
     party.ask(op="advertise_action", action="swing", type=KIND)
     assert client.wait_for_server(5)
@@ -178,7 +178,7 @@ def test_goals_are_aborted_when_the_action_is_withdrawn_and_when_the_client_leav
     sent = offer()
     party.ask(op="unadvertise_action", action="swing")
     assert sent.end == (ABORTED, "")
-    # On DDS, services that somebody would call are among the names, too.
+    # On DDS, the names also include services that have only clients.
     wait_for(lambda: "/swing" not in party.call("rosapi/action_servers")["action_servers"])
 
 

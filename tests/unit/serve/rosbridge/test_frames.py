@@ -1,4 +1,4 @@
-"""What frames say, whichever way they say it, and frames that say nothing."""
+"""Frames of rosbridge in each of their formats, and malformed frames."""
 
 from __future__ import annotations
 

@@ -107,7 +107,7 @@ NEEDED = {
 
 
 def hear(party: Party, op: str) -> Any:
-    """What ROS# makes of the next frame with an operation."""
+    """The next frame with this operation, as ROS# reads it."""
     fields = party.next(op=op)
     assert NEEDED[op] <= set(fields)
     assert all(isinstance(frame, str) and frame.isascii() for frame in party.frames)
@@ -136,7 +136,7 @@ def test_nodes_hear_messages_that_ros_sharp_publishes(party: Party, node: Node) 
     ):
         party.client.receive(advertise)
         wait_for(lambda topic=topic: node.count_publishers(topic))  # type: ignore[misc]
-        # What is said before a subscription has found the publisher is heard by nobody.
+        # A message is lost if the subscription has not found the publisher yet, so it is sent again.
         wait_for(lambda: party.client.receive(publish) or heard)  # noqa: B023
     assert words[0].data == "grüße ° 度"
     assert scans[0].ranges.tolist() == [1.5, pytest.approx(0.1), pytest.approx(3e-8)]
@@ -219,7 +219,7 @@ def test_ros_sharp_imports_the_description_of_a_robot(party: Party, node: Node) 
     assert json.loads(hear(party, "service_response")["values"]["value"]) == "file_server2"
     party.client.receive(GET_DESCRIPTION.replace(b"sim_0/sim_0", b"other"))
     value = hear(party, "service_response")["values"]["value"]
-    # Of JSON it knows quotation marks and ends of lines.
+    # ROS# decodes only quotation marks and ends of lines of JSON.
     assert value[1:-1].replace('\\"', '"').replace("\\n", "\n") == urdf
     party.client.receive(HAS)
     assert hear(party, "service_response")["values"] == {"exists": False}

@@ -1,4 +1,4 @@
-"""What clients are told of the ROS graph."""
+"""The services of rosapi, by which clients look at the ROS graph."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ SetBool: Any = get_service("std_srvs/srv/SetBool")
 
 @pytest.fixture
 def graph(node: Node, party: Party) -> Node:
-    """A node that has one of everything, with what nobody is to be told of."""
+    """A node that has one of everything, and topics that rosapi must hide."""
     node.create_publisher(JointState, "/states", 10)
     for hidden in ("/_hidden", "/sim_0/episode", "/part/_of/it"):
         node.create_publisher(String, hidden, 10)
@@ -127,7 +127,7 @@ def test_parameters_are_listed_read_and_set(party: Party, graph: Node) -> None:
     assert party.call("/rosapi/get_param", name="/other:none", default_value="7") == {"value": "7"}
     assert party.call("/rosapi/get_param", name="/gone:none", default_value="[1]") == {"value": "[1]"}
     assert party.call("/rosapi/get_param", name="/gone:none", default_value="no JSON") == {"value": '"no JSON"'}
-    # JavaScript knows no other one.
+    # JavaScript has only one kind of number, so a whole one must be accepted for a double.
     assert party.call("/rosapi/set_param", name="/other:mass", value="1")["successful"]
     assert graph.get_parameter("mass").value == 1.0
     assert party.call("/rosapi/set_param", name="/other:names", value='["b", "c"]')["successful"]

@@ -29,7 +29,7 @@ LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
 def words(node: Node, topic: str = "/words") -> Callable[..., None]:
-    """What publishes texts once somebody listens."""
+    """A function that publishes a text once somebody listens."""
     publisher = node.create_publisher(String, topic, 10)
 
     def say(*texts: str) -> None:
@@ -71,7 +71,7 @@ def test_a_topic_that_is_published_later_is_heard_from_its_first_message(
     publisher = node.create_publisher(String, "/soon", 10)
     wait_for_listener(publisher)
     publisher.publish(String(data="first"))
-    # Before the bridge gets to what has come, it looks around: that it does once a second.
+    # The bridge looks at the graph once a second, so it does that before it handles the message.
     time.sleep(1.1)
     go_on.set()
     assert party.next(op="publish")["msg"]["data"] == "first"
@@ -134,7 +134,7 @@ def test_the_lowest_throttle_and_the_longest_queue_of_a_client_count(party: Part
     party.call("rosapi/get_time")
     time.sleep(0.01)
     say(*"defgh")
-    # What does not fit into the queue is left out, the oldest first.
+    # A full queue drops its oldest messages.
     party.next(msg={"data": "h"})
     assert data(party)[0] == "a"
     assert data(party)[-2:] == ["g", "h"]

@@ -77,7 +77,7 @@ def test_a_slow_client_loses_the_oldest_frames_and_does_not_block_others(url: st
     with connect(url, max_queue=1) as slow, connect(url) as quick:
         for each in (slow, quick):
             each.send(subscribe)
-            # What follows is answered when the bridge has taken in this subscription, and not that of the other alone.
+            # When the bridge answers this frame, it has taken in the subscription of this client.
             each.send(json.dumps({"op": "nothing"}))
             assert hear(each)["op"] == "status"
         wait_for_listener(publisher)
@@ -97,7 +97,7 @@ def test_a_slow_client_loses_the_oldest_frames_and_does_not_block_others(url: st
 
 
 def test_memory_for_a_client_that_never_reads_is_bounded(url: str, node: Node) -> None:
-    """Far more is published than may wait; this process is publisher, bridge and both clients."""
+    """This publishes far more than may wait; the process is publisher, bridge and both clients."""
     publisher = node.create_publisher(String, "/much", WHOLE)
     subscribe = json.dumps({"op": "subscribe", "topic": "/much", "type": "std_msgs/String"})
     process, text, memory = psutil.Process(), "x" * 2**20, []
@@ -117,7 +117,7 @@ def test_memory_for_a_client_that_never_reads_is_bounded(url: str, node: Node) -
             while not hear(quick)["msg"]["data"].startswith(f"{number} "):
                 pass
             memory.append(process.memory_info().rss)
-        # As much waits after 100 MiB as may.
+        # After 100 MiB, the queue of the stalled client is full.
         assert max(memory) - max(memory[:100]) < 2**25, [each >> 20 for each in memory[::25]]
 
 

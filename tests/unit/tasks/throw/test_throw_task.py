@@ -180,7 +180,7 @@ def test_ball_that_rolls_on_over_the_rim_of_a_spoon_that_brakes_is_thrown():
 
 
 def test_ball_that_is_thrown_downwards_is_thrown():
-    """It lost energy on the way down, which says nothing about whether the spoon threw it."""
+    """A ball that loses energy on the way down may still be thrown by the spoon."""
     start, end = dict(Config().task.start), dict(Config().task.end)
     config = Config(task={"start": {**start, **end}, "end": {joint: start[joint] for joint in end}})
     samples, header = episode(config)
