@@ -47,12 +47,12 @@ from throwcollect.robots.tool_motion import ToolMotion
 
 _MESSAGE_BYTES = 1 << 17
 _ANSWER_S = 60.0
-"""Importing takes two seconds, on a machine that does a lot else some more."""
+"""Most time for an answer of the server: importing takes two seconds, and longer on a busy machine."""
 _LOOK_S = 0.2
 _DECIDES_IMPORTS = ("PYTHON", "LD_", "THROWCOLLECT_ROS", "RMW_", "ROS_", "OPENBLAS_", "OMP_")
-"""Beginnings of the names of variables that only hold for a process if it has started with them."""
+"""Prefixes of variables that have an effect only if a process starts with them."""
 _READ_LATER = ("ROS_DOMAIN_ID",)
-"""Variables that begin so, but are read by each context."""
+"""Exceptions of these prefixes: each context reads these variables when it is made."""
 _IMPORTED = ("pinocchio", "pybullet", "pyarrow.parquet")
 _RUNS_WHEN_IMPORTED = "throwcollect.__main__"
 

@@ -16,7 +16,7 @@ VAGUE = {"utils", "util", "helpers", "common", "misc", "base", "core", "types", 
 LONGEST_MODULE = 400
 LONGEST_FUNCTION = 60
 LONGEST_TEST = 500
-"""Lines of a module of tests; those that were longer had several subjects."""
+"""Most lines of a module of tests; longer modules had several subjects."""
 
 
 def name(path: Path) -> str:
@@ -61,7 +61,7 @@ def test_the_rules_find_each_offence_of_a_module() -> None:
 
 
 KINDS_OF_MEMBERS = (SOURCE / "engines", SOURCE / "tasks", SOURCE / "tools")
-"""Folders whose folders are members of one kind; they may be built alike."""
+"""Folders whose folders are members of one kind; these may have modules of the same names."""
 
 
 def search_repeated(paths: list[Path]) -> set[str]:
@@ -133,7 +133,7 @@ def test_the_rule_about_names_of_test_files_compares_whole_paths() -> None:
 
 
 CLOCK_OF_ALL = re.compile(r"""setattr\((?:\w+\.)*time, ["']|setattr\(["']time\.""")
-"""Setting the clock of the whole process, which stops threads of other tests, instead of that of the tested module."""
+"""Tests must not set the clock of the whole process, which stops threads of other tests, but that of a module."""
 
 
 def test_no_test_sets_the_clock_of_the_whole_process() -> None:

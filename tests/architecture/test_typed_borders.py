@@ -11,7 +11,7 @@ from tests.architecture.parsing import parse
 SOURCE = Path(__file__).parents[2] / "src"
 LOOSE = {f"{kind}[str, {value}]" for kind in ("dict", "Mapping") for value in ("Any", "object")}
 DOCUMENTS = {"as_dict", "to_yaml", "bag_information", "Qos.profile", "ValueShape.node"}
-"""What becomes JSON or YAML at once, and the JSON schema of the configuration."""
+"""Functions whose result becomes JSON or YAML at once, so that it may be a dictionary of anything."""
 
 
 def room_of(module: str) -> str:

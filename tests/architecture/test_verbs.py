@@ -17,7 +17,7 @@ spoken stolen struck swept taken taught thought thrown told torn withdrawn won w
 """
 NO_PARTICIPLES = ("embed", "exceed", "feed", "need", "proceed", "seed", "succeed")
 OTHERS_CALL_IT = {"canceled", "padded", "measured"}
-"""Names of rclpy, of the published interface, and of what declares a field of a class."""
+"""Participles that are allowed: names of rclpy, of the published interface, and of functions that declare a field."""
 
 
 def is_participle(word: str) -> bool:

@@ -17,7 +17,7 @@ BUILD = Path(__file__).parents[2] / "build"
 UNAVAILABLE = BUILD / "cluster-unavailable"
 __all__ = ["client"]
 USER = "throwcollect-ci"
-"""Whose jobs are run: nobody who may do more than others."""
+"""The user of the jobs, who has no special rights."""
 SHARED = "throwcollect-shared-"
 """Names of directories that tests share with jobs begin so."""
 

@@ -21,7 +21,7 @@ from pathlib import Path
 CPUS_PER_NODE = 2
 MEMORY_PER_NODE_MB = 6000
 KILL_WAIT_S = 5
-"""Between SIGTERM and SIGKILL."""
+"""Time between SIGTERM and SIGKILL."""
 _START_TIMEOUT_S = 30.0
 _FIRST_PORT = 16817
 _PORTS_PER_CLUSTER = 10

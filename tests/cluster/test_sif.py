@@ -33,7 +33,7 @@ BASE = "throwcollect-base:bookworm"
 PAGE = (ROOT / "docs" / "containers.md").read_text(encoding="utf-8")
 COMMANDS = re.findall(r"^ *(apptainer .*?throwcollect\.sif up [^#\n]*)", PAGE, flags=re.MULTILINE)
 PLACES = ("/tmp", "/var/tmp", "/home", "/dev/shm", "/run", "/run/user", "/opt")
-"""Where whoever shares the machine could be disturbed."""
+"""Directories that all users of a machine share."""
 AUTOMATIC = CONFIG.replace("runtime: local, ", "")
 
 

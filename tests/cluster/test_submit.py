@@ -25,7 +25,7 @@ pytestmark = pytest.mark.cluster
 SLICED = CONFIG + "record: {{trials_per_shard: {per_shard}}}\n"
 TASKS = 3
 SLOW = "sim.real_time_factor=1"
-"""Tasks of few trials that last, and leave the processor to others; the samples stay the same."""
+"""Makes array tasks of few trials last long, without using the processor or changing the samples."""
 
 
 def call(slurm: Slurm, *arguments: str | Path, expect: int = 0, **environment: str) -> str:

@@ -14,7 +14,7 @@ from throwcollect.ros.middleware import Middleware, uses_rclpy
 ON_RCLPY = uses_rclpy()
 ON_DDS = Middleware.of_process().is_fast_dds
 PATIENCE_S = 30.0
-"""Genuine nodes find each other, and all that they have, within a second; the machine may be very busy."""
+"""Genuine nodes discover each other and their endpoints within a second, but the machine may be very busy."""
 
 SERVER = """
 from throwcollect import ros

@@ -25,7 +25,7 @@ CONFINED = {
     "security_opt": ["no-new-privileges"],
     "network_mode": "none",
 }
-"""What a container of a run is allowed, or less."""
+"""Privileges of the test container: at most those of a container of a run."""
 
 
 def run(client: DockerClient, *command: str, **options: Any) -> str:

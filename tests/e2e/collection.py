@@ -35,7 +35,7 @@ sweep:
     ball.mass_kg: {{min: 0.03, max: 0.06}}
 run: {{runtime: local, replay: 0}}
 """
-"""Its sampler draws without a library that takes each command a second to import."""
+"""The uniform sampler needs no library that would take each command a second to import."""
 
 
 def call(
@@ -65,7 +65,7 @@ def call_here(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
 
 
 FAST = "engine: ballistic"
-"""For tests of nodes and files: throws without contacts take a sixth of the time, and are data as any other."""
+"""For tests of nodes and files: throws without contacts take a sixth of the time, and give the same kinds of files."""
 
 
 INPROCESS = ("--runtime", "inprocess")

@@ -16,7 +16,7 @@ from tests.e2e.chromium import Tab
 from throwcollect.runs.records import Records
 
 CHANGED = "ERR_NETWORK_CHANGED"
-"""What a browser says of requests that it breaks off when containers come and go beside it."""
+"""The error of a browser for requests that it breaks off when networks of containers come and go."""
 
 
 @contextmanager

@@ -49,7 +49,7 @@ record:
 run: {replay: 0}
 """
 OF_DERIVED_ONLY = {"sources.parquet", "datapackage.json"}
-"""Where the throws come from, and the manifest, which covers that, too."""
+"""Files that differ in a derived dataset: the table of sources, and the manifest, which covers that table."""
 
 
 @pytest.fixture(scope="module")

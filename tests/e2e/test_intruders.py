@@ -34,14 +34,14 @@ pytestmark = [
 NOBODY = 65534
 TRIALS = 12
 UNTIL_STOPPED = ("--trials", "200", "--set", "sim.real_time_factor=1")
-"""Longer than these tests, whatever else the machine does; its first trials are those of any number."""
+"""Makes the collection outlast these tests; the first trials do not depend on the number of trials."""
 
 BECOME_NOBODY = f"""
 os.setgroups([])
 os.setresgid({NOBODY}, {NOBODY}, {NOBODY})
 os.setresuid({NOBODY}, {NOBODY}, {NOBODY})
 """
-"""Comes after all imports, as another user may not even be able to read the interpreter of this one."""
+"""This code runs after all imports, as the other user may not be able to read this interpreter."""
 
 ATTEMPT = f"""
 import json, os, sys, time, zenoh
@@ -67,7 +67,7 @@ for name, override in json.loads(sys.argv[1]).items():
     session.close()
     print(f"{{name}}: HAS A SESSION, heard {{len(heard)}} messages, was answered {{answers}} times")
 """
-"""Somebody who subscribes, publishes and asks wherever there is a session."""
+"""An intruder that subscribes, publishes and calls services wherever it gets a session."""
 
 POSE = f"""
 import os, sys
@@ -81,7 +81,7 @@ session._PATIENCE_S = 0.5
 {BECOME_NOBODY}
 main()
 """
-"""Somebody who starts a node."""
+"""An intruder that starts a node."""
 
 LOOK = f"""
 import os, pathlib, sys
@@ -92,7 +92,7 @@ for path in map(pathlib.Path, sys.argv[1:]):
     except PermissionError:
         print("refused")
 """
-"""Somebody who looks around."""
+"""An intruder that reads files and lists directories."""
 
 LIKELIEST = "with a key of its own and the router's certificate"
 

@@ -35,9 +35,9 @@ from throwcollect.run_key import RunKey
 pytestmark = pytest.mark.e2e
 TRIALS = 30
 SLOW = "sim.real_time_factor=1"
-"""Longer than all that happens to the run; the samples stay the same."""
+"""Makes the run outlast the interventions of a test, without changing the samples."""
 CUT_S = 15.0
-"""Longer than Zenoh waits for a word of the other side, so that all has to be found again."""
+"""Longer than Zenoh waits for the other side, so that nodes have to discover each other again."""
 DELAY_S = 0.05
 
 

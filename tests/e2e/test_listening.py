@@ -21,7 +21,7 @@ SIMULATIONS = ("sim_0", "sim_1")
 KINDS = {"/joint_states": "sensor_msgs/msg/JointState", "/ball/odometry": "nav_msgs/msg/Odometry"}
 WHOLE = QoSProfile(history=HistoryPolicy.KEEP_ALL)
 _STAMP = slice(4, 12)
-"""Where the header's stamp is in a message of either type."""
+"""Bytes of the header's stamp in a message of either type."""
 
 Messages = dict[str, list[bytes]]
 

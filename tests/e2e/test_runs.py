@@ -33,10 +33,10 @@ from throwcollect.runs.state_directory import STATE_VARIABLE
 pytestmark = pytest.mark.e2e
 TRIALS = 40
 SLOWLY = ("--set", "sim.real_time_factor=1")
-"""Long enough to look at it."""
+"""Makes a run last long enough for commands to look at it."""
 MANY = 100
 UNTIL_STOPPED = ("--trials", str(MANY), *SLOWLY)
-"""Longer than any test: more than a minute, however long the commands in between take to start."""
+"""Makes a run outlast any test, as it takes more than a minute."""
 
 
 @pytest.fixture(scope="module")

@@ -37,7 +37,7 @@ from throwcollect.serve.rosbridge.reassembly import LONGEST_FRAME
 pytestmark = pytest.mark.e2e
 TRIALS, MANY = 10, 24
 NO_AUTHORITIES = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
-"""Nothing is asked over TLS. Otherwise each request would read all authorities of the web, for 30 ms and more."""
+"""Requests do not use TLS; without this context, each of them would read all certificate authorities, for 30 ms."""
 SLOWLY = {"sim.real_time_factor": 1}
 CATALOGUE = """\
 components:

@@ -38,7 +38,7 @@ _TOOLTIPS = """<robot name="talos">
   <tooltip name="image" topic="/img/base_joint_speed"><parent link="wrist_1_link"/></tooltip>
 </robot>"""
 _MESHES = 25
-"""Files that the description of Talos with its spoon draws."""
+"""Number of mesh files in the description of Talos with its spoon."""
 
 
 @pytest.fixture

@@ -66,7 +66,7 @@ _FLOOR = """
     }
   })
 """
-"""The emulator knows rooms by another package; of a room, the page asks the floor alone."""
+"""A stand-in for the room, which the emulator lacks; the page looks only for the floor."""
 _PAGE = """
 (() => {
   const { view, room } = throwcollect;

@@ -16,7 +16,7 @@ pytestmark = pytest.mark.e2e
 PAGE = (Path(__file__).parents[2] / "docs" / "targets.md").read_text(encoding="utf-8")
 LANDED = 100
 TRIALS = 192
-"""The first round is too little for so many to land, the first two are enough; so there is a third one."""
+"""Trials of three rounds: so many landings take the first two, and the third begins before these have ended."""
 
 
 @pytest.fixture(scope="module")

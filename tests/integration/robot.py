@@ -37,7 +37,7 @@ from throwcollect.ros.middleware import VARIABLE, Middleware, uses_rclpy
 from throwcollect.run_key import Signer
 
 CONFIG = Config.model_validate({"name": "integration", "tool": {"cup_floor_radius_m": 0.006}})
-"""Almost the defaults: the smallest balls fall through this spoon."""
+"""Defaults, but for a spoon through which the smallest balls fall."""
 OWN = "sim_1"
 """Name of a simulation that a test has for itself."""
 POSTURE = start_posture(CONFIG)
@@ -50,7 +50,7 @@ ON_DDS = Middleware.of_process().is_fast_dds
 FOUND_BY_OTHERS_S = 0.3
 
 ALL = QoSProfile(history=HistoryPolicy.KEEP_ALL)
-"""Nothing is lost on the client's side, however late it looks."""
+"""With this profile, the client loses no message, however late it looks."""
 
 in_order_of_arrival = pytest.mark.skipif(
     uses_rclpy(), reason="rclpy takes up a topic's messages and answers as it likes"

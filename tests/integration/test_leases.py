@@ -14,7 +14,7 @@ from throwcollect.run_key import Signer
 from throwcollect.trial.lease import Lease, leases_to_json
 
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-"""As ros2_controllers have it; DDS connects no others."""
+"""The profile of ros2_controllers; DDS connects only equally durable endpoints."""
 LEASED = "the simulation is leased for trial 4, until its episode is handed over"
 SpeedScalingFactor: Any = get_message("control_msgs/msg/SpeedScalingFactor")
 Result: Any = get_message("simulation_interfaces/msg/Result")

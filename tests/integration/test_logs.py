@@ -14,7 +14,7 @@ Log = "rcl_interfaces/msg/Log"
 SpeedScalingFactor: Any = get_message("control_msgs/msg/SpeedScalingFactor")
 
 LATCHED = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-"""As the simulation subscribes to speeds; on DDS it would not hear others."""
+"""The profile of the simulation's subscription to speeds; on DDS it would not hear less durable publishers."""
 
 
 def find_logged(heard: list[Any], words: str) -> list[Any]:

@@ -28,12 +28,12 @@ embedded_alone = pytest.mark.skipif(
 
 SEED = 20
 PAYLOADS = 4
-"""Malformed payloads for each key; and as many attachments and changed messages."""
+"""Number of malformed payloads for each key, and of malformed attachments and changed messages."""
 AT_ONCE = 5
-"""Less than a queue holds: what there is no room for is refused without a look at it."""
+"""Fewer requests than a queue holds, as a full queue refuses further ones unread."""
 VALID = Attachment(1, 0, bytes(16)).pack()
 CONSEQUENTIAL = ("set_simulation_state", "step_simulation", "simulate_steps")
-"""A correct request of these may end the process, or keep it busy for long."""
+"""Services and actions whose valid requests may end the process or keep it busy for long."""
 
 LATE = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 

@@ -45,7 +45,7 @@ while time.monotonic() < deadline:
     seen |= set(node.get_node_names()) | {name for name, _ in node.get_topic_names_and_types() if "sim_" in name}
 print(json.dumps(sorted(seen - {"stranger"})))
 """
-"""A genuine node that knows nothing of us, and looks around."""
+"""A genuine node without throwcollect, which lists nodes and topics."""
 
 JOIN = """
 import rclpy
@@ -71,7 +71,7 @@ for _ in range(200):
     rclpy.spin_once(node, timeout_sec=0.1)
 print(len(heard[0].name))
 """
-"""A genuine node that knows nothing of us, and takes part."""
+"""A genuine node without throwcollect, which joins the run."""
 
 
 @pytest.fixture

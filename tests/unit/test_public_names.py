@@ -16,7 +16,7 @@ from throwcollect.runs import prepare, resume
 
 ROOT = Path(__file__).parents[2]
 OWN = "throwcollect:"
-"""What stands before the name of a module that is public as a whole."""
+"""Prefix of a module that is public as a whole."""
 DOCUMENTS = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
 
 

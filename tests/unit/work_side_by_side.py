@@ -10,7 +10,7 @@ from collections.abc import Callable
 from throwcollect.errors import ConfigError
 
 READ: list[str] = []
-"""What a process has read; another one has it only if it is forked off."""
+"""Values that a process has read; another process has them only if it was forked off."""
 
 
 def begin(factor: int) -> Callable[[int], tuple[int, int]]:

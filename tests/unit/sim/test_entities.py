@@ -17,7 +17,7 @@ from throwcollect.sim.world import World
 CONFIG = Config()
 TURNED = (0.0, 0.0, 0.6, 0.8)
 LOPSIDED = '<inertia ixx="1" iyy="2" izz="2.5" ixy="0.3" ixz="0" iyz="0.1"/>'
-"""The engine locates such a body by axes that are not those of the link."""
+"""Inertia of a body whose axes, by which the engine locates it, are not those of the link."""
 
 
 def within(kind: int, *points: tuple[float, float, float]) -> EntityFilters:

@@ -103,7 +103,7 @@ NEEDED = {
     "action_feedback": {"id", "action", "values"},
     "action_result": {"id", "action", "values", "status", "result"},
 }
-"""Fields that it looks up in what it gets."""
+"""Fields that ROS# looks up in each operation that it gets."""
 
 
 def hear(party: Party, op: str) -> Any:

@@ -20,7 +20,7 @@ from throwcollect.serve.rosbridge.websocket import Outbox
 String: Any = get_message("std_msgs/msg/String")
 Trigger: Any = get_service("std_srvs/srv/Trigger")
 WHOLE = QoSProfile(history=HistoryPolicy.KEEP_ALL)
-"""Other publishers drop long messages on the way to the bridge when the machine is busy."""
+"""A profile that loses no message: by default, long messages to the bridge are dropped on a busy machine."""
 
 
 def hear(socket: ClientConnection) -> Any:
