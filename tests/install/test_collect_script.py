@@ -91,7 +91,7 @@ def test_an_unavailable_image_is_named_before_anything_is_created(tmp_path: Path
     assert not (tmp_path / "data").exists()
 
 
-def test_a_machine_without_compose_says_so(tmp_path: Path, calls: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_machine_without_compose_is_an_error(tmp_path: Path, calls: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     commands = calls.parent / "bin"
     for name in ("sh", "dirname", "basename", "id", "uname", "mkdir", "rmdir"):
         (commands / name).symlink_to(shutil.which(name) or name)
@@ -141,7 +141,7 @@ def test_only_a_collection_that_began_leaves_an_output_directory(
     assert (tmp_path / "told.removed").exists()
 
 
-def test_a_file_that_is_not_there_is_named_before_anything_starts(tmp_path: Path) -> None:
+def test_a_missing_configuration_is_named_before_anything_starts(tmp_path: Path) -> None:
     (tmp_path / "docker").write_text('#!/bin/sh\necho "$@" >>"$TOLD"\n')
     (tmp_path / "docker").chmod(0o755)
     told = tmp_path / "told"

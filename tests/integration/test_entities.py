@@ -44,7 +44,7 @@ def test_the_ball_lies_in_the_spoon_and_the_robot_stands_on_its_base(robot: Robo
     assert talos.pose.orientation.w == 1.0
 
 
-def test_a_ball_that_was_put_somewhere_flies_on_from_there(robot: Robot) -> None:
+def test_a_placed_ball_flies_on_from_its_new_position(robot: Robot) -> None:
     robot.put_into(PAUSED)
     placed = robot.call("set_entity_state", entity="ball", state=entity_state(z=1.5, vx=1.0))
     assert placed.result.result == Result.RESULT_OK

@@ -26,7 +26,7 @@ def test_trial_clock_and_swept_physics_are_parameters(robot: Robot) -> None:
     assert {"use_sim_time", *OWN, *physics} <= set(robot.parameters("list_parameters").result.names)
 
 
-def test_parameters_are_described_with_their_types_and_have_the_values_of_the_configuration(robot: Robot) -> None:
+def test_parameters_have_types_and_the_values_of_the_configuration(robot: Robot) -> None:
     names = [*OWN, "ball.mass_kg"]
     described = robot.parameters("describe_parameters", names=names).descriptors
     assert [(each.name, each.type) for each in described] == list(

@@ -57,7 +57,7 @@ def episode(robot: Robot, scope: int = Reset.SCOPE_DEFAULT) -> str:
     return hashlib.sha256(bytes(heard[0].data)).hexdigest()
 
 
-def test_a_spawned_body_falls_to_the_ground_and_lies_there(robot: Robot) -> None:
+def test_a_spawned_body_falls_to_the_ground_and_stays_on_it(robot: Robot) -> None:
     robot.put_into(PAUSED)
     assert spawn_successfully(robot, initial_pose=pose(2.0, 2.0, 0.5)) == "crate"
     assert entities(robot) == ["ball", "talos", "crate"]

@@ -96,7 +96,7 @@ def test_trials_with_another_tool_or_posture_leave_no_trace(trials, thrower):
     assert digest(one, trials[0]) == before
 
 
-def test_a_robot_with_unlocked_joints_starts_anew_as_well(trials, thrower):
+def test_trials_of_a_robot_with_unlocked_joints_do_not_depend_on_earlier_ones(trials, thrower):
     full = {"robot": {"locked": "none"}, "sim": {"max_trial_s": 1.0}}
     one = thrower(**full)
     wild = Config.model_validate({**full, "ball": {"radius_m": 0.03}}), trials[1][1]

@@ -54,7 +54,7 @@ def test_on_fast_dds_a_node_is_healthy_only_if_its_loop_beats(file: Path, monkey
     health.check("sim_0")
 
 
-def test_on_fast_dds_a_router_that_is_not_there_is_not_healthy(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_on_fast_dds_a_missing_router_is_not_healthy(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Middleware, "of_process", lambda: Middleware("rclpy", "rmw_fastrtps_cpp"))
     monkeypatch.setenv(OVERRIDE_VARIABLE, 'connect/endpoints=["udp/127.0.0.1:9"]')
     with pytest.raises(ThrowcollectError, match=r"router: no session with the router at udp/127\.0\.0\.1:9"):

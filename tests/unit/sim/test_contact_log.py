@@ -9,7 +9,7 @@ def intervals(*steps):
     return log.intervals(lambda step: 10 * step)
 
 
-def test_an_interval_starts_with_the_first_step_with_force_and_ends_with_the_first_without():
+def test_a_contact_lasts_from_the_first_step_with_force_to_the_first_without():
     assert intervals([], ["spoon"], ["spoon"], [], []) == (Contact("spoon", 10, 30),)
 
 

@@ -59,7 +59,7 @@ def test_talos_has_a_goal_tolerance_and_no_path_tolerance() -> None:
     assert set(parameters.constraints.joints) == set(parameters.joints)
 
 
-def test_joints_brake_if_the_configuration_says_so() -> None:
+def test_the_configuration_can_make_joints_brake_when_a_goal_is_cancelled() -> None:
     parameters = parameters_of(HEAD, hold="decelerate", max_deceleration_radps2=7.0)
     assert parameters.measures_velocity
     assert set(parameters.constraints.joints.values()) == {JointConstraints(goal=0.02, max_deceleration_on_cancel=7.0)}

@@ -293,7 +293,7 @@ def test_a_wheelhouse_with_other_files_is_not_replaced(wheelhouse: ModuleType, t
     assert (tmp_path / "thesis.tex").exists()
 
 
-def test_ros_wheels_are_added_on_request_unless_the_package_is_there(
+def test_ros_wheels_are_added_on_request_unless_another_version_exists(
     wheelhouse: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def collect(directory: Path) -> None:

@@ -105,14 +105,14 @@ def test_the_digest_of_a_configuration_leaves_out_how_it_is_run():
     assert config_digest(Config(name="other")) != config_digest(Config())
 
 
-def test_a_plan_made_before_the_section_controllers_still_belongs_to_its_configuration():
+def test_a_configuration_older_than_the_section_controllers_keeps_its_digest():
     before = "09626b408b776e79ab4ff485411deb75f2b6615377a41e80b715b04bdb842333"
     assert config_digest(Config(name="old", record=RECORD_OF_OLD)) == before
     other = ControllersConfig(hold="command")
     assert config_digest(Config(name="old", record=RECORD_OF_OLD, controllers=other)) != before
 
 
-def test_a_plan_made_before_targets_still_belongs_to_its_configuration():
+def test_a_configuration_older_than_targets_keeps_its_digest():
     sweep = SweepConfig(parameters={"ball.mass_kg": Range(min=0.1, max=0.2)})
     before = "ad57f77989d00389417c918c12a5291022ea27e8bca7c3da9f188a4a58b1b461"
     config = Config(name="old", sweep=sweep, record=RECORD_OF_OLD)

@@ -138,7 +138,7 @@ def test_the_file_of_a_plan_has_one_column_per_swept_key(tmp_path):
     assert table["ball.mass_kg"].to_pylist() == [trial.values["ball.mass_kg"] for trial in plan.trials]
 
 
-def test_a_plan_may_be_read_for_another_way_of_running_but_not_for_another_configuration(tmp_path):
+def test_a_plan_can_be_read_with_other_run_keys_but_not_with_another_seed(tmp_path):
     path = tmp_path / "plan.parquet"
     make_plan(make_config()).write(path)
     other_run = make_config().model_copy(update={"run": RunConfig(simulations=9)})

@@ -181,7 +181,7 @@ def test_places_is_the_inverse_of_spread(parameter, place):
         assert 0 <= found <= 1
 
 
-def test_until_draws_ten_times_as_many_points_as_should_land_unless_trials_says_otherwise():
+def test_until_without_trials_draws_ten_times_as_many_points_as_should_land():
     sweep = SweepConfig(parameters=SPREAD)
     assert len(draw_points(Config(until={"landed": 30}, sweep=sweep), directory=HERE).values) == 300
     assert len(draw_points(Config(trials=40, until={"landed": 30}, sweep=sweep), directory=HERE).values) == 40

@@ -111,7 +111,7 @@ def test_joints_are_shown_within_their_limits(collected: Path, messages: Message
         )
 
 
-def test_every_shape_moves_with_a_frame_that_is_there(messages: Messages) -> None:
+def test_every_shape_moves_with_an_existing_frame(messages: Messages) -> None:
     transforms = [each for topic in ("/tf", "/tf_static") for each in messages[topic][0][1].transforms]
     frames = {"world", *(each.child_frame_id for each in transforms)}
     drawn = [marker for topic in ("/view/robot", "/view/throws") for marker in messages[topic][0][1].markers]

@@ -141,7 +141,7 @@ def test_ball_on_a_bounce_at_the_start_is_in_the_spoon():
     assert judge(samples, header).outcome is ThrowOutcome.LANDED
 
 
-def test_ball_that_leaves_a_still_spoon_is_dropped_with_the_evidence_and_keeps_its_landing():
+def test_ball_that_leaves_a_still_spoon_is_dropped_with_the_evidence():
     """Only the left arm moves, and the ball leaves the right hand."""
     task = {"start": {**Config().task.start, "arm_left_4_joint": -1.9}, "end": {"arm_left_4_joint": -0.5}}
     config = Config(task=task)
