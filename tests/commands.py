@@ -47,12 +47,12 @@ from throwcollect.robots.tool_motion import ToolMotion
 
 _MESSAGE_BYTES = 1 << 17
 _ANSWER_S = 60.0
-"""Importing takes two seconds, on a machine that does a lot else some more."""
+"""Most time for an answer of the server: importing takes two seconds, and longer on a busy machine."""
 _LOOK_S = 0.2
 _DECIDES_IMPORTS = ("PYTHON", "LD_", "THROWCOLLECT_ROS", "RMW_", "ROS_", "OPENBLAS_", "OMP_")
-"""Beginnings of the names of variables that only hold for a process if it has started with them."""
+"""Prefixes of variables that have an effect only if a process starts with them."""
 _READ_LATER = ("ROS_DOMAIN_ID",)
-"""Variables that begin so, but are read by each context."""
+"""Exceptions of these prefixes: each context reads these variables when it is made."""
 _IMPORTED = ("pinocchio", "pybullet", "pyarrow.parquet")
 _RUNS_WHEN_IMPORTED = "throwcollect.__main__"
 
@@ -275,7 +275,7 @@ def start_command(
         stderr=stderr,
         env=whole,
         text=True,
-        # Without it, no Python runs between fork and exec, where another thread may hold a lock for ever.
+        # None, if possible: Python code between fork and exec may wait for ever for a lock of another thread.
         preexec_fn=None if restrictions == FREE else restrictions.impose,  # noqa: PLW1509
     )
 
@@ -294,7 +294,7 @@ def _import_libraries() -> None:
         importlib.import_module(name)
     for each in pkgutil.walk_packages(throwcollect.__path__, "throwcollect.", onerror=lambda _: None):
         if each.name != _RUNS_WHEN_IMPORTED:
-            # What needs an extra that is not installed is not needed by the commands of these tests either.
+            # A module whose extra is not installed is not needed by the commands of these tests.
             with contextlib.suppress(ImportError):
                 importlib.import_module(each.name)
 
@@ -360,7 +360,7 @@ def _become_command(request: dict[str, object], streams: Sequence[int]) -> list[
     assert isinstance(environment, dict)
     assert isinstance(restrictions, dict)
     Restrictions(**restrictions).impose()
-    # The title is found only as long as the environment is the one that the program was started with.
+    # `setproctitle` works only before the environment is replaced.
     setproctitle.setproctitle(" ".join(command(*arguments)))
     os.environ.clear()
     os.environ.update(environment)
@@ -373,7 +373,7 @@ def _leave(code: int) -> NoReturn:
 
     Libraries tidy up behind Python: that is what ending by `os._exit` would leave out.
     """
-    # Sessions that nobody refers to any more close now, and take their files in /dev/shm along.
+    # This closes unreferenced Zenoh sessions, which removes their files in /dev/shm.
     gc.collect()
     threading._shutdown()  # type: ignore[attr-defined]
     atexit._run_exitfuncs()
@@ -390,7 +390,7 @@ def main() -> None:
     connection = socket.socket(fileno=int(sys.argv[1]))
     _import_libraries()
     _compute_what_all_need()
-    # Pages that the garbage collector writes to could not be shared.
+    # The garbage collector does not write to frozen objects, so forked processes share their memory.
     gc.collect()
     gc.freeze()
     arguments = _serve(connection)

@@ -1,4 +1,4 @@
-"""What all tests rely on."""
+"""Settings and fixtures for all tests."""
 
 import gc
 import os
@@ -10,16 +10,16 @@ from hypothesis import settings
 
 from tests.commands import command_server
 
-# Whoever starts the tests in the background may have SIGINT ignored, which all processes that they start would inherit.
+# A shell may start tests in the background with SIGINT ignored, which all their processes would inherit.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
-# How long an example takes depends on what else the machine does.
+# There is no deadline, as the time of an example depends on the load of the machine.
 settings.register_profile("any machine", deadline=None)
 settings.load_profile("any machine")
 
 
 def pytest_collection_finish() -> None:
-    """Spare the garbage collector what stays until the end, a twentieth of the time of the tests."""
+    """Exempt objects that live until the end from garbage collection: that saves a twentieth of the time of tests."""
     gc.collect()
     gc.freeze()
     gc.set_threshold(20_000, 20, 50)
@@ -27,8 +27,8 @@ def pytest_collection_finish() -> None:
 
 @pytest.fixture(scope="session")
 def commands(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    """Commands are forked off one process for all tests of a session, and have what the extras bring alone."""
-    # Arrow imports pandas wherever that is installed, which takes each process a quarter of a second.
+    """Fork the commands of all tests off one process, which sees only packages that the extras bring."""
+    # Arrow imports pandas if it is installed, which would take each process a quarter of a second.
     extras_alone = tmp_path_factory.mktemp("extras")
     (extras_alone / "pandas.py").write_text("raise ImportError('no extra brings pandas')\n")
     with pytest.MonkeyPatch.context() as patch:
@@ -39,13 +39,13 @@ def commands(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
 
 @pytest.fixture(autouse=True)
 def _unsettled(monkeypatch: pytest.MonkeyPatch) -> None:
-    """What carries messages is what the environment says again, whatever a test before has settled on."""
+    """Forget the middleware that an earlier test has settled on, so that the environment decides again."""
     monkeypatch.setattr("throwcollect.ros.middleware._settled", [])
 
 
 @pytest.fixture(autouse=True)
 def _signal_handlers() -> Iterator[None]:
-    """Commands and nodes set handlers of signals; where a test runs one in this process, they are put back."""
+    """Restore signal handlers after each test, as commands and nodes that run in this process set their own."""
     before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
     yield
     for number, handler in before.items():

@@ -1,4 +1,4 @@
-"""Packages of npm that tests need: each is installed once on a machine."""
+"""Installs packages of npm for tests, each once on a machine."""
 
 from __future__ import annotations
 

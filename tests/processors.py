@@ -1,7 +1,7 @@
-"""Another processor, as far as the environment can make one of this."""
+"""Environment variables that make this processor compute like an older one."""
 
 PLAIN = {
     "NPY_DISABLE_CPU_FEATURES": "X86_V3 X86_V4 AVX512_ICL AVX512_SPR",
     "OPENBLAS_CORETYPE": "Prescott",
 }
-"""Makes NumPy, BLAS and LAPACK compute as on one with SSE3 alone."""
+"""Makes NumPy, BLAS and LAPACK compute as on a processor that has only SSE3."""

@@ -1,4 +1,4 @@
-"""What a process of a test may not do, though root has started it."""
+"""Restrictions for processes of tests that root has started."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a documented function raises stands in its docstring.
+"""The docstring of a documented function names all errors that it raises.
 
 The linter's rule of this kind (ruff's DOC501) cannot be used: it takes functions that make an error for errors, as in
 ``raise unreadable(...)``, asks for what a function itself catches, and would put ``Raises:`` into the help of commands.
@@ -79,7 +79,7 @@ def find_undocumented(path: Path, text: str, errors: Errors) -> Iterator[str]:
     for function in (node for node in ast.walk(parse(text)) if isinstance(node, ast.FunctionDef)):
         docstring = ast.get_docstring(function)
         is_command = "cli" in path.parts and not function.name.startswith("_")
-        if docstring is None or is_command:  # The docstring of a command is its help.
+        if docstring is None or is_command:  # The docstring of a command is its help, without `Raises:`.
             continue
         section = RAISES.search(docstring)
         documented = set(re.findall(r"^ +(\w+): ", section[1], flags=re.MULTILINE)) if section else set()
@@ -94,7 +94,7 @@ def test_raises_are_documented() -> None:
     assert {path: each for path, each in found.items() if each} == {}
 
 
-def test_the_rule_sees_what_it_should() -> None:
+def test_the_rule_finds_an_undocumented_raise() -> None:
     text = '''
 class OwnError(ValueError): ...
 def made(path) -> OwnError: ...

@@ -1,4 +1,4 @@
-"""The figures of the architecture: what scripts draw, and the rooms and imports that there are."""
+"""The figures of the architecture show the rooms and imports of the sources, as the scripts draw them."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ def flows(monkeypatch: pytest.MonkeyPatch) -> ModuleType:
     return importlib.import_module("flow_figures")
 
 
-def test_the_figure_is_the_one_that_the_sources_give(figure: ModuleType) -> None:
+def test_the_committed_figure_matches_the_sources(figure: ModuleType) -> None:
     assert figure.FIGURE.read_text(encoding="utf-8") == figure.draw(), "python packaging/architecture_figure.py"
 
 
-def test_every_room_is_drawn_and_stands_in_the_document(figure: ModuleType) -> None:
+def test_the_document_shows_the_figure_and_names_every_room(figure: ModuleType) -> None:
     imported, _ = figure.read_imports()
     assert "](architecture.svg)" in DOCUMENT
     assert figure.PLACES.keys() <= imported.keys()
@@ -42,13 +42,13 @@ def test_arrows_that_follow_from_others_are_left_out(figure: ModuleType) -> None
     assert figure.reduce_arrows(imported) == [("cli", "runs"), ("runs", "dataset")]
 
 
-def test_what_imports_a_room_does_not_lie_below_all(figure: ModuleType) -> None:
+def test_an_import_by_a_room_at_the_bottom_is_an_error(figure: ModuleType) -> None:
     imported = {room: set() for room in figure.PLACES} | {"wording": {"config"}}
     with pytest.raises(ValueError, match="wording imports config"):
         figure.reduce_arrows(imported)
 
 
-def test_flows_are_drawn_and_shown(flows: ModuleType) -> None:
+def test_the_committed_flow_figures_match_and_are_shown(flows: ModuleType) -> None:
     drawn = {path.stem: path.read_text(encoding="utf-8") for path in flows.FIGURES.iterdir()}
     assert drawn == {name: flows.draw(flow) for name, flow in flows.FLOWS.items()}, "python packaging/flow_figures.py"
     assert [name for name in drawn if f"](figures/{name}.svg)" not in DOCUMENT] == []

@@ -44,7 +44,7 @@ def read_forbidden() -> list[str]:
 
 
 def find_words(text: str, words: list[str]) -> list[str]:
-    """Forbidden words of a text, in the singular or the plural, in which a line may end between two of them."""
+    """Find forbidden words in a text, in the singular or the plural; a line may end between two words of one term."""
     alternatives = "|".join(words).replace(" ", r"\s+")
     return [found[0] for found in re.finditer(rf"\b(?:{alternatives})s?\b", text, flags=re.IGNORECASE)]
 
@@ -76,7 +76,7 @@ def find_offences(code: str, words: list[str]) -> Iterator[str]:
 
 
 def read_prose(page: str) -> str:
-    """What a page of Markdown says in words of ours: no code, and no changes of versions that are published."""
+    """Read the prose of a page of Markdown, without code and without changes of published versions."""
     unreleased = re.sub(r"^## \[\d.*", "", page, flags=re.MULTILINE | re.DOTALL)
     no_blocks = re.sub(r"^( *)```.*?^\1```$", "", unreleased, flags=re.MULTILINE | re.DOTALL)
     return re.sub(r"`[^`]*`", "", re.sub(r"^    .*$", "", no_blocks, flags=re.MULTILINE))

@@ -1,4 +1,4 @@
-"""Rules of the house that no linter knows."""
+"""Rules of this project that no linter checks."""
 
 import ast
 import re
@@ -16,7 +16,7 @@ VAGUE = {"utils", "util", "helpers", "common", "misc", "base", "core", "types", 
 LONGEST_MODULE = 400
 LONGEST_FUNCTION = 60
 LONGEST_TEST = 500
-"""Lines of a module of tests; those that were longer had several subjects."""
+"""Most lines of a module of tests; longer modules had several subjects."""
 
 
 def name(path: Path) -> str:
@@ -48,7 +48,7 @@ def test_modules_keep_the_rules() -> None:
     assert {path: each for path, each in found.items() if each} == {}
 
 
-def test_the_rules_see_what_they_should() -> None:
+def test_the_rules_find_each_offence_of_a_module() -> None:
     long = "\n".join(["def f():", "    # TODO", *["    x = 1"] * LONGEST_MODULE, "from tests import y"])
     assert list(offences(Path("utils.py"), long)) == [
         "has no docstring",
@@ -61,7 +61,7 @@ def test_the_rules_see_what_they_should() -> None:
 
 
 KINDS_OF_MEMBERS = (SOURCE / "engines", SOURCE / "tasks", SOURCE / "tools")
-"""Folders whose folders are members of one kind; they may be built alike."""
+"""Folders whose folders are members of one kind; these may have modules of the same names."""
 
 
 def search_repeated(paths: list[Path]) -> set[str]:
@@ -84,14 +84,14 @@ def search_repeated_classes(trees: dict[str, ast.Module]) -> set[str]:
     return {each for each in classes if classes.count(each) > 1}
 
 
-def test_a_module_and_a_class_are_found_by_their_names() -> None:
-    """Those of the ROS client have the names that rclpy gives them, so some of these are ours, too."""
+def test_no_two_modules_or_classes_share_a_name() -> None:
+    """The ROS client is left out: it has the names of rclpy, some of which throwcollect uses, too."""
     paths = sorted(SOURCE.rglob("*.py"))
     assert search_repeated(paths) == set()
     assert search_repeated_classes({name(path): parse(path.read_text(encoding="utf-8")) for path in paths}) == set()
 
 
-def test_the_rule_about_names_sees_what_it_should() -> None:
+def test_the_rule_about_names_finds_repeated_modules_and_classes() -> None:
     engines = SOURCE / "engines"
     alike = [engines / "bullet" / "bodies.py", engines / "mujoco" / "bodies.py", SOURCE / "__init__.py"]
     assert search_repeated(alike) == set()
@@ -100,7 +100,7 @@ def test_the_rule_about_names_sees_what_it_should() -> None:
     assert search_repeated_classes(classes) == {"Found"}
 
 
-def test_modules_of_tests_have_one_subject() -> None:
+def test_modules_of_tests_are_not_too_long() -> None:
     lengths = {path: len(path.read_text(encoding="utf-8").splitlines()) for path in (ROOT / "tests").rglob("*.py")}
     assert lengths
     assert {str(path): lines for path, lines in lengths.items() if lines > LONGEST_TEST} == {}
@@ -117,8 +117,8 @@ def is_named_after_a_module(test: Path) -> bool:
     return place.with_suffix(".py").exists() or (place / "__init__.py").exists()
 
 
-def test_a_test_has_the_name_of_its_module_or_says_what_it_is_about() -> None:
-    """What several modules do together, for example, has a name of its own."""
+def test_a_unit_test_file_is_named_after_a_module_or_has_a_docstring() -> None:
+    """A test of several modules together, for example, is named freely, and its docstring says what it tests."""
     tests = sorted(UNITS.rglob("test_*.py"))
     folders = {test.parent.relative_to(UNITS) for test in tests}
     assert {str(folder) for folder in folders if not (SOURCE / folder).is_dir()} == OUTSIDE_SOURCE
@@ -126,14 +126,14 @@ def test_a_test_has_the_name_of_its_module_or_says_what_it_is_about() -> None:
     assert [str(test) for test in others if not ast.get_docstring(parse(test.read_text(encoding="utf-8")))] == []
 
 
-def test_the_rule_about_names_of_tests_sees_what_it_should() -> None:
+def test_the_rule_about_names_of_test_files_compares_whole_paths() -> None:
     assert is_named_after_a_module(UNITS / "sweep" / "test_plan.py")
     assert is_named_after_a_module(UNITS / "test_simulator.py")
     assert not is_named_after_a_module(UNITS / "config" / "test_plan.py")
 
 
 CLOCK_OF_ALL = re.compile(r"""setattr\((?:\w+\.)*time, ["']|setattr\(["']time\.""")
-"""Setting the clock of the whole process, which stops threads of other tests, instead of that of the tested module."""
+"""Tests must not set the clock of the whole process, which stops threads of other tests, but that of a module."""
 
 
 def test_no_test_sets_the_clock_of_the_whole_process() -> None:
@@ -141,7 +141,7 @@ def test_no_test_sets_the_clock_of_the_whole_process() -> None:
     assert [name for name in sources if CLOCK_OF_ALL.search(name.read_text(encoding="utf-8"))] == []
 
 
-def test_the_rule_about_clocks_sees_what_it_should() -> None:
+def test_the_rule_about_clocks_finds_each_way_to_set_the_clock() -> None:
     setting = "monkeypatch." + "setattr"
     for wrong in ('time, "monotonic", f)', 'access.time, "monotonic", f)', '"time.monotonic", f)'):
         assert CLOCK_OF_ALL.search(f"{setting}({wrong}")
@@ -149,13 +149,13 @@ def test_the_rule_about_clocks_sees_what_it_should() -> None:
 
 
 def unfold(statement: ast.stmt) -> list[ast.stmt]:
-    """What stands in both branches of `if TYPE_CHECKING`, or else the statement itself."""
+    """Give the statements in both branches of `if TYPE_CHECKING`, or else the statement itself."""
     if isinstance(statement, ast.If) and ast.unparse(statement.test) == "TYPE_CHECKING":
         return [*statement.body, *statement.orelse]
     return [statement]
 
 
-def test_package_faces_hold_re_exports_only() -> None:
+def test_package_faces_hold_only_re_exports() -> None:
     for path in (path for path in MODULES if path.name == "__init__.py"):
         statements = parse(path.read_text(encoding="utf-8")).body
         for node in [inner for each in statements for inner in unfold(each)]:
@@ -195,13 +195,13 @@ def processor_dependent(tree: ast.AST) -> set[str]:
     return found
 
 
-def test_the_rule_about_processors_sees_what_it_should() -> None:
+def test_the_rule_about_processors_finds_arithmetic_that_depends_on_them() -> None:
     code = "np.exp(x) + np.linalg.solve(a, b) + a @ b + x**3 + x**y + x**2 + 10**9 + np.sqrt(x) + math.exp(1)"
     assert processor_dependent(parse(code)) == {"np.exp", "np.linalg.solve", "@", "**"}
 
 
 @pytest.mark.parametrize("room", PURE_ROOMS)
-def test_what_ends_up_in_a_dataset_does_not_depend_on_the_processor(room: str) -> None:
+def test_pure_rooms_avoid_arithmetic_that_depends_on_the_processor(room: str) -> None:
     paths = sorted((SOURCE / room).rglob("*.py"))
     assert paths
     found = {name(path): processor_dependent(parse(path.read_text(encoding="utf-8"))) for path in paths}

@@ -1,4 +1,4 @@
-"""Links of the documents lead somewhere: to a file of the repository, and to a heading in it."""
+"""Each link of the documents leads to a file of the repository that exists, and to a heading in it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The site is built without a warning, and loads nothing from other servers; what is cited is this version."""
+"""The site is built without warnings and loads nothing from other servers; the citation names this version."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def test_pages_from_outside_of_docs_link_into_the_site(site: Path) -> None:
         assert f'href="{path.stem}.html"' in decisions
 
 
-def test_a_bar_in_a_table_is_a_bar(site: Path) -> None:
+def test_a_bar_in_a_table_is_shown_without_its_backslash(site: Path) -> None:
     assert r"\|" not in (site / "cli.html").read_text(encoding="utf-8")
 
 

@@ -1,4 +1,4 @@
-"""What one room gives another has a type: a dictionary of anything hides which facts there are."""
+"""Functions that other rooms import have precise types, as a dictionary of anything hides which facts it holds."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from tests.architecture.parsing import parse
 SOURCE = Path(__file__).parents[2] / "src"
 LOOSE = {f"{kind}[str, {value}]" for kind in ("dict", "Mapping") for value in ("Any", "object")}
 DOCUMENTS = {"as_dict", "to_yaml", "bag_information", "Qos.profile", "ValueShape.node"}
-"""What becomes JSON or YAML at once, and the JSON schema of the configuration."""
+"""Functions whose result becomes JSON or YAML at once, so that it may be a dictionary of anything."""
 
 
 def room_of(module: str) -> str:
@@ -60,7 +60,7 @@ def is_document(name: str) -> bool:
     return name in DOCUMENTS or name.rpartition(".")[2] in DOCUMENTS
 
 
-def test_rooms_give_each_other_types() -> None:
+def test_functions_that_other_rooms_import_have_precise_types() -> None:
     modules = parse_modules()
     shared = find_imported_elsewhere(modules)
     found = {
@@ -74,7 +74,7 @@ def test_rooms_give_each_other_types() -> None:
     assert found == set()
 
 
-def test_the_rule_sees_what_it_should() -> None:
+def test_the_rule_finds_loosely_typed_functions_and_fields() -> None:
     code = """
 def read() -> dict[str, Any]: ...
 def write(entries: Iterable[Mapping[str, object]]) -> None: ...

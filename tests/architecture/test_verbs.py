@@ -1,4 +1,4 @@
-"""Functions are verbs: a participle leaves open whether something is looked up, made or changed."""
+"""Names of functions are verbs: a participle leaves open whether a function looks up, makes or changes something."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ spoken stolen struck swept taken taught thought thrown told torn withdrawn won w
 """
 NO_PARTICIPLES = ("embed", "exceed", "feed", "need", "proceed", "seed", "succeed")
 OTHERS_CALL_IT = {"canceled", "padded", "measured"}
-"""Names of rclpy, of the published interface, and of what declares a field of a class."""
+"""Participles that are allowed: names of rclpy, of the published interface, and of functions that declare a field."""
 
 
 def is_participle(word: str) -> bool:
@@ -53,7 +53,7 @@ def test_functions_are_verbs() -> None:
     assert {path: names for path, names in found.items() if names} == {}
 
 
-def test_the_rule_sees_what_it_should() -> None:
+def test_the_rule_finds_functions_that_are_participles() -> None:
     code = """
 def checked_plan() -> Plan: ...
 def _found(): ...

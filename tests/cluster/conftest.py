@@ -17,15 +17,15 @@ BUILD = Path(__file__).parents[2] / "build"
 UNAVAILABLE = BUILD / "cluster-unavailable"
 __all__ = ["client"]
 USER = "throwcollect-ci"
-"""Whose jobs are run: nobody who may do more than others."""
+"""The user of the jobs, who has no special rights."""
 SHARED = "throwcollect-shared-"
 """Names of directories that tests share with jobs begin so."""
 
 
 @pytest.fixture(scope="session", autouse=True)
 def _cluster() -> None:
-    """Nothing here is tested where there is no cluster."""
-    # Where continuous integration has tried to install one, it says why it could not.
+    """Skip all tests of this directory on a machine without the programs of a cluster."""
+    # Continuous integration writes this file with the reason if it could not install a cluster.
     if UNAVAILABLE.exists():
         pytest.skip(UNAVAILABLE.read_text().strip())
     path = f"{os.environ.get('PATH', '')}:/usr/sbin:/sbin"
@@ -64,7 +64,7 @@ def sif(client: DockerClient) -> Iterator[Path]:
     name = image.default_tag()
     kept = BUILD / "sif" / f"{client.images.get(name).id.removeprefix('sha256:')}.sif"
     if not kept.exists():
-        # Nobody asks for those of earlier images any more.
+        # SIFs of earlier images are no longer needed.
         shutil.rmtree(kept.parent, ignore_errors=True)
         kept.parent.mkdir(parents=True)
         make_sif(kept, image=name, say=lambda _line: None)

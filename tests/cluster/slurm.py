@@ -21,7 +21,7 @@ from pathlib import Path
 CPUS_PER_NODE = 2
 MEMORY_PER_NODE_MB = 6000
 KILL_WAIT_S = 5
-"""Between SIGTERM and SIGKILL."""
+"""Time between SIGTERM and SIGKILL."""
 _START_TIMEOUT_S = 30.0
 _FIRST_PORT = 16817
 _PORTS_PER_CLUSTER = 10
@@ -135,11 +135,11 @@ class Slurm:
         its jobs for running, for minutes.
         """
         _end(self._process(node), signal.SIGKILL)
-        # A process that is just being started shows up in the second look.
+        # The second round finds processes that were just being started in the first.
         for _ in range(2):
             found = _processes_of(node)
             for process in found:
-                # None of them shall be able to tell Slurm how the others end.
+                # All processes are stopped first, so that none can report the end of another one to Slurm.
                 with suppress(ProcessLookupError):
                     os.kill(process, signal.SIGSTOP)
             for process in found:
@@ -210,7 +210,7 @@ class Slurm:
             host=host,
             port=port,
             directory=self._directory,
-            # Without cgroups, what a killed batch script has started lives on, and memory is only looked at.
+            # Without cgroups, children of a killed batch script live on, and memory is measured but not limited.
             proctrack="cgroup" if has_cgroups else "linuxproc",
             task="cgroup" if has_cgroups else "none",
             gather="cgroup" if has_cgroups else "linux",
@@ -265,7 +265,7 @@ class Slurm:
 
 @contextmanager
 def _alone() -> Iterator[None]:
-    """Nobody else looks for free ports meanwhile."""
+    """Hold a lock, so that no other test looks for free ports at the same time."""
     with _LOCK.open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         yield
@@ -314,7 +314,7 @@ def _parent_of(process: int) -> int | None:
 
 
 def _name_of(process: int) -> str | None:
-    """Name of a process that lives; None for one that has ended, though nobody has asked yet how."""
+    """Name of a living process; None for one that has ended, even if nobody has collected its exit code yet."""
     fields = _stat(process)
     if not fields or fields[0] == "Z":
         return None

@@ -33,7 +33,7 @@ BASE = "throwcollect-base:bookworm"
 PAGE = (ROOT / "docs" / "containers.md").read_text(encoding="utf-8")
 COMMANDS = re.findall(r"^ *(apptainer .*?throwcollect\.sif up [^#\n]*)", PAGE, flags=re.MULTILINE)
 PLACES = ("/tmp", "/var/tmp", "/home", "/dev/shm", "/run", "/run/user", "/opt")
-"""Where whoever shares the machine could be disturbed."""
+"""Directories that all users of a machine share."""
 AUTOMATIC = CONFIG.replace("runtime: local, ", "")
 
 
@@ -76,18 +76,18 @@ def finish(process: subprocess.Popen[str]) -> str:
 
 
 def files_of(user: str) -> set[str]:
-    """All files of a user in places that users share, apart from directories of tests, be it of others just now."""
+    """All files of a user in directories that users share, apart from the directories of running tests."""
     own = ("-user", user)
-    # In what is another's and not open to all, nobody can have written; to walk through it may take half a minute.
+    # The user cannot write into closed directories of others, and to walk through them may take half a minute.
     closed = ("-type", "d", "-not", *own, "-not", "-perm", "-o=w", "-prune")
     tests = ("-name", f"{SHARED}*", "-prune", "-o", *closed, "-o", *own, "-not", "-type", "d", "-print")
     words = ("find", *(place for place in PLACES if Path(place).exists()), "-mindepth", "1", *tests)
-    # It complains of what others remove meanwhile.
+    # `find` complains of files that other processes remove meanwhile.
     return set(subprocess.run(words, capture_output=True, text=True, check=False).stdout.splitlines())
 
 
 @pytest.mark.parametrize("command", COMMANDS)
-def test_the_commands_of_the_docs_make_the_files_of_any_collection_and_write_nowhere_else(
+def test_the_documented_commands_make_the_usual_files_and_write_nowhere_else(
     command: str, place: Path, expected: dict[str, str]
 ) -> None:
     before = files_of(USER)
@@ -97,11 +97,11 @@ def test_the_commands_of_the_docs_make_the_files_of_any_collection_and_write_now
     assert files_of(USER) <= before
 
 
-def test_both_ways_to_run_it_are_in_the_docs() -> None:
+def test_the_docs_run_the_image_with_and_without_containall() -> None:
     assert [("--containall" in command) for command in COMMANDS] == [False, True]
 
 
-def test_two_users_on_one_machine_do_not_meet(place: Path, expected: dict[str, str]) -> None:
+def test_two_users_on_one_machine_do_not_disturb_each_other(place: Path, expected: dict[str, str]) -> None:
     place.chmod(0o755)
     processes = []
     for user in (USER, "nobody"):
@@ -114,17 +114,17 @@ def test_two_users_on_one_machine_do_not_meet(place: Path, expected: dict[str, s
     assert fingerprints(place / USER / "dataset") == fingerprints(place / "nobody" / "dataset") == expected
 
 
-def test_arguments_are_not_evaluated_once_more(place: Path) -> None:
+def test_apptainer_does_not_evaluate_arguments_a_second_time(place: Path) -> None:
     process = start("""apptainer run throwcollect.sif config throws.yaml --set 'name=a$PWD"b'""", place)
     assert """got 'a$PWD"b'""" in process.communicate(timeout=60)[0]
 
 
-def test_a_sif_says_what_is_in_it(sif: Path) -> None:
+def test_the_labels_of_a_sif_name_its_version(sif: Path) -> None:
     check_sif(sif)
     assert read_labels(sif)[VERSION_LABEL] == throwcollect.__version__
 
 
-def test_labels_of_an_archive_are_those_of_the_sif(tmp_path: Path) -> None:
+def test_a_sif_of_an_archive_with_other_sources_is_refused(tmp_path: Path) -> None:
     layer = pack({"etc/hostname": b""})
     config = {
         "architecture": "amd64",
@@ -143,7 +143,7 @@ def test_labels_of_an_archive_are_those_of_the_sif(tmp_path: Path) -> None:
 @pytest.mark.skipif(
     "THROWCOLLECT_TEST_ALL" not in os.environ, reason="takes a minute of two cores; THROWCOLLECT_TEST_ALL=1"
 )
-def test_without_an_engine_a_user_builds_the_same_from_the_clone(
+def test_a_sif_built_without_an_engine_collects_the_same_files(
     client: DockerClient, place: Path, expected: dict[str, str]
 ) -> None:
     wheelhouse = BUILD / "wheelhouse"

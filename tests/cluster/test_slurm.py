@@ -1,4 +1,4 @@
-"""The Slurm of the tests loses nodes, and gets them back, as those of clusters do."""
+"""The Slurm of the tests can lose nodes and get them back, as the Slurm of a real cluster does."""
 
 import os
 import time
@@ -26,14 +26,14 @@ def job(slurm: Slurm, shared: Path) -> Iterator[tuple[str, int]]:
     until(lambda: slurm.state(node) == "idle")
 
 
-def test_no_process_of_a_node_that_dies_lives_on(slurm: Slurm, job: tuple[str, int]) -> None:
+def test_a_node_that_dies_takes_its_processes_along(slurm: Slurm, job: tuple[str, int]) -> None:
     node, process = job
     slurm.kill_node(node)
     assert not lives(process)
     slurm.revive(node)
 
 
-def test_jobs_live_on_where_slurmd_dies_alone(slurm: Slurm, job: tuple[str, int]) -> None:
+def test_a_job_survives_the_death_of_slurmd(slurm: Slurm, job: tuple[str, int]) -> None:
     node, process = job
     slurm.kill_slurmd(node)
     assert lives(process)

@@ -25,7 +25,7 @@ pytestmark = pytest.mark.cluster
 SLICED = CONFIG + "record: {{trials_per_shard: {per_shard}}}\n"
 TASKS = 3
 SLOW = "sim.real_time_factor=1"
-"""Tasks of few trials that last, and leave the processor to others; the samples stay the same."""
+"""Makes array tasks of few trials last long, without using the processor or changing the samples."""
 
 
 def call(slurm: Slurm, *arguments: str | Path, expect: int = 0, **environment: str) -> str:
@@ -45,14 +45,14 @@ def configure(directory: Path, *, trials: int, shards: int = 2 * TASKS) -> Path:
 
 
 def collect_whole(config: Path, directory: Path) -> dict[str, str]:
-    """What one collection makes of a configuration."""
+    """Collect a configuration in one run; returns the fingerprints of its files."""
     with runs.prepare(config, overrides=["run.runtime=inprocess"], output=directory) as run:
         run.collect()
     return fingerprints(directory)
 
 
 def recordings(files: dict[str, str]) -> dict[str, str]:
-    """What stays the same whatever the configuration says of the speed: recordings, and what came of the trials."""
+    """The files that do not depend on the configured speed: the recordings, and the table of outcomes."""
     return {name: each for name, each in files.items() if name.endswith(".mcap") or name == "throws.parquet"}
 
 
@@ -108,7 +108,7 @@ def limited(slurm: Slurm, tmp_path_factory: pytest.TempPathFactory) -> Iterator[
     slurm.run("scancel", "--quiet", array)
 
 
-def test_what_is_missing_is_submitted_again_and_nothing_else(
+def test_resume_submits_only_the_missing_slices(
     slurm: Slurm, short: tuple[Path, dict[str, str]], tmp_path: Path
 ) -> None:
     """A task is cancelled, the disk of another one is full, and then the joining job is cancelled."""
@@ -171,10 +171,10 @@ def test_a_run_is_listed_and_can_be_stopped(slurm: Slurm, tmp_path: Path) -> Non
     assert "3 slices of 3 not collected: cancelled" in call(slurm, "wait", "--run", data, expect=130)
 
 
-def test_nothing_is_lost_when_nodes_die_and_tasks_are_preempted(
+def test_no_trial_is_lost_when_nodes_die_and_array_tasks_are_preempted(
     slurm: Slurm, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    # The runs of tasks that are killed stay remembered; those of the user are not to be found among them.
+    # Records of killed array tasks stay behind; here, they do not mix with those of the user.
     monkeypatch.setenv(STATE_VARIABLE, str(tmp_path / "state"))
     config = configure(tmp_path, trials=60)
     whole = recordings(collect_whole(config, tmp_path / "whole"))
@@ -194,7 +194,7 @@ def test_nothing_is_lost_when_nodes_die_and_tasks_are_preempted(
     assert recordings(fingerprints(data)) == whole
 
 
-def test_a_script_collects_in_an_image_for_whoever_submits_it(
+def test_another_user_can_submit_the_printed_script_with_an_image(
     slurm: Slurm, short: tuple[Path, dict[str, str]], shared: Path, sif: Path
 ) -> None:
     """The user of the jobs has nothing but the image, and the script of somebody else."""
@@ -205,7 +205,7 @@ def test_a_script_collects_in_an_image_for_whoever_submits_it(
     said = call(slurm, *arguments, "--set", "cluster.memory=1G", "--set", f"cluster.image={sif}")
     begin = said.index("#!")
     (shared / "collect.sh").write_text(said[begin:])
-    # What has to be done besides is told beside the script.
+    # The lines before the script name the other commands to run.
     plan, logs, join = (shlex.split(line.rpartition(": ")[2]) for line in said[:begin].splitlines())
     inside = ("apptainer", "--quiet", "exec", str(sif))
     slurm.run(*inside, *plan, user=USER, cwd=shared)
@@ -221,7 +221,7 @@ def test_a_plan_that_grows_is_collected_by_one_run_on_several_nodes(slurm: Slurm
     with runs.prepare(config, overrides=["run.runtime=inprocess", *grows], output=tmp_path / "whole") as run:
         run.collect()
     data = tmp_path / "with blank" / "data"
-    # So slowly that machines which join find something to do, however busy this one is.
+    # Slow enough that joining machines find trials left, even if this one is busy.
     slowly = "sim.real_time_factor=4"
     settings = [word for setting in ("cluster.memory=1G", slowly, *grows) for word in ("--set", setting)]
     arguments = ("submit", config, "--output", data, "--tasks", "3", "--mode", "live", *settings)
@@ -230,7 +230,7 @@ def test_a_plan_that_grows_is_collected_by_one_run_on_several_nodes(slurm: Slurm
     assert recordings(fingerprints(data)) == recordings(fingerprints(tmp_path / "whole"))
     printed = call(slurm, "logs", "--run", data)
     assert printed.count("1 simulation of this machine will join") == 2
-    # The simulations that joined end some seconds later, and the script after them.
+    # The joined simulations end some seconds later, and then the script ends.
     wait_until(lambda: not (data / "cluster" / "token").exists())
     assert "nothing is left to submit" in call(slurm, "resume", data)
 
@@ -245,7 +245,7 @@ def test_a_plan_that_grows_is_collected_by_one_run_on_several_nodes(slurm: Slurm
         (["cluster.time=soon"], "cluster.time: should be minutes"),
     ],
 )
-def test_what_cannot_be_submitted_leaves_nothing_behind(
+def test_a_refused_submission_leaves_no_directory_and_no_job(
     slurm: Slurm, short: tuple[Path, dict[str, str]], tmp_path: Path, settings: list[str], message: str
 ) -> None:
     data = tmp_path / "data"
@@ -255,7 +255,7 @@ def test_what_cannot_be_submitted_leaves_nothing_behind(
     assert not slurm.run("squeue", "--noheader", "--format=%k").count(str(data))
 
 
-def test_more_tasks_than_slurm_takes_are_refused(slurm: Slurm, tmp_path: Path) -> None:
+def test_more_array_tasks_than_slurm_takes_are_refused(slurm: Slurm, tmp_path: Path) -> None:
     config = configure(tmp_path, trials=24)
     said = call(
         slurm, "submit", config, "--output", tmp_path / "data", "--tasks", "20000", "--trials", "20000",
@@ -264,7 +264,7 @@ def test_more_tasks_than_slurm_takes_are_refused(slurm: Slurm, tmp_path: Path) -
     assert "--tasks 20000: is more than Slurm takes here" in said
 
 
-def test_the_site_says_what_all_its_datasets_have_in_common(
+def test_the_file_of_the_site_gives_defaults_for_cluster_keys(
     slurm: Slurm, short: tuple[Path, dict[str, str]], tmp_path: Path
 ) -> None:
     site = tmp_path / "throwcollect" / "cluster.yaml"
@@ -279,14 +279,14 @@ def test_the_site_says_what_all_its_datasets_have_in_common(
     assert "cluster.yaml:2: tiem: unknown key" in said
 
 
-def test_where_there_is_no_slurm_it_says_so(short: tuple[Path, dict[str, str]], slurm: Slurm, tmp_path: Path) -> None:
+def test_submit_without_slurm_is_an_error(short: tuple[Path, dict[str, str]], slurm: Slurm, tmp_path: Path) -> None:
     data = tmp_path / "data"
     said = call(slurm, "submit", short[0], "--output", data, "--tasks", str(TASKS), expect=2, PATH="/nowhere")
     assert "this is no machine that submits to Slurm" in said
     assert not data.exists()
 
 
-def test_a_task_that_comes_near_its_time_limit_goes_on_and_no_other_is_disturbed(
+def test_an_array_task_near_its_time_limit_goes_on_without_disturbing_others(
     slurm: Slurm, limited: tuple[Path, dict[str, str]]
 ) -> None:
     data, whole = limited

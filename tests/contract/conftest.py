@@ -1,4 +1,4 @@
-"""Nodes that can be reached by each other and by nobody else, on the backend that this process is on.
+"""Nodes that reach each other and no other nodes, on the backend of this process.
 
 The embedded backend and rmw_zenoh_cpp have a router of the tests' own, Fast DDS has discovery on this host. Each test
 has a domain of its own.

@@ -1,4 +1,4 @@
-"""Nodes of the backend that this process is on, and what of rclpy has another place on each of the two."""
+"""Nodes on the backend of this process, and names of rclpy that lie in different modules on the two backends."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from throwcollect.ros.middleware import Middleware, uses_rclpy
 ON_RCLPY = uses_rclpy()
 ON_DDS = Middleware.of_process().is_fast_dds
 PATIENCE_S = 30.0
-"""Genuine nodes find each other, and all that they have, within a second; the machine may be very busy."""
+"""Genuine nodes discover each other and their endpoints within a second, but the machine may be very busy."""
 
 SERVER = """
 from throwcollect import ros
@@ -55,7 +55,7 @@ else:
 
 
 def choose_words(*, embedded: str, rclpy: str) -> str:
-    """What an error says, as a regular expression: its kind is the same on both backends, its words are not."""
+    """Choose the regular expression for a message: both backends raise the same class of error, with other words."""
     return rclpy if ON_RCLPY else embedded
 
 
@@ -100,7 +100,7 @@ class Rig:
         return True
 
     def sees(self, condition: Callable[[], Any]) -> bool:
-        """Whether something of others is seen, as soon as word of it has come by the router or by discovery."""
+        """Whether a condition becomes true: news of other nodes takes a while, by router or by discovery."""
         return self.spin(condition)
 
     def result(self, future: Future, timeout: float = PATIENCE_S) -> Any:
@@ -108,11 +108,11 @@ class Rig:
         return future.result()
 
     def rest(self, seconds: float = 0.1) -> None:
-        """Spin for a while, so that what should not happen had its chance."""
+        """Spin for a while, so that an event that should not happen has time to happen."""
         self.spin(lambda: False, seconds)
 
     def close(self) -> None:
-        # That of rclpy would wait for tasks.
+        # Without a timeout, an executor of rclpy would wait for tasks.
         options: Any = {"timeout_sec": 0} if ON_RCLPY else {}
         for executor, node in self.executors:
             executor.shutdown(**options)

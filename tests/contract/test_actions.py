@@ -105,7 +105,7 @@ def test_a_goal_is_accepted_executed_and_reached_with_feedback(rig, controller, 
     assert rig.spin(lambda: theirs.status == GoalStatus.STATUS_SUCCEEDED)
 
 
-def test_a_result_is_given_as_often_as_it_is_asked_for(rig, controller, client):
+def test_a_client_can_request_a_result_several_times(rig, controller, client):
     theirs, ours = send(rig, controller, client, "a")
     early = [theirs.get_result_async(), theirs.get_result_async()]
     controller.end(ours, "abort", error_code=-4)
@@ -113,13 +113,13 @@ def test_a_result_is_given_as_often_as_it_is_asked_for(rig, controller, client):
     assert [(r.status, r.result.error_code) for r in results] == [(GoalStatus.STATUS_ABORTED, -4)] * 3
 
 
-def test_a_goal_may_be_rejected(rig, controller, client):
+def test_a_server_can_reject_a_goal(rig, controller, client):
     handle = rig.result(client.send_goal_async(goal()))
     assert not handle.accepted
     assert rig.result(handle.get_result_async()).status == GoalStatus.STATUS_UNKNOWN
 
 
-def test_an_identifier_is_accepted_once(rig, controller, client):
+def test_a_goal_with_a_repeated_identifier_is_rejected(rig, controller, client):
     identifier = Uuid(uuid=np.arange(16, dtype=np.uint8))
     futures = [client.send_goal_async(goal("a"), goal_uuid=identifier) for _ in range(2)]
     assert [rig.result(future).accepted for future in futures] == [True, False]
@@ -134,7 +134,7 @@ def test_the_result_of_an_unknown_goal_is_unknown(rig, controller, client):
     assert rig.result(service.call_async(request)).status == GoalStatus.STATUS_UNKNOWN
 
 
-def test_a_goal_is_cancelled(rig, controller, client):
+def test_a_client_can_cancel_a_goal(rig, controller, client):
     theirs, ours = send(rig, controller, client, "a")
     response = rig.result(theirs.cancel_goal_async())
     assert response.return_code == CancelGoal.Response.ERROR_NONE
@@ -145,16 +145,16 @@ def test_a_goal_is_cancelled(rig, controller, client):
     assert rig.result(theirs.cancel_goal_async()).return_code == CancelGoal.Response.ERROR_GOAL_TERMINATED
 
 
-def test_a_goal_may_refuse_to_be_cancelled(rig, controller, client):
+def test_a_server_can_refuse_to_cancel_a_goal(rig, controller, client):
     theirs, ours = send(rig, controller, client, "stubborn")
     response = rig.result(theirs.cancel_goal_async())
-    # rclpy leaves the code as it was, rclcpp and the embedded backend tell that all have refused.
+    # rclpy leaves the code unchanged; rclcpp and the embedded backend set it if all goals refuse.
     code = CancelGoal.Response.ERROR_NONE if ON_RCLPY else CancelGoal.Response.ERROR_REJECTED
     assert (response.return_code, response.goals_canceling) == (code, [])
     assert ours.status == GoalStatus.STATUS_EXECUTING
 
 
-def test_all_goals_are_cancelled_and_an_unknown_one_is_not(rig, controller, client):
+def test_an_empty_request_cancels_all_goals_and_an_unknown_id_is_an_error(rig, controller, client):
     handles = [send(rig, controller, client, "a")[0] for _ in range(3)]
     node = rig.node("canceler")
     service = node.create_client(CancelGoal, "/arm/follow_joint_trajectory/_action/cancel_goal")
@@ -166,7 +166,7 @@ def test_all_goals_are_cancelled_and_an_unknown_one_is_not(rig, controller, clie
     assert [info.goal_id for info in response.goals_canceling] == [handle.goal_id for handle in handles]
 
 
-def test_results_are_forgotten_after_their_time(rig):
+def test_a_result_is_forgotten_after_its_timeout(rig):
     controller = Controller(rig.node("server"), result_timeout=0.05)
     client = ActionClient(rig.node("client"), FJT, "/arm/follow_joint_trajectory")
     assert client.wait_for_server(timeout_sec=5)
@@ -178,7 +178,7 @@ def test_results_are_forgotten_after_their_time(rig):
     assert ours.status == GoalStatus.STATUS_UNKNOWN
 
 
-def test_who_joins_late_gets_the_status_of_all_goals(rig, controller, client):
+def test_a_late_subscriber_gets_the_status_of_all_goals(rig, controller, client):
     _, first = send(rig, controller, client, "a")
     send(rig, controller, client, "b")
     controller.end(first, "succeed")
@@ -211,14 +211,14 @@ def test_an_execute_callback_that_fails_aborts_the_goal(rig):
     assert client.wait_for_server(5)
     future = client.send_goal_async(goal("a"))
     if not ON_RCLPY:
-        # rclpy logs it and goes on; the embedded backend treats it like that of any other callback.
+        # rclpy logs the exception and goes on; the embedded backend raises it, as for every callback.
         with pytest.raises(LookupError, match="callback failed"):
             rig.rest(5)
     handle = rig.result(future)
     assert rig.result(handle.get_result_async()).status == GoalStatus.STATUS_ABORTED
 
 
-def test_wrong_types_are_refused(rig, controller, client):
+def test_goals_and_feedback_of_a_wrong_type_are_refused(rig, controller, client):
     _, ours = send(rig, controller, client, "a")
     with pytest.raises(
         TypeError, match=choose_words(embedded="expected .*FollowJointTrajectory.Goal, got .*Result", rclpy="^$")

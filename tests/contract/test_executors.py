@@ -42,14 +42,14 @@ def test_spinning_once_calls_one_callback(node, executor):
     executor.create_task(calls.append, 2)
     while not calls:
         executor.spin_once(timeout_sec=1)
-    # rclpy calls the latest of tasks first.
+    # rclpy calls the latest task first.
     order = [2, 1] if ON_RCLPY else [1, 2]
     assert calls == order[:1]
     executor.spin_once(timeout_sec=1)
     assert calls == order
 
 
-def test_timers_and_messages_take_turns(rig, node, executor):
+def test_timers_and_tasks_take_turns(rig, node, executor):
     calls = []
     node.create_timer(0.0, lambda: calls.append("timer"))
     for _ in range(3):
@@ -93,7 +93,7 @@ def test_waiting_for_a_future_ends_at_the_timeout(node, executor):
     assert 0.05 <= time.monotonic() - start < 1.0
 
 
-def test_an_exception_in_a_task_reaches_those_who_await_it_and_who_spins(node, executor):
+def test_an_exception_in_a_task_reaches_its_result_and_the_spinning_caller(node, executor):
     async def fail():
         raise LookupError("task failed")
 
@@ -121,7 +121,7 @@ def test_a_cancelled_task_goes_no_further(rig, node, executor):
     assert reached == []
 
 
-def test_work_of_a_node_follows_it_to_another_executor(rig, node, executor):
+def test_waiting_messages_follow_a_node_to_another_executor(rig, node, executor):
     heard = []
     node.create_subscription(String, "t", heard.append, 10)
     publisher = node.create_publisher(String, "t", 10)
@@ -144,7 +144,7 @@ def test_shutting_the_context_down_ends_spinning(node, executor):
     threading.Timer(0.05, node.context.shutdown).start()
     with pytest.raises(ExternalShutdownException, match=choose_words(embedded="shut down", rclpy="^$")):
         executor.spin()
-    # rclpy has nothing to wait with any more, and says so.
+    # rclpy raises another error, as its wait set is gone after the shutdown.
     with pytest.raises(Exception if ON_RCLPY else ExternalShutdownException, match=r"shut down|rcl_shutdown\(\)"):
         executor.spin_once(timeout_sec=0)
 
@@ -152,5 +152,5 @@ def test_shutting_the_context_down_ends_spinning(node, executor):
 def test_shutting_the_executor_down_ends_spinning(node, executor):
     threading.Timer(0.05, executor.shutdown).start()
     executor.spin()
-    # On rclpy, nodes remember the last executor they were in.
+    # On rclpy, a node still refers to its last executor.
     assert ON_RCLPY or node.executor is None

@@ -1,4 +1,4 @@
-"""What nodes see of each other."""
+"""Topics, services and nodes that a node sees of other nodes."""
 
 from rclzenoh.interfaces import type_hash
 from tests.contract.rig import ON_DDS, names_of
@@ -10,7 +10,7 @@ Int32 = get_message(INT32)
 Trigger = get_service(TRIGGER)
 
 
-def test_nodes_see_what_others_have_as_soon_as_they_exist(rig):
+def test_a_node_sees_topics_services_and_clients_of_other_nodes(rig):
     node = rig.node("a", namespace="/ns")
     node.create_publisher(String, "topic", 10)
     node.create_subscription(Int32, "~/other", lambda _: None, 10)
@@ -34,13 +34,13 @@ def test_nodes_see_what_others_have_as_soon_as_they_exist(rig):
     assert seen.count_publishers("/ns/topic") == 0
 
 
-def test_each_endpoint_of_a_topic_is_known_as_a_genuine_node_shows_it(rig):
+def test_endpoint_infos_of_a_topic_look_like_those_of_genuine_nodes(rig):
     node = rig.node("a", namespace="/ns")
     qos = QoSProfile(depth=3, durability=DurabilityPolicy.TRANSIENT_LOCAL)
     node.create_publisher(String, "t", qos)
     node.create_subscription(String, "t", print, QoSProfile(depth=5, reliability=ReliabilityPolicy.BEST_EFFORT))
     seen = rig.node("b", namespace="/ns")
-    # DDS tells whose an endpoint is after it has told of the endpoint.
+    # DDS announces the node of an endpoint later than the endpoint itself.
     assert rig.sees(lambda: [info.node_name for info in seen.get_publishers_info_by_topic("t")] == ["a"])
     assert rig.sees(lambda: seen.count_subscribers("t") == 1)
     (info,) = seen.get_publishers_info_by_topic("t")
@@ -54,7 +54,7 @@ def test_each_endpoint_of_a_topic_is_known_as_a_genuine_node_shows_it(rig):
         f"GID: {gid.hex('.')}",
         "QoS profile:",
         "  Reliability: RELIABLE",
-        # DDS does not tell others of it.
+        # DDS does not announce the history of an endpoint.
         f"  History (Depth): {'UNKNOWN' if ON_DDS else 'KEEP_LAST (3)'}",
         "  Durability: TRANSIENT_LOCAL",
         "  Lifespan: Infinite",
@@ -69,7 +69,7 @@ def test_each_endpoint_of_a_topic_is_known_as_a_genuine_node_shows_it(rig):
 def test_endpoints_match_by_name_and_type(rig):
     node, other = rig.node("a"), rig.node("b")
     publisher = node.create_publisher(String, "t", 10)
-    # Not of the same session: there, DDS has one type for each name.
+    # This node has another session, as DDS allows one type for each topic name of a session.
     other.create_subscription(Int32, "t", lambda _: None, 10)
     assert rig.spin(lambda: node.count_subscribers("t") == 1)
     assert publisher.get_subscription_count() == 0
@@ -77,7 +77,7 @@ def test_endpoints_match_by_name_and_type(rig):
     assert rig.spin(lambda: publisher.get_subscription_count() == 1)
 
 
-def test_other_domains_are_invisible(rig, monkeypatch):
+def test_a_node_does_not_see_nodes_of_another_domain(rig, monkeypatch):
     rig.node("a")
     monkeypatch.setenv("ROS_DOMAIN_ID", "232")
     assert names_of(rig.node("b")) == ["b"]

@@ -1,4 +1,4 @@
-"""What a node is called, what it logs, and how it ends."""
+"""Names, log messages and the end of a node."""
 
 import re
 from pathlib import Path
@@ -25,7 +25,7 @@ def test_a_node_knows_its_names(rig):
     assert node.resolve_topic_name("~/x") == "/talos/sim/x"
 
 
-def test_what_a_node_logs_goes_to_standard_error_and_rosout(rig, capfd):
+def test_log_messages_go_to_standard_error_and_rosout(rig, capfd):
     node, heard = rig.node("sim", namespace="talos"), []
     node.get_logger().warning("careful")
     qos = QoSProfile(depth=1000, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -36,7 +36,7 @@ def test_what_a_node_logs_goes_to_standard_error_and_rosout(rig, capfd):
         Log.WARN[0] if isinstance(Log.WARN, bytes) else Log.WARN,
         "careful",
     )
-    assert (heard[0].file, heard[0].function) == (__file__, "test_what_a_node_logs_goes_to_standard_error_and_rosout")
+    assert (heard[0].file, heard[0].function) == (__file__, "test_log_messages_go_to_standard_error_and_rosout")
     assert "careful" in Path(__file__).read_text(encoding="utf-8").splitlines()[heard[0].line - 1]
     lines = capfd.readouterr().err.splitlines()
     assert len(lines) == 1
@@ -44,12 +44,12 @@ def test_what_a_node_logs_goes_to_standard_error_and_rosout(rig, capfd):
     assert lines[0].endswith("[talos.sim]: careful")
 
 
-# rclpy knows of other nodes of its own process alone, and warns that what both log takes one way.
+# rclpy warns only of nodes in the same process, because they share a logger.
 WARNING = choose_words(embedded="there is another node /ns/twin", rclpy="node name: 'twin'.*'ns.twin'")
 
 
 @pytest.mark.parametrize("same_session", [True, False])
-def test_a_second_node_of_one_name_works_and_warns(rig, capfd, same_session):
+def test_a_second_node_of_the_same_name_works_and_logs_a_warning(rig, capfd, same_session):
     first = rig.node("twin", namespace="ns")
     rig.node("twin", namespace="other")
     assert "twin" not in capfd.readouterr().err
@@ -71,7 +71,7 @@ def test_logging_goes_on_after_the_node_ended(rig, capfd):
     assert "late" in capfd.readouterr().err
 
 
-def test_repeated_messages_can_be_limited(capfd):
+def test_a_throttled_log_message_is_printed_once(capfd):
     logger = get_logger("limited")
     assert [logger.info("slow", throttle_duration_sec=100.0) for _ in range(3)] == [True, False, False]
     assert capfd.readouterr().err.count("\n") == 1

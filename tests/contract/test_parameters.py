@@ -43,7 +43,7 @@ def test_declaring_twice_and_using_undeclared_parameters_is_refused(node):
 
 
 def test_a_parameter_has_a_type_or_is_typed_dynamically(node):
-    # rclpy warns of it yet, as it is deprecated.
+    # rclpy only warns of a declaration without a type, as that is deprecated.
     with pytest.warns(match="deprecated") if ON_RCLPY else pytest.raises(ValueError, match="dynamic_typing"):
         node.declare_parameter("no_type")
     node.declare_parameter("a", descriptor=ParameterDescriptor(dynamic_typing=True))
@@ -59,7 +59,7 @@ def test_a_parameter_has_a_type_or_is_typed_dynamically(node):
 
 
 def plain(value):
-    """Without rclpy's arrays of numbers."""
+    """Turn an array of numbers, as rclpy returns it, into a list."""
     return list(value) if isinstance(value, array) else value
 
 
@@ -124,7 +124,7 @@ def test_parameters_are_set_atomically_or_not_at_all(node):
     assert node.get_parameter("a").value == 1
 
 
-def test_callbacks_are_asked_before_and_told_after(node):
+def test_callbacks_run_before_and_after_a_parameter_is_set(node):
     node.declare_parameter("a", 1)
     node.declare_parameter("b", 1)
     asked, told = [], []
@@ -140,7 +140,7 @@ def test_callbacks_are_asked_before_and_told_after(node):
     assert (asked, told, node.get_parameter("a").value) == ([[2, 3], [5]], [2], 2)
 
 
-def test_the_last_callback_that_was_added_is_asked_first(node):
+def test_the_callback_that_was_added_last_runs_first(node):
     node.declare_parameter("a", 1)
     for reason in ("first", "last"):
         result = SetParametersResult(successful=False, reason=reason)
@@ -196,7 +196,7 @@ def test_other_nodes_read_and_change_parameters(rig, node):
     assert not remote.call("SetParametersAtomically", parameters=[gain, wrong]).result.successful
 
 
-def test_unknown_names_and_types_are_answered_and_not_fatal(rig, node):
+def test_requests_with_unknown_names_and_types_are_answered(rig, node):
     remote = Remote(rig)
     assert remote.call("GetParameters", names=["use_sim_time", "absent"]).values == []
     assert remote.call("GetParameterTypes", names=["absent"]).types.tolist() == []
@@ -206,14 +206,14 @@ def test_unknown_names_and_types_are_answered_and_not_fatal(rig, node):
         Parameter("use_sim_time", value=True).to_parameter_msg(),
     )
     odd.value.type = 77
-    # `spin_once` of rclpy ends at a type that there is not; `spin_some` does not, as the next test shows.
+    # An unknown type ends `spin_once` of rclpy, but not `spin_some`, as the next test shows.
     wanted = [absent] if ON_RCLPY else [absent, odd]
     results = remote.call("SetParameters", parameters=wanted).results
     assert [result.successful for result in results] == [False] * len(wanted)
     assert choose_words(embedded="not declared", rclpy="undeclared") in results[0].reason
 
 
-def test_a_request_that_cannot_be_read_ends_no_node(rig):
+def test_a_malformed_request_does_not_end_the_node(rig):
     _, caller = rig.node("asked"), rig.node("caller")
     (executor, _), asking = rig.executors[0], SingleThreadedExecutor(context=caller.context)
     asking.add_node(caller)

@@ -6,7 +6,7 @@ import sys
 from tests.contract.rig import ON_RCLPY, SERVER, names_of, start_python
 
 GONE_S = 40.0 if ON_RCLPY else 5.0
-"""By itself, DDS believes for 20 s in a process that says nothing any more."""
+"""By default, DDS takes a silent process for living for 20 s."""
 
 
 def test_a_process_that_forgets_to_shut_down_ends(environment):

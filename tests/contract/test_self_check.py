@@ -1,4 +1,4 @@
-"""Whether a node finds out that nobody can reach it."""
+"""A node checks whether other nodes can reach it."""
 
 import pytest
 
@@ -13,7 +13,7 @@ def test_a_node_that_is_spun_answers_itself(rig):
     assert rig.spin(lambda: node.get_client_names_and_types_by_node("node", "/") == [])
 
 
-def test_a_node_that_nobody_spins_is_an_error(rig, monkeypatch):
+def test_a_node_that_nobody_spins_fails_its_self_check(rig, monkeypatch):
     monkeypatch.setattr(self_check, "_ANSWER_S", 0.5)
     node = rig.node("node")
     with pytest.raises(WorkerError, match=r"/node does not answer itself within 0.5 s, over (the embedded|rclpy with)"):

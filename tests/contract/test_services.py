@@ -20,7 +20,7 @@ def pair(rig):
     return server, client, client.create_client(SetBool, "/server/set")
 
 
-def test_a_request_is_answered(rig, pair):
+def test_a_service_answers_a_request(rig, pair):
     server, _, client = pair
     assert not client.wait_for_service(timeout_sec=0.05)
     server.create_service(SetBool, "~/set", answer)
@@ -32,12 +32,12 @@ def test_many_requests_at_once_get_their_own_answers(rig, pair):
     server, _, client = pair
     server.create_service(SetBool, "~/set", answer)
     client.wait_for_service(5)
-    # As many as the queue of the service holds.
+    # Ten requests are as many as the queue of the service holds.
     futures = [client.call_async(SetBool.Request(data=bool(i % 3))) for i in range(10)]
     assert [rig.result(future).success for future in futures] == [bool(i % 3) for i in range(10)]
 
 
-def test_a_coroutine_callback_does_not_hold_up_others(rig, pair):
+def test_a_waiting_coroutine_callback_blocks_others_only_on_rclpy(rig, pair):
     server, _, client = pair
     gate, order = Future(), []
 
@@ -51,7 +51,7 @@ def test_a_coroutine_callback_does_not_hold_up_others(rig, pair):
     client.wait_for_service(5)
     slow, fast = (client.call_async(SetBool.Request(data=data)) for data in (True, False))
     if ON_RCLPY:
-        # It does, as both callbacks are in the node's group, which lets one of them run at a time.
+        # On rclpy, it blocks: both callbacks are in the node's group, which runs one at a time.
         rig.rest(0.3)
         assert not fast.done()
     else:
@@ -77,7 +77,7 @@ def test_a_service_may_call_another_service_in_a_coroutine(rig, pair):
     assert inner.wait_for_service(5)
     answer = client.call_async(SetBool.Request())
     if ON_RCLPY:
-        # The answer is for the same group of callbacks as the service that waits for it, and so never taken.
+        # The answer is never taken: its callback is in the same group as the service that waits for it.
         rig.rest(0.3)
         assert not answer.done()
     else:
@@ -97,7 +97,7 @@ def test_an_error_in_a_callback_ends_spinning(rig, pair):
         rig.rest(5)
 
 
-def test_a_callback_that_returns_no_response_is_a_mistake(rig, pair):
+def test_a_callback_that_returns_no_response_is_a_type_error(rig, pair):
     server, _, client = pair
     server.create_service(SetBool, "~/set", lambda _request, _response: None)
     client.wait_for_service(5)
@@ -120,7 +120,7 @@ def test_a_destroyed_client_sends_nothing(rig, pair):
         client.call_async(SetBool.Request())
 
 
-def test_a_destroyed_service_is_not_offered_any_more(rig, pair):
+def test_clients_do_not_find_a_destroyed_service(rig, pair):
     server, _, client = pair
     service = server.create_service(SetBool, "~/set", answer)
     assert client.wait_for_service(5)

@@ -31,7 +31,7 @@ def simulation(rig):
     return set_time
 
 
-def test_ros_time_is_the_system_time_until_simulated_time_is_wanted(rig, simulation):
+def test_ros_time_is_the_system_time_unless_use_sim_time_is_set(rig, simulation):
     node = rig.node("node")
     assert abs(node.get_clock().now().nanoseconds - time.time_ns()) < 5e9
     node.set_parameters([Parameter("use_sim_time", value=True)])

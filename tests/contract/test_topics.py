@@ -35,7 +35,7 @@ def test_nodes_of_one_session_hear_each_other(rig):
     assert heard == [String(data="hello")]
 
 
-def test_bytes_are_published_and_received_as_they_are(rig):
+def test_raw_bytes_are_published_and_received_unchanged(rig):
     node = rig.node("node")
     heard = []
     node.create_subscription(String, "t", heard.append, 10, raw=True)
@@ -57,17 +57,17 @@ def test_messages_of_another_type_are_not_published(rig):
         publisher.publish(JointState())
 
 
-# On DDS, only those get them that asked for reliable ones.
+# On DDS, only reliable late subscribers get earlier messages.
 @pytest.mark.parametrize(
     "reliability", [ReliabilityPolicy.RELIABLE] + ([] if ON_RCLPY else [ReliabilityPolicy.BEST_EFFORT])
 )
-def test_who_joins_late_gets_the_last_messages_of_a_transient_local_topic(rig, reliability):
+def test_a_late_subscriber_gets_the_last_messages_of_a_transient_local_topic(rig, reliability):
     qos = QoSProfile(depth=2, durability=DurabilityPolicy.TRANSIENT_LOCAL, reliability=reliability)
     talker, listener = rig.node("talker"), rig.node("listener")
     publisher = talker.create_publisher(String, "t", qos)
     for text in "abc":
         publisher.publish(String(data=text))
-    rig.rest()  # What is still on its way would be heard as well.
+    rig.rest()  # Otherwise, a message still on its way would be heard as well.
     heard = []
     listener.create_subscription(String, "t", lambda m: heard.append(m.data), qos)
     assert rig.spin(lambda: len(heard) == 2)
@@ -87,7 +87,7 @@ def test_a_late_publisher_of_a_transient_local_topic_is_heard_once(rig):
     assert heard == ["a"]
 
 
-def test_the_oldest_messages_make_room_when_nobody_spins(rig):
+def test_a_full_subscription_drops_its_oldest_messages(rig):
     node, talker = rig.node("listener"), rig.node("talker")
     heard, marks = [], []
     node.create_subscription(String, "t", lambda m: heard.append(m.data), 3)
@@ -98,7 +98,7 @@ def test_the_oldest_messages_make_room_when_nobody_spins(rig):
         publisher.publish(String(data=str(i)))
     end.publish(String())
     time.sleep(0.2)
-    # On DDS, what one publisher sends may overtake what another one sent before.
+    # On DDS, messages of one publisher may overtake earlier ones of another publisher.
     assert rig.spin(lambda: marks and "19" in heard)
     rig.rest(0.05)
     assert heard == ["17", "18", "19"]

@@ -29,7 +29,7 @@ TRIALS = 20
 
 
 def config_file(directory: Path) -> Path:
-    """A collection so slow that it outlives what is done to it, with few trials to compute."""
+    """A configuration so slow that its collection outlives the interventions of a test, with few trials to compute."""
     return write_config(directory, trials=TRIALS, sim=f"{FAST}, real_time_factor: 8")
 
 
@@ -104,7 +104,7 @@ def place_of(run: str, dataset: Path, key: RunKey, *, volume: str | None = None)
 def collecting(
     client: DockerClient, directory: Path, *overrides: str, run: str | None = None, found: tuple[str, ...] = ()
 ) -> Iterator[Collection]:
-    """A collection whose nodes are started, or those of this run taken over; nothing of it is left afterwards."""
+    """Start the nodes of a collection, or take over those of a run; nothing of it is left afterwards."""
     run = run or new_run()
     config = config_for(directory, *overrides)
     dataset = directory / "dataset"

@@ -19,7 +19,7 @@ def client() -> Iterator[DockerClient]:
     try:
         found = connect()
     except WorkerError as error:
-        # Where continuous integration has tried to start one, it says why it could not.
+        # Continuous integration writes this file with the reason if it could not start an engine.
         pytest.skip(UNAVAILABLE.read_text().strip() if UNAVAILABLE.exists() else error.message)
     with closing(found):
         try:

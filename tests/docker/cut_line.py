@@ -1,4 +1,4 @@
-"""A line to the engine that can be cut, as if the engine went away."""
+"""A connection to the engine that a test can cut, as if the engine went away."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class CutLine:
                 end.shutdown(socket.SHUT_RDWR)
 
     def clog(self) -> None:
-        """Let nothing through any more, without breaking anything."""
+        """Stop forwarding data, while the connections stay open."""
         self._flows.clear()
 
     def cut(self) -> None:

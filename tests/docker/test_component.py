@@ -1,4 +1,4 @@
-"""Containers of the catalogue of a real engine, which join a run and hear it."""
+"""Containers of the catalogue, on a real engine: they join a run and hear its topics."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def runs_all(run: Run) -> bool:
 
 
 @pytest.mark.parametrize("runtime", ["docker", "local"])
-def test_it_hears_the_run_that_it_has_joined_and_ends_with_it(
+def test_a_container_hears_the_run_that_it_joined_and_ends_with_it(
     client: DockerClient, runtime: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv(STATE_VARIABLE, str(tmp_path / "state"))

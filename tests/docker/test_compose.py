@@ -74,7 +74,7 @@ def run(environment: dict[str, str], *arguments: str | Path, cwd: Path = ROOT) -
 @pytest.mark.parametrize(
     ("environment", "simulations"), [("v2", "1"), ("1.29", "2")], indirect=["environment"], ids=["v2", "1.29"]
 )
-def test_the_files_are_those_of_processes_for_any_number(
+def test_compose_collects_the_files_of_one_process(
     environment: dict[str, str], simulations: str, tmp_path: Path
 ) -> None:
     """Other tests compare what two and four simulations make on v2."""
@@ -118,7 +118,7 @@ def test_the_documented_command_runs(environment: dict[str, str], tmp_path: Path
 
 @pytest.mark.parametrize("environment", ["v2"], indirect=True)
 def test_a_node_that_dies_is_started_again(environment: dict[str, str], tmp_path: Path) -> None:
-    # So slowly that the collection outlives both kills on a fast machine, too.
+    # Slow enough that the collection outlives both kills even on a fast machine.
     config = write_config(tmp_path, trials=30, sim=f"{FAST}, real_time_factor: 2")
     collect_here(config, tmp_path / "undisturbed")
     command = [str(SCRIPT), str(config), "2", str(tmp_path / "data")]
@@ -134,7 +134,7 @@ def test_a_node_that_dies_is_started_again(environment: dict[str, str], tmp_path
 
 
 def kill_node_of(project: str, service: str) -> None:
-    """End the node in one of a service's containers, once it works."""
+    """Wait until the node in a container of a service works, and end it."""
     labels = [f"com.docker.compose.project={project}", f"com.docker.compose.service={service}"]
     client, deadline = connect(), time.monotonic() + 60
     while time.monotonic() < deadline:

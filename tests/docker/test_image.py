@@ -1,4 +1,4 @@
-"""The image as it is: what it can do in a container that may do next to nothing, and what is not in it."""
+"""The built image: what runs in a container with hardly any privileges, and which tools are not in it."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ CONFINED = {
     "security_opt": ["no-new-privileges"],
     "network_mode": "none",
 }
-"""What a container of a run is allowed, or less."""
+"""Privileges of the test container: at most those of a container of a run."""
 
 
 def run(client: DockerClient, *command: str, **options: Any) -> str:
@@ -43,12 +43,12 @@ def volume(client: DockerClient) -> Iterator[str]:
     made.remove()
 
 
-def test_the_command_decides_what_runs(client: DockerClient) -> None:
+def test_the_arguments_of_a_container_go_to_throwcollect(client: DockerClient) -> None:
     assert run(client, "--version") == f"throwcollect {throwcollect.__version__}\n"
 
 
 @pytest.mark.parametrize("user", ["4242:4242", "0:0", None])
-def test_any_user_makes_a_plan_on_a_file_system_that_cannot_be_written(client: DockerClient, user: str | None) -> None:
+def test_any_user_can_make_a_plan_on_a_read_only_file_system(client: DockerClient, user: str | None) -> None:
     sweep = "{sampler: sobol, parameters: {task.duration_s: {min: 1.0, max: 1.3}}}"
     command = f"echo '{{trials: 4, sweep: {sweep}}}' > /tmp/c.yaml && throwcollect plan /tmp/c.yaml --json"
     assert '"trial": 3' in script(client, command, user=user)
@@ -61,7 +61,7 @@ def test_any_user_may_write_into_a_new_volume_for_data(client: DockerClient, vol
     assert script(client, "stat -c %a /data", volumes=mounted) == "1777\n"
 
 
-def test_nothing_that_builds_or_installs_is_left(client: DockerClient) -> None:
+def test_the_image_has_no_tools_that_build_or_install(client: DockerClient) -> None:
     tools = "pip pip3 gcc cc ld strip make cmake git"
     assert script(client, f"for tool in {tools}; do command -v $tool; done; true") == ""
     with pytest.raises(ContainerError, match="No module named pip"):
@@ -70,21 +70,21 @@ def test_nothing_that_builds_or_installs_is_left(client: DockerClient) -> None:
     assert script(client, f"find /opt /build /wheelhouse {kinds} 2>/dev/null; true") == ""
 
 
-def test_of_the_robots_talos_alone_is_there(client: DockerClient) -> None:
+def test_talos_is_the_only_robot_of_the_image(client: DockerClient) -> None:
     robots = "ls /opt/venv/lib/python3*/site-packages/cmeel.prefix/share/example-robot-data/robots"
     assert script(client, robots) == "talos_data\n"
 
 
-def test_labels_say_what_it_is_and_where_it_comes_from(client: DockerClient) -> None:
+def test_the_labels_of_the_image_name_its_title_version_and_revision(client: DockerClient) -> None:
     labels = client.images.get(default_tag()).labels
     assert labels["org.opencontainers.image.title"] == "throwcollect"
     assert labels["org.opencontainers.image.version"] == throwcollect.__version__
     assert labels["org.opencontainers.image.revision"]
-    # The path of a clone on this machine would tell nobody else where the sources are.
+    # The path of a clone on this machine would be useless to other people.
     assert not labels.get("org.opencontainers.image.source", "").startswith("/")
 
 
-def test_it_runs_as_nobody_special_and_leaves_no_volume(client: DockerClient) -> None:
+def test_the_image_runs_as_an_ordinary_user_and_declares_no_volume(client: DockerClient) -> None:
     config = client.images.get(default_tag()).attrs["Config"]
     assert config["User"] == "10001:10001"
     assert not config.get("Volumes")
@@ -112,7 +112,7 @@ def healthcheck(client: DockerClient, container: Any, **environment: str) -> int
     return code
 
 
-def test_a_node_whose_loop_goes_round_is_healthy(client: DockerClient, router: Any) -> None:
+def test_a_router_with_a_recent_heartbeat_is_healthy(client: DockerClient, router: Any) -> None:
     assert healthcheck(client, router) == 0
     assert healthcheck(client, router, THROWCOLLECT_HEARTBEAT="/tmp/nobody") == 1
 
@@ -127,7 +127,7 @@ def test_a_router_that_is_stuck_is_unhealthy(client: DockerClient, router: Any) 
     assert healthcheck(client, router) == 1
 
 
-def test_a_node_ends_when_it_is_told_to(router: Any) -> None:
+def test_a_router_ends_without_error_when_its_container_is_stopped(router: Any) -> None:
     router.stop(timeout=30)
     router.reload()
     assert router.attrs["State"]["ExitCode"] == 0

@@ -76,14 +76,14 @@ def container(client: DockerClient, collection: Collection, node: str) -> Contai
 def list_what_is_left(client: DockerClient, label: str) -> list[Any]:
     filters = {"label": label}
     containers, networks = client.containers.list(all=True, filters=filters), client.networks.list(filters=filters)
-    # The volume of a dataset stays, if there is one.
+    # The volume of a dataset may stay, so only volumes of keys count here.
     return [*containers, *networks, *client.volumes.list(filters={"label": [label, KEY_LABEL]})]
 
 
 def test_a_collection_in_containers_yields_the_dataset_of_one_in_processes(
     client: DockerClient, tmp_path: Path, digest: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    caller = os.getuid() or 4242  # root may be anybody
+    caller = os.getuid() or 4242  # root can give files to any user
     monkeypatch.setattr(os, "getuid", lambda: caller)
     run = new_run()
     prepared = tmp_path / "dataset"
@@ -225,13 +225,13 @@ def test_a_run_whose_launcher_vanished_is_taken_over(client: DockerClient, tmp_p
     with collecting(client, tmp_path, run=run, found=nodes) as collection:
         assert collection.finish() == digest
     assert [line for line in collection.news if "sim_1 was lost (ended by SIGKILL)" in line]
-    # What the first launcher has copied already is not copied again.
+    # The second launcher does not copy log lines that the first one has copied.
     assert (dataset / "logs" / "sim_0.log").read_text().count("sim_0 is ready") == 1
 
 
 @pytest.fixture
 def bare(client: DockerClient, tmp_path: Path) -> Any:
-    """Makes runtimes without a dataset, for nodes that need none."""
+    """A function that makes runtimes without a dataset, for nodes that need none."""
     made: list[tuple[DockerNodes, str]] = []
 
     def make(*overrides: str, through: DockerClient = client) -> DockerNodes:
@@ -248,7 +248,7 @@ def bare(client: DockerClient, tmp_path: Path) -> Any:
         remove(client, run, volumes=True)
 
 
-def test_what_the_engine_refuses_is_the_reason_of_an_end(bare: Any) -> None:
+def test_a_node_that_the_engine_cannot_start_or_kills_ends_with_the_reason(bare: Any) -> None:
     runtime = bare("containers.sim.options.runtime=nowhere", "containers.coordinator.memory=16m")
     runtime.start(NodeSpec("sim_0", ("--version",), NodeRole.EXPENDABLE))
     end = wait_for_end(runtime)
@@ -260,8 +260,8 @@ def test_what_the_engine_refuses_is_the_reason_of_an_end(bare: Any) -> None:
     assert wait_for_end(runtime).reason == "ran out of memory (limit 16m)"
 
 
-def test_a_node_says_how_it_ended_and_what_it_said_last(monkeypatch: pytest.MonkeyPatch, bare: Any) -> None:
-    monkeypatch.setattr(docker_watch, "_LOOK_EVERY_S", 3600.0)  # the engine's events are enough
+def test_an_ended_node_has_its_exit_code_and_last_log_lines(monkeypatch: pytest.MonkeyPatch, bare: Any) -> None:
+    monkeypatch.setattr(docker_watch, "_LOOK_EVERY_S", 3600.0)  # so that only events of the engine report the end
     runtime = bare()
     runtime.start(NodeSpec("sim_0", ("sim", "/data/nothing.yaml"), NodeRole.EXPENDABLE))
     end = wait_for_end(runtime)
@@ -272,7 +272,7 @@ def test_a_node_says_how_it_ended_and_what_it_said_last(monkeypatch: pytest.Monk
     assert wait_for_end(runtime).log.splitlines()[-2:] == [*end.log.splitlines()[-1:], f"throwcollect {__version__}"]
 
 
-def test_a_container_that_somebody_removes_has_ended(bare: Any, client: DockerClient) -> None:
+def test_a_node_whose_container_is_removed_counts_as_ended(bare: Any, client: DockerClient) -> None:
     runtime = bare()
     runtime.start(NodeSpec(ROUTER, ("router", "--listen", runtime.listen), NodeRole.EXPENDABLE))
     until(lambda: runtime.handle(ROUTER) is not None)
@@ -280,7 +280,7 @@ def test_a_container_that_somebody_removes_has_ended(bare: Any, client: DockerCl
     assert wait_for_end(runtime).reason in ("its container was removed", "ended by SIGKILL")
 
 
-def test_a_published_router_is_reached_on_the_loopback_interface_alone(bare: Any, client: DockerClient) -> None:
+def test_a_published_router_listens_only_on_the_loopback_interface(bare: Any, client: DockerClient) -> None:
     with socket.create_server(("127.0.0.1", 0)) as probe:
         port = probe.getsockname()[1]
         with pytest.raises(ConfigError, match=f"run.router_port: port {port} of 127.0.0.1 cannot be used"):
@@ -297,7 +297,7 @@ def test_a_published_router_is_reached_on_the_loopback_interface_alone(bare: Any
     assert runtime.endpoint is None
 
 
-def test_a_node_has_the_key_as_files_of_the_caller_which_the_engine_tells_nobody(
+def test_a_node_gets_the_key_as_private_files_that_the_engine_does_not_show(
     bare: Any, client: DockerClient, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(os, "getuid", lambda: 4242)
@@ -309,7 +309,7 @@ def test_a_node_has_the_key_as_files_of_the_caller_which_the_engine_tells_nobody
     router = client.containers.get(runtime.handle(ROUTER))
     script = "stat -c '%a %u' /key/*; touch /key/new; cat /key/key.pem"
     said = router.exec_run(["sh", "-c", script]).output.decode()
-    # The engine may tell what stands in one stream before what was printed earlier into the other.
+    # The engine may deliver the two output streams in another order than they were printed.
     assert "400 4242\n400 4242\n" in said
     assert "/key/new': Read-only file system" in said
     assert key in said
@@ -324,7 +324,7 @@ def test_a_node_has_the_key_as_files_of_the_caller_which_the_engine_tells_nobody
         volume.reload()
 
 
-def test_what_is_not_there_is_found_before_anything_is_started(bare: Any, tmp_path: Path) -> None:
+def test_missing_images_networks_and_mounts_are_found_before_the_start(bare: Any, tmp_path: Path) -> None:
     with pytest.raises(WorkerError, match="the Docker engine has no image nobody/has:this"):
         bare("containers.image=nobody/has:this")
     sock = tmp_path / "link"
@@ -339,7 +339,7 @@ def test_what_is_not_there_is_found_before_anything_is_started(bare: Any, tmp_pa
     ]
 
 
-def test_mounts_environment_and_networks_of_the_configuration_are_there(
+def test_a_container_gets_the_configured_mounts_environment_and_networks(
     bare: Any, client: DockerClient, tmp_path: Path
 ) -> None:
     network = client.networks.create(new_run())
@@ -375,7 +375,9 @@ def line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> CutLine:
     return line
 
 
-def test_a_broken_line_to_the_engine_is_mended(bare: Any, client: DockerClient, line: CutLine) -> None:
+def test_the_runtime_reconnects_to_the_engine_after_an_interruption(
+    bare: Any, client: DockerClient, line: CutLine
+) -> None:
     runtime = bare(through=connect())
     runtime.start(NodeSpec(ROUTER, ("router", "--listen", runtime.listen), NodeRole.EXPENDABLE))
     until(lambda: runtime.log_tail(ROUTER) != "")
@@ -387,7 +389,7 @@ def test_a_broken_line_to_the_engine_is_mended(bare: Any, client: DockerClient, 
 
 
 @pytest.mark.parametrize(("trouble", "evidence"), [("cut", "Connection refused\n"), ("clog", "")])
-def test_an_engine_that_does_not_answer_any_more_is_said_so_with_what_is_safe(
+def test_a_silent_engine_is_an_error_that_names_containers_that_may_run_on(
     monkeypatch: pytest.MonkeyPatch,
     line: CutLine,
     bare: Any,

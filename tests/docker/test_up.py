@@ -23,7 +23,7 @@ LABEL = "throwcollect.run"
 
 @pytest.fixture(scope="module")
 def config(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    # So slowly that a collection takes long enough for what is done to it meanwhile, with few trials to compute.
+    # Slow enough that a collection outlasts the interventions of a test, with few trials to compute.
     return write_config(tmp_path_factory.mktemp("config"), trials=16, sim=f"{FAST}, real_time_factor: 4")
 
 
@@ -57,9 +57,11 @@ def containers_of(client: docker.DockerClient, directory: Path) -> dict[str, doc
     return {each.labels["throwcollect.node"]: each for each in client.containers.list(filters=filters)}
 
 
-def test_chaos(engine: docker.DockerClient, tmp_path: Path) -> None:
+def test_resume_completes_a_collection_after_kills_and_pauses_at_random(
+    engine: docker.DockerClient, tmp_path: Path
+) -> None:
     """Simulations, router and coordinator are killed, one is paused, then the launcher dies; resuming completes it."""
-    # So slowly that the collection outlives all of them on a fast machine, too.
+    # Slow enough that the collection outlives all kills even on a fast machine.
     config = write_config(tmp_path, trials=48, sim=f"{FAST}, real_time_factor: 2")
     directory = tmp_path / "data"
     collect_here(config, tmp_path / "undisturbed")
@@ -72,7 +74,7 @@ def test_chaos(engine: docker.DockerClient, tmp_path: Path) -> None:
     for harm in harms:
         nodes = containers_of(engine, directory)
         if harm in ("router", "coordinator"):
-            # It may just be starting again.
+            # A node that is just being restarted is missing.
             if harm in nodes:
                 nodes[harm].kill()
         elif victim := nodes.get(f"sim_{victims.pop()}"):
@@ -88,7 +90,9 @@ def test_chaos(engine: docker.DockerClient, tmp_path: Path) -> None:
     assert fingerprints(directory) == fingerprints(tmp_path / "undisturbed")
 
 
-def test_what_a_killed_launcher_leaves_is_cleaned_up(config: Path, engine: docker.DockerClient, tmp_path: Path) -> None:
+def test_down_removes_the_containers_of_a_killed_launcher(
+    config: Path, engine: docker.DockerClient, tmp_path: Path
+) -> None:
     directory = tmp_path / "data"
     running = start(config, directory, 1, "--runtime", "docker")
     running.wait_until(lambda: len(containers_of(engine, directory)) == 3)
@@ -99,11 +103,11 @@ def test_what_a_killed_launcher_leaves_is_cleaned_up(config: Path, engine: docke
     assert not containers_of(engine, directory)
 
 
-def test_containers_get_nothing_that_they_do_not_need_and_the_files_are_those_of_processes(
+def test_containers_have_few_privileges_and_collect_the_usual_files(
     config: Path, expected: dict[str, str], engine: docker.DockerClient, tmp_path: Path
 ) -> None:
     directory = tmp_path / "data"
-    # One more than that of the reference.
+    # The reference has one simulation, this collection has two.
     running = start(config, directory, 2, "--runtime", "docker", "--set", "containers.sim.memory=512m")
     running.wait_until(lambda: len(containers_of(engine, directory)) == 4)
     for name, container in containers_of(engine, directory).items():
@@ -127,7 +131,9 @@ def test_containers_get_nothing_that_they_do_not_need_and_the_files_are_those_of
     assert {path.stat().st_uid for path in directory.rglob("*")} == {os.getuid()}
 
 
-def test_ctrl_c_leaves_nothing_behind(config: Path, engine: docker.DockerClient, tmp_path: Path) -> None:
+def test_ctrl_c_leaves_no_containers_networks_or_keys_behind(
+    config: Path, engine: docker.DockerClient, tmp_path: Path
+) -> None:
     running: Running = start(config, tmp_path / "data", 1, "--runtime", "docker", "--trials", "40")
     running.wait_until(lambda: running.count_bytes() > 0)
     running.process.send_signal(signal.SIGINT)

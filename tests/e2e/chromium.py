@@ -31,7 +31,7 @@ FLAGS = (
     "--no-first-run",
     "--remote-debugging-port=0",
 )
-"""Software draws, which needs no screen and no GPU."""
+"""Options of Chromium: software draws, without screen and GPU."""
 
 
 def chromium() -> str | None:

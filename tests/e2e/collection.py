@@ -35,7 +35,7 @@ sweep:
     ball.mass_kg: {{min: 0.03, max: 0.06}}
 run: {{runtime: local, replay: 0}}
 """
-"""Its sampler draws without a library that takes each command a second to import."""
+"""The uniform sampler needs no library that would take each command a second to import."""
 
 
 def call(
@@ -65,7 +65,7 @@ def call_here(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
 
 
 FAST = "engine: ballistic"
-"""For tests of nodes and files: throws without contacts take a sixth of the time, and are data as any other."""
+"""For tests of nodes and files: throws without contacts take a sixth of the time, and give the same kinds of files."""
 
 
 INPROCESS = ("--runtime", "inprocess")
@@ -73,7 +73,7 @@ INPROCESS = ("--runtime", "inprocess")
 
 
 def words_of(process: psutil.Process) -> list[str]:
-    """Words of a command line, as `ps` shows it: psutil gives a node's in one piece, and free room behind it."""
+    """Words of a command line, as `ps` shows it: psutil returns that of a forked node as one padded text."""
     return " ".join(process.cmdline()).split()
 
 
@@ -91,7 +91,7 @@ class Running:
     directory: Path
 
     def nodes(self) -> list[psutil.Process]:
-        """Its nodes: what was forked by the process that has imported their libraries."""
+        """Nodes of the run: the children of the process that has imported their libraries."""
         return [node for server in psutil.Process(self.process.pid).children() for node in server.children()]
 
     def node(self, *words: str) -> psutil.Process:

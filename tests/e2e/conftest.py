@@ -1,4 +1,4 @@
-"""Runs of tests are remembered apart from those of the user."""
+"""Keep the records of runs of tests apart from those of the user."""
 
 from collections.abc import Iterator
 

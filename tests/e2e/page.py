@@ -16,7 +16,7 @@ from tests.e2e.chromium import Tab
 from throwcollect.runs.records import Records
 
 CHANGED = "ERR_NETWORK_CHANGED"
-"""What a browser says of requests that it breaks off when containers come and go beside it."""
+"""The error of a browser for requests that it breaks off when networks of containers come and go."""
 
 
 @contextmanager
@@ -29,14 +29,14 @@ def serve(catalogue: Path, datasets: Path, models: Path | None = None) -> Iterat
             yield json.loads(server.stdout.readline())
         finally:
             server.terminate()
-            # Runs outlive whoever served them.
+            # Runs outlive their server, so they are ended here.
             for run in Records().all():
                 if run.lives and datasets in Path(run.record.directory).parents:
                     os.kill(run.record.launcher, signal.SIGTERM)
 
 
 def load(tab: Tab) -> None:
-    """Wait until the page works; modules that the browser gave up, as a network of the machine changed, come again."""
+    """Wait until the page works; it is loaded again if a change of a network made the browser give up on modules."""
     for _ in range(5):
         with suppress(AssertionError):
             tab.wait_for("document.querySelector('#components form') !== null", within_s=20)
@@ -56,7 +56,7 @@ def find_own_errors(tab: Tab) -> list[str]:
 
 
 def wait_for(condition: Callable[[], Any], seconds: float = 60) -> Any:
-    """Wait until something is so, and return what the condition found."""
+    """Wait until a condition is true, and return its value."""
     deadline = time.monotonic() + seconds
     while not (found := condition()):
         assert time.monotonic() < deadline, "did not happen"

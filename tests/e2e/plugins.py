@@ -21,18 +21,18 @@ PLUGINS = Path(__file__).parents[1] / "plugins"
 
 @contextmanager
 def process_with_plugins() -> Iterator[ProcessPoolExecutor]:
-    """A process that finds these packages, as do those that it starts; what is submitted to it is done there."""
+    """A process that finds these packages, as do its children; it runs the functions that are submitted to it."""
     with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as process:
         with pytest.MonkeyPatch.context() as patch:
             patch.setenv("PYTHONPATH", str(PLUGINS), prepend=os.pathsep)
             patch.setattr(sys, "path", [str(PLUGINS), *sys.path])
-            # It is started for the first that it has to do.
+            # The process starts with its first function, while the path is patched.
             assert process.submit(call_here, "--version").result().returncode == 0
         yield process
 
 
 def run_program(program: str, **names: Any) -> dict[str, Any]:
-    """Run a program that knows of some names; returns what it calls ``found``, as JSON has it."""
+    """Run a program with the given names; returns its variable ``found`` after the way through JSON."""
     exec(program, names)  # noqa: S102
     found: dict[str, Any] = json.loads(json.dumps(names["found"]))
     return found

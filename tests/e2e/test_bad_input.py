@@ -1,4 +1,4 @@
-"""What a clumsy user meets: one clear message, the right exit code, nothing left behind, never a traceback."""
+"""Each mistake of a user gives one clear message and the right exit code, no files and no traceback."""
 
 import contextlib
 import json
@@ -105,7 +105,7 @@ def small(tmp_path: Path) -> Path:
         (["plan", *LIST, "sweep.file=bad.csv", "bare.yaml"], "bad.csv:3: ball.mass_kg: should be a number, got 'x'"),
     ],
 )
-def test_a_wrong_request_is_one_message(
+def test_a_wrong_command_line_gives_one_message_and_no_files(
     arguments: list[str], message: str, say: Callable[..., Said], small: Path, tmp_path: Path
 ) -> None:
     (tmp_path / "binary.yaml").write_bytes(b"\xff\x00")
@@ -129,7 +129,7 @@ def test_a_wrong_request_is_one_message(
     assert sorted(tmp_path.iterdir()) == before
 
 
-def test_all_problems_of_a_file_come_at_once(say: Callable[..., Said], tmp_path: Path) -> None:
+def test_all_problems_of_a_configuration_are_reported_at_once(say: Callable[..., Said], tmp_path: Path) -> None:
     (tmp_path / "many.yaml").write_text(
         "trails: 9\nball: {mass_kg: heavy}\ntask: {end: {arm_right_4_joint: 90}}\nsim: {physics_hz: 5}\n"
     )
@@ -198,7 +198,7 @@ def test_a_sweep_that_the_robot_cannot_do_is_refused(say: Callable[..., Said], s
 
 
 @pytest.mark.parametrize("directory", ["locked", "locked/data"])
-def test_no_permission_to_write(directory: str, small: Path, tmp_path: Path) -> None:
+def test_up_into_a_directory_without_write_permission_is_refused(directory: str, small: Path, tmp_path: Path) -> None:
     (tmp_path / "locked").mkdir(mode=0o555)
     said = call("up", small, "--output", tmp_path / directory, restrictions=OBEYING)
     assert (said.returncode, said.stdout) == (2, "")
@@ -207,7 +207,7 @@ def test_no_permission_to_write(directory: str, small: Path, tmp_path: Path) -> 
     assert list((tmp_path / "locked").iterdir()) == []
 
 
-def test_no_permission_to_read(small: Path) -> None:
+def test_a_configuration_without_read_permission_is_refused(small: Path) -> None:
     small.chmod(0o000)
     said = call("plan", small, restrictions=OBEYING)
     assert (said.returncode, said.stdout) == (2, "")
@@ -225,7 +225,9 @@ def test_no_permission_to_read(small: Path) -> None:
         ),
     ],
 )
-def test_a_robot_that_cannot_be_read(urdf: str | None, message: str, small: Path, tmp_path: Path) -> None:
+def test_up_and_doctor_report_a_robot_that_cannot_be_read(
+    urdf: str | None, message: str, small: Path, tmp_path: Path
+) -> None:
     fake = tmp_path / "fake"
     metadata = fake / "example_robot_data-6.0.0.dist-info" / "METADATA"
     metadata.parent.mkdir(parents=True)
@@ -257,15 +259,17 @@ def dataset(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, o
 
 
 @pytest.mark.parametrize("moment", ["plan", "collection", "finish"])
-def test_a_full_disk(moment: str, small: Path, tmp_path: Path, dataset: tuple[Path, dict[str, object]]) -> None:
+def test_a_collection_on_a_full_disk_ends_with_an_error_and_can_be_resumed(
+    moment: str, small: Path, tmp_path: Path, dataset: tuple[Path, dict[str, object]]
+) -> None:
     shard = (dataset[0] / "small_00000.mcap").stat().st_size
-    # The finished shard is larger than that in order of arrival by its summary, which is some kilobytes.
+    # The finished shard is some kilobytes larger than the part file, because it has a summary.
     limit, file = {
         "plan": (1000, "config.yaml"),
         "collection": (shard // 2, "small_00000.mcap.part"),
         "finish": (shard - 100, "small_00000.mcap"),
     }[moment]
-    # The coordinator, a node of its own, finds it out while it collects.
+    # In a collection by nodes, it is the coordinator that runs into the full disk.
     runtime = ("-n", "1") if moment == "collection" else INPROCESS
     said = call("up", *runtime, small, "--output", tmp_path / "data", restrictions=Restrictions(file_bytes=limit))
     assert said.stdout == ""
@@ -281,7 +285,7 @@ def test_a_full_disk(moment: str, small: Path, tmp_path: Path, dataset: tuple[Pa
         assert json.loads(resumed.stdout)["digest"] == dataset[1]["digest"]
 
 
-def test_directories_that_are_no_whole_dataset(
+def test_info_verify_and_digest_refuse_an_incomplete_dataset(
     say: Callable[..., Said], tmp_path: Path, dataset: tuple[Path, dict[str, object]]
 ) -> None:
     whole = dataset[0]
@@ -308,7 +312,7 @@ def test_directories_that_are_no_whole_dataset(
             assert said.err.startswith("throwcollect: ")
 
 
-def test_answers_for_programs_are_one_document_and_silence(
+def test_json_output_is_one_document_without_messages(
     say: Callable[..., Said], small: Path, dataset: tuple[Path, dict[str, object]]
 ) -> None:
     for arguments in (
@@ -324,14 +328,14 @@ def test_answers_for_programs_are_one_document_and_silence(
     assert told.items() <= dataset[1].items()
 
 
-def test_a_trial_that_is_not_in_the_plan_is_told(say: Callable[..., Said], small: Path, tmp_path: Path) -> None:
+def test_simulating_a_trial_outside_the_plan_is_an_error(say: Callable[..., Said], small: Path, tmp_path: Path) -> None:
     assert say("plan", str(small), "--output", "planned").code == 0
     said = say("simulate", "planned", "0", "999")
     assert said == (2, "", "throwcollect: planned/plan.parquet: no trial 999\n  expected: 0 to 1\n")
 
 
 @pytest.mark.parametrize("arguments", [["plan", "small.yaml"], ["config", "small.yaml"], ["--help"]])
-def test_a_reader_that_leaves_is_no_error(arguments: list[str], small: Path) -> None:
+def test_a_closed_output_pipe_is_no_error(arguments: list[str], small: Path) -> None:
     reading, writing = os.pipe()
     os.close(reading)
     said = subprocess.run(
@@ -349,7 +353,7 @@ def test_a_reader_that_leaves_is_no_error(arguments: list[str], small: Path) -> 
 
 
 @pytest.mark.parametrize("lost", ["both", "messages"])
-def test_a_collection_outlives_its_readers(lost: str, small: Path, tmp_path: Path) -> None:
+def test_a_collection_goes_on_when_its_output_pipe_is_closed(lost: str, small: Path, tmp_path: Path) -> None:
     reading, writing = os.pipe()
     os.close(reading)
     collecting = subprocess.run(
@@ -369,8 +373,8 @@ def test_a_collection_outlives_its_readers(lost: str, small: Path, tmp_path: Pat
     assert (tmp_path / "data" / "metadata.yaml").exists()
 
 
-def test_ctrl_c_while_libraries_are_loaded_is_no_error(small: Path, tmp_path: Path) -> None:
-    # What the command line is made of, in which Ctrl-C arrives while it is loaded.
+def test_ctrl_c_while_libraries_are_loaded_prints_no_traceback(small: Path, tmp_path: Path) -> None:
+    # This stands in for the library of the command line: Ctrl-C arrives while it is imported.
     (tmp_path / "typer.py").write_text("import os, signal, time\nos.kill(os.getpid(), signal.SIGINT)\ntime.sleep(9)\n")
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")])}
     said = subprocess.run(
@@ -410,7 +414,7 @@ def test_progress_is_a_bar_on_a_terminal(small: Path, tmp_path: Path) -> None:
     running = start_command(*words, stdout=subprocess.DEVNULL, stderr=own_end, **screen)
     os.close(own_end)
     shown = b""
-    with contextlib.suppress(OSError):  # the terminal's end is an error on Linux
+    with contextlib.suppress(OSError):  # on Linux, reading at the end of a terminal is an error
         while piece := os.read(terminal, 65536):
             shown += piece
     os.close(terminal)

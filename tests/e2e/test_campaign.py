@@ -10,8 +10,8 @@ from tests.e2e.collection import FAST
 pytestmark = pytest.mark.e2e
 
 
-def test_no_attack_is_missed(tmp_path: Path) -> None:
-    # Slow enough that signals arrive before the last trial has ended, but without the work of contacts.
+def test_a_small_campaign_detects_every_attack(tmp_path: Path) -> None:
+    # Slow enough that signals arrive before the last trial ends, without the work of computing contacts.
     counts = run(seed=1, flip_count=300, plans=1, kill_count=2, scratch=tmp_path, sim=f"{FAST}, real_time_factor: 10")
     assert {kind: count.missed for kind, count in counts.items()} == {"flips": [], "forgeries": [], "kills": []}
     assert counts["flips"].tried == 300

@@ -1,4 +1,4 @@
-"""What docs/cluster.md says of other schedulers is what happens."""
+"""The script that docs/cluster.md shows for other schedulers works."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from tests.e2e.collection import CONFIG, FAST, collect_here, fingerprints, write
 PAGE = Path(__file__).parents[2] / "docs" / "cluster.md"
 
 
-def test_a_loop_is_a_scheduler(tmp_path: Path) -> None:
+def test_the_documented_shell_loop_collects_all_slices(tmp_path: Path) -> None:
     marked = rf"<!-- run by tests/e2e/{Path(__file__).name} -->\n```sh\n(.*?)```"
     (script,) = re.findall(marked, PAGE.read_text(encoding="utf-8"), flags=re.DOTALL)
     text = CONFIG.replace("local", "inprocess") + "record: {{trials_per_shard: 2}}\n"

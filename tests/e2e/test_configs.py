@@ -10,10 +10,10 @@ from throwcollect.dataset.verify import verify
 pytestmark = pytest.mark.e2e
 CONFIGS = sorted((Path(__file__).parents[2] / "configs").glob("*.yaml"))
 WHOLE = {"reference": 2}
-"""Trials of those that have as many as their points, and few of them."""
+"""Configurations that are collected as a whole, as they have few points, with the number of their trials."""
 
 
-def test_there_are_configurations() -> None:
+def test_the_project_comes_with_the_known_configurations() -> None:
     assert {path.stem for path in CONFIGS} >= {"dmp", "grid", "quickstart", "randomised", "reference", "targets"}
 
 

@@ -1,4 +1,4 @@
-"""A derived dataset is the dataset that a collection of its trials gives, and docs/deriving.md is true."""
+"""A derived dataset equals a collection of its trials, and the commands of docs/deriving.md work."""
 
 import re
 import shlex
@@ -49,7 +49,7 @@ record:
 run: {replay: 0}
 """
 OF_DERIVED_ONLY = {"sources.parquet", "datapackage.json"}
-"""Where the throws come from, and the manifest, which covers that, too."""
+"""Files that differ in a derived dataset: the table of sources, and the manifest, which covers that table."""
 
 
 @pytest.fixture(scope="module")
@@ -67,7 +67,7 @@ def home(tmp_path_factory: pytest.TempPathFactory) -> Path:
             assert program == "throwcollect"
             if command == "up":
                 config, *_, output = arguments
-                # The two that the page begins with are those from above, which differ more.
+                # The first two datasets of the page are those made above, which differ more from each other.
                 if not (directory / output).exists():
                     collect_here(directory / config, directory / output)
             else:
@@ -87,17 +87,17 @@ def as_derived(directory: Path) -> dict[str, str]:
     return {name: digest for name, digest in fingerprints(directory).items() if name not in OF_DERIVED_ONLY}
 
 
-def test_a_merged_dataset_is_what_a_collection_of_its_trials_gives(home: Path, tmp_path: Path) -> None:
+def test_a_merged_dataset_equals_a_collection_of_its_trials(home: Path, tmp_path: Path) -> None:
     assert verify(home / "both") == []
     assert as_derived(home / "both") == collect_anew(home / "both", tmp_path / "anew")
 
 
-def test_a_filtered_dataset_is_what_a_collection_of_its_trials_gives(home: Path) -> None:
+def test_a_filtered_dataset_equals_a_collection_of_its_trials(home: Path) -> None:
     assert len(fingerprints(home / "short")) > 1
     assert as_derived(home / "short") == as_derived(home / "again")
 
 
-def test_all_derived_datasets_are_whole(home: Path) -> None:
+def test_verify_finds_nothing_wrong_in_derived_datasets(home: Path) -> None:
     derived = [path.parent for path in home.rglob("sources.parquet")]
     assert {str(path.relative_to(home)) for path in derived} == {
         *("both", "short", "few"),
@@ -107,7 +107,7 @@ def test_all_derived_datasets_are_whole(home: Path) -> None:
         assert verify(directory) == []
 
 
-def test_the_python_of_the_page_works(home: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_python_program_of_the_page_runs(home: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (python,) = re.findall(r"```python\n(.*?)```", PAGE, flags=re.DOTALL)
     monkeypatch.chdir(home.parent)
     names: dict[str, Any] = {}

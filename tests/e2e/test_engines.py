@@ -26,7 +26,7 @@ def test_a_collection_without_contacts_can_be_verified_replayed_and_collected_ag
     assert again["digest"] == first["digest"]
 
 
-def test_a_collection_by_mujoco_is_the_same_whoever_simulates_it(tmp_path: Path) -> None:
+def test_mujoco_collects_the_same_files_in_nodes_and_in_one_process(tmp_path: Path) -> None:
     config, directory = write_config(tmp_path, trials=6), tmp_path / "throws"
     mujoco = ("--set", "sim.engine=mujoco")
     first = collect(config, directory, 2, *mujoco)

@@ -1,4 +1,4 @@
-"""Simulations that are none, or that are of something else, beside one that does its work: nodes without a key."""
+"""Impostors and a simulation of another configuration, beside a simulation that does its work, without a key."""
 
 import subprocess
 import threading
@@ -64,7 +64,7 @@ def spinning(context: ros.Context, *nodes: ros.Node) -> Iterator[None]:
 @contextmanager
 def run_in_background(*arguments: str | Path, log: Path) -> Iterator[Command]:
     with log.open("wb") as file, start_command(*arguments, stdout=file.fileno(), stderr=subprocess.STDOUT) as process:
-        # Also when what is tried meanwhile fails; the process is waited for either way.
+        # The process is ended even if the test fails, as the context waits for its end in any case.
         try:
             yield process
         finally:
@@ -81,11 +81,9 @@ def graph(monkeypatch: pytest.MonkeyPatch) -> Iterator[ros.Context]:
         context.try_shutdown()
 
 
-def test_a_dataset_is_that_of_its_configuration_whoever_poses_as_a_simulation(
-    graph: ros.Context, tmp_path: Path
-) -> None:
+def test_impostor_simulations_do_not_change_the_dataset(graph: ros.Context, tmp_path: Path) -> None:
     config = write_config(tmp_path, trials=TRIALS, sim=FAST)
-    # Every trial is simulated again at the end, so it is known that all are right.
+    # The run replays every trial at the end, which shows that all are right.
     config.write_text(config.read_text().replace("replay: 0", f"replay: {TRIALS}, trial_timeout_s: 3"))
     other = tmp_path / "other.yaml"
     other.write_text(config.read_text() + "ball: {friction: 0.1}\n")

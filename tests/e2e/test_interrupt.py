@@ -1,4 +1,4 @@
-"""Interruptions and losses: nothing half-done, nobody left behind, and the evidence told."""
+"""Interruptions and losses leave no torn files and no processes, and messages name their cause."""
 
 import io
 import json
@@ -55,7 +55,7 @@ def reference(config: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def started(tmp_path: Path) -> Iterator[list[Running]]:
-    """Collections that are ended with the test, however that ends."""
+    """A list of collections, which are ended after the test even if it fails."""
     running: list[Running] = []
     yield running
     for each in running:
@@ -93,7 +93,7 @@ def episodes(part: Path, *, cut: bool = False) -> Counter[str]:
             if isinstance(record, Metadata) and record.name == "throwcollect.episode":
                 found[record.metadata["trial"]] += 1
     except (McapError, EOFError):
-        # The footer is missing; up to there, all records were read.
+        # Only the footer is missing: all records before it were read.
         assert cut or data.tell() == len(data.getvalue())
     assert cut or chunks == len(found) + 1
     return found
@@ -116,8 +116,10 @@ def events(directory: Path) -> list[dict[str, Any]]:
     return journal(directory)
 
 
-def test_ctrl_c_before_any_simulation_is_ready(config: Path, tmp_path: Path, started: list[Running]) -> None:
-    # A busy machine may look for the nodes only when trials run; in real time it is then not too late.
+def test_ctrl_c_before_any_simulation_is_ready_ends_the_run_and_its_nodes(
+    config: Path, tmp_path: Path, started: list[Running]
+) -> None:
+    # A busy machine may find the nodes only when trials run; in real time, the run is then not yet over.
     running, nodes = begin(started, config, tmp_path / "data", "--set", "sim.real_time_factor=1")
     running.process.send_signal(signal.SIGINT)
     code, out, err = running.finish()
@@ -135,7 +137,7 @@ _HANGUP = pytest.param(
 
 
 @pytest.mark.parametrize(("number", "share"), [(signal.SIGINT, 0.3), _HANGUP])
-def test_an_interruption_finishes_what_runs(
+def test_an_interruption_finishes_the_running_trials(
     number: signal.Signals, share: float, config: Path, reference: Path, tmp_path: Path, started: list[Running]
 ) -> None:
     running, nodes = begin(started, config, tmp_path / "data")
@@ -155,18 +157,18 @@ def test_an_interruption_finishes_what_runs(
     assert_goes_on(tmp_path / "data", reference)
 
 
-def test_what_runs_gets_the_grace_of_the_configuration(
+def test_an_interrupted_trial_gets_the_configured_grace_time(
     config: Path, reference: Path, tmp_path: Path, started: list[Running]
 ) -> None:
     running, nodes = begin(started, config, tmp_path / "data", "--set", "run.grace_s=0.5")
     in_the_middle(running, whole=reference)
-    # Its trial will never end.
+    # The trial of a suspended simulation never ends.
     running.node("--name", "sim_0").suspend()
     running.process.send_signal(signal.SIGTERM)
     code, _, _ = running.finish()
     assert code == 130
     assert_gone(nodes)
-    # The coordinator came to its own end; it was not ended by force, as after some seconds more.
+    # The coordinator ended by itself; some seconds later, it would have been killed.
     assert "interrupted; what is finished is in" in (tmp_path / "data" / "logs" / "coordinator.log").read_text()
 
 
@@ -179,19 +181,19 @@ def test_a_second_ctrl_c_does_not_wait_for_trials(
     hanging.suspend()
     coordinator = running.node("coordinator", str(tmp_path / "data"))
     running.process.send_signal(signal.SIGINT)
-    # The trial of the hanging simulation does not end, so this is where it would wait.
+    # The coordinator waits for the hanging simulation, whose trial does not end.
     with pytest.raises(psutil.TimeoutExpired, match="timeout after 2 seconds"):
         coordinator.wait(2)
     running.process.send_signal(signal.SIGINT)
     code, _, _ = running.finish()
     assert code == 130
     assert_gone(nodes)
-    # It did not get so far as to say that it had drained.
+    # The coordinator was ended before it could report that it had drained.
     assert "interrupted" not in (tmp_path / "data" / "logs" / "coordinator.log").read_text()
     assert len(episodes(tmp_path / "data" / "small_00000.mcap.part")) > 0
 
 
-def test_a_killed_launcher_takes_its_nodes_along(
+def test_a_killed_launcher_ends_its_nodes_and_the_dataset_can_be_resumed(
     config: Path, reference: Path, tmp_path: Path, started: list[Running]
 ) -> None:
     running, nodes = begin(started, config, tmp_path / "data")
@@ -203,7 +205,7 @@ def test_a_killed_launcher_takes_its_nodes_along(
     assert_goes_on(tmp_path / "data", reference, untold=1)
 
 
-def test_a_killed_coordinator_is_started_again_and_takes_in_what_is_there(
+def test_a_restarted_coordinator_recovers_the_recorded_episodes(
     config: Path, reference: Path, tmp_path: Path, started: list[Running]
 ) -> None:
     running, _ = begin(started, config, tmp_path / "data", "--set", "run.trial_timeout_s=5")
@@ -231,7 +233,7 @@ def test_a_finished_dataset_whose_recording_was_cut_goes_on_to_the_same_files(
     assert fingerprints(directory) == fingerprints(reference)
 
 
-def test_a_power_cut_costs_what_had_not_reached_the_disk(
+def test_resuming_after_a_power_cut_keeps_the_episodes_on_the_disk(
     config: Path, reference: Path, tmp_path: Path, started: list[Running]
 ) -> None:
     running, nodes = begin(started, config, tmp_path / "data")
@@ -250,13 +252,15 @@ def test_a_power_cut_costs_what_had_not_reached_the_disk(
     assert next(event["episodes"] for event in events(tmp_path / "data") if event["event"] == "recovered") == kept > 0
 
 
-def test_a_killed_router_costs_nothing(config: Path, reference: Path, tmp_path: Path, started: list[Running]) -> None:
+def test_a_killed_router_is_restarted_and_the_dataset_stays_the_same(
+    config: Path, reference: Path, tmp_path: Path, started: list[Running]
+) -> None:
     running, nodes = begin(started, config, tmp_path / "data", "--set", "run.trial_timeout_s=5")
     in_the_middle(running, whole=reference)
     next(node for node in nodes if "router" in words_of(node)).kill()
     code, out, err = running.finish()
     assert code == 0, err
-    # Where nobody looks, progress is plain lines.
+    # Without a terminal, progress is shown as plain lines.
     assert "\x1b" not in out + err
     assert f"{TRIALS}/{TRIALS} throws: {TRIALS} landed, 0 failed, 2 simulations," in err
     assert "router was lost (ended by SIGKILL) and is started again" in err
@@ -316,7 +320,7 @@ def test_simulations_that_never_start_end_the_run(
     begun = time.monotonic()
     said = call("up", "-n", "2", config, "--output", tmp_path / "data", "--set", option, "--set", "sim.engine=bullet")
     assert said.returncode == 3
-    # Longer than the six seconds of the configuration on the busiest machine; its default is a minute.
+    # Six seconds are configured, which may take longer on a busy machine; the default is a minute.
     assert time.monotonic() - begun < 45
     assert message in said.stderr
     assert ("broken pybullet" in said.stderr) == ("broken" in physics)

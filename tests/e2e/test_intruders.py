@@ -34,14 +34,14 @@ pytestmark = [
 NOBODY = 65534
 TRIALS = 12
 UNTIL_STOPPED = ("--trials", "200", "--set", "sim.real_time_factor=1")
-"""Longer than these tests, whatever else the machine does; its first trials are those of any number."""
+"""Makes the collection outlast these tests; the first trials do not depend on the number of trials."""
 
 BECOME_NOBODY = f"""
 os.setgroups([])
 os.setresgid({NOBODY}, {NOBODY}, {NOBODY})
 os.setresuid({NOBODY}, {NOBODY}, {NOBODY})
 """
-"""Comes after all imports, as another user may not even be able to read the interpreter of this one."""
+"""This code runs after all imports, as the other user may not be able to read this interpreter."""
 
 ATTEMPT = f"""
 import json, os, sys, time, zenoh
@@ -67,7 +67,7 @@ for name, override in json.loads(sys.argv[1]).items():
     session.close()
     print(f"{{name}}: HAS A SESSION, heard {{len(heard)}} messages, was answered {{answers}} times")
 """
-"""Somebody who subscribes, publishes and asks wherever there is a session."""
+"""An intruder that subscribes, publishes and calls services wherever it gets a session."""
 
 POSE = f"""
 import os, sys
@@ -81,7 +81,7 @@ session._PATIENCE_S = 0.5
 {BECOME_NOBODY}
 main()
 """
-"""Somebody who starts a node."""
+"""An intruder that starts a node."""
 
 LOOK = f"""
 import os, pathlib, sys
@@ -92,7 +92,7 @@ for path in map(pathlib.Path, sys.argv[1:]):
     except PermissionError:
         print("refused")
 """
-"""Somebody who looks around."""
+"""An intruder that reads files and lists directories."""
 
 LIKELIEST = "with a key of its own and the router's certificate"
 
@@ -133,7 +133,7 @@ class Scene:
 
 @pytest.fixture(scope="module")
 def scene() -> Iterator[Scene]:
-    # Not among pytest's directories, which others cannot even enter.
+    # Other users cannot enter the directories of pytest, so the scene is elsewhere.
     with tempfile.TemporaryDirectory() as directory:
         Path(directory).chmod(0o755)
         yield from _scene_in(Path(directory))
@@ -141,11 +141,11 @@ def scene() -> Iterator[Scene]:
 
 def _scene_in(directory: Path) -> Iterator[Scene]:
     state = directory / "state"
-    # Others may read in it, as in most directories.
+    # Other users can read this directory, as most directories.
     state.mkdir(mode=0o755)
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv(STATE_VARIABLE, str(state))
-        # Runs of others on an engine of this machine are none of these tests' business.
+        # Without an engine, no runs of other users on this machine are seen.
         patch.setenv("DOCKER_HOST", f"unix://{directory}/none.sock")
         config = write_config(directory, trials=TRIALS, sim=FAST)
         running = start(config, directory / "data", 2, *UNTIL_STOPPED)
@@ -167,7 +167,7 @@ def _ways(endpoint: str, home: Path) -> dict[str, str]:
     """Ways to the router for somebody who knows where it is, and can make keys."""
     forged = RunKey(home / "forged")
     forged.create()
-    # Any server shows its certificate to everybody; that makes the router trusted, but not the one who comes.
+    # Every client can get the router's certificate; with it, the client trusts the router, but not the reverse.
     shown = RunKey(home / "shown")
     shutil.copytree(forged.directory, shown.directory)
     host, _, port = endpoint.partition("/")[2].rpartition(":")
@@ -187,16 +187,16 @@ def _ways(endpoint: str, home: Path) -> dict[str, str]:
     }
 
 
-def test_nobody_else_hears_says_or_asks_anything(scene: Scene) -> None:
-    """Not even a session is had, in which they could."""
+def test_another_user_gets_no_session_with_the_router(scene: Scene) -> None:
+    """Without a session, a user can neither hear nor send anything."""
     said = scene.as_nobody(ATTEMPT, json.dumps(scene.ways))
     assert len(said.stdout.splitlines()) == len(scene.ways) == 5, said
     for line in said.stdout.splitlines():
         assert ": Unable to connect to any of " in line, said
 
 
-def test_whoever_is_let_in_hears_says_and_asks(scene: Scene) -> None:
-    """So that the test above does not pass because there is nothing to be heard."""
+def test_a_client_with_the_key_can_listen_publish_and_call(scene: Scene) -> None:
+    """This shows that the test above does not pass only because the run is silent."""
     with_key = client_override(scene.record.endpoint or "", scene.key)
     said = subprocess.run(
         [sys.executable, "-c", ATTEMPT.replace(BECOME_NOBODY, ""), json.dumps({"owner": with_key})],
@@ -208,8 +208,8 @@ def test_whoever_is_let_in_hears_says_and_asks(scene: Scene) -> None:
     assert re.match("owner: HAS A SESSION, heard [1-9].* messages, was answered 1 times\n", said.stdout), said
 
 
-def test_nobody_else_poses_as_a_node(scene: Scene) -> None:
-    """A simulation that would be given trials, a coordinator that would give some: neither finds the router."""
+def test_another_user_cannot_start_a_node_in_the_run(scene: Scene) -> None:
+    """Neither a simulation nor a coordinator of another user connects to the router."""
     (scene.home / "other.yaml").write_text((scene.running.directory.parent / "small.yaml").read_text())
     for node in (["sim", "other.yaml", "--name", "evil"], ["coordinator", "data", "--config", "other.yaml"]):
         said = scene.as_nobody(POSE, *node)
@@ -217,7 +217,7 @@ def test_nobody_else_poses_as_a_node(scene: Scene) -> None:
         assert re.search(r"no Zenoh session within [\d.]+ s; connecting to", said.stderr), said
 
 
-def test_nobody_else_reads_the_key_or_lists_the_runs(scene: Scene) -> None:
+def test_another_user_cannot_read_the_key_or_list_the_runs(scene: Scene) -> None:
     assert scene.key.exists
     places = (scene.key.private_key, scene.key.certificate, scene.key.directory, scene.key.directory.parents[1])
     said = scene.as_nobody(LOOK, *map(str, places))
@@ -227,15 +227,15 @@ def test_nobody_else_reads_the_key_or_lists_the_runs(scene: Scene) -> None:
     assert re.match("thief: the key of the run cannot be read: .*/key.pem: Permission denied\n", said.stdout), said
 
 
-def test_nobody_else_sees_the_key_in_what_the_system_tells_of_processes(scene: Scene) -> None:
+def test_arguments_and_environment_of_nodes_do_not_show_the_key(scene: Scene) -> None:
     secret = scene.key.private_key.read_text().splitlines()[1]
     for node in (scene.running.process.pid, *(int(node.handle or 0) for node in scene.record.nodes)):
         for told in ("cmdline", "environ"):
             assert secret not in Path(f"/proc/{node}/{told}").read_text(errors="replace")
 
 
-def test_whoever_evaluates_one_line_has_joined(scene: Scene) -> None:
-    """The owner, in a shell; the next process there is any node, of which this is the smallest."""
+def test_a_shell_that_evaluates_ros_env_has_joined_the_run(scene: Scene) -> None:
+    """In a shell of the owner, `ros node list` stands for any node that is started after `ros env`."""
     throwcollect = f"{sys.executable} -m throwcollect"
     script = f'eval "$({throwcollect} ros env)"; {throwcollect} ros node list; printenv RMW_IMPLEMENTATION'
     said = subprocess.run(["bash", "-c", script], capture_output=True, text=True, timeout=60, check=False)
@@ -244,14 +244,14 @@ def test_whoever_evaluates_one_line_has_joined(scene: Scene) -> None:
     assert said.stdout.endswith("rmw_zenoh_cpp\n")
 
 
-def test_the_owner_changes_the_run_as_ever(scene: Scene) -> None:
+def test_the_owner_can_scale_the_run(scene: Scene) -> None:
     assert call("scale", "3").returncode == 0
     (listed,) = json.loads(call("ps", "--json").stdout)
     assert (listed["run"], listed["simulations"]) == (scene.record.run, 3)
 
 
-def test_what_is_collected_is_what_would_have_been(scene: Scene) -> None:
-    """Comes last: it ends the collection."""
+def test_the_attacks_do_not_change_the_collected_trials(scene: Scene) -> None:
+    """This test has to be the last one, as it ends the collection."""
     assert call("stop").returncode == 0
     code, out, _ = scene.running.finish()
     assert (code, "run.open" in out) == (130, False)

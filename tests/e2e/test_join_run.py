@@ -35,9 +35,9 @@ from throwcollect.run_key import RunKey
 pytestmark = pytest.mark.e2e
 TRIALS = 30
 SLOW = "sim.real_time_factor=1"
-"""Longer than all that happens to the run; the samples stay the same."""
+"""Makes the run outlast the interventions of a test, without changing the samples."""
 CUT_S = 15.0
-"""Longer than Zenoh waits for a word of the other side, so that all has to be found again."""
+"""Longer than Zenoh waits for the other side, so that nodes have to discover each other again."""
 DELAY_S = 0.05
 
 
@@ -46,7 +46,7 @@ class Machine:
 
     def __init__(self) -> None:
         self.name = f"tc{secrets.token_hex(4)}"
-        # Drawn, so that tests that run at the same time have wires of their own.
+        # The network is drawn at random, so that tests at the same time have wires of their own.
         network = f"10.{secrets.randbelow(64) + 190}.{secrets.randbelow(256)}"
         self.gateway, self.address = f"{network}.1", f"{network}.2"
         self.wire = f"{self.name}w"
@@ -61,7 +61,7 @@ class Machine:
         return self
 
     def __exit__(self, *_: object) -> None:
-        # The wire goes with the namespace, but only when the last process in there has ended.
+        # The namespace would remove the wire only after the end of its last process.
         ip("link", "del", self.wire)
         ip("netns", "del", self.name)
 
@@ -133,7 +133,7 @@ def listen(directory: Path, *options: str) -> tuple[Running, str, int]:
         "--listen", f"tcp/0.0.0.0:{port}", *options,
     )  # fmt: skip
     assert running.process.stderr is not None
-    # Nobody else would end what prints no token.
+    # A run that prints no token would otherwise never end.
     late = threading.Timer(60, running.process.kill)
     late.start()
     try:
@@ -188,7 +188,7 @@ def processes() -> Iterator[list[subprocess.Popen[str]]]:
 
 
 @needs_machines
-def test_machines_come_and_go_and_the_files_are_the_same(
+def test_machines_can_join_and_leave_without_changing_the_files(
     tmp_path: Path, machines: list[Machine], processes: list[subprocess.Popen[str]]
 ) -> None:
     running, token, port = listen(tmp_path, "--set", SLOW)
@@ -198,7 +198,7 @@ def test_machines_come_and_go_and_the_files_are_the_same(
         join(gone, move_endpoint(token, gone.gateway, port)),
     ]
     wait_for(100_000, running, processes)
-    gone.cut()  # so that nothing can be said any more
+    gone.cut()  # so that its simulation cannot announce its end
     processes[1].kill()
     wire = SlowWire(late.gateway, port)
     processes.append(join(late, move_endpoint(token, late.gateway, wire.port)))
@@ -216,7 +216,7 @@ def test_machines_come_and_go_and_the_files_are_the_same(
     whole, joined = fingerprints(tmp_path / "whole"), fingerprints(tmp_path / "data")
     same = [name for name in whole if name.endswith(".mcap") or name == "throws.parquet"]
     assert len(same) == 2
-    # What the configuration says of the speed stands in the other files.
+    # The other files hold the configured speed, which differs.
     assert {name: joined[name] for name in same} == {name: whole[name] for name in same}
 
 
@@ -233,7 +233,7 @@ print("HAS A SESSION")
 
 
 @needs_machines
-def test_nobody_gets_in_without_the_token(tmp_path: Path, machines: list[Machine]) -> None:
+def test_a_machine_without_the_token_cannot_join(tmp_path: Path, machines: list[Machine]) -> None:
     running, _, port = listen(tmp_path)
     machine = machines[0]
     own = RunKey(tmp_path / "own")
@@ -260,7 +260,7 @@ def test_nobody_gets_in_without_the_token(tmp_path: Path, machines: list[Machine
     running.finish()
 
 
-def test_other_sources_are_refused_with_a_clear_word(tmp_path: Path) -> None:
+def test_joining_with_other_sources_is_refused_with_the_reason(tmp_path: Path) -> None:
     from throwcollect.runs.token import JoinToken
 
     token = JoinToken("many-1234", "tls/127.0.0.1:1", "11" * 32, 0, "bullet", build="another").encode()
@@ -270,7 +270,7 @@ def test_other_sources_are_refused_with_a_clear_word(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("word", ["", "tc2.", "tc2.e30", "x" * 50, "tc2.!!!"])
-def test_what_is_no_token_is_refused(word: str) -> None:
+def test_a_malformed_token_is_refused(word: str) -> None:
     done = call_here("join-run", word)
     assert done.returncode == 2
     assert "this is no token of a run, or not a whole one" in done.stderr
@@ -286,7 +286,7 @@ def test_waiting_for_a_token_can_be_interrupted() -> None:
     with subprocess.Popen(
         command("join-run", "-"), stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     ) as waiting:
-        # It has loaded its libraries by then, and reads.
+        # Once the process waits at the pipe, it has loaded its libraries.
         wchan = Path(f"/proc/{waiting.pid}/wchan")
         deadline = time.monotonic() + 30
         while "pipe" not in wchan.read_text() and time.monotonic() < deadline:
@@ -298,7 +298,7 @@ def test_waiting_for_a_token_can_be_interrupted() -> None:
             waiting.kill()
 
 
-def test_a_token_is_written_for_its_owner_alone(tmp_path: Path) -> None:
+def test_only_the_owner_can_read_the_file_of_the_token(tmp_path: Path) -> None:
     path = tmp_path / "small.yaml"
     path.write_text(CONFIG.format(trials=1) + f"sim: {{{FAST}}}\n")
     with socket.create_server(("", 0)) as free:

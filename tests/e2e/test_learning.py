@@ -41,7 +41,7 @@ def middle(place: Path) -> str:
     return found[1]
 
 
-def test_what_aiming_prints_throws_there(place: Path) -> None:
+def test_a_throw_with_the_printed_aim_lands_at_the_target(place: Path) -> None:
     target = middle(place)
     aim = call_here("aim", place / "model", "--at", target)
     assert aim.returncode == 0, aim.stderr
@@ -53,15 +53,15 @@ def test_what_aiming_prints_throws_there(place: Path) -> None:
     assert row["landing_y_m"] == pytest.approx(y, abs=0.03)
 
 
-def test_the_commands_of_the_page_work_as_they_stand_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_commands_of_the_page_work_in_their_order(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     text = (ROOT / "configs" / "quickstart.yaml").read_text(encoding="utf-8")
     Path("configs").mkdir()
     Path("configs", "quickstart.yaml").write_text(text + "\nsim: {engine: ballistic}\nrun: {replay: 0}\n")
     fewer = PAGE.replace("--trials 1024", "--trials 200").replace("--targets 20  ", "--targets 3 --seeds 1  ")
-    # In process, there is one simulation.
+    # The runtime `inprocess` has only one simulation.
     fewer = fewer.replace("up -n 2 ", "up ")
-    # This engine throws elsewhere.
+    # The ballistic engine throws to other places.
     fewer = fewer.replace("--at 1.3,-0.1", "--at 1.31,-0.05")
     lines = "".join(re.findall(r"```bash\n(.*?)```", fewer, flags=re.DOTALL)).splitlines()
     lines += re.findall(r"^    (throwcollect .*)$", fewer, flags=re.MULTILINE)
@@ -69,7 +69,7 @@ def test_the_commands_of_the_page_work_as_they_stand_there(tmp_path: Path, monke
     said = ""
     for line in lines:
         if "measured.csv" in line:
-            # Whoever has the robot writes it.
+            # With a real robot, people write this file from their measurements.
             throws = throwcollect.load("datasets/aimed")
             keys = [*throws.parameters.names, "landing_x_m", "landing_y_m"]
             rows = [",".join(repr(float(throw[key])) for key in keys) for throw in throws]
@@ -124,7 +124,7 @@ def test_aimed_throws_become_a_dataset_with_targets_and_misses(place: Path) -> N
     assert throw.miss_m < 0.03
 
 
-def test_a_score_tells_how_throws_hit_here_and_elsewhere(place: Path) -> None:
+def test_a_score_measures_hits_in_the_own_and_in_another_world(place: Path) -> None:
     other = ["--config", place / "throws.yaml", "--set", "scene.gravity_mps2=8.5"]
     found = call_here("score", place / "model", "--targets", "5", "--seeds", "2", *other, "--json")
     assert found.returncode == 0, found.stderr
@@ -162,7 +162,7 @@ def test_a_score_tells_how_throws_hit_here_and_elsewhere(place: Path) -> None:
         (["throw", "throws.yaml", "--set", "task.duration_s=0.2"], "its limit is 1.76 rad/s"),
     ],
 )
-def test_what_cannot_be_done_is_one_message(place: Path, arguments: list[str], message: str) -> None:
+def test_a_wrong_learning_command_gives_one_message(place: Path, arguments: list[str], message: str) -> None:
     files = {"model", "data", "throws.yaml", "new", "model/config.yaml"}
     said = call_here(*(place / each if each in files else each for each in arguments))
     assert said.returncode == 2 or "model.json" in message, said.stderr
@@ -171,7 +171,7 @@ def test_what_cannot_be_done_is_one_message(place: Path, arguments: list[str], m
     assert not (place / "new").exists()
 
 
-def test_a_cell_that_is_no_number_is_told_with_its_line(place: Path) -> None:
+def test_a_cell_without_a_finite_number_is_an_error_with_its_line(place: Path) -> None:
     (place / "cells.csv").write_text("landing_x_m,landing_y_m\n1,0\n1,nan\n")
     said = call_here("aim", place / "model", "--targets", place / "cells.csv")
     assert said.returncode == 2
@@ -186,7 +186,7 @@ def test_a_cell_that_is_no_number_is_told_with_its_line(place: Path) -> None:
         ({"landing_x_m": 2e6}, "landing_x_m: 2e+06\n  expected: a number of at most 1e+06"),
     ],
 )
-def test_a_measured_throw_that_is_far_from_all_others_is_told_with_its_line(
+def test_a_measured_throw_far_from_all_others_is_an_error_with_its_line(
     place: Path, changed: dict[str, float], message: str
 ) -> None:
     model = throwcollect.load_model(place / "model")
@@ -208,14 +208,14 @@ def test_throws_of_another_robot_are_refused(place: Path) -> None:
     assert "the task throw of the robot talos\n  expected: throw of arm, as the model has it" in said.stderr
 
 
-def test_a_target_out_of_reach_is_told_with_the_nearest_point(place: Path) -> None:
+def test_a_target_out_of_reach_is_reported_with_the_nearest_point(place: Path) -> None:
     said = call_here("aim", place / "model", "--at", "9,0")
     assert said.returncode == 1
     told = r"out of reach: 9\.000,0\.000; no throw .*\n  .* that was reached: \d\.\d+,-?\d\.\d+ \(7\d\d\.\d+ cm away\)"
     assert re.search(told, said.stderr), said.stderr
 
 
-def test_of_very_many_targets_out_of_reach_most_are_counted(place: Path) -> None:
+def test_after_20_targets_out_of_reach_the_others_are_only_counted(place: Path) -> None:
     (place / "far.csv").write_text("landing_x_m,landing_y_m\n" + "9,0\n" * 30 + middle(place))
     said = call_here("aim", place / "model", "--targets", place / "far.csv", "-o", place / "far_throws.csv")
     assert said.returncode == 1
@@ -223,7 +223,7 @@ def test_of_very_many_targets_out_of_reach_most_are_counted(place: Path) -> None
     assert said.stderr.endswith("\nand 10 more; 30 of 31 targets are out of reach\n")
 
 
-def test_each_target_out_of_reach_is_told_with_where_its_parameters_lead(place: Path) -> None:
+def test_each_target_out_of_reach_is_reported_with_its_predicted_end(place: Path) -> None:
     said = call_here("aim", place / "model", "--at", middle(place), "--at", "9,0", "--at", "0,-9", "--json")
     found = json.loads(said.stdout)
     assert [each["reachable"] for each in found] == [True, False, False]
@@ -232,7 +232,7 @@ def test_each_target_out_of_reach_is_told_with_where_its_parameters_lead(place: 
     assert told == [("2", ends[1]), ("3", ends[2])]
 
 
-def test_a_model_is_learned_from_a_directory_as_from_what_was_loaded(place: Path) -> None:
+def test_fit_learns_the_same_model_from_a_directory_and_a_loaded_dataset(place: Path) -> None:
     directory = place / "data"
     by_path, loaded = throwcollect.fit(str(directory)), throwcollect.fit(throwcollect.load(directory))
     assert by_path.file.model_dump_json() == loaded.file.model_dump_json()
@@ -248,19 +248,19 @@ def test_targets_are_read_from_a_list_that_aiming_wrote(place: Path) -> None:
     assert (place / "again.csv").read_text() == (place / "written.csv").read_text()
 
 
-def test_a_missing_target_column_is_told_with_the_other_name_that_it_may_have(place: Path) -> None:
+def test_a_missing_target_column_is_an_error_with_both_possible_names(place: Path) -> None:
     (place / "half.csv").write_text("landing_x_m\n1\n")
     said = call_here("aim", place / "model", "--targets", place / "half.csv")
     assert "half.csv:1: no column landing_y_m\n" in said.stderr
     assert "columns landing_x_m, landing_y_m, or target_y_m for landing_y_m" in said.stderr
 
 
-def test_adapting_tells_by_how_much_throws_missed_with_its_unit(place: Path) -> None:
+def test_adapt_prints_the_median_miss_with_its_unit(place: Path) -> None:
     said = call_here("adapt", place / "model", place / "data", "-o", place / "told")
     assert re.search(r"^median miss before: [\d.]+ cm", said.stdout, re.M), said.stdout
 
 
-def test_the_program_of_the_documents_runs(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_python_program_of_the_page_runs(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (program,) = re.findall(r"```python\n(.*?)```", PAGE, flags=re.DOTALL)
     program = program.replace('"datasets/many"', '"data"').replace('"configs/quickstart.yaml"', '"throws.yaml"')
     x, y = middle(place).split(",")
@@ -270,7 +270,7 @@ def test_the_program_of_the_documents_runs(place: Path, monkeypatch: pytest.Monk
     assert (place / "models" / "corrected" / "model.json").exists()
 
 
-def test_the_example_ends_nearer_to_its_target_than_it_began(place: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_example_halves_the_miss_of_the_other_robot(place: Path, capsys: pytest.CaptureFixture[str]) -> None:
     text = (ROOT / "configs" / "real.yaml").read_text(encoding="utf-8")
     (place / "real.yaml").write_text(text + "\nsim: {engine: ballistic}\n")
     example = runpy.run_path(str(ROOT / "examples" / "learning.py"))

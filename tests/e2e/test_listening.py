@@ -1,4 +1,4 @@
-"""Who listens during a collection hears what the dataset will hold, and changes nothing."""
+"""A listener during a collection gets the messages that the dataset will hold, and does not change it."""
 
 import socket
 from collections import Counter, defaultdict
@@ -21,7 +21,7 @@ SIMULATIONS = ("sim_0", "sim_1")
 KINDS = {"/joint_states": "sensor_msgs/msg/JointState", "/ball/odometry": "nav_msgs/msg/Odometry"}
 WHOLE = QoSProfile(history=HistoryPolicy.KEEP_ALL)
 _STAMP = slice(4, 12)
-"""Where the header's stamp is in a message of either type."""
+"""Bytes of the header's stamp in a message of either type."""
 
 Messages = dict[str, list[bytes]]
 
@@ -63,7 +63,7 @@ def is_open(port: int) -> bool:
 
 
 def during_trials(messages: Messages) -> Messages:
-    """Without those of time 0: where a simulation stands before its first trial."""
+    """Leave out messages of time 0, which simulations send before their first trial."""
     return {topic: [data for data in found if any(data[_STAMP])] for topic, found in messages.items()}
 
 
@@ -85,7 +85,7 @@ def listened(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, 
     directory = tmp_path_factory.mktemp("listened")
     port = free_port()
     config = write_config(directory, trials=TRIALS, sim=FAST)
-    # Open, so that anybody may listen.
+    # An open run lets listeners in without a key.
     running = start(config, directory / "data", 2, "--set", f"run.router_port={port}", "--set", "run.open=true")
     running.wait_until(lambda: is_open(port))
     with listener(port) as ears:
@@ -110,7 +110,7 @@ def test_every_message_heard_is_in_the_dataset_byte_for_byte(listened: tuple[Pat
         assert not strange, f"{topic}: {len(strange)} of {len(everything)} messages are not in the dataset"
 
 
-def test_whole_trials_are_heard(listened: tuple[Path, dict[str, Messages]]) -> None:
+def test_a_listener_gets_all_messages_of_some_trials(listened: tuple[Path, dict[str, Messages]]) -> None:
     directory, heard = listened
     messages = read_recorded(directory)
     complete = []

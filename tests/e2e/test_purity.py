@@ -29,7 +29,7 @@ def reference(config: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return directory
 
 
-def test_a_collection_is_whole(reference: Path) -> None:
+def test_a_collection_has_all_files_and_verify_finds_nothing_wrong(reference: Path) -> None:
     assert verify(reference) == []
     promised = {
         "metadata.yaml",
@@ -42,7 +42,7 @@ def test_a_collection_is_whole(reference: Path) -> None:
     assert set(fingerprints(reference)) == promised
 
 
-def test_stored_throws_come_out_of_the_simulation_again(reference: Path) -> None:
+def test_replayed_throws_equal_the_stored_ones_bit_for_bit(reference: Path) -> None:
     said = call_here("dataset", "replay", reference, "--all", "--sample", "5")
     assert (said.returncode, said.stderr) == (0, "")
     assert said.stdout == f"{reference}: 5 throws replayed, the same bit for bit\n"
@@ -74,7 +74,7 @@ def test_every_file_is_the_same_for_any_number_of_simulations(
 def test_every_file_is_the_same_when_trials_end_in_another_order(config: Path, reference: Path, tmp_path: Path) -> None:
     running = start(config, tmp_path / "data", 2)
     running.wait_until(lambda: running.count_bytes() > 100_000)
-    # Frozen in the middle of a trial, it hands it in long after those that follow.
+    # A simulation that is frozen in the middle of a trial hands it in long after later trials.
     frozen = running.node("--name", "sim_0")
     frozen.suspend()
     before = running.count_bytes()

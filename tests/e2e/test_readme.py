@@ -1,4 +1,4 @@
-"""What the README shows is true."""
+"""The examples of the README work as they are shown."""
 
 import re
 from pathlib import Path
@@ -17,7 +17,7 @@ def blocks(language: str) -> list[str]:
     return re.findall(rf"```{language}\n(.*?)```", README, flags=re.DOTALL)
 
 
-def test_the_yaml_and_the_python_work(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_yaml_and_the_python_of_the_readme_work(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (yaml,), (python,) = blocks("yaml"), blocks("python")
     config = tmp_path / "throws.yaml"
     config.write_text(yaml, encoding="utf-8")
@@ -33,7 +33,7 @@ def test_the_yaml_and_the_python_work(tmp_path: Path, capsys: pytest.CaptureFixt
     assert re.search(r"^1 \(\d+, 32\) \[", printed, flags=re.MULTILINE)
 
 
-def test_the_directory_is_as_drawn(tmp_path: Path) -> None:
+def test_a_dataset_has_the_files_that_the_readme_draws(tmp_path: Path) -> None:
     drawn = set(re.findall(r"^[├└]── ([\w.]+)", README, flags=re.MULTILINE))
     (yaml,) = blocks("yaml")
     config = tmp_path / "quickstart.yaml"
@@ -42,7 +42,7 @@ def test_the_directory_is_as_drawn(tmp_path: Path) -> None:
     assert {path.name for path in (tmp_path / "data").iterdir()} == drawn
 
 
-def test_its_commands_exist() -> None:
+def test_the_make_targets_of_the_readme_exist() -> None:
     makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
     for target in re.findall(r"^make (\w+)", README, flags=re.MULTILINE):
         assert re.search(rf"^{target}:", makefile, flags=re.MULTILINE), target

@@ -7,7 +7,7 @@ from tests.e2e.collection import CONFIG, FAST, call_here, collect, collect_here,
 ROOT = CONFIG.replace("replay: 0", "replay: 0, simulations: 1, root_namespace: true")
 
 
-def test_the_dataset_does_not_know_where_the_simulation_lived(tmp_path: Path) -> None:
+def test_a_simulation_in_the_root_namespace_collects_the_same_files(tmp_path: Path) -> None:
     (tmp_path / "root").mkdir()
     usual, rooted = tmp_path / "a", tmp_path / "b"
     collect_here(write_config(tmp_path, trials=6, sim=FAST), usual)
@@ -17,7 +17,7 @@ def test_the_dataset_does_not_know_where_the_simulation_lived(tmp_path: Path) ->
     assert '"simulation":"sim_0"' in journal.replace(" ", "")
 
 
-def test_several_simulations_cannot_live_there(tmp_path: Path) -> None:
+def test_several_simulations_in_the_root_namespace_are_refused(tmp_path: Path) -> None:
     path = write_config(tmp_path, trials=6, text=ROOT, sim=FAST)
     ended = call_here("up", "-n", "2", "--runtime", "local", path, "--output", tmp_path / "a")
     assert ended.returncode == 2

@@ -33,10 +33,10 @@ from throwcollect.runs.state_directory import STATE_VARIABLE
 pytestmark = pytest.mark.e2e
 TRIALS = 40
 SLOWLY = ("--set", "sim.real_time_factor=1")
-"""Long enough to look at it."""
+"""Makes a run last long enough for commands to look at it."""
 MANY = 100
 UNTIL_STOPPED = ("--trials", str(MANY), *SLOWLY)
-"""Longer than any test: more than a minute, however long the commands in between take to start."""
+"""Makes a run outlast any test, as it takes more than a minute."""
 
 
 @pytest.fixture(scope="module")
@@ -54,9 +54,9 @@ def reference(config: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(autouse=True)
 def records(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Records]:
-    """Where the runs of one test are remembered; whatever it leaves running is ended."""
+    """Records of the runs of one test; runs that it leaves are ended afterwards."""
     monkeypatch.setenv(STATE_VARIABLE, str(tmp_path / "state"))
-    # Runs of others on an engine of this machine are none of these tests' business.
+    # Without an engine, no runs of other users on this machine are seen.
     monkeypatch.setenv("DOCKER_HOST", f"unix://{tmp_path}/none.sock")
     records = Records()
     yield records
@@ -72,7 +72,7 @@ def say(*arguments: str | Path) -> tuple[int, str, str]:
 
 
 def detach(config: Path, directory: Path, *options: str) -> str:
-    """A run by itself; its id."""
+    """Start a detached run; returns its id."""
     said = call_here("up", "-d", config, "--output", directory, *options)
     assert said.returncode == 0, said.stderr
     return said.stdout.strip()
@@ -113,7 +113,7 @@ def assert_gone(processes: dict[str, psutil.Process]) -> None:
     assert alive == []
 
 
-def test_a_run_goes_on_by_itself_and_is_waited_for_elsewhere(
+def test_another_command_can_wait_for_a_detached_run(
     config: Path, reference: Path, records: Records, tmp_path: Path
 ) -> None:
     said = call("up", "-d", config, "--output", tmp_path / "data")
@@ -121,7 +121,7 @@ def test_a_run_goes_on_by_itself_and_is_waited_for_elsewhere(
     assert re.fullmatch(r"small-[0-9a-f]{4}", run)
     assert f"follow it: throwcollect wait --run {run}" in said.stderr
     record = records.get(run).record
-    # It belongs to no terminal's session, so that nothing ends it when one is closed.
+    # The launcher has a session of its own, so that closing a terminal does not end it.
     assert os.getsid(record.launcher) == record.launcher
     assert [node.name for node in record.nodes] == ["router", "sim_0", "sim_1", "coordinator"]
     waited = call("wait")
@@ -133,7 +133,7 @@ def test_a_run_goes_on_by_itself_and_is_waited_for_elsewhere(
     assert list_runs() == []
     (ended,) = list_runs("-a")
     assert (ended["run"], ended["status"], ended["exit_code"], ended["progress"]["ended"]) == (run, "ended", 0, TRIALS)
-    # Whoever comes late gets the same answer.
+    # Waiting for a run that is over gives the same answer.
     again = call_here("wait", "--run", tmp_path / "data", "--json")
     assert (again.returncode, again.stderr) == (0, "")
     assert (
@@ -157,7 +157,7 @@ def test_scaling_and_losses_do_not_change_the_dataset(config: Path, records: Rec
     assert_gone({"sim_2": removed})
     waited = call_here("wait")
     assert waited.returncode == 0, waited.stderr
-    # On standard error, too, unless it was over by then.
+    # Standard error has this as well, unless the run was over before `wait` began.
     assert re.search(r"^trials +24: 24 landed$", waited.stdout, re.MULTILINE)
     assert fingerprints(tmp_path / "data") == fingerprints(tmp_path / "reference")
     told = [re.sub(r": \d+$", "", line.split("  ", 1)[1]) for line in call_here("events").stdout.splitlines()]
@@ -174,7 +174,7 @@ def test_scaling_and_losses_do_not_change_the_dataset(config: Path, records: Rec
     assert told.index("sim_2 ready") < told.index("sim_2 removed")
 
 
-def test_stopping_drains_as_ctrl_c_does(config: Path, records: Records, tmp_path: Path) -> None:
+def test_stop_ends_a_run_as_ctrl_c_does(config: Path, records: Records, tmp_path: Path) -> None:
     run = detach(config, tmp_path / "data", "-n", "1", *UNTIL_STOPPED)
     in_the_middle(records, run)
     processes = nodes(records, run)
@@ -203,7 +203,7 @@ def test_down_ends_everything_and_keeps_the_directory(config: Path, records: Rec
     assert (tmp_path / "data" / "small_00000.mcap.part").stat().st_size > 0
 
 
-def test_a_killed_launcher_takes_its_processes_along_and_is_told(
+def test_a_killed_launcher_ends_its_nodes_and_commands_report_its_death(
     config: Path, records: Records, tmp_path: Path
 ) -> None:
     run = detach(config, tmp_path / "data", "-n", "1", *UNTIL_STOPPED)
@@ -226,7 +226,7 @@ def test_a_killed_launcher_takes_its_processes_along_and_is_told(
     assert records.ids() == []
 
 
-def test_a_run_in_the_foreground_is_a_run_like_any_other(config: Path, records: Records, tmp_path: Path) -> None:
+def test_other_commands_see_and_control_a_run_in_the_foreground(config: Path, records: Records, tmp_path: Path) -> None:
     running = start(config, tmp_path / "data", 2, *UNTIL_STOPPED)
     running.wait_until(lambda: bool(records.ids()))
     (run,) = records.ids()
@@ -237,7 +237,7 @@ def test_a_run_in_the_foreground_is_a_run_like_any_other(config: Path, records: 
         f"throwcollect: {tmp_path / 'data'}: run {run} collects into it\n"
         f"  try: throwcollect wait --run {run} follows it\n"
     )
-    # Somebody whose records do not have the run is kept out as well, before anything is changed.
+    # A command with other records is refused as well, before it changes anything.
     plan = (tmp_path / "data" / "plan.parquet").read_bytes()
     elsewhere = {STATE_VARIABLE: str(tmp_path / "other")}
     third = call("resume", tmp_path / "data", "--trials", str(MANY + 1), **elsewhere)
@@ -265,7 +265,7 @@ def test_a_run_whose_record_cannot_be_written_goes_on(config: Path, records: Rec
     in_the_way = tmp_path / "state" / "runs" / f"{records.ids()[0]}.json.new"
 
     def stands() -> bool:
-        # For a moment, a record may just be written there.
+        # The launcher may just be writing a record there.
         with suppress(FileExistsError):
             in_the_way.mkdir()
         return in_the_way.is_dir()
@@ -276,7 +276,7 @@ def test_a_run_whose_record_cannot_be_written_goes_on(config: Path, records: Rec
     assert err.count("what happens in this run is not written down any more: ") == 1
 
 
-def test_ctrl_c_leaves_a_run_that_is_only_watched(config: Path, records: Records, tmp_path: Path) -> None:
+def test_ctrl_c_on_wait_does_not_end_the_run(config: Path, records: Records, tmp_path: Path) -> None:
     run = detach(config, tmp_path / "data", "-n", "1", *UNTIL_STOPPED)
     watchers = [start_command("wait") for _ in range(2)]
     for watcher in watchers:
@@ -313,7 +313,7 @@ def test_logs_follow_a_run_to_its_end(config: Path, records: Records, tmp_path: 
     assert (tmp_path / "data" / "logs" / "launcher.log").read_text() == ""
 
 
-def test_mistakes_are_seen_in_the_foreground_and_leave_nothing_behind(
+def test_up_detached_reports_mistakes_at_once_and_leaves_nothing_behind(
     config: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
@@ -331,10 +331,10 @@ def test_mistakes_are_seen_in_the_foreground_and_leave_nothing_behind(
     assert not (tmp_path / "datasets").exists()
 
 
-def test_a_launcher_that_cannot_start_its_nodes_is_told_by_the_command_that_started_it(
+def test_up_detached_reports_a_launcher_that_cannot_start_its_nodes(
     config: Path, records: Records, tmp_path: Path
 ) -> None:
-    # A log that is a directory cannot be written.
+    # The router cannot be started, because a directory is in the place of its log.
     site = tmp_path / "site"
     site.mkdir()
     (site / "sitecustomize.py").write_text(
@@ -355,8 +355,8 @@ def test_a_launcher_that_cannot_start_its_nodes_is_told_by_the_command_that_star
     assert (run.status, run.record.exit_code) == ("ended", 3)
 
 
-def test_a_failure_is_told_to_whoever_waits(config: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    # Whoever starts the run is gone by then.
+def test_wait_reports_the_failure_of_a_run(config: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    # The failure comes so late that the starting command has ended by then.
     (tmp_path / "pybullet.py").write_text("import time\ntime.sleep(1)\nraise ImportError('broken pybullet')")
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
     detach(config, tmp_path / "data", "--set", "run.restarts=0", "--set", "sim.engine=bullet")
@@ -366,7 +366,7 @@ def test_a_failure_is_told_to_whoever_waits(config: Path, tmp_path: Path, monkey
     assert "broken pybullet" in waited.stderr
 
 
-def test_ctrl_c_while_a_run_is_being_started_ends_it(config: Path, records: Records, tmp_path: Path) -> None:
+def test_ctrl_c_during_the_start_ends_a_detached_run(config: Path, records: Records, tmp_path: Path) -> None:
     starting = start_command("up", "-d", config, "--output", tmp_path / "data")
     log = tmp_path / "data" / "logs" / "launcher.log"
     until(log.exists)
@@ -377,7 +377,7 @@ def test_ctrl_c_while_a_run_is_being_started_ends_it(config: Path, records: Reco
     assert [run.status for run in records.all() if run.lives] == []
 
 
-def test_among_several_runs_one_must_be_named(records: Records, tmp_path: Path) -> None:
+def test_commands_need_the_name_of_a_run_when_there_are_several(records: Records, tmp_path: Path) -> None:
     started = datetime.now(timezone.utc)
     runs = [records.new(name) for name in ("first", "second")]
     for run in runs:
@@ -391,7 +391,7 @@ def test_among_several_runs_one_must_be_named(records: Records, tmp_path: Path) 
         run.close()
 
 
-def test_without_any_run_every_verb_says_so() -> None:
+def test_commands_report_that_there_is_no_run() -> None:
     for verb in (["wait"], ["stop"], ["scale", "2"], ["down"], ["logs"], ["events"]):
         code, out, err = say(*verb)
         assert (verb, code, out) == (verb, 2, "")
@@ -401,7 +401,7 @@ def test_without_any_run_every_verb_says_so() -> None:
     assert (code, out.split()) == (0, ["RUN", "RUNTIME", "SIMULATIONS", "THROWS", "STATUS", "DATASET"])
 
 
-def test_a_run_whose_plan_is_being_made_tells_how_far_it_is(records: Records) -> None:
+def test_ps_shows_the_progress_of_planning(records: Records) -> None:
     run, started = records.new("large"), datetime.now(timezone.utc)
     record = RunRecord(run.run, "large", "", "/data", None, "/data/logs", 0, started, os.getpid(), 2)
     run.write(replace(record, planning=Planning(1200, 30000)))
@@ -422,7 +422,7 @@ def test_a_damaged_record_is_named_and_can_be_forgotten(tmp_path: Path) -> None:
     assert not path.exists()
 
 
-def test_a_state_directory_that_cannot_be_used_is_named(
+def test_an_unusable_state_directory_is_an_error_that_names_it(
     config: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "file").write_text("")

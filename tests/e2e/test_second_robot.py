@@ -1,4 +1,4 @@
-"""The robot of another package, `tests/plugins`, from its configuration to what is made of its datasets."""
+"""The robot of another package, `tests/plugins`, from its configuration to derived and exported datasets."""
 
 from __future__ import annotations
 
@@ -94,13 +94,13 @@ def arm(process: ProcessPoolExecutor, tmp_path_factory: pytest.TempPathFactory) 
 
 @pytest.fixture
 def say(process: ProcessPoolExecutor) -> Say:
-    """The command where the package of the robot is installed."""
+    """A function that calls throwcollect where the package of the robot is installed."""
     return lambda *arguments: process.submit(call_here, *arguments).result()
 
 
 @pytest.fixture
 def run(process: ProcessPoolExecutor, arm: Path, tmp_path: Path) -> Run:
-    """What a program finds that knows of the dataset and of a directory for what it makes of it."""
+    """A function that runs a program which knows the dataset, and a directory for its results."""
     return lambda program: process.submit(run_program, program, directory=arm, scratch=tmp_path).result()
 
 
@@ -112,7 +112,7 @@ def test_nodes_and_one_process_write_the_same_files(say: Say, arm: Path, tmp_pat
     assert "nothing wrong" in say("dataset", "verify", arm).stdout
 
 
-def test_its_throws_can_be_read_and_simulated_again(run: Run) -> None:
+def test_throws_of_the_second_robot_can_be_read_and_simulated_again(run: Run) -> None:
     found = run(READ)
     joints = ["shoulder_joint", "elbow_joint"]
     assert found["joints"] == [joints] * 4
@@ -123,18 +123,18 @@ def test_its_throws_can_be_read_and_simulated_again(run: Run) -> None:
     assert [found["statistics"][group] for group in ("position_rad", "velocity_radps", "effort_nm")] == [joints] * 3
 
 
-def test_datasets_are_made_of_it(run: Run) -> None:
+def test_a_dataset_of_the_second_robot_can_be_derived_and_replayed(run: Run) -> None:
     assert run(DERIVE) == {"findings": [0, 0, 0], "replayed": 0, "trials": [6, 3]}
 
 
-def test_it_is_exported(run: Run) -> None:
+def test_a_dataset_of_the_second_robot_can_be_exported(run: Run) -> None:
     found = run(EXPORT)
     assert found["lerobot"] == ["planar_arm", ["shoulder_joint.pos", "elbow_joint.pos"]]
     assert found["npz"] == [["shoulder_joint", "elbow_joint"], 2]
     assert found["cards"] == [1, 1]
 
 
-def test_it_is_reported_and_viewed(say: Say, arm: Path, tmp_path: Path) -> None:
+def test_a_dataset_of_the_second_robot_can_be_reported_and_viewed(say: Say, arm: Path, tmp_path: Path) -> None:
     reported = say("dataset", "report", arm, "--output", tmp_path / "report.html")
     assert reported.returncode == 0, reported.stderr
     assert "simulated throws of a ball by the planar arm" in (tmp_path / "report.html").read_text()
@@ -143,7 +143,7 @@ def test_it_is_reported_and_viewed(say: Say, arm: Path, tmp_path: Path) -> None:
     assert (tmp_path / "view" / "throws.mcap").stat().st_size > 0
 
 
-def test_a_damaged_dataset_of_it_is_repaired(say: Say, arm: Path, tmp_path: Path) -> None:
+def test_a_damaged_dataset_of_the_second_robot_can_be_repaired(say: Say, arm: Path, tmp_path: Path) -> None:
     broken = tmp_path / "broken"
     shutil.copytree(arm, broken)
     (shard,) = broken.glob("*.mcap")
@@ -156,7 +156,7 @@ def test_a_damaged_dataset_of_it_is_repaired(say: Say, arm: Path, tmp_path: Path
     assert fingerprints(tmp_path / "repaired") == fingerprints(arm)
 
 
-def test_without_its_package_it_is_not_read(arm: Path) -> None:
+def test_reading_a_dataset_without_the_package_of_its_robot_is_an_error(arm: Path) -> None:
     done = call_here("dataset", "info", arm)
     assert done.returncode == 2
     sentence = "robot.name: should be 'talos', got 'planar_arm'; no package that is installed brings it"

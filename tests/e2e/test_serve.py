@@ -1,4 +1,4 @@
-"""`throwcollect serve` with real processes: what it begins, who watches, and what becomes of it when it is killed."""
+"""`throwcollect serve` with real processes: its instances, their watchers, and servers that are killed."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ from throwcollect.serve.rosbridge.reassembly import LONGEST_FRAME
 pytestmark = pytest.mark.e2e
 TRIALS, MANY = 10, 24
 NO_AUTHORITIES = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
-"""Nothing is asked over TLS. Otherwise each request would read all authorities of the web, for 30 ms and more."""
+"""Requests do not use TLS; without this context, each of them would read all certificate authorities, for 30 ms."""
 SLOWLY = {"sim.real_time_factor": 1}
 CATALOGUE = """\
 components:
@@ -153,7 +153,7 @@ def server(place: Place, first: Server) -> Iterator[Server]:
         again.kill()
 
 
-def test_clients_who_ask_at_once_never_get_one_too_many(server: Server) -> None:
+def test_concurrent_clients_get_at_most_max_instances(server: Server) -> None:
     wish = {"component": "throws", "simulations": 1, "set": SLOWLY}
     with ThreadPoolExecutor(4) as pool:
         answers = list(pool.map(lambda name: server.ask("PUT", f"/instances/{name}", wish), ("a", "b", "c", "d")))
@@ -162,13 +162,13 @@ def test_clients_who_ask_at_once_never_get_one_too_many(server: Server) -> None:
     assert refused["title"] == "component throws: 2 instances live, as many as max_instances allows"
     begun = [content["id"] for status, content in answers if status == 202]
     assert refused["hint"] == f"stop one of {begun[0]}, {begun[1]}" or refused["hint"].endswith(f"{begun[0]}")
-    # They have hardly begun, and are told to stop; whoever asks for the same once more changes nothing.
+    # The instances are stopped while they start; a repeated request then changes nothing.
     for name in begun:
         assert server.ask("DELETE", f"/instances/{name}")[0] == 202
     for name in begun:
         end = server.wait_until(name, "ended")
         assert end["exit_code"] == 130
-        # On a busy machine the first one may be on its way already; otherwise `test_background.py` has the exact words.
+        # On a busy machine the first one may be collecting already; `test_background.py` tests the exact words.
         stopped = "(stopped|interrupted) before any node was started|interrupted; finished throws are in"
         assert re.match(stopped, end["message"])
         assert server.ask("PUT", f"/instances/{name}", wish) == (200, end)
@@ -176,8 +176,8 @@ def test_clients_who_ask_at_once_never_get_one_too_many(server: Server) -> None:
         assert server.ask("DELETE", f"/instances/{name}")[0] == 409
 
 
-def test_what_the_preparation_fails_of_is_told(server: Server) -> None:
-    # Faster than the robot can move, which only the plan finds out.
+def test_an_instance_reports_why_its_preparation_failed(server: Server) -> None:
+    # The throws are too fast for the robot, which only making the plan finds out.
     wish = {"component": "throws", "set": {"sweep.parameters": {"task.duration_s": {"min": 0.1, "max": 0.12}}}}
     assert server.ask("PUT", "/instances/hasty", wish)[0] == 202
     end = server.wait_until("hasty", "ended")
@@ -185,7 +185,7 @@ def test_what_the_preparation_fails_of_is_told(server: Server) -> None:
     assert "trials, all refused: " in end["message"]
 
 
-def test_an_id_whose_dataset_was_left_is_refused(place: Place, server: Server) -> None:
+def test_an_id_with_an_existing_dataset_directory_is_refused(place: Place, server: Server) -> None:
     taken = place.directory / "datasets" / "taken"
     taken.mkdir(parents=True)
     (taken / "mine").touch()
@@ -213,7 +213,7 @@ def never_read(server: Server, path: str) -> socket.socket:
     return client
 
 
-def test_a_run_is_watched_outlives_its_server_is_stopped_and_resumed(
+def test_a_watched_run_outlives_its_server_and_can_be_stopped_and_resumed(
     place: Place, first: Server, tmp_path: Path
 ) -> None:
     # Enough to go on for as long as a server takes to start on a busy machine.
@@ -233,7 +233,7 @@ def test_a_run_is_watched_outlives_its_server_is_stopped_and_resumed(
             assert 0 <= len(frame) - 4 * numbers - 4 - len(json.dumps(header)) < 4
             before = first.instance("watched")
             first.kill()
-            # It is cut off, so this comes to an end.
+            # The end of the server has cut the socket, so the iteration ends.
             assert list(iter_until_cut(state))[-1]["version"] == 1
     second = place.serve()
     after = second.instance("watched")
@@ -244,7 +244,7 @@ def test_a_run_is_watched_outlives_its_server_is_stopped_and_resumed(
     assert second.ask("POST", "/collections/watched/resume")[0] == 409
     assert second.ask("DELETE", "/instances/watched")[0] == 202
     wait_for(lambda: (found := second.instance("watched"))["stopping"] or found["status"] == "ended")
-    # Whoever asks once more does not end what is under way.
+    # A second request does not end the running trials at once.
     assert second.ask("DELETE", "/instances/watched")[0] in (202, 409)
     assert second.wait_until("watched", "ended")["exit_code"] == 130
     status, resumed = second.ask("POST", "/collections/watched/resume")
@@ -274,7 +274,7 @@ def read_factor(name: str) -> float:
         ros.shutdown(context=context)
 
 
-def test_a_session_serves_clients_and_is_slow_as_long_as_somebody_watches(place: Place, server: Server) -> None:
+def test_a_session_runs_in_real_time_as_long_as_a_client_watches(place: Place, server: Server) -> None:
     assert server.ask("PUT", "/instances/talos", {"component": "talos", "simulations": 1})[0] == 202
     assert server.ask("PUT", "/instances/other", {"component": "talos"})[0] == 409
     begun = server.wait_until("talos", "running")
@@ -293,14 +293,14 @@ def test_a_session_serves_clients_and_is_slow_as_long_as_somebody_watches(place:
     with server.open_rosbridge("talos") as client:
         client.send(longest)
         assert "no operation nothing" in json.loads(client.recv(60))["msg"]
-        # The server does not read to the end of what is longer, so the client may see a reset in the place of 1009.
+        # The server stops reading a frame that is too long, so the client may see a reset in place of code 1009.
         with suppress(ConnectionClosed):
             client.send(longest + " ")
         with pytest.raises(ConnectionClosed):
             client.recv(60)
     with server.open("/instances/talos/live/sim_0"):
         server.kill()
-        # Another server lets go of what a killed one has slowed down.
+        # The next server restores the speed that a killed one has slowed down.
         assert read_factor("talos") == 1.0
         again = place.serve()
         wait_for(lambda: read_factor("talos") == 0.0)
@@ -309,7 +309,7 @@ def test_a_session_serves_clients_and_is_slow_as_long_as_somebody_watches(place:
     again.kill()
 
 
-def test_a_server_that_is_told_to_end_does_so_whoever_listens(server: Server, place: Place) -> None:
+def test_a_terminated_server_ends_despite_connected_listeners(server: Server, place: Place) -> None:
     other = place.serve("--datasets", "elsewhere")
     assert place.address()["url"] == server.address["url"]
     with server.open("/state") as state, closing(never_read(server, "/state")):
@@ -318,12 +318,12 @@ def test_a_server_that_is_told_to_end_does_so_whoever_listens(server: Server, pl
         server.process.wait(timeout=3)
         with pytest.raises(ConnectionClosed):
             state.recv(timeout=3)
-    # Who came second is found when the first has ended.
+    # The second server is found when the first one has ended.
     wait_for(lambda: place.address()["url"] == other.address["url"], 5)
     other.kill()
 
 
-def test_view_starts_one_server(place: Place, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_view_starts_only_one_server(place: Place, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(place.directory)
     pids = set()
     try:
@@ -334,7 +334,7 @@ def test_view_starts_one_server(place: Place, monkeypatch: pytest.MonkeyPatch) -
             pids.add(address["pid"])
             assert json.loads(said.stdout)["page"].startswith(f"{address['url']}/#code=")
             code = json.loads(said.stdout)["page"].rpartition("=")[2]
-            # Others may be allowed to read the log.
+            # Other users may be allowed to read the log.
             assert code not in (place.state / "serve.log").read_text()
         said = call_here("up", "--view", "--runtime", "inprocess", "--trials", "1", "small.yaml", "--output", "seen")
         assert f"look inside: {address['url']}/#code=" in said.stderr
@@ -345,7 +345,7 @@ def test_view_starts_one_server(place: Place, monkeypatch: pytest.MonkeyPatch) -
         psutil.Process(place.address()["pid"]).kill()
 
 
-def test_what_nobody_can_be_served_at_is_told_in_one_message(place: Place, tmp_path: Path) -> None:
+def test_an_unusable_address_or_certificate_gives_one_message(place: Place, tmp_path: Path) -> None:
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
         taken.listen()

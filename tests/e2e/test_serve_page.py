@@ -1,4 +1,4 @@
-"""The page of a server in a real browser: a collection is started, watched and stopped by it."""
+"""The page of a server in a real browser, which starts, watches and stops a collection."""
 
 from __future__ import annotations
 
@@ -38,12 +38,12 @@ _TOOLTIPS = """<robot name="talos">
   <tooltip name="image" topic="/img/base_joint_speed"><parent link="wrist_1_link"/></tooltip>
 </robot>"""
 _MESHES = 25
-"""Files that the description of Talos with its spoon draws."""
+"""Number of mesh files in the description of Talos with its spoon."""
 
 
 @pytest.fixture
 def address(tmp_path: Path) -> Iterator[str]:
-    """Of the page of a server, with a code."""
+    """Address of the page of a server, with a code."""
     # Slow enough to be stopped half-way, and to leave the processor to the browser.
     write_config(tmp_path, trials=600, sim=f"{FAST}, real_time_factor: 1")
     catalogue = tmp_path / "catalogue.yaml"
@@ -55,11 +55,11 @@ def address(tmp_path: Path) -> Iterator[str]:
 
 @pytest.mark.skipif(chromium() is None, reason="needs Chromium: apt-get install chromium")
 def test_a_collection_is_started_watched_and_stopped_by_the_page(address: str) -> None:
-    # Software draws, and that is dear: the replay stands still at first, as it does for all who want little motion.
+    # Drawing by software is slow, so the browser asks for little motion, and the replay stands still at first.
     with browse(address, width=800, height=600, features={"prefers-reduced-motion": "reduce"}) as tab:
         load(tab)
         assert tab.evaluate("location.hash") == "", "the code is still in the address"
-        # What smooths edges takes software longer than all else of a picture, and so simulations beside it.
+        # Smooth edges take software longer than the rest of a picture, and would slow down simulations.
         assert tab.evaluate("throwcollect.view.renderer.getContextAttributes().antialias") is False
         assert "Nothing runs" in tab.evaluate("document.querySelector('#empty').textContent")
         tab.evaluate("document.querySelector('#components input').value = '2'")
@@ -74,7 +74,7 @@ def test_a_collection_is_started_watched_and_stopped_by_the_page(address: str) -
         tab.wait_for("document.querySelector('#scrub').value > 0.2")
         # All landings are on the map, whether their throws were shown or not.
         tab.wait_for("document.querySelector('#map-text').textContent.includes('landings so far')")
-        # A description brings its plots, each once; what cannot be plotted is left out.
+        # Each plot of a description is shown once, even if it comes twice; entries that cannot be plotted are left out.
         tab.evaluate(f"for (const _ of [1, 2]) throwcollect.plots.bind('sim_0', {json.dumps(_TOOLTIPS)})")
         titles = "[...document.querySelectorAll('.plot strong')].map((each) => each.textContent).join()"
         assert tab.evaluate(titles) == "arm_right_4_joint position [rad],ball z [m]"
@@ -101,16 +101,14 @@ def over() -> Iterator[tuple[str, str]]:
 
 
 @pytest.mark.skipif(chromium() is None, reason="needs Chromium: apt-get install chromium")
-def test_the_address_names_the_run_that_is_seen_also_in_a_tab_that_has_the_page(
-    address: str, over: tuple[str, str]
-) -> None:
+def test_the_page_shows_the_run_that_its_address_names(address: str, over: tuple[str, str]) -> None:
     watched = "window.throwcollect?.watching.id"
     with browse(f"{address}&run={over[0]}", width=390, height=800) as tab:
         load(tab)
         tab.wait_for(f"{watched} === {json.dumps(over[0])}")
         server = find_server()
         assert server is not None
-        # To go there changes the fragment alone, so the browser does not load the page by itself.
+        # Only the fragment of the address changes, so the browser does not load the page again.
         tab.ask("Page.navigate", url=make_page_address(server, over[1]))
         tab.wait_for(f"{watched} === {json.dumps(over[1])}")
         assert tab.evaluate("location.hash") == ""
@@ -133,7 +131,7 @@ def died(tmp_path: Path) -> Iterator[tuple[str, str]]:
 
 
 @pytest.mark.skipif(chromium() is None, reason="needs Chromium: apt-get install chromium")
-def test_only_what_is_not_complete_can_be_resumed_by_the_page(died: tuple[str, str], address: str) -> None:
+def test_the_page_offers_to_resume_only_incomplete_collections(died: tuple[str, str], address: str) -> None:
     with browse(address, width=800, height=600) as tab:
         load(tab)
         button = "document.querySelector('[aria-label=\"Resume {}\"]')"
@@ -143,7 +141,7 @@ def test_only_what_is_not_complete_can_be_resumed_by_the_page(died: tuple[str, s
 
 
 @pytest.mark.skipif(chromium() is None, reason="needs Chromium: apt-get install chromium")
-def test_a_model_is_seen_and_aims_where_somebody_clicks(address: str) -> None:
+def test_a_click_on_the_map_aims_with_the_chosen_model(address: str) -> None:
     with browse(address, width=390, height=800) as tab:
         load(tab)
         tab.wait_for("!document.querySelector('#model-box').hidden")
@@ -154,7 +152,7 @@ def test_a_model_is_seen_and_aims_where_somebody_clicks(address: str) -> None:
         assert "400 of the throws" in tab.evaluate("document.querySelector('#map-model').textContent")
         tab.evaluate("document.querySelector('#map').dispatchEvent(new MouseEvent('click', {bubbles: true}))")
         tab.wait_for("document.querySelector('#aim-text').textContent !== ''")
-        # By fields, what is clicked can be said exactly.
+        # The fields take an exact target, which a click cannot give.
         tab.evaluate(
             "document.querySelectorAll('#aim-fields input').forEach((field, i) => field.value = [0.25, -0.5][i])"
         )

@@ -1,4 +1,4 @@
-"""The page in a room: an emulated headset enters, places the robot, sets a target, has it collected for, and leaves."""
+"""The page in a room: an emulated headset enters, places the robot, sets a target, starts a collection and leaves."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ _FLOOR = """
     }
   })
 """
-"""The emulator knows rooms by another package; of a room, the page asks the floor alone."""
+"""A stand-in for the room, which the emulator lacks; the page looks only for the floor."""
 _PAGE = """
 (() => {
   const { view, room } = throwcollect;
@@ -162,7 +162,7 @@ class Ears:
                 listener.spin(Records().get(self._run).connection, 0.1)
 
     def _subscribe(self, node: ros.Node) -> None:
-        # Whoever comes late hears the last one.
+        # A late subscriber gets the last target.
         qos = ros.QoSProfile(depth=1, durability=ros.DurabilityPolicy.TRANSIENT_LOCAL)
         node.create_subscription(ros.get_message("geometry_msgs/msg/PointStamped"), "/target", self._heard.put, qos)
 
@@ -186,12 +186,12 @@ def hold(tab: Tab, x: float, y: float, z: float) -> None:
 
 
 def turn(left: float, up: float) -> str:
-    """A quaternion (x, y, z, w) of who looks to the left and up by some angles [rad]."""
+    """Quaternion (x, y, z, w) of a view that is turned to the left and up by some angles [rad]."""
     (sin_left, cos_left), (sin_up, cos_up) = ((math.sin(each / 2), math.cos(each / 2)) for each in (left, up))
     return f"{cos_left * sin_up}, {sin_left * cos_up}, {-sin_left * sin_up}, {cos_left * cos_up}"
 
 
-def test_a_target_is_set_by_hand_and_collected_for(server: dict[str, Any], emulator: str) -> None:
+def test_a_hand_can_set_a_target_and_start_a_collection_for_it(server: dict[str, Any], emulator: str) -> None:
     still = {"prefers-reduced-motion": "reduce"}
     with browse(server["page"], width=640, height=400, features=still, script=emulator) as tab:
         load(tab)
@@ -217,7 +217,7 @@ def test_a_target_is_set_by_hand_and_collected_for(server: dict[str, Any], emula
         assert find_own_errors(tab) == []
 
 
-def test_a_room_that_is_left_while_it_is_entered_stays_left(server: dict[str, Any], emulator: str) -> None:
+def test_leaving_a_room_while_entering_it_restores_the_page(server: dict[str, Any], emulator: str) -> None:
     with browse(server["page"], width=640, height=400, script=emulator) as tab:
         load(tab)
         before = tab.evaluate(_PAGE)
@@ -239,7 +239,7 @@ def set_by_hand(tab: Tab, ears: Ears) -> None:
     enter(tab)
     tab.wait_for("throwcollect.view.world.visible")
     assert tab.evaluate(_PAGE) != before
-    # The robot stands 2 m ahead, and throws to the right; who holds the controller looks to its left.
+    # The robot stands 2 m ahead and throws to the right; the user sees its left side.
     hold(tab, 0.3, 0.9, -1.2)
     tab.evaluate("pull()")
     assert ears.hear() == pytest.approx((0.3, -0.8, 0.9), abs=_MM)

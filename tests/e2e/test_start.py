@@ -1,4 +1,4 @@
-"""What starting a collection does, and what it leaves alone."""
+"""Processes and imports at the start of a collection."""
 
 import contextlib
 import os
@@ -52,7 +52,7 @@ def test_no_process_of_a_collection_imports_pandas(yaml, tmp_path: Path) -> None
 
 
 @pytest.mark.parametrize("on_terminal", [False, True])
-def test_a_collection_is_one_interpreter_and_what_is_forked_off_it(on_terminal, yaml, tmp_path: Path) -> None:
+def test_a_collection_starts_one_interpreter_and_forks_its_nodes(on_terminal, yaml, tmp_path: Path) -> None:
     started = tmp_path / "started"
     (tmp_path / "before").mkdir()
     (tmp_path / "before" / "sitecustomize.py").write_text(
@@ -67,7 +67,7 @@ def test_a_collection_is_one_interpreter_and_what_is_forked_off_it(on_terminal, 
     ) as running:
         os.close(writer)
         said = b""
-        # Whoever writes to a terminal that nobody reads waits. On Linux, its end is an error.
+        # A process that writes to an unread terminal would block. On Linux, reading at its end is an error.
         with contextlib.suppress(OSError):
             while piece := os.read(reader, 65536):
                 said += piece
@@ -78,7 +78,7 @@ def test_a_collection_is_one_interpreter_and_what_is_forked_off_it(on_terminal, 
     assert len(started.read_text().splitlines()) == 1, started.read_text()
 
 
-def test_what_was_begun_ends_with_a_run_that_is_refused_or_left(yaml, tmp_path: Path) -> None:
+def test_the_node_server_ends_with_a_refused_or_abandoned_run(yaml, tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match="all refused"):
         runs.prepare(yaml(least=0.1, most=0.11), output=tmp_path / "data", ahead=True)
     assert not _servers()

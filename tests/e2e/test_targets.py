@@ -16,7 +16,7 @@ pytestmark = pytest.mark.e2e
 PAGE = (Path(__file__).parents[2] / "docs" / "targets.md").read_text(encoding="utf-8")
 LANDED = 100
 TRIALS = 192
-"""The first round is too little for so many to land, the first two are enough; so there is a third one."""
+"""Trials of three rounds: so many landings take the first two, and the third begins before these have ended."""
 
 
 @pytest.fixture(scope="module")
@@ -32,14 +32,14 @@ def config(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def undisturbed(config: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
-    """A collection with one simulation, and what was said meanwhile."""
+    """The directory of a collection with one simulation, and its messages."""
     directory = tmp_path_factory.mktemp("undisturbed") / "data"
     done = call_here("up", *INPROCESS, config, "--output", directory)
     assert done.returncode == 0, done.stderr
     return directory, done.stderr
 
 
-def test_a_collection_ends_with_the_round_in_which_it_knows_that_enough_have_landed(
+def test_a_collection_ends_with_the_round_that_knows_of_enough_landings(
     undisturbed: tuple[Path, str],
 ) -> None:
     directory, said = undisturbed
@@ -55,9 +55,7 @@ def test_a_collection_ends_with_the_round_in_which_it_knows_that_enough_have_lan
     assert f"Collected until {LANDED} throws had landed, or all trials had been used up." in card
 
 
-def test_its_third_round_comes_from_results_and_those_before_from_sobol(
-    config: Path, undisturbed: tuple[Path, str]
-) -> None:
+def test_the_first_two_rounds_are_sobol_and_the_third_differs(config: Path, undisturbed: tuple[Path, str]) -> None:
     ordinary = ["--set", "sweep.target=null", "--set", "until=null", "--trials", str(TRIALS), "--json"]
     sobol = np.array(
         [list(trial["values"].values()) for trial in json.loads(call_here("plan", config, *ordinary).stdout)]
@@ -68,7 +66,7 @@ def test_its_third_round_comes_from_results_and_those_before_from_sobol(
     assert (ours[128:] != sobol[128:]).all()
 
 
-def test_every_file_is_the_same_when_it_is_interrupted_and_goes_on_with_more_simulations(
+def test_a_growing_plan_resumed_with_more_simulations_gives_the_same_files(
     config: Path, undisturbed: tuple[Path, str], tmp_path: Path
 ) -> None:
     directory = tmp_path / "data"

@@ -20,7 +20,7 @@ def test_the_tutorial_ends_with_a_throw_at_its_target(
     assert "trials: 200" in yaml
     few = yaml.replace("trials: 200", "trials: 100") + "sim: {engine: ballistic}\nrun: {replay: 0}\n"
     Path("throws.yaml").write_text(few, encoding="utf-8")
-    # In process, there is one simulation.
+    # The runtime `inprocess` has only one simulation.
     commands = "".join(re.findall(r"```sh\n(.*?)```", PAGE, flags=re.DOTALL)).replace("up -n 2 ", "up ").splitlines()
     done = {}
     for line in commands:

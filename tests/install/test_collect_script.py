@@ -1,4 +1,4 @@
-"""What `compose/collect.sh` does where something fails, with an engine that only writes down what it is asked."""
+"""Failures of `compose/collect.sh`, with a stand-in for the engine that only records how it is called."""
 
 import os
 import shutil
@@ -55,7 +55,7 @@ def collect(
     return subprocess.run(words, cwd=directory, env=environment, capture_output=True, text=True, check=False)
 
 
-def test_nothing_is_collected_that_could_not_be_put_anywhere(tmp_path: Path, calls: Path) -> None:
+def test_an_impossible_output_directory_is_refused_before_the_engine_is_called(tmp_path: Path, calls: Path) -> None:
     (tmp_path / "file").touch()
     assert collect(tmp_path, "file/data").returncode == 2
     assert calls.read_text() == ""
@@ -70,20 +70,20 @@ def test_a_dataset_that_cannot_be_copied_stays_in_its_volume(tmp_path: Path, cal
     assert collect(tmp_path, "other", RUN="1", UP="5").returncode == 5
 
 
-def test_of_a_collection_that_never_began_nothing_stays(tmp_path: Path, calls: Path) -> None:
+def test_a_collection_that_never_began_leaves_no_directory_and_no_volume(tmp_path: Path, calls: Path) -> None:
     assert collect(tmp_path, "data", UP="2").returncode == 2
     assert not (tmp_path / "data").exists()
     assert calls.read_text().splitlines()[-1].endswith(" down --volumes --timeout 5")
 
 
-def test_directories_are_found_whatever_the_shell_of_the_user_searches(tmp_path: Path, calls: Path) -> None:
+def test_the_cdpath_of_the_user_does_not_change_directories(tmp_path: Path, calls: Path) -> None:
     assert collect(tmp_path, "data", CDPATH=".").returncode == 0
     up, run, _ = calls.read_text().splitlines()
     assert up == f"up {tmp_path}/configs throws.yaml"
     assert f" -v {tmp_path}/data:/out " in run
 
 
-def test_an_image_that_cannot_be_had_is_named_before_anything_is_made(tmp_path: Path, calls: Path) -> None:
+def test_an_unavailable_image_is_named_before_anything_is_created(tmp_path: Path, calls: Path) -> None:
     done = collect(tmp_path, "data", INSPECT="1", THROWCOLLECT_IMAGE="nobody/has:1")
     assert (done.returncode, calls.read_text()) == (2, "")
     assert "pull nobody/has:1: access denied" in done.stderr
@@ -91,7 +91,7 @@ def test_an_image_that_cannot_be_had_is_named_before_anything_is_made(tmp_path: 
     assert not (tmp_path / "data").exists()
 
 
-def test_a_machine_without_compose_says_so(tmp_path: Path, calls: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_machine_without_compose_is_an_error(tmp_path: Path, calls: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     commands = calls.parent / "bin"
     for name in ("sh", "dirname", "basename", "id", "uname", "mkdir", "rmdir"):
         (commands / name).symlink_to(shutil.which(name) or name)
@@ -112,7 +112,7 @@ def test_a_colon_in_a_path_is_refused_before_anything_is_collected(tmp_path: Pat
     assert not (tmp_path / paths["output"]).exists()
 
 
-def test_files_may_begin_with_a_dash(tmp_path: Path, calls: Path) -> None:
+def test_names_of_files_may_begin_with_a_dash(tmp_path: Path, calls: Path) -> None:
     (tmp_path / "-v.yaml").touch()
     assert collect(tmp_path, "-data", config="-v.yaml").returncode == 0
     assert calls.read_text().splitlines()[0] == f"up {tmp_path} -v.yaml"
@@ -121,7 +121,7 @@ def test_files_may_begin_with_a_dash(tmp_path: Path, calls: Path) -> None:
 @pytest.mark.parametrize(
     ("begun", "signal", "code"), [("", "", 4), ("yes", "", 4), ("yes", "INT", 130), ("yes", "TERM", 130)]
 )
-def test_what_was_collected_is_taken_out_and_what_never_began_leaves_no_directory(
+def test_only_a_collection_that_began_leaves_an_output_directory(
     tmp_path: Path, begun: str, signal: str, code: int
 ) -> None:
     (tmp_path / "docker").write_text(DOCKER)
@@ -129,7 +129,7 @@ def test_what_was_collected_is_taken_out_and_what_never_began_leaves_no_director
     (tmp_path / "bad.yaml").write_text("nonsense: 1\n")
     output = tmp_path / "my data"
     variables = {"OUTPUT": str(output), "TOLD": str(tmp_path / "told"), "BEGUN": begun, "SIGNAL": signal}
-    # Of an .env file or a machine on which other datasets are made.
+    # A variable of this name may come from an .env file, or from other datasets on the machine.
     variables["DATASET"] = "mnist"
     environment = {**os.environ, **variables, "PATH": f"{tmp_path}:{os.environ['PATH']}"}
     done = subprocess.run(
@@ -141,7 +141,7 @@ def test_what_was_collected_is_taken_out_and_what_never_began_leaves_no_director
     assert (tmp_path / "told.removed").exists()
 
 
-def test_a_file_that_is_not_there_is_named_before_anything_starts(tmp_path: Path) -> None:
+def test_a_missing_configuration_is_named_before_anything_starts(tmp_path: Path) -> None:
     (tmp_path / "docker").write_text('#!/bin/sh\necho "$@" >>"$TOLD"\n')
     (tmp_path / "docker").chmod(0o755)
     told = tmp_path / "told"

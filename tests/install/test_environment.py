@@ -15,7 +15,7 @@ SCRIPT = ROOT / "packaging" / "environment.sh"
 
 @pytest.fixture
 def commands(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """The only directory with commands; each is a script that writes down what it was called with."""
+    """The only directory in the path; each command in it is a script that prints its arguments."""
     directory = tmp_path / "commands"
     directory.mkdir()
     (directory / "sh").symlink_to(shutil.which("sh") or "/bin/sh")
@@ -70,7 +70,7 @@ def make_environment(*arguments: str, cwd: Path | None = None) -> tuple[int, str
     return done.returncode, done.stdout, done.stderr
 
 
-def test_the_first_python_with_wheels_is_taken(commands: Path) -> None:
+def test_the_first_python_with_wheels_makes_the_environment(commands: Path) -> None:
     put(commands, "python3.11", version="3.9")
     put(commands, "python3.10", version="3.10")
     put(commands, "python3")
@@ -79,7 +79,7 @@ def test_the_first_python_with_wheels_is_taken(commands: Path) -> None:
     assert (code, out.splitlines()[-1]) == (0, "python3.10 -m venv there")
 
 
-def test_where_no_python_suits_uv_fetches_one(commands: Path) -> None:
+def test_without_a_suitable_python_uv_fetches_one(commands: Path) -> None:
     put(commands, "python3", version="3.13")
     put(commands, "uv")
     code, out, _ = make_environment()
@@ -90,7 +90,7 @@ def test_where_no_python_suits_uv_fetches_one(commands: Path) -> None:
 
 
 @pytest.mark.parametrize("finished", [True, False])
-def test_what_is_left_of_an_unfinished_environment_keeps_uv_from_nothing(
+def test_an_unfinished_environment_is_removed_before_uv_makes_one(
     commands: Path, tmp_path: Path, finished: bool
 ) -> None:
     (commands / "rm").symlink_to(shutil.which("rm") or "/bin/rm")
@@ -105,7 +105,7 @@ def test_what_is_left_of_an_unfinished_environment_keeps_uv_from_nothing(
 
 
 @pytest.mark.parametrize("by", ["pip", "fetch"])
-def test_where_uv_is_missing_pip_fetches_it_or_a_script_without_pip(commands: Path, tmp_path: Path, by: str) -> None:
+def test_a_missing_uv_is_fetched_by_pip_or_else_by_a_script(commands: Path, tmp_path: Path, by: str) -> None:
     for name in ("mkdir", "chmod", "cat"):
         (commands / name).symlink_to(shutil.which(name) or f"/bin/{name}")
     fetched = """mkdir -p build/uv/bin; echo 'echo "uv $*"' > build/uv/bin/uv; chmod +x build/uv/bin/uv; exit 0"""
@@ -119,9 +119,7 @@ def test_where_uv_is_missing_pip_fetches_it_or_a_script_without_pip(commands: Pa
 
 
 @pytest.mark.parametrize(("version", "told"), [("3.13", ", for which pybullet has no wheel: "), ("3.11", "")])
-def test_a_python_without_the_modules_for_it_gets_its_environment_by_uv(
-    commands: Path, version: str, told: str
-) -> None:
+def test_uv_makes_the_environment_of_a_python_without_venv(commands: Path, version: str, told: str) -> None:
     put(commands, "python3", version=version, makes=False)
     put(commands, "uv")
     code, out, _ = make_environment("python3")
@@ -152,9 +150,7 @@ def test_the_newest_uv_for_this_machine_is_chosen() -> None:
 
 
 @pytest.mark.parametrize("uv", [False, True])
-def test_where_uv_is_not_to_be_had_or_fetches_nothing_mujoco_simulates(
-    commands: Path, tmp_path: Path, uv: bool
-) -> None:
+def test_mujoco_simulates_if_uv_is_missing_or_fetches_no_python(commands: Path, tmp_path: Path, uv: bool) -> None:
     put(commands, "python3", version="3.13")
     if uv:
         put(commands, "uv", ends="echo 'error: x\n  cause: y https://z\n  cause: no name' >&2; exit 2")
@@ -167,7 +163,7 @@ def test_where_uv_is_not_to_be_had_or_fetches_nothing_mujoco_simulates(
     assert "for which pybullet has no wheel: MuJoCo simulates" in told
 
 
-def test_a_python_that_is_named_is_the_only_one_that_is_looked_at(commands: Path) -> None:
+def test_a_named_python_is_the_only_candidate(commands: Path) -> None:
     put(commands, "python3.11")
     put(commands, "python3.9", version="3.9")
     put(commands, "python3.12", version="3.12")
@@ -191,7 +187,7 @@ def test_a_python_that_is_named_is_the_only_one_that_is_looked_at(commands: Path
         assert f"python{version} -m venv there" in make_environment(str(blank / f"python{version}"))[1]
 
 
-def test_without_python_and_uv_one_sentence_says_so_at_once(commands: Path) -> None:
+def test_without_python_and_uv_the_script_fails_at_once_with_one_sentence(commands: Path) -> None:
     began = time.monotonic()
     code, out, err = make_environment()
     assert (code, out, err.count("\n")) == (1, "", 1)
@@ -200,7 +196,7 @@ def test_without_python_and_uv_one_sentence_says_so_at_once(commands: Path) -> N
     assert time.monotonic() - began < 1 + 0.5 * os.getloadavg()[0]
 
 
-def test_a_genuine_python_is_judged_by_its_version(tmp_path: Path) -> None:
+def test_a_real_python_that_is_too_old_is_refused(tmp_path: Path) -> None:
     pythons = [name for name in ("python3.8", "python3.9") if works(name)]
     if not pythons:
         pytest.skip("no Python before 3.10 is here")
@@ -210,13 +206,13 @@ def test_a_genuine_python_is_judged_by_its_version(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("target", ["up", "check"])
-def test_make_uses_it_before_anything_else(target: str, tmp_path: Path) -> None:
+def test_make_runs_the_environment_script_first(target: str, tmp_path: Path) -> None:
     shutil.copy(ROOT / "Makefile", tmp_path)
     (tmp_path / "pyproject.toml").touch()
     said = subprocess.run(
         ["make", "-n", target, "PYTHON=python3.12"],
         cwd=tmp_path,
-        # Not as a part of the `make` that may run the tests.
+        # This `make` must not count as part of the one that may run the tests.
         env={name: value for name, value in os.environ.items() if not name.startswith("MAKE")},
         capture_output=True,
         text=True,
@@ -255,7 +251,7 @@ def test_an_environment_with_another_python_than_the_named_one_is_not_used(tmp_p
     refused = make_up("PYTHON=./other")
     assert (refused.returncode != 0, refused.stdout) == (True, "")
     assert refused.stderr.startswith(".venv has Python 3.11.2, not that of ./other: rm -r .venv, then make up")
-    # Nobody is told to take an environment away for a Python that would be refused afterwards.
+    # The advice to remove .venv would be wrong for a Python that would then be refused.
     for unfit in ("./old", "./nowhere"):
         refused = make_up(f"PYTHON={unfit}")
         assert (refused.returncode != 0, refused.stdout) == (True, "")
@@ -276,7 +272,7 @@ def test_an_environment_with_another_python_than_the_named_one_is_not_used(tmp_p
     ],
     ids=["by uv", "uv cannot be had", "uv cannot install"],
 )
-def test_uv_installs_and_pip_where_uv_cannot(fails: str, installs: str, tmp_path: Path) -> None:
+def test_pip_installs_the_project_if_uv_is_missing_or_fails(fails: str, installs: str, tmp_path: Path) -> None:
     python = tmp_path / "python"
     python.write_text(f'#!/bin/sh\necho "$*"\ncase "$*" in {fails}) exit 1 ;; esac\n')
     python.chmod(0o755)

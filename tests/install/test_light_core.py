@@ -109,7 +109,7 @@ for line in sys.stdin:
 """
 
     def __init__(self, environment: Path, directory: Path) -> None:
-        # The directory of a program is where Python looks first, and this one has nothing else in it.
+        # Python looks first in the directory of a program, so this one has nothing else in it.
         program = directory / "throwcollect"
         program.write_text(self.PROGRAM)
         self._streams = [directory.with_name(f"{directory.name}-{name}") for name in ("stdout", "stderr")]
@@ -143,7 +143,7 @@ def forker(environment: Path, tmp_path_factory: pytest.TempPathFactory) -> Itera
     forker.close()
 
 
-def test_nothing_of_the_extras_is_installed(environment: Path) -> None:
+def test_no_package_of_the_extras_is_installed(environment: Path) -> None:
     script = "from throwcollect.extras import EXTRA_OF, is_installed; print([*filter(is_installed, EXTRA_OF)])"
     assert run(environment, "python", "-c", script).stdout == "[]\n"
 
@@ -172,7 +172,7 @@ def test_datasets_are_read_exported_and_derived_as_with_all_extras(
     assert filecmp.cmpfiles(tmp_path / "few", tmp_path / "as few", names, shallow=False) == (names, [], [])
 
 
-def test_verify_names_what_it_cannot_check(environment: Path, dataset: Path) -> None:
+def test_verify_names_the_checks_that_need_an_extra(environment: Path, dataset: Path) -> None:
     said = run(environment, "throwcollect", "dataset", "verify", dataset)
     assert (said.returncode, said.stderr) == (0, "")
     assert "nothing wrong" in said.stdout
@@ -220,7 +220,7 @@ except ImportError as error:
         ("export", ("dataset", "export", "DATASET", "out", "--to", "npz", "--rate", "77")),
     ],
 )
-def test_a_command_without_its_extra_says_which_one_helps(
+def test_a_command_without_its_extra_names_that_extra(
     extra: str, arguments: tuple[str, ...], forker: Forker, dataset: Path, tmp_path: Path
 ) -> None:
     names = {"DATASET": str(dataset), "out": str(tmp_path / "out")}
@@ -232,7 +232,7 @@ def test_a_command_without_its_extra_says_which_one_helps(
     assert not (tmp_path / "out").exists()
 
 
-def test_a_command_that_simulates_has_a_hint_for_pythons_without_a_wheel(environment: Path, dataset: Path) -> None:
+def test_replay_without_pybullet_is_an_error_with_a_hint(environment: Path, dataset: Path) -> None:
     said = run(environment, "throwcollect", "dataset", "replay", dataset, "--all")
     assert said.returncode == 2
     assert "this needs pybullet, which is not installed" in said.stderr

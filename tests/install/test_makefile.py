@@ -1,4 +1,4 @@
-"""What `make` does on machines that are not as ours are; what it installs and calls is replaced."""
+"""`make` on machines that differ from ours, with stand-ins for the programs that it installs and calls."""
 
 import os
 import shutil
@@ -32,7 +32,7 @@ def put(path: Path, lines: str) -> None:
 
 
 def make(directory: Path, target: str) -> subprocess.CompletedProcess[str]:
-    # Another make may run the tests.
+    # This `make` must not count as part of the one that may run the tests.
     variables = {name: value for name, value in os.environ.items() if not name.startswith(("MAKE", "MFLAGS"))}
     variables["PATH"] = "/usr/bin:/bin"
     return subprocess.run(
@@ -40,7 +40,7 @@ def make(directory: Path, target: str) -> subprocess.CompletedProcess[str]:
     )
 
 
-def test_a_clone_may_lie_anywhere(clone: Path) -> None:
+def test_make_up_works_in_a_clone_at_any_path(clone: Path) -> None:
     done = make(clone, "up")
     assert done.returncode == 0, done.stderr
     collected, hint = done.stdout.splitlines()
@@ -48,7 +48,7 @@ def test_a_clone_may_lie_anywhere(clone: Path) -> None:
     assert hint == f'so that the shell finds throwcollect: export PATH="{clone}/.venv/bin:$PATH"'
 
 
-def test_an_environment_that_could_not_be_finished_is_not_taken_for_one(clone: Path) -> None:
+def test_make_removes_the_python_of_an_unfinished_environment(clone: Path) -> None:
     shutil.rmtree(clone / ".venv")
     unfinished = f'mkdir -p "$1/bin"; ln -s "{sys.executable}" "$1/bin/python"; exit 1'
     put(clone / "packaging" / "environment.sh", unfinished)

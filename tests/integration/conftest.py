@@ -31,7 +31,7 @@ NAME = "sim_0"
 
 @pytest.fixture(scope="session", autouse=True)
 def _state(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    # Whether libraries of genuine ROS 2 can be forked is not what these tests are about.
+    # Libraries of genuine ROS 2 may not survive a fork, so their simulations start by themselves.
     if not uses_rclpy():
         request.getfixturevalue("commands")
     with pytest.MonkeyPatch.context() as patch:
@@ -69,7 +69,7 @@ def defaults(shared: Robot) -> dict[str, object]:
 
 @pytest.fixture
 def robot(shared: Robot, defaults: dict[str, object]) -> Robot:
-    """The simulation as it was when it had just started."""
+    """The simulation, reset to the state in which it had just started."""
     assert shared.set(defaults).successful
     if shared.state() != PLAYING:
         shared.put_into(PLAYING)
@@ -94,5 +94,5 @@ def running(
         process.kill()
         process.communicate()
     robot.wait_until_gone()
-    # Last: a session of rmw_zenoh_cpp hangs for good if a client is destroyed while its last answer is being taken in.
+    # This comes last: a session of rmw_zenoh_cpp hangs for good if a client is destroyed during its last answer.
     robot.node.destroy_node()

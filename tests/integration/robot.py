@@ -37,7 +37,7 @@ from throwcollect.ros.middleware import VARIABLE, Middleware, uses_rclpy
 from throwcollect.run_key import Signer
 
 CONFIG = Config.model_validate({"name": "integration", "tool": {"cup_floor_radius_m": 0.006}})
-"""Almost the defaults: the smallest balls fall through this spoon."""
+"""Defaults, but for a spoon through which the smallest balls fall."""
 OWN = "sim_1"
 """Name of a simulation that a test has for itself."""
 POSTURE = start_posture(CONFIG)
@@ -51,7 +51,7 @@ PATIENCE_S = 20.0 if ON_DDS else 60.0
 FOUND_BY_OTHERS_S = 0.3
 
 ALL = QoSProfile(history=HistoryPolicy.KEEP_ALL)
-"""Nothing is lost on the client's side, however late it looks."""
+"""With this profile, the client loses no message, however late it looks."""
 
 in_order_of_arrival = pytest.mark.skipif(
     uses_rclpy(), reason="rclpy takes up a topic's messages and answers as it likes"
@@ -124,7 +124,7 @@ def running_simulation(
         output, _ = process.communicate(timeout=20)
         assert process.returncode == 0, output
     finally:
-        # Whatever failed, nothing goes on behind the tests.
+        # The process is killed even after a failure, so that it does not outlive the tests.
         process.kill()
         process.communicate()
     robot.wait_until_gone()
@@ -209,7 +209,7 @@ class Robot:
         self.wait_until(ready, f"{self.name} is ready")
 
     def wait_until_gone(self) -> None:
-        """Wait until no trace of an ended simulation is left: the next one of its name would pass for ready at once."""
+        """Wait until an ended simulation has left the graph, as the next one of its name would seem ready at once."""
         self.wait_until(lambda: not self.node.count_publishers(self.topic("episode")), f"{self.name} is out of sight")
 
     def result(self, future: Future) -> Any:
@@ -239,7 +239,7 @@ class Robot:
         return self.parameters("set_parameters_atomically", node=node, parameters=messages).result
 
     def publish(self, topic: str, message: Any, qos: QoSProfile | int = 10) -> None:
-        """Publish a message once the simulation listens, and let it have that."""
+        """Publish a message once the simulation listens, and wait until it has taken it in."""
         publisher = self.node.create_publisher(type(message), self.topic(topic), qos)
         self.wait_until(lambda: publisher.get_subscription_count() > 0, topic)
         publisher.publish(message)
@@ -288,10 +288,10 @@ class Robot:
         name = topic if topic.startswith("/") else self.topic(topic)
         message_type = get_message(kind) if isinstance(kind, str) else kind
         subscription = self.node.create_subscription(message_type, name, heard.append, qos, raw=raw)
-        # The answer comes after the simulation has been told, as both take the same way.
+        # The request takes the same way as the subscription, so the simulation knows of it once it answers.
         self.state()
         if ON_DDS:
-            # They do not: each side finds the other, and cannot know when the other has found it.
+            # On DDS, they take different ways, and neither side knows when the other one has found it.
             self.wait_until(lambda: subscription.get_publisher_count() > 0, f"somebody publishes {name}")
             found = time.monotonic()
             self.wait_until(lambda: time.monotonic() > found + FOUND_BY_OTHERS_S)

@@ -1,4 +1,4 @@
-"""What viewers draw may be changed while a simulation runs; what is simulated may not."""
+"""A running simulation accepts another appearance of the robot for viewers, but no other physics."""
 
 import xml.etree.ElementTree as ElementTree
 
@@ -18,7 +18,7 @@ def with_hat() -> str:
     return ElementTree.tostring(robot, encoding="unicode")
 
 
-def test_a_robot_with_a_hat_is_shown_to_whoever_comes(robot: Robot) -> None:
+def test_a_changed_description_reaches_present_and_late_listeners(robot: Robot) -> None:
     hat = with_hat()
     with robot.listening("std_msgs/msg/String", "robot_description", LATE) as before:
         robot.wait_until(lambda: bool(before), "the description")

@@ -1,4 +1,4 @@
-"""Controllers as nodes of their own: their list, parameters, services and speed, and what can be set otherwise."""
+"""Controllers as nodes of their own: their list, parameters, services and speed, and their configurable behaviour."""
 
 import re
 from collections.abc import Iterator
@@ -73,7 +73,7 @@ def test_controllers_are_listed_as_the_controller_manager_does(robot: Robot) -> 
         assert each.claimed_interfaces == each.required_command_interfaces == positions
         assert each.required_state_interfaces == positions
         assert (each.is_async, each.is_chainable, each.is_chained) == (False, False, False)
-    # Clients stop a motion when the answer changes.
+    # Some clients stop a motion when this answer changes.
     assert robot.result(robot.ask("controller_manager_msgs/srv/ListControllers", service)).controller == listed
 
 
@@ -132,7 +132,7 @@ def test_partial_goals_can_be_allowed(robot: Robot) -> None:
         ("constraints__no_joint__goal", 0.1, "declared parameter|not declared"),
     ],
 )
-def test_parameters_that_cannot_be_are_refused_with_the_reason(
+def test_impossible_parameters_are_refused_with_the_reason(
     parameter: str, value: Any, reason: str, robot: Robot
 ) -> None:
     before = values(robot)
@@ -142,7 +142,7 @@ def test_parameters_that_cannot_be_are_refused_with_the_reason(
     assert values(robot) == before
 
 
-def test_a_trajectory_can_be_asked_for_its_state(robot: Robot) -> None:
+def test_query_state_returns_the_state_of_the_running_trajectory(robot: Robot) -> None:
     def query(time_ns: int) -> Any:
         time = Time(sec=time_ns // 10**9, nanosec=time_ns % 10**9)
         return robot.result(robot.ask("control_msgs/srv/QueryTrajectoryState", f"{ARM}/query_state", time=time))
@@ -218,7 +218,7 @@ def test_a_refused_goal_is_one_line_in_the_log_of_its_controller(robot: Robot) -
 
 @pytest.fixture(scope="module")
 def other(endpoint: str, session: Context, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Robot]:
-    """A simulation with everything that can be set otherwise."""
+    """A simulation in which every configurable behaviour of controllers differs from its default."""
     options = ControllersConfig(names="ros1", hold="decelerate", topic_aborts_goal=True, refused_goals="abort")
     config = CONFIG.model_copy(update={"controllers": options})
     with running_simulation(tmp_path_factory.mktemp("other"), endpoint, session, "sim_1", config) as robot:
@@ -249,7 +249,7 @@ def test_goals_that_are_refused_can_be_accepted_and_aborted_with_the_reason(othe
     assert other.now_ns() == 0
 
 
-def test_a_goal_that_is_refused_leaves_the_one_before_alone(other: Robot) -> None:
+def test_a_refused_goal_does_not_abort_the_running_goal(other: Robot) -> None:
     other.reset()
     other.put_into(PAUSED)
     first = other.send(goal(ARM, 0.5, arm_right_4_joint=-1.2), RIGHT_ARM)

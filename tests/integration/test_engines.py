@@ -1,4 +1,4 @@
-"""A simulation on an engine that knows robot, ground and ball alone."""
+"""A simulation on an engine that knows only robot, ground and ball."""
 
 from collections.abc import Iterator
 
@@ -21,12 +21,12 @@ def kinematic(tmp_path_factory: pytest.TempPathFactory, endpoint: str, session: 
         yield robot
 
 
-def test_goals_are_carried_out(kinematic: Robot) -> None:
+def test_a_simulation_on_the_ballistic_engine_carries_out_goals(kinematic: Robot) -> None:
     assert kinematic.outcome(kinematic.send(swing(0.3)))[1] == 0
     assert kinematic.joint("arm_right_4_joint") == pytest.approx(-0.5, abs=1e-9)
 
 
-def test_nothing_can_be_spawned_and_the_features_say_so(kinematic: Robot) -> None:
+def test_spawning_is_refused_and_missing_in_the_features(kinematic: Robot) -> None:
     features = kinematic.call("get_simulator_features").features
     assert Features.SPAWNING not in features.features
     assert Features.STEP_SIMULATION_ACTION in features.features

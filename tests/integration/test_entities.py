@@ -1,4 +1,4 @@
-"""Services about entities: which there are, where, how large, what is said about them."""
+"""Services about entities: their names, states, bounds and infos."""
 
 from typing import Any
 
@@ -26,7 +26,7 @@ def entity_state(*, z: float = 1.0, vx: float = 0.0, w: float = 1.0, frame: str 
     return state
 
 
-def test_an_unknown_entity_is_named_with_those_that_are_known(robot: Robot) -> None:
+def test_an_unknown_entity_is_an_error_that_lists_the_known_ones(robot: Robot) -> None:
     for result in (
         robot.call("get_entity_state", entity="table").result,
         robot.call("set_entity_state", entity="table", state=entity_state()).result,
@@ -44,7 +44,7 @@ def test_the_ball_lies_in_the_spoon_and_the_robot_stands_on_its_base(robot: Robo
     assert talos.pose.orientation.w == 1.0
 
 
-def test_a_ball_that_was_put_somewhere_flies_on_from_there(robot: Robot) -> None:
+def test_a_placed_ball_flies_on_from_its_new_position(robot: Robot) -> None:
     robot.put_into(PAUSED)
     placed = robot.call("set_entity_state", entity="ball", state=entity_state(z=1.5, vx=1.0))
     assert placed.result.result == Result.RESULT_OK
@@ -80,7 +80,7 @@ def test_a_state_without_meaning_is_refused_and_leaves_the_ball(
     assert robot.call("get_entity_state", entity="ball").state == before
 
 
-def test_the_robot_is_fixed(robot: Robot) -> None:
+def test_the_state_of_the_fixed_robot_cannot_be_set(robot: Robot) -> None:
     refused = robot.call("set_entity_state", entity="talos", state=entity_state()).result
     assert refused.result == Result.RESULT_OPERATION_FAILED
     assert refused.error_message == "talos is fixed to the world"
@@ -122,14 +122,14 @@ def test_entities_are_found_by_extended_regular_expressions(pattern: str, names:
         ("\\w", "invalid escape sequence: \\w"),
     ],
 )
-def test_expressions_that_are_none_are_refused_with_the_reason(pattern: str, words: str, robot: Robot) -> None:
+def test_malformed_expressions_are_refused_with_the_reason(pattern: str, words: str, robot: Robot) -> None:
     refused = robot.call("get_entities", filters=EntityFilters(filter=pattern))
     assert refused.result.result == Result.RESULT_OPERATION_FAILED
     assert words in refused.result.error_message
     assert list(refused.entities) == []
 
 
-def test_an_expression_that_never_ends_elsewhere_is_answered(robot: Robot) -> None:
+def test_an_expression_with_endless_backtracking_elsewhere_is_answered(robot: Robot) -> None:
     assert find_entities(robot, filter="^(([a-z])+.)+[A-Z]([a-z])+$") == []
 
 
@@ -148,7 +148,7 @@ def test_entities_are_found_by_category(robot: Robot) -> None:
     assert find_entities(robot, categories=robots, filter="ball") == []
 
 
-def test_what_is_said_about_an_entity_can_be_changed_and_found_until_a_full_reset(robot: Robot) -> None:
+def test_the_info_of_an_entity_can_be_changed_until_a_full_reset(robot: Robot) -> None:
     before = robot.call("get_entity_info", entity="ball").info
     assert before.category.category == EntityCategory.CATEGORY_DYNAMIC_OBJECT
     info = EntityInfo(description="a tennis ball", tags=["round", "soft"])
@@ -163,7 +163,7 @@ def test_what_is_said_about_an_entity_can_be_changed_and_found_until_a_full_rese
     assert robot.call("get_entity_info", entity="ball").info == before
 
 
-def test_senseless_wishes_about_tags_and_categories_are_refused(robot: Robot) -> None:
+def test_invalid_tag_filters_categories_and_descriptions_are_refused(robot: Robot) -> None:
     refused = robot.call("get_entities", filters=EntityFilters(tags=TagsFilter(tags=["a"], filter_mode=7))).result
     assert (refused.result, refused.error_message) == (Result.RESULT_OPERATION_FAILED, "no tags filter mode 7")
     info = EntityInfo()
@@ -200,13 +200,13 @@ def test_entities_are_found_by_place(robot: Robot) -> None:
         (bounds(3, (0, 0, 0), (float("nan"), 0, 0)), Result.RESULT_OPERATION_FAILED, "radius nan"),
     ],
 )
-def test_bounds_that_are_none_are_refused(region: Any, code: int, words: str, robot: Robot) -> None:
+def test_invalid_bounds_are_refused(region: Any, code: int, words: str, robot: Robot) -> None:
     refused = robot.call("get_entities_states", filters=EntityFilters(bounds=region)).result
     assert refused.result == code
     assert words in refused.error_message
 
 
-def test_states_of_many_entities_are_those_of_each(robot: Robot) -> None:
+def test_get_entities_states_returns_the_state_of_each_entity(robot: Robot) -> None:
     response = robot.call("get_entities_states")
     assert list(response.entities) == ["ball", "talos"]
     for name, state in zip(response.entities, response.states, strict=True):
@@ -220,12 +220,12 @@ def test_bounds_enclose_an_entity_in_its_own_frame(robot: Robot) -> None:
     assert (upper.x, upper.y, upper.z) == pytest.approx((0.025,) * 3, abs=1e-6)
     assert (lower.x, lower.y, lower.z) == pytest.approx((-0.025,) * 3, abs=1e-6)
     upper, lower = robot.call("get_entity_bounds", entity="talos").bounds.points
-    # Its base is a metre above the ground.
+    # The base of the robot is a metre above the ground.
     assert lower.z == pytest.approx(-1.02, abs=0.03)
     assert 0.6 < upper.z < 1.2
 
 
-def test_unknown_names_are_found_nowhere_and_not_repeated_at_length(robot: Robot) -> None:
+def test_a_long_unknown_name_is_not_found_and_shortened_in_the_message(robot: Robot) -> None:
     for service in ("get_entity_info", "get_entity_bounds", "delete_entity", "set_entity_info", "get_entity_state"):
         refused = robot.call(service, entity="x" * 10**6).result
         assert refused.result == Result.RESULT_NOT_FOUND, service

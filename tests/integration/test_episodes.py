@@ -43,7 +43,7 @@ def test_a_genuine_subscriber_misses_no_episode(endpoint: str, robot: Robot) -> 
         for number in range(TRIALS):
             assert robot.set({"trial.number": number, "trial.controllers": [ARM]}).successful
             robot.reset()
-            # Every third one ends late, with an arm that stands still.
+            # Every third trial ends late, as the arm stands still and the ball stays in the spoon.
             robot.send(goal(ARM, 0.2) if number % 3 == 2 else swing(1.0))
             robot.wait_until(lambda number=number: len(samples) > number, f"episode {number}")
         robot.wait_until(lambda: len(ours) == TRIALS, "all episodes")

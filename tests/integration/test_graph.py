@@ -1,4 +1,4 @@
-"""What a simulation offers, as `ros2 node info` and late subscribers see it."""
+"""Topics, services and actions of a simulation, as `ros2 node info` and late subscribers see them."""
 
 import xml.etree.ElementTree as ET
 from pathlib import Path
@@ -70,7 +70,7 @@ def tokens(robot: Robot, *kinds: EntityKind) -> list[Token]:
 
 
 def visible(names_and_types: list[tuple[str, list[str]]]) -> dict[str, str]:
-    """Without what makes up actions, which ROS hides, and the descriptions of types that nodes of rclpy offer."""
+    """Leave out the hidden topics and services of actions, and the type descriptions that nodes of rclpy offer."""
     hidden = ("/_action/", "/get_type_description")
     return {name: kind for name, (kind,) in names_and_types if not any(part in name for part in hidden)}
 
@@ -103,7 +103,7 @@ def test_exactly_the_documented_services_are_offered(robot: Robot) -> None:
 
 
 @pytest.mark.parametrize("name", TALOS.controllers)
-def test_a_controller_offers_what_it_offers_on_the_robot(name: str, robot: Robot) -> None:
+def test_a_controller_has_the_topics_services_and_action_of_the_real_one(name: str, robot: Robot) -> None:
     node = robot.node
     assert visible(node.get_publisher_names_and_types_by_node(name, "/sim_0")) == EVERY_NODE | {
         f"/sim_0/{name}/controller_state": "control_msgs/msg/JointTrajectoryControllerState"
@@ -131,7 +131,7 @@ def test_every_type_is_announced_with_the_hash_of_the_official_generator(robot: 
     assert {name: HASHES.get(name) for name in found} == found
 
 
-def test_the_qualities_of_service_are_those_of_genuine_nodes(robot: Robot) -> None:
+def test_endpoints_have_the_quality_of_service_of_genuine_nodes(robot: Robot) -> None:
     expected = {
         "/rosout": ":1:,1000:,:10,0:,,",
         "/parameter_events": "::,1000:,:,:,,",
@@ -155,7 +155,7 @@ def test_a_late_listener_gets_a_description_with_the_spoon_and_32_movable_joints
     assert pinocchio.buildModelFromXML(description).nq == 32
 
 
-def test_every_link_has_its_place_below_world_by_static_and_moving_transforms(robot: Robot, description: str) -> None:
+def test_static_and_moving_transforms_connect_every_link_to_world(robot: Robot, description: str) -> None:
     static = wait_for_latched(robot, "tf2_msgs/msg/TFMessage", "tf_static")
     with robot.listening("tf2_msgs/msg/TFMessage", "tf") as moving:
         robot.put_into(PAUSED)

@@ -14,7 +14,7 @@ from throwcollect.run_key import Signer
 from throwcollect.trial.lease import Lease, leases_to_json
 
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-"""As ros2_controllers have it; DDS connects no others."""
+"""The profile of ros2_controllers; DDS connects only equally durable endpoints."""
 LEASED = "the simulation is leased for trial 4, until its episode is handed over"
 SpeedScalingFactor: Any = get_message("control_msgs/msg/SpeedScalingFactor")
 Result: Any = get_message("simulation_interfaces/msg/Result")
@@ -74,7 +74,7 @@ def test_leased_trials_are_simulated_and_judged_in_their_order(robot: Robot) -> 
     assert start_ns == [CONFIG.trial_start_ns(trial) for trial in (4, 2, 3)]
 
 
-def test_a_trial_that_cannot_be_simulated_is_refused_and_the_others_are_not(robot: Robot) -> None:
+def test_an_impossible_trial_is_refused_and_the_next_one_is_simulated(robot: Robot) -> None:
     wrong, right = lease(robot, {"ball.mass_kg": -1.0}), lease(robot, {}, trial=5)
     refusal, delivery = wait_for_episodes(robot, wrong, right)
     assert refusal.token == wrong.token
@@ -91,13 +91,13 @@ def test_leases_that_are_not_signed_are_refused(robot: Robot) -> None:
     assert robot.now_ns() == 0
 
 
-def test_leases_are_set_alone(robot: Robot) -> None:
+def test_leases_cannot_be_set_together_with_other_parameters(robot: Robot) -> None:
     result = robot.set({"trial.leases": "[]", "ball.mass_kg": 0.05})
     assert not result.successful
     assert result.reason == "trial.leases: is set alone, not with ball.mass_kg"
 
 
-def test_what_a_lease_does_not_say_is_as_configured(robot: Robot) -> None:
+def test_a_leased_trial_ignores_parameters_that_were_set_by_hand(robot: Robot) -> None:
     by_hand = {"trial.number": 7, "trial.controllers": [ARM], "ball.friction": 0.1, "scene.gravity_mps2": 1.6}
     assert robot.set(by_hand).successful
     assert robot.set({"constraints.goal_time": 0.1, "cmd_timeout": 0.2}, node=ARM).successful
@@ -110,7 +110,7 @@ def test_what_a_lease_does_not_say_is_as_configured(robot: Robot) -> None:
     assert [value.double_value for value in limits] == [0.6, 0.0]
 
 
-def test_after_a_lease_a_reset_begins_what_the_parameters_say(robot: Robot) -> None:
+def test_a_reset_after_a_lease_begins_the_trial_of_the_parameters(robot: Robot) -> None:
     wait_for_episodes(robot, lease(robot, {"ball.mass_kg": 0.05}))
     robot.reset()
     assert robot.now_ns() == 0
@@ -168,7 +168,7 @@ def test_the_world_of_a_leased_trial_cannot_be_changed(service: str, fields: dic
     assert (result.result, result.error_message) == (Result.RESULT_INCORRECT_STATE, LEASED)
 
 
-def test_nothing_else_moves_or_stops_a_leased_controller(robot: Robot) -> None:
+def test_other_clients_cannot_move_or_stop_a_leased_controller(robot: Robot) -> None:
     asked = [lease(robot, {"ball.mass_kg": 0.05}) for _ in range(2)]
     (untouched,) = wait_for_episodes(robot, asked[0])
     assert robot.set(SLOWLY).successful
@@ -199,7 +199,7 @@ def test_a_lease_can_be_ended_by_hand(leased: Robot) -> None:
     assert leased.joint(ELBOW) == pytest.approx(POSTURE[ELBOW], abs=1e-4)
 
 
-def test_what_was_simulated_without_a_lease_says_so(robot: Robot) -> None:
+def test_an_episode_without_a_lease_has_an_empty_lease_in_its_conditions(robot: Robot) -> None:
     assert robot.set({"trial.number": 4, "trial.controllers": [ARM, TORSO], "ball.mass_kg": 0.05}).successful
     robot.reset()
     delivery = by_hand(robot)

@@ -1,4 +1,4 @@
-"""What a simulation says on /rosout: from where, and how often."""
+"""Log messages of a simulation on /rosout: their place in the sources, and how often they come."""
 
 import signal
 from pathlib import Path
@@ -14,7 +14,7 @@ Log = "rcl_interfaces/msg/Log"
 SpeedScalingFactor: Any = get_message("control_msgs/msg/SpeedScalingFactor")
 
 LATCHED = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-"""As the simulation subscribes to speeds; on DDS it would not hear others."""
+"""The profile of the simulation's subscription to speeds; on DDS it would not hear less durable publishers."""
 
 
 def find_logged(heard: list[Any], words: str) -> list[Any]:
@@ -22,12 +22,12 @@ def find_logged(heard: list[Any], words: str) -> list[Any]:
 
 
 def settle(robot: Robot) -> None:
-    """What was logged before an answer has been heard after a few more."""
+    """Wait for a few more answers: everything logged before the first one has then arrived."""
     for _ in range(5):
         robot.state()
 
 
-def test_a_refused_goal_is_one_line_that_names_where_it_was_refused(robot: Robot) -> None:
+def test_a_refused_goal_logs_one_line_with_its_place_in_the_sources(robot: Robot) -> None:
     with robot.listening(Log, "/rosout") as heard:
         for _ in range(3):
             assert not robot.send(goal(ARM, 0.0)).accepted
@@ -52,7 +52,7 @@ def test_speeds_that_are_refused_do_not_flood_the_log(robot: Robot) -> None:
     assert (Path(lines[0].file).name, lines[0].function) == ("controller.py", "scale_speed")
 
 
-def test_what_cannot_take_effect_is_said_once_for_one_request(robot: Robot) -> None:
+def test_an_ineffective_parameter_is_logged_once_per_request(robot: Robot) -> None:
     wanted = [Parameter("cmd_timeout", value=0.1)]
     wanted += [Parameter(f"constraints.arm_right_{number}_joint.goal", value=0.03) for number in range(1, 8)]
     with robot.listening(Log, "/rosout") as heard:

@@ -26,7 +26,7 @@ def test_trial_clock_and_swept_physics_are_parameters(robot: Robot) -> None:
     assert {"use_sim_time", *OWN, *physics} <= set(robot.parameters("list_parameters").result.names)
 
 
-def test_parameters_are_described_with_their_types_and_have_the_values_of_the_configuration(robot: Robot) -> None:
+def test_parameters_have_types_and_the_values_of_the_configuration(robot: Robot) -> None:
     names = [*OWN, "ball.mass_kg"]
     described = robot.parameters("describe_parameters", names=names).descriptors
     assert [(each.name, each.type) for each in described] == list(
@@ -43,7 +43,7 @@ def range_of(descriptor: Any) -> tuple[float, float] | None:
     return None
 
 
-def test_parameters_are_described_by_what_the_configuration_says_of_them(robot: Robot) -> None:
+def test_descriptions_of_parameters_come_from_the_configuration(robot: Robot) -> None:
     names = robot.parameters("list_parameters").result.names
     described = {each.name: each for each in robot.parameters("describe_parameters", names=names).descriptors}
     mine = {name: each for name, each in described.items() if name not in FOREIGN}
@@ -105,13 +105,13 @@ def test_a_wrong_value_is_refused_with_the_reason(values: dict[str, Any], reason
     assert re.search(reason, result.reason)
 
 
-def test_a_wrong_value_keeps_the_others_of_its_request_from_being_set(robot: Robot) -> None:
+def test_an_atomic_request_with_a_wrong_value_sets_no_parameter(robot: Robot) -> None:
     assert not robot.set({"ball.mass_kg": 0.06, "ball.radius_m": 5.0}).successful
     (value,) = robot.parameters("get_parameters", names=["ball.mass_kg"]).values
     assert value.double_value == CONFIG.ball.mass_kg
 
 
-def test_one_by_one_each_parameter_has_its_own_result(robot: Robot) -> None:
+def test_set_parameters_gives_each_parameter_its_own_result(robot: Robot) -> None:
     wanted = [Parameter("ball.mass_kg", value=0.06), Parameter("ball.radius_m", value=5.0)]
     results = robot.parameters("set_parameters", parameters=[each.to_parameter_msg() for each in wanted]).results
     assert [each.successful for each in results] == [True, False]
@@ -169,7 +169,7 @@ def test_the_rest_of_the_configuration_can_be_read_but_not_set(robot: Robot) -> 
     assert "read-only" in result.reason
 
 
-def test_the_largest_numbers_that_a_controller_may_have_end_no_node(robot: Robot) -> None:
+def test_the_largest_numbers_as_tolerances_do_not_end_the_node(robot: Robot) -> None:
     largest = sys.float_info.max
     before = {"cmd_timeout": 0.0, "constraints.goal_time": 0.6}
     assert robot.set({"cmd_timeout": largest, "constraints.goal_time": largest / 2}, node=ARM).successful

@@ -80,7 +80,7 @@ class PlayMotion:
         }
 
     def play(self, motion: Motion) -> list[tuple[int, int, str]]:
-        """Results of the goals that the motion was divided into."""
+        """Play a motion; returns the results of the goals into which it was divided."""
         joints, points = motion
         first_s, first = next(iter(points.items()))
         now = self.joint_states()
@@ -132,7 +132,7 @@ def test_joint_states_have_velocity_and_effort_of_every_joint(talos: Robot) -> N
     assert abs(states["arm_right_2_joint"][2]) > 0.1
 
 
-def test_a_robot_at_rest_goes_on_to_tell_its_state(talos: Robot) -> None:
+def test_a_robot_at_rest_still_publishes_its_joint_states(talos: Robot) -> None:
     talos.reset()
     before = talos.now_ns()
     with talos.listening(*JOINT_STATES) as heard:

@@ -21,19 +21,19 @@ from tests.integration.robot import ARM, OWN, PLAYING, Robot, connect, environme
 from throwcollect.ros import DurabilityPolicy, QoSProfile, get_message
 from throwcollect.ros.middleware import uses_rclpy
 
-# How rclpy and its RMW take garbage is their business.
+# These tests do not cover how rclpy and its RMW handle garbage.
 embedded_alone = pytest.mark.skipif(
     uses_rclpy() or os.environ.get("SIMULATION_ROS") == "rclpy", reason="somebody is on genuine rclpy"
 )
 
 SEED = 20
 PAYLOADS = 4
-"""Malformed payloads for each key; and as many attachments and changed messages."""
+"""Number of malformed payloads for each key, and of malformed attachments and changed messages."""
 AT_ONCE = 5
-"""Less than a queue holds: what there is no room for is refused without a look at it."""
+"""Fewer requests than a queue holds, as a full queue refuses further ones unread."""
 VALID = Attachment(1, 0, bytes(16)).pack()
 CONSEQUENTIAL = ("set_simulation_state", "step_simulation", "simulate_steps")
-"""A correct request of these may end the process, or keep it busy for long."""
+"""Services and actions whose valid requests may end the process or keep it busy for long."""
 
 LATE = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
@@ -102,7 +102,7 @@ def hostile(type_name: str, sample: Any, chance: random.Random) -> Iterator[tupl
 
 
 @embedded_alone
-def test_garbage_on_every_key_is_survived(running: tuple[Command, Robot]) -> None:
+def test_a_simulation_survives_garbage_on_every_key(running: tuple[Command, Robot]) -> None:
     process, robot = running
     chance = random.Random(SEED)
     session, domain = robot.node.context.session, robot.node.context.get_domain_id()
@@ -117,7 +117,7 @@ def test_garbage_on_every_key_is_survived(running: tuple[Command, Robot]) -> Non
             session.put(key, payload, attachment=attachment)
             if number % AT_ONCE == 0:
                 robot.state()
-        # Some of it was good enough to be followed for years.
+        # Some mutated trajectories are valid and would last for years.
         robot.reset()
     unanswered: set[int] = set()
     for token in services:
@@ -177,7 +177,7 @@ def assert_works(robot: Robot) -> None:
 
 
 @embedded_alone
-def test_tokens_of_odd_forms_are_survived(running: tuple[Command, Robot], endpoint: str) -> None:
+def test_a_simulation_survives_malformed_tokens(running: tuple[Command, Robot], endpoint: str) -> None:
     process, robot = running
     chance = random.Random(SEED)
     session, domain = robot.node.context.session, robot.node.context.get_domain_id()
@@ -195,7 +195,7 @@ def test_tokens_of_odd_forms_are_survived(running: tuple[Command, Robot], endpoi
         try:
             tokens.append(session.liveliness().declare_token(key))
         except zenoh.ZError:
-            continue  # Not even a key of Zenoh.
+            continue  # Zenoh itself refuses this key.
     assert len(tokens) > 200
     assert_works(robot)
     for token in tokens:
@@ -226,7 +226,7 @@ def test_a_goal_goes_on_when_its_client_vanishes_and_is_forgotten_in_time(
 
     robot.wait_until(lambda: last() == [4], "the goal of nobody is reached")
     assert robot.set({"sim.real_time_factor": 0.0, "trial.number": 3}).successful
-    # Its clock jumps by more than the time for which results are kept.
+    # The clock of the simulation jumps by more than the time for which results are kept.
     robot.reset()
     assert robot.outcome(robot.send(swing(0.2)))[1] == 0
     # On DDS, the result may overtake the status.
@@ -255,14 +255,14 @@ def start_router(listen: str) -> tuple[subprocess.Popen[str], str]:
     return process, process.stdout.readline().split()[-1]
 
 
-def test_a_simulation_goes_on_while_its_router_is_away_and_is_all_there_when_it_is_back(tmp_path: Path) -> None:
+def test_a_simulation_survives_the_loss_of_its_router_and_reconnects(tmp_path: Path) -> None:
     router, endpoint = start_router("tcp/127.0.0.1:0")
     simulation = start_simulation(tmp_path, endpoint, OWN)
     try:
         with connect(endpoint) as context:
             robot = Robot(context, OWN)
             robot.wait_until_ready(simulation)
-            # It asks itself for something before it says that it is ready, by a client that goes then.
+            # A simulation checks itself by a client before it is ready; the test waits until that client has gone.
             robot.wait_until(lambda: not endpoints(robot, EntityKind.CLIENT), "it has asked itself")
             before = {token.key() for kind in EntityKind for token in endpoints(robot, kind)}
             assert robot.set({"sim.real_time_factor": 1.0}).successful
@@ -277,7 +277,7 @@ def test_a_simulation_goes_on_while_its_router_is_away_and_is_all_there_when_it_
                 return {token.key() for kind in EntityKind for token in endpoints(robot, kind)}
 
             robot.wait_until(lambda: list_keys() == before, "everything is announced again")
-            # The request for the result died with the router, but not what it asked for.
+            # The request for the result was lost with the router, but the result itself was not.
             assert robot.outcome(handle)[:2] == (4, 0)
             assert not lost.done()
             with robot.listening("std_msgs/msg/String", "robot_description", LATE) as heard:

@@ -1,4 +1,4 @@
-"""A simulation in the root namespace, where nodes look that know the real Talos."""
+"""A simulation in the root namespace, where clients of the real Talos look for it."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -14,7 +14,7 @@ _NAMES = ("/clock", "/tf", "/tf_static", "/joint_states", "/robot_description", 
 
 @pytest.fixture(scope="module")
 def endpoint() -> Iterator[str]:
-    """A router of this module's own: the other simulations shall not meet this one."""
+    """A router of this module's own, so that this simulation does not meet the others."""
     with router("tcp/127.0.0.1:0") as endpoint:
         yield endpoint
 
@@ -31,7 +31,7 @@ def talos(endpoint: str, tmp_path_factory: pytest.TempPathFactory) -> Iterator[R
     assert process.returncode == 0, output
 
 
-def test_names_are_those_of_the_real_robot(talos: Robot) -> None:
+def test_topics_have_the_names_of_the_real_robot(talos: Robot) -> None:
     assert {name for name, _ in talos.node.get_topic_names_and_types()} >= set(_NAMES)
     assert talos.outcome(talos.send(swing(0.3)))[1] == 0
     assert talos.set({"ball.mass_kg": 0.05}).successful
@@ -55,7 +55,7 @@ def test_a_node_with_simulated_time_follows_the_simulation(talos: Robot) -> None
 
 
 @pytest.mark.usefixtures("talos")
-def test_a_second_simulation_is_refused_there(endpoint: str, tmp_path: Path) -> None:
+def test_a_second_simulation_in_the_root_namespace_is_refused(endpoint: str, tmp_path: Path) -> None:
     process = start_simulation(tmp_path, endpoint, "sim_2", options=("--namespace", "/"))
     output, _ = process.communicate(timeout=20)
     assert process.returncode == 2

@@ -29,7 +29,7 @@ Features: Any = get_message("simulation_interfaces/msg/SimulatorFeatures")
 ABORTED, INVALID_GOAL = 6, -1
 
 
-def test_the_listed_features_are_those_that_work(robot: Robot) -> None:
+def test_get_simulator_features_lists_the_supported_features(robot: Robot) -> None:
     features = robot.call("get_simulator_features").features
     assert sorted(features.features) == sorted(
         [
@@ -67,7 +67,7 @@ def test_a_simulation_plays_from_the_start(robot: Robot) -> None:
     assert (response.state.state, response.result.result) == (PLAYING, Result.RESULT_OK)
 
 
-def test_states_change_and_the_present_one_is_refused(robot: Robot) -> None:
+def test_each_state_can_be_set_and_the_present_one_is_refused(robot: Robot) -> None:
     for state, name in ((PAUSED, "PAUSED"), (PLAYING, "PLAYING"), (STOPPED, "STOPPED"), (PAUSED, "PAUSED")):
         assert robot.put_into(state).result == Result.RESULT_OK
         assert robot.state() == state
@@ -84,7 +84,7 @@ def test_states_that_cannot_be_set_are_refused(state: int, robot: Robot) -> None
     assert robot.state() == PLAYING
 
 
-def test_stopping_resets_and_nothing_runs_until_it_plays_again(robot: Robot) -> None:
+def test_a_stopped_simulation_is_reset_and_holds_goals_until_it_plays(robot: Robot) -> None:
     robot.put_into(PAUSED)
     handle = robot.send(swing())
     robot.step(100)
@@ -112,7 +112,7 @@ def test_a_reset_brings_time_robot_and_ball_back(scope: int, robot: Robot) -> No
 
 
 @pytest.mark.parametrize("scope", [8, 9, 128, 254])
-def test_scopes_that_mean_nothing_are_refused_and_change_nothing(scope: int, robot: Robot) -> None:
+def test_a_reset_with_unknown_scope_bits_is_refused_and_changes_nothing(scope: int, robot: Robot) -> None:
     robot.put_into(PAUSED)
     robot.step(5)
     refused = robot.call("reset_simulation", scope=scope).result
@@ -122,7 +122,7 @@ def test_scopes_that_mean_nothing_are_refused_and_change_nothing(scope: int, rob
 
 
 @in_order_of_arrival
-def test_a_reset_of_time_stops_goals_where_they_are_and_tells_the_time_though_paused(robot: Robot) -> None:
+def test_a_reset_of_time_aborts_goals_and_publishes_the_clock_while_paused(robot: Robot) -> None:
     robot.put_into(PAUSED)
     with robot.listening("rosgraph_msgs/msg/Clock", "clock") as heard:
         handle = robot.send(goal(ARM, 1.0, arm_right_4_joint=-0.5))
@@ -149,7 +149,7 @@ def test_a_reset_of_states_goes_back_to_the_start_while_time_goes_on(robot: Robo
     assert robot.call("reset_simulation", scope=Reset.SCOPE_STATE).result.result == Result.RESULT_OK
     assert robot.now_ns() == later > 0
     assert robot.call("get_entity_state", entity="ball").state.pose == start.pose
-    # Nothing goes back to what was held before.
+    # The joints stay at the start posture and do not return to where they were held before.
     robot.step(100)
     assert robot.joint(ELBOW) == pytest.approx(POSTURE[ELBOW], abs=1e-3)
     assert robot.now_ns() == later + 100 * STEP_NS
@@ -163,10 +163,10 @@ def test_a_reset_of_states_aborts_goals(robot: Robot) -> None:
     assert robot.outcome(handle) == (ABORTED, INVALID_GOAL, "simulation was reset")
 
 
-def test_a_pause_in_the_middle_of_a_goal_changes_nothing_but_the_wait(robot: Robot) -> None:
-    # Whether the first sample is heard, and how far an idle simulation goes on, are no part of the motion.
+def test_a_pause_in_the_middle_of_a_goal_does_not_change_the_motion(robot: Robot) -> None:
+    # The first sample and the samples after the motion are left out, as whether they are heard depends on chance.
     moments = set(range(2 * SAMPLE_NS, 600_000_001, SAMPLE_NS))
-    # A busy machine may drop messages of samples, and then nine tenths of them show the same.
+    # A busy machine may drop some messages, so nine tenths of the samples are enough.
     enough = len(moments) * 9 // 10
 
     def motion(*, pause: bool) -> dict[int, list[float]]:
@@ -193,7 +193,7 @@ def test_a_pause_in_the_middle_of_a_goal_changes_nothing_but_the_wait(robot: Rob
     assert max(both) > 500_000_000
 
 
-def test_a_start_state_that_does_not_exist_is_refused_and_another_one_can_be_set(robot: Robot) -> None:
+def test_a_reset_to_an_impossible_start_state_is_refused_until_it_is_corrected(robot: Robot) -> None:
     assert robot.set({"ball.radius_m": 0.005}).successful
     refused = robot.call("reset_simulation").result
     assert refused.result == Result.RESULT_OPERATION_FAILED

@@ -64,7 +64,7 @@ for change in range(1, 1000):
 
 
 class Listener(runs.Onlooker):
-    """Keeps what it is told."""
+    """Keeps the messages that it gets."""
 
     def __init__(self) -> None:
         self.lines: list[str] = []
@@ -81,7 +81,7 @@ def config(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def whole(config: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The dataset as one collection makes it."""
+    """The dataset of a single collection, to compare with."""
     directory = tmp_path_factory.mktemp("whole") / "data"
     with runs.prepare(config, overrides=INPROCESS, output=directory) as run:
         run.collect()
@@ -113,7 +113,7 @@ def interrupt_after(directory: Path, text: str, size: int) -> Path:
     return attempt
 
 
-def test_joined_slices_are_the_files_of_one_collection(frozen: Path, whole: Path) -> None:
+def test_joined_slices_give_the_files_of_one_collection(frozen: Path, whole: Path) -> None:
     collect(frozen, "2/3", "0/3", "1/3")
     join(frozen)
     assert fingerprints(frozen) == fingerprints(whole)
@@ -130,7 +130,7 @@ def test_a_finished_slice_has_few_files(frozen: Path) -> None:
     ]
 
 
-def test_a_slice_that_was_interrupted_goes_on_with_what_is_there(frozen: Path, whole: Path) -> None:
+def test_an_interrupted_slice_goes_on_with_its_recordings(frozen: Path, whole: Path) -> None:
     interrupt_after(frozen, "0/2", 50_000)
     assert not find_finished(frozen)
     onlooker = Listener()
@@ -141,8 +141,8 @@ def test_a_slice_that_was_interrupted_goes_on_with_what_is_there(frozen: Path, w
     assert fingerprints(frozen) == fingerprints(whole)
 
 
-def test_of_attempts_that_were_stopped_one_is_left_and_it_has_most(frozen: Path, whole: Path) -> None:
-    """However often a task is queued again: its files do not become more, and what is recorded does not become less."""
+def test_a_repeated_attempt_takes_over_the_largest_stopped_one(frozen: Path, whole: Path) -> None:
+    """A task that is requeued again and again does not gather files, and does not lose recordings."""
     slice = Slice(0, 2)
     sizes = []
     for size in (50_000, 100_000, 150_000):
@@ -150,7 +150,7 @@ def test_of_attempts_that_were_stopped_one_is_left_and_it_has_most(frozen: Path,
         assert find_attempts(frozen, slice) == [attempt]
         sizes.append(sum(path.stat().st_size for path in attempt.glob("*.mcap*")))
     assert sizes == sorted(sizes)
-    # Beside one that died with less.
+    # This attempt died with less, and lies beside the other one.
     dead = make_attempt(frozen, slice)
     (dead / "small_00000.mcap.part").write_bytes((attempt / "small_00000.mcap").read_bytes()[:1000])
     early = frozen / SLICES / "0-of-2.attempt-a"
@@ -165,7 +165,7 @@ def test_of_attempts_that_were_stopped_one_is_left_and_it_has_most(frozen: Path,
     assert fingerprints(frozen) == fingerprints(whole)
 
 
-def test_a_slice_takes_over_recordings_and_not_what_is_damaged_in_them(frozen: Path, whole: Path) -> None:
+def test_a_damaged_recording_of_an_attempt_does_not_change_the_dataset(frozen: Path, whole: Path) -> None:
     attempt = interrupt_after(frozen, "0/2", 50_000)
     recording = max(attempt.glob("*.mcap*"), key=lambda path: path.stat().st_size)
     data = bytearray(recording.read_bytes())
@@ -176,7 +176,7 @@ def test_a_slice_takes_over_recordings_and_not_what_is_damaged_in_them(frozen: P
     assert fingerprints(frozen) == fingerprints(whole)
 
 
-def test_of_two_attempts_at_a_slice_the_second_changes_nothing(frozen: Path) -> None:
+def test_a_second_attempt_does_not_replace_a_finished_slice(frozen: Path) -> None:
     collect(frozen, "0/6")
     place = frozen / SLICES / "0-of-6"
     before = fingerprints(place)
@@ -200,12 +200,12 @@ def test_joining_says_which_slices_are_missing(frozen: Path) -> None:
     assert "--slice 0/3" in str(caught.value)
 
 
-def test_joining_that_is_killed_anywhere_can_be_done_again(frozen: Path, whole: Path, tmp_path: Path) -> None:
+def test_joining_can_be_repeated_after_a_kill_at_any_point(frozen: Path, whole: Path, tmp_path: Path) -> None:
     collect(frozen, "0/2", "1/2")
     killed = subprocess.run([sys.executable, "-c", KILLED_ANYWHERE, frozen, tmp_path / "killed"], check=False)
     assert killed.returncode == 0
     states = sorted((tmp_path / "killed").iterdir())
-    # It dies with all shards in their slices, with some of them moved, and when only slices are left to be removed.
+    # Joining is killed before, while and after it moves the shards out of their slices.
     assert {len(list(each.glob("*.mcap"))) for each in states} == set(range(7))
     assert any((each / METADATA).exists() and (each / SLICES).exists() for each in states)
     for each in states:
@@ -238,7 +238,7 @@ def test_a_recording_that_was_cut_off_is_not_joined(frozen: Path) -> None:
         join(frozen)
 
 
-def test_what_would_change_the_dataset_is_refused(frozen: Path) -> None:
+def test_overrides_that_would_change_the_dataset_are_refused(frozen: Path) -> None:
     with pytest.raises(ConfigError, match="seed"):
         collect_slice(frozen, Slice(0, 2), overrides=["seed=9"])
     with pytest.raises(ConfigError, match=r"run.open: should be false"):
@@ -246,7 +246,7 @@ def test_what_would_change_the_dataset_is_refused(frozen: Path) -> None:
 
 
 def test_slices_need_no_locks(config: Path, whole: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Some file systems of clusters have none; what one run collects needs them all the same."""
+    """Some file systems of clusters have no locks; slices work without them, but a run of one collection does not."""
 
     def refuse(descriptor: int, _: int) -> None:
         if str(tmp_path) in os.readlink(f"/proc/self/fd/{descriptor}"):
@@ -261,7 +261,7 @@ def test_slices_need_no_locks(config: Path, whole: Path, tmp_path: Path, monkeyp
         runs.prepare(config, overrides=INPROCESS, output=tmp_path / "one")
 
 
-def test_a_disk_that_is_full_costs_the_attempt_and_nothing_else(
+def test_a_full_disk_ends_the_attempt_and_a_later_one_succeeds(
     frozen: Path, whole: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     full = True
@@ -282,7 +282,7 @@ def test_a_disk_that_is_full_costs_the_attempt_and_nothing_else(
     assert fingerprints(frozen) == fingerprints(whole)
 
 
-def test_of_a_slice_that_has_lost_a_trial_all_others_are_kept_also_from_a_disk_of_the_node(
+def test_a_slice_with_a_lost_trial_keeps_its_others_for_the_next_attempt(
     frozen: Path, whole: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     begin, refused, begun = TrialRunner.begin, True, set[int]()

@@ -1,4 +1,4 @@
-"""Putting entities into a simulation and taking them out again, and what that does to throws."""
+"""Spawning and deleting entities in a simulation, and their effect on throws."""
 
 import hashlib
 from pathlib import Path
@@ -57,7 +57,7 @@ def episode(robot: Robot, scope: int = Reset.SCOPE_DEFAULT) -> str:
     return hashlib.sha256(bytes(heard[0].data)).hexdigest()
 
 
-def test_a_spawned_body_falls_to_the_ground_and_lies_there(robot: Robot) -> None:
+def test_a_spawned_body_falls_to_the_ground_and_stays_on_it(robot: Robot) -> None:
     robot.put_into(PAUSED)
     assert spawn_successfully(robot, initial_pose=pose(2.0, 2.0, 0.5)) == "crate"
     assert entities(robot) == ["ball", "talos", "crate"]
@@ -67,7 +67,7 @@ def test_a_spawned_body_falls_to_the_ground_and_lies_there(robot: Robot) -> None
     assert height(robot, "crate") == pytest.approx(0.1, abs=2e-3)
 
 
-def test_the_ball_lands_on_what_was_spawned(robot: Robot) -> None:
+def test_the_ball_lands_on_a_spawned_table(robot: Robot) -> None:
     robot.put_into(PAUSED)
     assert (
         spawn_successfully(robot, "table", resource_string=box("0.5 0.5 1.0", mass=0), initial_pose=pose(2.0, 2.0, 0.5))
@@ -81,7 +81,7 @@ def test_the_ball_lands_on_what_was_spawned(robot: Robot) -> None:
     assert height(robot, "table") == 0.5
 
 
-def test_a_name_is_given_once_unless_another_one_will_do(robot: Robot) -> None:
+def test_a_taken_name_is_refused_unless_renaming_is_allowed(robot: Robot) -> None:
     assert spawn_successfully(robot) == "crate"
     refused = spawn(robot)
     assert refused.result.result == Spawn.NAME_NOT_UNIQUE
@@ -130,7 +130,7 @@ def test_a_name_is_given_once_unless_another_one_will_do(robot: Robot) -> None:
         ),
     ],
 )
-def test_wishes_that_cannot_be_met_are_refused_by_their_codes(
+def test_invalid_spawn_requests_are_refused_with_their_codes(
     fields: dict[str, Any], code: int, words: str, robot: Robot
 ) -> None:
     refused = spawn(robot, **{"name": "crate", **fields}).result
@@ -140,7 +140,7 @@ def test_wishes_that_cannot_be_met_are_refused_by_their_codes(
     assert entities(robot) == ["ball", "talos"]
 
 
-def test_a_description_that_would_blow_up_is_refused_and_the_simulation_goes_on(robot: Robot) -> None:
+def test_an_entity_bomb_and_huge_descriptions_are_refused(robot: Robot) -> None:
     entity = "".join(f'<!ENTITY e{n + 1} "{f"&e{n};" * 10}">' for n in range(9))
     bomb = f'<!DOCTYPE robot [<!ENTITY e0 "boom">{entity}]><robot name="&e9;"/>'
     deep = "<robot>" + "<link>" * 200_000 + "</link>" * 200_000 + "</robot>"
@@ -152,7 +152,7 @@ def test_a_description_that_would_blow_up_is_refused_and_the_simulation_goes_on(
     assert spawn_successfully(robot) == "crate"
 
 
-def test_a_robot_is_spawned_from_its_package_and_found_by_its_category(robot: Robot) -> None:
+def test_a_robot_spawned_from_its_package_has_the_category_robot(robot: Robot) -> None:
     spawnables = robot.call("get_spawnables")
     assert spawnables.result.result == Result.RESULT_OK
     assert {PANDA, "package://example-robot-data/robots/talos_data/robots/talos_reduced.urdf"} <= {
@@ -164,7 +164,7 @@ def test_a_robot_is_spawned_from_its_package_and_found_by_its_category(robot: Ro
     assert info.description == f"URDF 'panda' of {PANDA}, namespace /left"
 
 
-def test_spawnables_are_looked_for_where_one_says(robot: Robot, tmp_path: Path) -> None:
+def test_get_spawnables_searches_the_requested_sources(robot: Robot, tmp_path: Path) -> None:
     (tmp_path / "good.urdf").write_text(box(name="a crate"))
     (tmp_path / "torn.urdf").write_text("<robot")
     (tmp_path / "mesh.urdf").write_text(box().replace("<box", '<mesh filename="missing.stl"/><box'))
@@ -178,7 +178,7 @@ def test_spawnables_are_looked_for_where_one_says(robot: Robot, tmp_path: Path) 
     assert spawn_successfully(robot, uri=own[0].uri) == "crate"
 
 
-def test_a_pose_may_be_given_in_the_frame_of_what_was_spawned_before(robot: Robot) -> None:
+def test_a_pose_may_be_given_in_the_frame_of_a_spawned_entity(robot: Robot) -> None:
     first = pose(1.0, 1.0, 0.5)
     first.pose.orientation.z, first.pose.orientation.w = 0.5**0.5, 0.5**0.5
     spawn_successfully(robot, "table", resource_string=box(mass=0), initial_pose=first)
@@ -188,7 +188,7 @@ def test_a_pose_may_be_given_in_the_frame_of_what_was_spawned_before(robot: Robo
     assert there.orientation.z == pytest.approx(0.5**0.5, abs=1e-6)
 
 
-def test_many_wishes_are_met_one_by_one(robot: Robot) -> None:
+def test_each_of_many_spawn_requests_has_its_own_result(robot: Robot) -> None:
     def wish(name: str, text: str) -> Any:
         request = SpawnRequest(name=name, initial_pose=pose(3.0, 0.0, 1.0))
         request.entity_resource.resource_string = text
@@ -214,7 +214,7 @@ def test_many_wishes_are_met_one_by_one(robot: Robot) -> None:
     assert "there is no room" in spawn(robot).result.error_message
 
 
-def test_what_is_fixed_can_be_put_somewhere_but_not_set_in_motion(robot: Robot) -> None:
+def test_a_fixed_entity_can_be_placed_but_not_set_in_motion(robot: Robot) -> None:
     spawn_successfully(robot, resource_string=box(mass=0))
     state = EntityState()
     state.pose.position.z = 3.0
@@ -230,7 +230,7 @@ def test_what_is_fixed_can_be_put_somewhere_but_not_set_in_motion(robot: Robot) 
     assert info.category.category == EntityCategory.CATEGORY_STATIC_OBJECT
 
 
-def test_what_was_spawned_is_deleted_once(robot: Robot) -> None:
+def test_a_spawned_entity_can_be_deleted_once(robot: Robot) -> None:
     spawn_successfully(robot)
     assert robot.call("delete_entity", entity="crate").result.result == Result.RESULT_OK
     assert robot.call("delete_entity", entity="crate").result.result == Result.RESULT_NOT_FOUND
@@ -238,7 +238,7 @@ def test_what_was_spawned_is_deleted_once(robot: Robot) -> None:
     assert spawn_successfully(robot) == "crate"
 
 
-def test_a_reset_of_what_was_spawned_leaves_time_and_robot(robot: Robot) -> None:
+def test_a_reset_of_spawned_entities_leaves_time_and_ball(robot: Robot) -> None:
     robot.put_into(PAUSED)
     spawn_successfully(robot)
     robot.step(100)
@@ -249,7 +249,7 @@ def test_a_reset_of_what_was_spawned_leaves_time_and_robot(robot: Robot) -> None
     assert height(robot, "ball") == ball
 
 
-def test_a_reset_of_time_and_state_puts_what_was_spawned_where_it_was_spawned(robot: Robot) -> None:
+def test_a_reset_of_time_and_state_moves_spawned_entities_back(robot: Robot) -> None:
     robot.put_into(PAUSED)
     spawn_successfully(robot, initial_pose=pose(2.0, 2.0, 1.0))
     robot.step(100)
@@ -260,10 +260,10 @@ def test_a_reset_of_time_and_state_puts_what_was_spawned_where_it_was_spawned(ro
     assert robot.now_ns() == 0
 
 
-def test_a_trial_goes_on_among_spawned_bodies_and_leaves_no_trace_in_later_ones(robot: Robot) -> None:
+def test_spawned_entities_change_their_trial_and_no_later_one(robot: Robot) -> None:
     alone = episode(robot)
     assert episode(robot) == alone
-    # In the way of the arm and of the ball.
+    # Both entities are in the way of the arm or of the ball.
     spawn_successfully(robot, "wall", resource_string=box("0.1 3.0 4.0", mass=0), initial_pose=pose(0.9, 0.0, 0.0))
     spawn_successfully(robot, "crate", initial_pose=pose(0.5, -0.4, 1.6))
     among = episode(robot, Reset.SCOPE_TIME | Reset.SCOPE_STATE)

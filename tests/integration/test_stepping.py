@@ -56,7 +56,7 @@ def test_steps_advance_the_clock_exactly(steps: int, robot: Robot) -> None:
 
 
 @pytest.mark.parametrize("state", [PLAYING, STOPPED])
-def test_steps_are_refused_unless_it_is_paused(state: int, robot: Robot) -> None:
+def test_steps_are_refused_unless_the_simulation_is_paused(state: int, robot: Robot) -> None:
     if state != PLAYING:
         robot.put_into(state)
     refused = robot.step(1)
@@ -76,7 +76,7 @@ def test_steps_carry_a_goal_forward(robot: Robot) -> None:
 
 
 @pytest.mark.parametrize("steps", [1, 10])
-def test_steps_are_told_on_the_clock_to_the_nanosecond(steps: int, robot: Robot) -> None:
+def test_the_clock_shows_steps_to_the_nanosecond(steps: int, robot: Robot) -> None:
     robot.put_into(PAUSED)
     robot.step(3)
     with robot.listening("rosgraph_msgs/msg/Clock", "clock") as heard:
@@ -88,7 +88,7 @@ def test_steps_are_told_on_the_clock_to_the_nanosecond(steps: int, robot: Robot)
     assert stamps == sorted(set(stamps))
 
 
-def test_no_steps_are_taken_at_once(robot: Robot, action: ActionClient) -> None:
+def test_a_request_for_zero_steps_succeeds(robot: Robot, action: ActionClient) -> None:
     robot.put_into(PAUSED)
     assert robot.step(0).result == Result.RESULT_OK
     assert end(robot, begin(robot, action, 0)) == (SUCCEEDED, Result.RESULT_OK, "")
@@ -105,20 +105,20 @@ def test_more_steps_than_a_caller_would_wait_for_are_refused_by_the_service(robo
 
 
 @in_order_of_arrival
-def test_the_action_tells_of_every_step_and_ends_paused(robot: Robot, action: ActionClient) -> None:
+def test_the_step_action_gives_feedback_on_each_step_and_ends_paused(robot: Robot, action: ActionClient) -> None:
     robot.put_into(PAUSED)
     told: list[tuple[int, int]] = []
 
     def take(message: Any) -> None:
         told.append((int(message.feedback.completed_steps), int(message.feedback.remaining_steps)))
 
-    # The simulation hears of the subscription before it hears of the goal.
+    # A goal of zero steps comes first, so that the simulation knows of the subscription before the real goal.
     end(robot, begin(robot, action, 0, feedback_callback=take))
     robot.state()
     handle = begin(robot, action, 60, feedback_callback=take)
     assert end(robot, handle) == (SUCCEEDED, Result.RESULT_OK, "")
     robot.wait_until(lambda: bool(told) and told[-1] == (60, 0), "the last feedback")
-    # A client keeps the last ten that it had no time to look at.
+    # The queue of a client keeps only the last ten messages.
     assert len(told) >= 10
     assert told == [(step, 60 - step) for step, _ in sorted(told)]
     assert robot.now_ns() == 60 * STEP_NS
@@ -126,7 +126,7 @@ def test_the_action_tells_of_every_step_and_ends_paused(robot: Robot, action: Ac
 
 
 @pytest.mark.parametrize("state", [PLAYING, STOPPED])
-def test_the_action_fails_unless_it_is_paused(state: int, robot: Robot, action: ActionClient) -> None:
+def test_the_step_action_fails_unless_the_simulation_is_paused(state: int, robot: Robot, action: ActionClient) -> None:
     if state != PLAYING:
         robot.put_into(state)
     status, code, words = end(robot, begin(robot, action, 5))
@@ -135,7 +135,7 @@ def test_the_action_fails_unless_it_is_paused(state: int, robot: Robot, action: 
     assert robot.now_ns() == 0
 
 
-def test_while_steps_are_taken_others_are_answered_and_other_steps_refused(robot: Robot, action: ActionClient) -> None:
+def test_other_step_requests_are_refused_while_steps_are_taken(robot: Robot, action: ActionClient) -> None:
     robot.put_into(PAUSED)
     handle = begin(robot, action, FOR_EVER)
     robot.wait_until(lambda: robot.now_ns() > 0, "steps are taken")
@@ -161,9 +161,7 @@ def test_while_steps_are_taken_others_are_answered_and_other_steps_refused(robot
         (lambda robot: robot.put_into(STOPPED), "the simulation is STOPPED now, after "),
     ],
 )
-def test_steps_end_when_the_simulation_is_told_otherwise(
-    interrupt: Any, words: str, robot: Robot, action: ActionClient
-) -> None:
+def test_a_reset_or_another_state_ends_steps(interrupt: Any, words: str, robot: Robot, action: ActionClient) -> None:
     robot.put_into(PAUSED)
     handle = begin(robot, action, FOR_EVER)
     robot.wait_until(lambda: robot.now_ns() > 0, "steps are taken")

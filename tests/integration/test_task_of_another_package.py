@@ -1,4 +1,4 @@
-"""A task that only moves, in a package of its own (`tests/plugins/reach`), goes all the way that a throw goes."""
+"""A task without a throw, in a package of its own (`tests/plugins/reach`), works from plan to report."""
 
 import json
 import shutil
@@ -61,7 +61,7 @@ def process() -> Iterator[ProcessPoolExecutor]:
 
 @pytest.fixture(scope="module")
 def throwcollect(process: ProcessPoolExecutor) -> Command:
-    """A command that has to succeed, where the package of the task is installed; returns what it prints."""
+    """A function that calls throwcollect with the task installed; the command must succeed; returns its output."""
 
     def run(*arguments: str | Path) -> str:
         done = process.submit(call_here, *arguments).result()
@@ -73,7 +73,7 @@ def throwcollect(process: ProcessPoolExecutor) -> Command:
 
 @pytest.fixture
 def refusal(process: ProcessPoolExecutor) -> Command:
-    """A command that has to be refused; returns why it is."""
+    """A function that calls throwcollect with the task installed; the command must fail; returns its error."""
 
     def run(*arguments: str | Path) -> str:
         done = process.submit(call_here, *arguments).result()
@@ -93,23 +93,23 @@ def reached(throwcollect: Command, tmp_path_factory: pytest.TempPathFactory) -> 
 
 @pytest.fixture(scope="module")
 def few(throwcollect: Command, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A configuration of few trials, and beside it what was collected of it, as long as the task had done its work."""
+    """A configuration of few trials, beside the dataset that was collected of it while the task still worked."""
     directory = tmp_path_factory.mktemp("few")
     (directory / "reach.yaml").write_text(FEW)
     throwcollect("up", directory / "reach.yaml", "--runtime", "inprocess", "--output", directory / "data")
     return directory
 
 
-def test_until_counts_what_the_task_calls_a_success(throwcollect: Command, reached: Path) -> None:
+def test_until_counts_the_success_outcome_of_the_task(throwcollect: Command, reached: Path) -> None:
     info: dict[str, Any] = json.loads(throwcollect("dataset", "info", reached, "--json"))
-    assert info["trials"] == 128  # of 200: two rounds hold more than the 30 that were wanted
+    assert info["trials"] == 128  # of 200 possible ones: two rounds already had more than the 30 wanted successes
     assert info["outcomes"]["reached"] >= info["wanted"] == 30
     assert set(info["outcomes"]) == {"reached", "missed"}
     assert (info["success"], info["noun"], info["landing"]) == ("reached", "trial", None)
     assert "landing" not in throwcollect("dataset", "info", reached)
 
 
-def test_what_it_measures_stands_in_the_table(process: ProcessPoolExecutor, reached: Path) -> None:
+def test_the_table_has_the_measures_of_the_task(process: ProcessPoolExecutor, reached: Path) -> None:
     found = process.submit(run_program, READ, directory=reached).result()
     own = found["columns"].index("torso_1_joint_end_error_rad")
     assert own < found["columns"].index("position_peak_share")
@@ -120,7 +120,7 @@ def test_what_it_measures_stands_in_the_table(process: ProcessPoolExecutor, reac
     assert found["reason"] == f"torso_1_joint ended {found['end_error_rad']:.3g} rad away from its end"
 
 
-def test_it_is_verified_judged_again_and_rebuilt(throwcollect: Command, reached: Path) -> None:
+def test_a_dataset_of_the_task_can_be_verified_rebuilt_and_replayed(throwcollect: Command, reached: Path) -> None:
     assert "nothing wrong" in throwcollect("dataset", "verify", reached)
     table = (reached / "throws.parquet").read_bytes()
     (reached / "throws.parquet").unlink()
@@ -129,13 +129,17 @@ def test_it_is_verified_judged_again_and_rebuilt(throwcollect: Command, reached:
     throwcollect("dataset", "replay", reached, "--trial", "3")
 
 
-def test_datasets_are_made_of_it(throwcollect: Command, reached: Path, tmp_path: Path) -> None:
+def test_a_dataset_of_the_task_can_be_filtered_by_its_measures(
+    throwcollect: Command, reached: Path, tmp_path: Path
+) -> None:
     throwcollect("dataset", "filter", reached, tmp_path / "some", "--where", "torso_1_joint_end_error_rad > 0.01")
     info = json.loads(throwcollect("dataset", "info", tmp_path / "some", "--json"))
     assert list(info["outcomes"]) == ["missed"]
 
 
-def test_it_is_exported_and_reported(throwcollect: Command, reached: Path, tmp_path: Path) -> None:
+def test_a_dataset_of_the_task_can_be_exported_and_reported(
+    throwcollect: Command, reached: Path, tmp_path: Path
+) -> None:
     throwcollect("dataset", "export", reached, tmp_path / "parquet", "--to", "parquet")
     assert "simulated trials of the task reach" in (tmp_path / "parquet" / "README.md").read_text()
     throwcollect("dataset", "report", reached, "--output", tmp_path / "report.html")
@@ -145,7 +149,9 @@ def test_it_is_exported_and_reported(throwcollect: Command, reached: Path, tmp_p
     assert "Where the balls land" not in page
 
 
-def test_what_only_throws_have_is_refused_in_words(refusal: Command, reached: Path, tmp_path: Path) -> None:
+def test_formats_and_keys_for_throws_alone_are_refused_with_the_reason(
+    refusal: Command, reached: Path, tmp_path: Path
+) -> None:
     said = refusal("dataset", "export", reached, tmp_path / "mat", "--to", "mat")
     assert "mat has the structure of a throwing database, and the task reach throws no ball" in said
     path = tmp_path / "wrong.yaml"
@@ -159,7 +165,7 @@ def test_what_only_throws_have_is_refused_in_words(refusal: Command, reached: Pa
     assert f"{path}:6: sweep.target: should be left out, as the task reach throws no ball" in said
 
 
-def test_configurations_that_name_no_task_throw_all_the_same(throwcollect: Command, tmp_path: Path) -> None:
+def test_a_configuration_without_a_task_name_is_for_throws(throwcollect: Command, tmp_path: Path) -> None:
     path = tmp_path / "throws.yaml"
     path.write_text("task: {duration_s: 1.1}\nuntil: {landed: 3}\n")
     printed = throwcollect("config", path)
@@ -167,7 +173,7 @@ def test_configurations_that_name_no_task_throw_all_the_same(throwcollect: Comma
     assert "until:\n  landed: 3\n" in printed
 
 
-def test_a_task_that_there_is_not_is_refused_in_words(refusal: Command, tmp_path: Path) -> None:
+def test_an_unknown_task_is_refused_with_the_reason(refusal: Command, tmp_path: Path) -> None:
     path = tmp_path / "wrong.yaml"
     path.write_text("task: {name: reech, duration_s: 1.1}\nuntil: {lands: 3}\n")
     said = refusal("config", path)
@@ -204,7 +210,7 @@ def test_a_task_that_there_is_not_is_refused_in_words(refusal: Command, tmp_path
         ),
     ],
 )
-def test_where_it_fails_one_sentence_names_it(
+def test_an_error_in_the_task_gives_one_sentence_that_names_it(
     method: str,
     does: str,
     commands: dict[str, int],

@@ -37,7 +37,7 @@ def time_of(message: Any) -> int:
 
 
 @pytest.mark.parametrize("topic", KINDS)
-def test_a_listener_hears_every_sample_of_a_stretch_of_time(topic: str, robot: Robot) -> None:
+def test_a_listener_gets_every_sample_in_order(topic: str, robot: Robot) -> None:
     robot.put_into(PAUSED)
     with robot.listening(KINDS[topic], topic) as heard:
         robot.step(50)
@@ -45,13 +45,13 @@ def test_a_listener_hears_every_sample_of_a_stretch_of_time(topic: str, robot: R
     times = [time_of(message) for message in heard]
     assert times == sorted(set(times))
     if topic == "clock":
-        # Besides, it tells where a slice of the steps has ended.
+        # The clock also shows where slices of the steps end, between samples.
         times = [time for time in times if time % SAMPLE_NS == 0]
     assert times == list(range(times[0], 50 * STEP_NS + 1, SAMPLE_NS))
     assert times[0] in (0, SAMPLE_NS)
 
 
-def test_in_real_time_samples_leave_at_their_time(robot: Robot) -> None:
+def test_samples_in_real_time_are_sent_at_their_time(robot: Robot) -> None:
     left: list[int] = []
 
     def note(_message: Any, info: Any) -> None:
@@ -64,11 +64,11 @@ def test_in_real_time_samples_leave_at_their_time(robot: Robot) -> None:
     assert robot.outcome(robot.send(swing(1.0)))[1] == 0
     robot.node.destroy_subscription(subscription)
     gaps = [later - before for before, later in pairwise(left)]
-    # Most of them were less than 0.1 ms where the samples of a slice of 50 ms left together.
+    # If all samples of a slice of 50 ms were sent together, most gaps would be below 0.1 ms.
     assert statistics.median(gaps) == pytest.approx(SAMPLE_NS, rel=0.5)
 
 
-def test_nobody_is_told_anything_twice_while_time_stands_still(robot: Robot) -> None:
+def test_no_clock_message_is_repeated_while_time_stands_still(robot: Robot) -> None:
     robot.put_into(PAUSED)
     with robot.listening(KINDS["clock"], "clock") as heard:
         robot.step(20)
@@ -91,7 +91,7 @@ def test_joint_states_hold_all_joints_and_follow_a_motion(robot: Robot) -> None:
     assert max(message.velocity[column] for message in heard) > 1.0
 
 
-def test_the_ball_is_heard_to_fly_and_to_land(robot: Robot) -> None:
+def test_odometry_of_the_ball_covers_its_flight_and_landing(robot: Robot) -> None:
     assert robot.set({"trial.number": 0, "trial.controllers": [ARM]}).successful
     robot.reset()
     start_ns = CONFIG.trial_start_ns(0)
@@ -110,7 +110,7 @@ def test_the_ball_is_heard_to_fly_and_to_land(robot: Robot) -> None:
     assert time_of(heard[-1]) > start_ns + 10**9
 
 
-def test_the_state_of_a_controller_comes_in_every_control_period_while_somebody_listens(robot: Robot) -> None:
+def test_a_listener_gets_the_controller_state_of_every_control_period(robot: Robot) -> None:
     kind = "control_msgs/msg/JointTrajectoryControllerState"
     with robot.listening(kind, f"{ARM}/controller_state") as heard:
         robot.outcome(robot.send(goal(ARM, 0.5, arm_right_4_joint=-1.0)))

@@ -59,7 +59,7 @@ def with_last_point(**fields: Any) -> Any:
     return wish
 
 
-def test_a_goal_is_reached_and_says_so(robot: Robot) -> None:
+def test_a_goal_succeeds_with_the_joint_at_its_position(robot: Robot) -> None:
     handle = robot.send(goal(ARM, 1.0, arm_right_4_joint=-0.9))
     assert handle.accepted
     assert robot.outcome(handle) == REACHED
@@ -108,7 +108,7 @@ def test_a_feedback_callback_is_called(robot: Robot) -> None:
     assert bytes(heard[0].goal_id.uuid) == bytes(handle.goal_id.uuid)
 
 
-def test_there_is_no_feedback_while_time_stands_still(robot: Robot) -> None:
+def test_feedback_is_sent_only_when_time_goes_on(robot: Robot) -> None:
     robot.put_into(PAUSED)
     topic = f"{ARM}/follow_joint_trajectory/_action/feedback"
     with robot.listening(FollowJointTrajectory.Impl.FeedbackMessage, topic) as heard:
@@ -138,16 +138,14 @@ def test_there_is_no_feedback_while_time_stands_still(robot: Robot) -> None:
         (goal(ARM, arm_right_5_joint=0.4), "arm_right_5_joint is locked at 0 rad (robot.locked)"),
     ],
 )
-def test_a_goal_that_cannot_be_carried_out_is_rejected_and_the_log_says_why(
-    wish: Any, reason: str, robot: Robot
-) -> None:
+def test_an_impossible_goal_is_rejected_and_the_log_says_why(wish: Any, reason: str, robot: Robot) -> None:
     with robot.listening("rcl_interfaces/msg/Log", "/rosout") as log:
         assert not robot.send(wish).accepted
         robot.wait_until(lambda: any(reason in message.msg for message in log), f"{reason!r} in {log}")
     assert robot.now_ns() == 0
 
 
-def test_a_locked_limb_is_refused_by_name_and_its_neighbours_still_move(robot: Robot) -> None:
+def test_a_goal_that_moves_a_locked_limb_is_rejected_and_other_limbs_move(robot: Robot) -> None:
     assert not robot.send(goal(HEAD, head_1_joint=0.3), HEAD).accepted
     assert robot.outcome(robot.send(goal(HEAD, 0.2), HEAD)) == REACHED
     assert robot.outcome(robot.send(goal(TORSO, 1.0, torso_1_joint=0.2), TORSO)) == REACHED
@@ -160,7 +158,7 @@ def test_an_arm_too_weak_to_arrive_breaks_the_tolerance_of_the_goal(robot: Robot
     status, code, text = robot.outcome(robot.send(swing()))
     assert (status, code) == (ABORTED, FollowJointTrajectory.Result.GOAL_TOLERANCE_VIOLATED)
     assert code == -5
-    # 0.6 s are those of PAL's configuration; it is over in the first period after them.
+    # PAL's configuration allows 0.6 s; the goal ends in the first period after that.
     assert text.startswith("Aborted due to goal_time_tolerance exceeding by 0.602000 seconds: ")
     assert f"joint {ELBOW} has position error" in text
 
@@ -211,7 +209,7 @@ def test_goals_that_are_over_or_unknown_are_not_cancelled(robot: Robot) -> None:
     assert answer.return_code == CancelGoal.ERROR_UNKNOWN_GOAL_ID
 
 
-def test_a_new_goal_aborts_the_one_before(robot: Robot) -> None:
+def test_a_new_goal_aborts_the_running_goal(robot: Robot) -> None:
     robot.put_into(PAUSED)
     first = robot.send(swing())
     robot.step(100)
@@ -222,21 +220,21 @@ def test_a_new_goal_aborts_the_one_before(robot: Robot) -> None:
     assert robot.joint(ELBOW) == pytest.approx(-1.5, abs=0.005)
 
 
-def test_of_goals_sent_at_once_the_last_one_counts_and_each_gets_its_own_result(robot: Robot) -> None:
+def test_the_last_of_several_goals_wins_and_each_gets_its_own_result(robot: Robot) -> None:
     futures = [robot.action().send_goal_async(goal(ARM, 0.5, arm_right_4_joint=end)) for end in (-0.6, -1.0, -1.4)]
     handles = [robot.result(future) for future in futures]
     assert [robot.outcome(handle) for handle in handles] == [PREEMPTED, PREEMPTED, REACHED]
     assert robot.joint(ELBOW) == pytest.approx(-1.4, abs=0.005)
 
 
-def test_a_goal_of_another_limb_aborts_nothing(robot: Robot) -> None:
+def test_a_goal_of_another_limb_aborts_no_goal(robot: Robot) -> None:
     robot.put_into(PAUSED)
     handles = [robot.send(swing()), robot.send(goal(TORSO, 0.5), TORSO)]
     robot.put_into(PLAYING)
     assert [robot.outcome(handle) for handle in handles] == [REACHED, REACHED]
 
 
-def test_a_reset_aborts_a_goal_even_right_after_it(robot: Robot) -> None:
+def test_a_reset_right_after_a_goal_aborts_it(robot: Robot) -> None:
     future = robot.action().send_goal_async(swing())
     reset = robot.ask("simulation_interfaces/srv/ResetSimulation", "reset_simulation")
     handle = robot.result(future)

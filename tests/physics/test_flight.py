@@ -24,7 +24,7 @@ def flight(samples, contacts):
 
 
 @pytest.mark.parametrize("coefficient", [0.0, 0.47, 2.0])
-def test_flight_with_quadratic_drag(coefficient, thrower):
+def test_the_flight_with_drag_matches_an_exact_integration(coefficient, thrower):
     ball = {"drag_coefficient": coefficient, "mass_kg": 0.02, "radius_m": 0.03}
     one = thrower(**SECTIONS, ball=ball)
     samples = one.throw()
@@ -43,7 +43,7 @@ def test_flight_with_quadratic_drag(coefficient, thrower):
     assert samples.ball_linear_velocity[last] == pytest.approx(velocity, abs=5e-3)
 
 
-def test_without_drag_nothing_slows_the_ball(thrower):
+def test_without_drag_horizontal_velocity_and_spin_stay_constant(thrower):
     one = thrower(**SECTIONS)
     samples = one.throw()
     first, last = flight(samples, one.world.contacts())
@@ -51,7 +51,7 @@ def test_without_drag_nothing_slows_the_ball(thrower):
     assert np.ptp(samples.ball_angular_velocity[first : last + 1], axis=0) == pytest.approx([0, 0, 0], abs=1e-9)
 
 
-def test_thin_air_carries_further(thrower):
+def test_a_ball_with_drag_flies_farther_in_thinner_air(thrower):
     reach = [
         thrower(ball={"drag_coefficient": 0.5}, scene={"air_density_kgpm3": density}).throw().ball_position[-1, 0]
         for density in (0.0, 1.2, 5.0)

@@ -43,14 +43,14 @@ def up_in_spoon(config):
         ("arm_right_5_joint", {"ball": {"radius_m": 0.04, "friction": 0.0}, "tool": {"cup_depth_m": 0.045}}),
     ],
 )
-def test_ball_stays_while_the_way_out_climbs(turned, sections):
+def test_a_ball_stays_in_a_tilted_spoon_while_the_way_out_climbs(turned, sections):
     world = None
     seen = set()
     for angle in np.arange(0.0, 1.5, 0.02):
         start = {**START, turned: START[turned] + angle}
         config = Config.model_validate({**sections, "task": {"start": start}, "sim": {"settle_s": 0.0}})
         slope = tool_of(config.tool).way_out(config.ball.radius_m, up_in_spoon(config))
-        # Once just before the ball is lost, and once just after.
+        # One angle just before the ball is lost is tested, and one just after.
         side = "stays" if slope > 0 else "leaves"
         if side in seen or not (0.01 < slope < 0.04 or -0.08 < slope < -0.03):
             continue
@@ -64,7 +64,7 @@ def test_ball_stays_while_the_way_out_climbs(turned, sections):
     world.close()
 
 
-def test_spoon_is_where_the_physics_has_it():
+def test_tool_motion_places_the_ball_where_the_physics_has_it():
     world = World(Config(sim={"settle_s": 0.0}))
     samples = world.samples()
     place = ToolMotion(Config()).place(samples.position[0])
@@ -76,7 +76,7 @@ def test_spoon_is_where_the_physics_has_it():
     ("start", "outcome"),
     [({}, ThrowOutcome.LANDED), ({"arm_right_5_joint": 1.5}, ThrowOutcome.DROPPED)],
 )
-def test_ball_of_a_spoon_that_does_not_hold_it_is_dropped(start, outcome, thrower):
+def test_a_ball_that_the_turned_spoon_does_not_hold_is_dropped(start, outcome, thrower):
     one = thrower(task={"start": {**START, **start}})
     samples = one.throw()
     header = EpisodeHeader(0, int(samples.stamps_ns[0]), "landed", one.world.contacts(), (), len(samples))

@@ -1,4 +1,4 @@
-"""Whatever the simulation records, in whatever settings, is nothing that `dataset verify` takes for a forgery."""
+"""`dataset verify` takes no episode of a simulation for a forgery, whatever its settings are."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ SETTINGS: dict[str, dict[str, Any]] = {
 
 
 @pytest.mark.parametrize("name", SETTINGS)
-def test_nothing_is_held_against_an_honest_throw(name: str, tmp_path: Path) -> None:
+def test_the_episode_check_finds_no_problem_in_an_honest_throw(name: str, tmp_path: Path) -> None:
     points = [{}, GENTLE] if SETTINGS[name] else [{}, GENTLE, EARLY_STOP, BACK]
     default = {"task.duration_s": 1.1, "task.end.arm_right_4_joint": -0.5, "task.trajectory.gamma": 1.2}
     default |= {"task.start.arm_right_7_joint": -0.1, "task.end.arm_right_7_joint": 0.5}

@@ -37,7 +37,7 @@ def thrown():
 @pytest.mark.parametrize(
     ("number", "expected", "tolerance_m"), [(0, (1.688, -0.272), 0.001), (1, (2.201, -0.309), 0.002)]
 )
-def test_landing(number, expected, tolerance_m, thrown, landing):
+def test_reference_throws_land_at_the_reference_point(number, expected, tolerance_m, thrown, landing):
     point, _ = landing(thrown[number][0])
     assert point == pytest.approx(expected, abs=tolerance_m)
 
@@ -45,7 +45,7 @@ def test_landing(number, expected, tolerance_m, thrown, landing):
 @pytest.mark.parametrize(
     ("number", "expected_s", "velocity"), [(0, 0.638, (2.18, -0.16, 0.34)), (1, 0.598, (2.85, -0.20, 0.06))]
 )
-def test_release(number, expected_s, velocity, thrown):
+def test_reference_throws_are_released_at_the_reference_time_and_velocity(number, expected_s, velocity, thrown):
     samples, release_s = thrown[number]
     assert release_s == pytest.approx(expected_s, abs=0.0015)
     # A step earlier or later changes the vertical velocity by 0.01 m/s.

@@ -70,15 +70,15 @@ def test_mixed_trials_in_any_order_equal_the_same_trials_in_a_new_world(trials, 
 
     rng = random.Random(6)
     one = thrower()
-    # Some several times in a row: then the start state comes from what was kept of the trial before.
+    # Some trials come several times in a row: they then start from the kept state of the trial before.
     order = [number for number in range(TRIALS) for _ in range(rng.choice([1, 1, 3]))]
     rng.shuffle(order)
     for number in [*order, *range(TRIALS)]:
         assert digest(one, trials[number]) == alone[number], f"trial {number} depends on what was before"
 
 
-def test_throws_of_one_ball_leave_no_order_of_contacts(trials, thrower):
-    """A world that stays the same keeps pairs of shapes that once came close, unless they are forgotten."""
+def test_throws_of_the_same_ball_do_not_depend_on_their_order(trials, thrower):
+    """A world with the same bodies would keep pairs of shapes that once came close, if a reset did not forget them."""
     bouncy = {"ball": {"restitution": 0.8}, "scene": {"landing_height_m": 1.0}, "sim": {"max_trial_s": 3}}
     throws = [
         (Config.model_validate({**bouncy, "task": {"start": config.task.start}}), motion) for config, motion in trials
@@ -88,7 +88,7 @@ def test_throws_of_one_ball_leave_no_order_of_contacts(trials, thrower):
     assert [digest(one, throws[number]) for number in reversed(range(TRIALS))] == alone[::-1]
 
 
-def test_other_tools_and_locked_joints_in_between_leave_no_trace(trials, thrower):
+def test_trials_with_another_tool_or_posture_leave_no_trace(trials, thrower):
     one = thrower()
     before = digest(one, trials[0])
     one.throw(Config.model_validate({"tool": {"cup_walls": 8}, "robot": {"posture": {"torso_2_joint": 0.1}}}))
@@ -96,7 +96,7 @@ def test_other_tools_and_locked_joints_in_between_leave_no_trace(trials, thrower
     assert digest(one, trials[0]) == before
 
 
-def test_the_full_robot_starts_anew_as_well(trials, thrower):
+def test_trials_of_a_robot_with_unlocked_joints_do_not_depend_on_earlier_ones(trials, thrower):
     full = {"robot": {"locked": "none"}, "sim": {"max_trial_s": 1.0}}
     one = thrower(**full)
     wild = Config.model_validate({**full, "ball": {"radius_m": 0.03}}), trials[1][1]

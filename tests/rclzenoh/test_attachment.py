@@ -13,6 +13,6 @@ def test_an_attachment_is_laid_out_as_zenoh_serialises_its_parts():
 
 
 @pytest.mark.parametrize("data", [b"", bytes(32), bytes(34), bytes(33)])
-def test_other_layouts_are_refused(data):
+def test_an_attachment_of_another_layout_is_refused(data):
     with pytest.raises(ValueError, match="not that of a ROS 2 Jazzy node"):
         unpack(data)

@@ -23,7 +23,7 @@ def test_sigterm_is_handled_as_long_as_the_default_context_lives(environment):
     assert signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
 
 
-def test_a_session_is_there_from_init_to_shutdown(environment):
+def test_a_context_has_an_open_session_from_init_to_shutdown(environment):
     context = Context()
     with pytest.raises(NotInitializedException, match=r"init\(\) has not been called"):
         _ = context.session
@@ -33,7 +33,7 @@ def test_a_session_is_there_from_init_to_shutdown(environment):
     assert session.is_closed()
 
 
-def test_a_shutdown_that_was_requested_ends_what_spins_before_it_is_carried_out(environment):
+def test_a_context_is_not_ok_as_soon_as_a_shutdown_is_requested(environment):
     context, calls = Context(), []
     context.init()
     context.on_shutdown(lambda: calls.append(1))

@@ -17,7 +17,7 @@ Trigger = get_service("std_srvs/srv/Trigger")
 def test_the_graph_is_complete_when_a_node_begins(rig):
     session, domain = rig.context().session, int(os.environ["ROS_DOMAIN_ID"])
     tokens = [session.liveliness().declare_token(f"@ros2_lv/{domain}/1a/{i}/{i}/NN/%/%/n{i}") for i in range(500)]
-    # The router ends a query that nobody answers after it has taken the tokens.
+    # When the router has ended this unanswered query, it has also taken the tokens.
     list(session.get("nobody/has/this"))
     assert len([name for name, _ in rig.node("observer").get_node_names_and_namespaces()]) == len(tokens) + 1
 

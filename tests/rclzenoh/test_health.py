@@ -4,7 +4,7 @@ from rclzenoh.interfaces import serialize
 from rclzenoh.interfaces.srv import GetParameters
 
 
-def test_the_request_is_what_a_client_node_would_send():
+def test_the_health_request_equals_that_of_a_client_node():
     assert serialize(GetParameters.Request()) == REQUEST
     received = unpack(attachment())
     assert received.sequence == 1

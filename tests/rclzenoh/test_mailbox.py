@@ -1,4 +1,4 @@
-"""What waits in the mailbox of a node goes with the node."""
+"""Waiting items in the mailbox of a node move with the node to another executor."""
 
 from __future__ import annotations
 

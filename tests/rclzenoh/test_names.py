@@ -29,7 +29,7 @@ def test_invalid_node_names_are_refused(name):
         check_node_name(name)
 
 
-def test_namespaces_become_absolute():
+def test_a_relative_namespace_becomes_absolute():
     assert [absolute_namespace(name) for name in ("", "/", "a/b", "/a")] == ["/", "/", "/a/b", "/a"]
     with pytest.raises(NameValidationException, match="invalid namespace"):
         absolute_namespace("a//b")

@@ -1,4 +1,4 @@
-"""What the embedded backend lets nodes do with parameters and rclpy does not."""
+"""Uses of parameters that the embedded backend allows and rclpy does not."""
 
 from rclzenoh.api import Parameter, ParameterDescriptor
 

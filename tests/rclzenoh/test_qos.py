@@ -75,7 +75,7 @@ def test_a_profile_is_read_with_the_defaults_of_the_middleware():
         "::,1" + 99 * "0" + ":,:,:,,",
     ],
 )
-def test_a_malformed_profile_is_none(text):
+def test_decode_returns_none_for_a_malformed_profile(text):
     assert decode(text) is None
 
 

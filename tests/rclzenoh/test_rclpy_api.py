@@ -69,7 +69,7 @@ def has(name: str) -> bool:
 
 
 def missing() -> Iterator[str]:
-    """Names that there are not: of what is missing as a whole the whole alone."""
+    """Names of rclpy that the embedded backend lacks; of a missing class only the class, not its members."""
     gone: set[str] = set()
     for line in API.read_text(encoding="utf-8").splitlines():
         if line.startswith("#"):
@@ -96,12 +96,12 @@ def rows() -> list[str]:
     return [f"| {titles.get(above, f'`{above}`')} | {', '.join(names)} |" for above, names in table.items()]
 
 
-def test_the_list_of_what_is_left_out_is_complete_and_true() -> None:
+def test_the_documented_list_of_missing_parts_of_rclpy_is_complete() -> None:
     section = PAGE.read_text(encoding="utf-8").partition(HEADING)[2].partition("\n## ")[0]
     assert [line for line in section.splitlines() if line.startswith("| ")][1:] == rows(), "\n".join(rows())
 
 
-def test_what_the_door_offers_is_what_nodes_import() -> None:
+def test_every_public_name_of_the_embedded_backend_is_used() -> None:
     root = Path(__file__).parents[2]
     used = "\n".join(
         path.read_text(encoding="utf-8")

@@ -27,7 +27,7 @@ def pair(rig):
     return server, client, client.create_client(SetBool, "/server/set")
 
 
-def test_a_service_that_is_seen_answers(rig, pair):
+def test_a_discovered_service_answers_the_first_request(rig, pair):
     server, node, _ = pair
     for number in range(50):
         client = node.create_client(SetBool, f"/set{number}")
@@ -39,7 +39,7 @@ def test_a_service_that_is_seen_answers(rig, pair):
         assert rig.spin(future.done, timeout=2), f"the first request to {client.service_name} is lost"
 
 
-def test_the_wire_is_that_of_rmw_zenoh(rig, pair):
+def test_a_service_answers_on_the_wire_as_rmw_zenoh_does(rig, pair):
     server, node, client = pair
     server.create_service(SetBool, "~/set", answer)
     assert client.wait_for_service(5)
@@ -100,7 +100,7 @@ def test_an_error_in_a_callback_ends_spinning_and_the_request(rig, pair):
     )
     with pytest.raises(LookupError, match="callback failed") as caught:
         rig.rest(5)
-    # Even while the traceback keeps everything alive.
+    # The query ends even while the traceback keeps its objects alive.
     assert rig.spin(lambda: replies == [None])
     assert caught.value.args == ("callback failed",)
 
@@ -111,7 +111,7 @@ def test_a_request_that_arrives_while_the_service_is_destroyed_gets_no_response(
     assert client.wait_for_service(5)
 
     def destroy_meanwhile(payload, kind):
-        # As another thread may, while the one that spins has just taken the request.
+        # Another thread may destroy the service just after the spinning thread has taken a request.
         server.destroy_service(service)
         return deserialize(payload, kind)
 
@@ -127,7 +127,7 @@ def test_a_request_that_arrives_while_the_service_is_destroyed_gets_no_response(
     assert replies == [None]
 
 
-def test_a_request_that_is_not_handled_is_told_why(rig, pair):
+def test_a_request_that_is_not_handled_gets_an_error_with_the_reason(rig, pair):
     server, node, client = pair
     service = server.create_service(SetBool, "~/set", answer, qos_profile=QoSProfile(depth=1))
     assert client.wait_for_service(5)

@@ -10,7 +10,7 @@ from rclzenoh.session import open_session
 from rclzenoh.session_config import environment_config, router_config
 
 
-def test_without_a_router_the_error_says_where_it_was_looked_for(environment, monkeypatch):
+def test_a_missing_router_is_an_error_that_names_the_endpoint(environment, monkeypatch):
     monkeypatch.setattr(session, "_PATIENCE_S", 0.2)
     monkeypatch.setenv("ZENOH_CONFIG_OVERRIDE", 'connect/endpoints=["tcp/127.0.0.1:1"]')
     with pytest.raises(NoRouterError, match=r"connecting to .*tcp/127.0.0.1:1") as caught:
@@ -64,7 +64,7 @@ def test_a_configuration_file_replaces_the_defaults(environment, endpoint, monke
         opened.close()
 
 
-def test_a_configuration_file_that_is_none_is_refused(environment, monkeypatch, tmp_path):
+def test_a_missing_configuration_file_is_refused(environment, monkeypatch, tmp_path):
     monkeypatch.setenv("ZENOH_SESSION_CONFIG_URI", str(tmp_path / "absent.json5"))
     with pytest.raises(ConfigurationError, match=r"ZENOH_SESSION_CONFIG_URI: .*absent.json5"):
         open_session(environment_config())

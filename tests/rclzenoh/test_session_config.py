@@ -1,4 +1,4 @@
-"""Where the environment says that the router of a run is."""
+"""The router and the protection that the environment configures for a session."""
 
 import pytest
 
@@ -32,11 +32,11 @@ def key(tmp_path):
     return made
 
 
-def test_an_environment_that_says_nothing_of_a_router_leads_to_none():
+def test_an_empty_environment_names_no_router():
     assert connect_endpoint() is None
 
 
-def test_the_router_is_the_one_that_the_environment_names(monkeypatch, key, tmp_path):
+def test_the_router_comes_from_the_override_or_the_configuration_file(monkeypatch, key, tmp_path):
     monkeypatch.setenv(OVERRIDE_VARIABLE, client_override(ENDPOINT, key))
     assert connect_endpoint() == ENDPOINT
     monkeypatch.delenv(OVERRIDE_VARIABLE)
@@ -48,31 +48,31 @@ def test_the_router_is_the_one_that_the_environment_names(monkeypatch, key, tmp_
 @pytest.mark.parametrize(
     ("mode", "endpoint"), [('"client"', "tcp/192.0.2.7:1"), ('"peer"', "tcp/192.0.2.7:2"), ('"router"', None)]
 )
-def test_the_router_is_the_one_of_the_mode_that_the_environment_names(mode, endpoint, monkeypatch):
+def test_the_router_is_that_of_the_mode_in_the_environment(mode, endpoint, monkeypatch):
     endpoints = '{client: ["tcp/192.0.2.7:1"], peer: ["tcp/192.0.2.7:2"]}'
     monkeypatch.setenv(OVERRIDE_VARIABLE, f"mode={mode};connect/endpoints={endpoints}")
     assert connect_endpoint() == endpoint
 
 
-def test_the_router_of_an_environment_that_names_no_mode_is_that_of_a_peer(monkeypatch, tmp_path):
+def test_without_a_mode_the_router_is_that_of_a_peer(monkeypatch, tmp_path):
     endpoints = '{client: ["tcp/192.0.2.7:1"], peer: ["tcp/192.0.2.7:2"]}'
     (tmp_path / "session.json5").write_text(f"{{connect: {{endpoints: {endpoints}}}}}")
     monkeypatch.setenv(CONFIG_FILE_VARIABLE, str(tmp_path / "session.json5"))
     assert connect_endpoint() == "tcp/192.0.2.7:2"
 
 
-def test_an_environment_with_no_router_at_all_leads_to_none(monkeypatch):
+def test_an_empty_list_of_endpoints_names_no_router(monkeypatch):
     monkeypatch.setenv(OVERRIDE_VARIABLE, "connect/endpoints=[]")
     assert connect_endpoint() is None
 
 
-def test_an_environment_that_is_malformed_is_refused(monkeypatch):
+def test_a_malformed_environment_is_refused(monkeypatch):
     monkeypatch.setenv(OVERRIDE_VARIABLE, "connect/endpoints")
     with pytest.raises(ConfigurationError, match="has no '='"):
         connect_endpoint()
 
 
-def test_a_key_that_cannot_be_read_is_named(key):
+def test_an_unreadable_key_is_an_error_that_names_it(key):
     key.certificate.unlink()
     with pytest.raises(UnreadableKeyError, match="No such file") as caught:
         client_config(ENDPOINT, key)
@@ -90,14 +90,14 @@ def test_a_client_listens_nowhere_whatever_the_configuration_file_says(monkeypat
     assert (config.get_json("mode"), config.get_json("listen/endpoints")) == ('"client"', "[]")
 
 
-def test_an_endpoint_that_is_none_is_refused():
+def test_a_malformed_endpoint_is_refused():
     with pytest.raises(ConfigurationError, match="endpoint: connect/endpoints cannot be"):
         client_config("nowhere")
 
 
 @pytest.mark.parametrize("defaults", ["{}", '{mode: "peer", listen: {endpoints: ["tcp/localhost:0"]}}'])
 def test_a_client_of_a_router_with_a_key_is_protected(monkeypatch, key, tmp_path, defaults):
-    """Also where the override is applied to a configuration like the one that rmw_zenoh_cpp has by default."""
+    """This holds also for a configuration file with the defaults of rmw_zenoh_cpp, to which the override is applied."""
     (tmp_path / "session.json5").write_text(defaults)
     monkeypatch.setenv(CONFIG_FILE_VARIABLE, str(tmp_path / "session.json5"))
     monkeypatch.setenv(OVERRIDE_VARIABLE, client_override(ENDPOINT, key))
@@ -118,7 +118,7 @@ def test_a_client_of_a_router_with_a_key_is_protected(monkeypatch, key, tmp_path
         ('mode="peer";connect/endpoints=["tls/192.0.2.7:1"];listen/endpoints=["tls/127.0.0.1:0"]', True),
     ],
 )
-def test_a_session_is_protected_if_every_way_in_is(override, protected, monkeypatch):
+def test_a_session_is_protected_if_all_its_endpoints_use_tls(override, protected, monkeypatch):
     monkeypatch.setenv(OVERRIDE_VARIABLE, override)
     assert is_protected() == protected
 
@@ -126,9 +126,7 @@ def test_a_session_is_protected_if_every_way_in_is(override, protected, monkeypa
 @pytest.mark.parametrize(
     ("listen", "protected"), [("", False), (";listen/endpoints=[]", True), (";listen/endpoints={client: []}", True)]
 )
-def test_a_session_that_listens_by_default_is_protected_only_if_it_is_told_not_to(
-    listen, protected, monkeypatch, tmp_path
-):
+def test_default_listeners_make_a_session_unprotected_unless_replaced(listen, protected, monkeypatch, tmp_path):
     monkeypatch.setenv(OVERRIDE_VARIABLE, f'mode="client";connect/endpoints=["tls/192.0.2.7:1"]{listen}')
     assert is_protected(LISTENS_OF_RMW) == protected
     (tmp_path / "session.json5").write_text("{}")
@@ -136,7 +134,7 @@ def test_a_session_that_listens_by_default_is_protected_only_if_it_is_told_not_t
     assert is_protected(LISTENS_OF_RMW)
 
 
-def test_an_environment_that_says_nothing_is_not_protected(monkeypatch, tmp_path):
+def test_a_session_of_an_empty_environment_is_not_protected(monkeypatch, tmp_path):
     assert not is_protected()
     (tmp_path / "session.json5").write_text("{}")
     monkeypatch.setenv(CONFIG_FILE_VARIABLE, str(tmp_path / "session.json5"))

@@ -21,7 +21,7 @@ JointState = get_message("sensor_msgs/msg/JointState")
 LATCHED = QoSProfile(depth=2, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
-def test_the_wire_is_that_of_rmw_zenoh(rig):
+def test_a_publisher_sends_samples_as_rmw_zenoh_does(rig):
     node = rig.node("talker", namespace="/talos")
     samples = []
     key = data_key(node.context.get_domain_id(), "/talos/chatter", String.TYPE, type_hash(String.TYPE))
@@ -42,7 +42,7 @@ def test_the_wire_is_that_of_rmw_zenoh(rig):
 
 
 @pytest.mark.parametrize("durability", list(DurabilityPolicy)[1:3])
-def test_an_advanced_subscriber_as_genuine_nodes_have_it_loses_nothing(rig, durability):
+def test_an_advanced_subscriber_of_zenoh_loses_no_message(rig, durability):
     qos = QoSProfile(depth=2000, history=HistoryPolicy.KEEP_ALL, durability=durability)
     node = rig.node("talker")
     key = data_key(node.context.get_domain_id(), "/t", String.TYPE, type_hash(String.TYPE))
@@ -86,7 +86,7 @@ def test_inputs_are_handled_in_order_of_arrival_across_topics(rig):
     assert heard == order
 
 
-def test_whoever_is_seen_to_listen_hears_the_next_message(rig):
+def test_a_discovered_subscriber_gets_the_next_message(rig):
     talker, listener = rig.node("talker"), rig.node("listener")
     seen = talker.context.graph
     for number in range(50):
@@ -115,7 +115,7 @@ def test_garbage_on_a_topic_is_logged_once_and_does_not_stop_the_node(rig, capsy
         session.put(key, body, attachment=attachment)
         session.put(key, good, attachment=body)
     session.put(key, good)
-    # From the same session, so that it cannot overtake the garbage.
+    # The last message comes from the same session, so it cannot overtake the garbage.
     last = serialize(JointState(position=[2.0]))
     assert rig.spin(
         lambda: session.put(key, last, attachment=attachment) or (heard and heard[-1].position.tolist() == [2.0])
@@ -123,9 +123,9 @@ def test_garbage_on_a_topic_is_logged_once_and_does_not_stop_the_node(rig, capsy
     assert capsys.readouterr().err.count("/t: ignored") == 1
 
 
-def test_all_messages_have_arrived_whole_when_a_session_closes(rig):
+def test_all_messages_arrive_whole_before_a_session_closes(rig):
     with socket.create_server(("127.0.0.1", 0)) as probe:
-        # Sockets that hold so little are full until the end, as the subscriber below is slow.
+        # With such small buffers and the slow subscriber below, the sockets are full until the end.
         endpoint = f"tcp/127.0.0.1:{probe.getsockname()[1]}#so_sndbuf=16384;so_rcvbuf=16384"
     heard = []
 

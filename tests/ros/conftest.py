@@ -11,7 +11,7 @@ from throwcollect.ros.middleware import EMBEDDED_RMW, RMW_VARIABLE
 
 HERE = Path(__file__).parent
 
-# The wheels of rclpy come without the command `ros2`, which meets an embedded simulation over Zenoh alone.
+# The wheels of rclpy lack the command `ros2`, and it meets embedded simulations only over Zenoh.
 _MEETS = shutil.which("ros2") is not None and os.environ.get(RMW_VARIABLE) == EMBEDDED_RMW
 collect_ignore = [] if _MEETS else ["test_ros2cli.py"]
 

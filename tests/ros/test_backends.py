@@ -11,7 +11,7 @@ from throwcollect.ros.middleware import EMBEDDED_RMW, RMW_VARIABLE
 
 ROOT = Path(__file__).parents[2]
 
-# Genuine and embedded nodes meet over Zenoh alone; with another RMW, there are no such cases.
+# Genuine and embedded nodes meet only over Zenoh, so another RMW has no mixed cases.
 MIXED = [("rclpy", "embedded"), ("embedded", "rclpy")] if os.environ.get(RMW_VARIABLE) == EMBEDDED_RMW else []
 
 # On Fast DDS those that tell most: the acceptance cases of the controllers, and trials. Others lean on an order of
@@ -20,7 +20,7 @@ TOLD = [f"tests/integration/test_{name}.py" for name in ("controllers", "traject
 
 
 @pytest.mark.parametrize(("client", "simulation"), [*MIXED, ("rclpy", "rclpy")])
-def test_a_simulation_behaves_alike_whatever_backend_it_and_its_client_are_on(client, simulation, tmp_path):
+def test_the_integration_tests_pass_on_each_pair_of_backends(client, simulation, tmp_path):
     """The integration tests, with the client and the simulation each on a given backend.
 
     What fails is run again, twice at most: nodes on Fast DDS at times do not find each other, in which case a run would

@@ -1,4 +1,4 @@
-"""Collections on genuine rclpy: what comes of them, and who sees them."""
+"""Collections on genuine rclpy: their datasets, and which nodes see them."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ while time.monotonic() < deadline:
     seen |= set(node.get_node_names()) | {name for name, _ in node.get_topic_names_and_types() if "sim_" in name}
 print(json.dumps(sorted(seen - {"stranger"})))
 """
-"""A genuine node that knows nothing of us, and looks around."""
+"""A genuine node without throwcollect, which lists nodes and topics."""
 
 JOIN = """
 import rclpy
@@ -71,7 +71,7 @@ for _ in range(200):
     rclpy.spin_once(node, timeout_sec=0.1)
 print(len(heard[0].name))
 """
-"""A genuine node that knows nothing of us, and takes part."""
+"""A genuine node without throwcollect, which joins the run."""
 
 
 @pytest.fixture
@@ -122,7 +122,7 @@ def beside(going_on: Running, tmp_path_factory: pytest.TempPathFactory) -> dict[
     return fingerprints(directory / "data")
 
 
-def test_the_trial_of_a_simulation_that_was_killed_is_given_to_another_though_the_router_is_killed_too(
+def test_a_killed_simulation_gives_up_its_trial_even_if_the_router_dies_too(
     reference: dict[str, str], records: Records, tmp_path: Path
 ) -> None:
     """A discovery server that comes back too soon is never told of the nodes that are there."""
@@ -152,10 +152,10 @@ def test_the_trial_of_a_simulation_that_was_killed_is_given_to_another_though_th
         assert collected[name] == reference[name]
 
 
-def test_a_coordinator_that_sees_no_simulation_is_told_of_after_a_while(
+def test_a_coordinator_that_sees_no_simulation_ends_the_run_with_an_error(
     records: Records, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """As behind a firewall: every simulation lives in another domain than the rest of its run.
+    """Every simulation lives in another domain than the rest of its run, as if it were behind a firewall.
 
     On the embedded backend: to a discovery server of Fast DDS, domains make no difference.
     """
@@ -190,9 +190,7 @@ def test_the_dataset_does_not_depend_on_the_backend(reference: dict[str, str], b
     assert beside == reference
 
 
-def test_who_does_not_know_the_port_sees_nothing_and_whoever_evaluates_one_line_takes_part(
-    going_on: Running, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_only_a_shell_that_evaluates_ros_env_sees_the_run(going_on: Running, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(STATE_VARIABLE, str(going_on.directory.parent / "state"))
     plain = {name: value for name, value in os.environ.items() if not name.startswith(("THROWCOLLECT", "FASTRTPS"))}
     for way in ({}, {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}):
@@ -208,7 +206,7 @@ def test_who_does_not_know_the_port_sees_nothing_and_whoever_evaluates_one_line_
         check=False,
     )
     assert said.returncode == 0, said.stderr
-    # RMWs print there, too, and Zenoh does when it is closed.
+    # The RMW prints to standard output as well, so only one line is looked for.
     assert "32" in said.stdout.splitlines()
     named = call("ros", "node", "list", "--run", going_on.directory).stdout.splitlines()
     assert {"/coordinator", "/sim_0/sim_0", "/sim_0/arm_right_controller"} <= set(named)
@@ -228,5 +226,5 @@ def python(program: str, environment: dict[str, str]) -> str:
         [sys.executable, "-c", program], env=environment, capture_output=True, text=True, timeout=60, check=False
     )
     assert found.returncode == 0, found.stderr
-    # Fast DDS prints what it cannot do, too.
+    # Fast DDS prints warnings to standard output, so only the last line counts.
     return found.stdout.splitlines()[-1]

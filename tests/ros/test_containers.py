@@ -44,7 +44,7 @@ def test_nodes_that_are_killed_come_back_and_find_each_other(engine: docker.Dock
         assert collected[name] == undisturbed[name]
 
 
-def test_health_is_that_of_the_loop(engine: docker.DockerClient, tmp_path: Path) -> None:
+def test_a_container_with_a_stuck_loop_is_unhealthy(engine: docker.DockerClient, tmp_path: Path) -> None:
     directory = tmp_path / "data"
     slow = ("--runtime", "docker", "--set", "run.ros=rclpy", "--set", "sim.real_time_factor=1", "--trials", "300")
     running = start(write_config(tmp_path, trials=8, sim=FAST), directory, 1, *slow)
@@ -53,7 +53,7 @@ def test_health_is_that_of_the_loop(engine: docker.DockerClient, tmp_path: Path)
     assert nodes.keys() == {"router", "sim_0", "coordinator"}
     for node in nodes.values():
         assert look_at(node) == 0, node.name
-    # Its process is stopped, and not the container, so that the launcher takes it for well.
+    # Only the process is suspended, not the container, so that the launcher does not replace the node.
     (stuck,) = psutil.Process(nodes["sim_0"].attrs["State"]["Pid"]).children()
     stuck.suspend()
     try:
@@ -65,7 +65,7 @@ def test_health_is_that_of_the_loop(engine: docker.DockerClient, tmp_path: Path)
     running.finish()
 
 
-def test_the_image_says_which_rclpy_it_has(client: docker.DockerClient) -> None:
+def test_a_label_of_the_image_names_the_rmw_of_its_rclpy(client: docker.DockerClient) -> None:
     assert client.images.get(default_tag()).labels[RMW_LABEL] == "rmw_fastrtps_cpp"
     assert os.environ.get("THROWCOLLECT_ROS") is None
 

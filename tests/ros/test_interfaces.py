@@ -53,14 +53,14 @@ def test_type_hashes_of_both_backends_are_equal(name):
 
 
 @pytest.mark.usefixtures("_wheels")
-def test_the_wheel_holds_what_is_defined_and_nothing_else():
+def test_the_wheel_holds_exactly_the_defined_interfaces():
     files = [file.as_posix() for file in distribution("throwcollect-ros-interfaces").files or ()]
     found = [file for file in files if file.endswith((".msg", ".srv", ".action"))]
     assert {file.partition("share/")[2].rpartition(".")[0] for file in found} == find_defined()
 
 
 @pytest.mark.parametrize("name", sorted(find_used() | find_defined()))
-def test_an_interface_that_is_used_is_loaded_with_its_type_support(name):
+def test_every_used_interface_loads_its_type_support(name):
     package, kind, short = name.split("/")
     interface = getattr(import_module(f"{package}.{kind}"), short)
     type(interface).__import_type_support__()
@@ -86,7 +86,7 @@ def test_a_name_of_no_interface_is_refused_by_both_backends(get, wrong):
         getattr(interfaces, get)(wrong)
 
 
-def test_classes_are_those_that_ros_has():
+def test_the_genuine_backend_returns_the_classes_of_ros():
     from throwcollect.ros import genuine
 
     follow = import_module("control_msgs.action").FollowJointTrajectory

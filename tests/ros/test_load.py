@@ -60,7 +60,7 @@ print([number for number, _ in heard] == list(range({SMALL + LARGE})), sum(large
 """
 
 
-def test_no_episode_is_dropped_however_slow_the_subscriber_is(tmp_path):
+def test_a_slow_subscriber_gets_every_episode(tmp_path):
     middleware = Middleware("rclpy", Middleware.of_process().rmw)
     with discovery_server() if middleware.is_fast_dds else router("tcp/127.0.0.1:0") as endpoint:
         joining = Connection(endpoint, RunKey(tmp_path), 0, middleware).environment()
@@ -77,6 +77,6 @@ def test_no_episode_is_dropped_however_slow_the_subscriber_is(tmp_path):
         with start(LISTEN) as listener, start(TALK) as talker:
             said, _ = listener.communicate(timeout=60)
             sent, _ = talker.communicate("\n", timeout=20)
-    # Zenoh prints there, too, when it is closed.
+    # Zenoh prints to standard output when it is closed, so only the first line counts.
     assert sent.splitlines()[0] == f"sent {SMALL + LARGE}"
     assert said.splitlines()[0] == f"True {LARGE} {SMALL + LARGE}"

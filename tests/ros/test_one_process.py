@@ -71,8 +71,8 @@ print("all of it works")
 
 
 @pytest.mark.parametrize("order", list(itertools.permutations(IMPORTS, 2)), ids="-".join)
-def test_all_libraries_work_in_one_process(order):
-    # The rest in its own order: what matters is which two are first.
+def test_all_native_libraries_work_in_one_process(order):
+    # The other imports keep their order: only the first two matter.
     names = [*order, *(name for name in IMPORTS if name not in order)]
     program = "\n".join([*(IMPORTS[name] for name in names), WORK])
     found = subprocess.run(
@@ -111,7 +111,7 @@ except WorkerError as error:
 
 
 @pytest.mark.skipif(not Middleware.of_process().is_fast_dds, reason="a discovery server is Fast DDS's")
-def test_a_process_on_fast_dds_is_in_one_run_and_says_so():
+def test_a_process_on_fast_dds_can_join_only_one_run():
     found = subprocess.run([sys.executable, "-c", SECOND_RUN], capture_output=True, text=True, timeout=60, check=False)
     said = (
         "this process is in the run at udp/127.0.0.1:7411, and on Fast DDS it cannot be in that at udp/127.0.0.1:7412"

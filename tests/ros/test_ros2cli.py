@@ -35,7 +35,7 @@ def ros2(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Ros2]:
             assert found.returncode == 0, found.stdout + found.stderr
             return found.stdout + found.stderr
 
-        # It waits for the service, and so for the simulation.
+        # This command waits for the service, and so for the simulation.
         state = "simulation_interfaces/srv/GetSimulationState"
         assert "SimulationState(state=1)" in call("service", "call", "/sim_0/get_simulation_state", state)
         yield call
@@ -53,7 +53,7 @@ def test_nodes_and_their_endpoints_are_listed(ros2: Ros2) -> None:
     assert "/sim_0/joint_states [sensor_msgs/msg/JointState]" in topics
 
 
-def test_quality_of_service_and_type_hash_are_told(ros2: Ros2) -> None:
+def test_topic_info_shows_quality_of_service_and_type_hash(ros2: Ros2) -> None:
     info = ros2("topic", "info", "-v", "/sim_0/robot_description", *ALONE)
     for line in (
         "Node namespace: /sim_0",
@@ -65,7 +65,7 @@ def test_quality_of_service_and_type_hash_are_told(ros2: Ros2) -> None:
         assert line in info
 
 
-def test_a_latched_message_is_heard_late(ros2: Ros2) -> None:
+def test_topic_echo_shows_a_latched_message(ros2: Ros2) -> None:
     heard = ros2("topic", "echo", "--once", "--full-length", "/sim_0/robot_description", *ALONE)
     assert 'robot name=\\"talos\\"' in heard
 

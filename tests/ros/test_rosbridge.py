@@ -17,7 +17,7 @@ from throwcollect.run_key import RunKey
 from throwcollect.serve.rosbridge import Bridge
 
 
-def test_topics_services_and_actions_go_both_ways() -> None:
+def test_rosbridge_passes_topics_services_and_actions_both_ways() -> None:
     with discovery_server() if ON_DDS else router("tcp/127.0.0.1:0") as endpoint:
         connection = Connection(endpoint, RunKey(Path("/no/key")), middleware=Middleware.of_process())
         context = Context()

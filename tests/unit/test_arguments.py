@@ -1,4 +1,4 @@
-"""What programs are told that call a function with a wrong argument."""
+"""Errors for programs that call a function with a wrong argument."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ from throwcollect.errors import ConfigError, Problem
 from throwcollect.learning.learned_map import Kind
 
 
-def test_an_argument_is_told_by_its_own_name() -> None:
+def test_an_error_of_an_argument_names_it() -> None:
     error = refuse_argument("where", "got 1", expected="a text", hint="quote it")
     assert error.problems == [Problem("got 1", "where", argument=True)]
     assert str(error) == "where: got 1\n  expected: a text\n  try: quote it"
 
 
-def test_a_word_is_read_or_refused_with_those_that_there_are() -> None:
+def test_an_unknown_word_is_refused_with_the_known_ones() -> None:
     assert read_word("kind", "local", Kind) is Kind.LOCAL
     for given in ("magic", 1, ["local"]):
         with pytest.raises(ConfigError, match=r"^kind: ") as caught:
@@ -46,14 +46,14 @@ def test_a_word_is_read_or_refused_with_those_that_there_are() -> None:
         (["a", ("b" * 200,)], f"('{'b' * 78}… is in the list", "a list of names"),
     ],
 )
-def test_what_is_no_list_is_refused(given: object, problem: str, expected: str) -> None:
+def test_a_value_that_is_no_list_is_refused(given: object, problem: str, expected: str) -> None:
     with pytest.raises(ConfigError) as caught:
         read_list("columns", given, "names")
     assert caught.value.problems == [Problem(problem, "columns", argument=True)]
     assert caught.value.expected == expected
 
 
-def test_whatever_gives_its_elements_one_by_one_is_a_list() -> None:
+def test_any_iterable_but_a_text_counts_as_a_list() -> None:
     assert read_list("columns", (name for name in "ab"), "names") == read_list("columns", ["a", "b"], "names")
     rows = np.eye(2)
     assert [row.tolist() for row in read_list("targets", rows, "targets", (Iterable,))] == rows.tolist()
@@ -62,18 +62,18 @@ def test_whatever_gives_its_elements_one_by_one_is_a_list() -> None:
     assert caught.value.expected == "a list of targets"
 
 
-def test_to_be_checked_takes_nothing_out_of_a_list() -> None:
+def test_check_list_does_not_consume_an_iterator() -> None:
     points = iter([1, 2])
     check_list("points", points, "points")
     assert list(points) == [1, 2]
 
 
-def test_what_is_no_number_is_none_that_is_finite() -> None:
+def test_as_float_returns_nan_for_a_value_that_is_no_number() -> None:
     assert as_float(np.float32(0.5)) == as_float("0.5") == 0.5
     assert all(math.isnan(as_float(each)) for each in ("a", None, [1], 10**400))
 
 
-def test_whole_numbers_have_bounds() -> None:
+def test_a_number_that_is_not_whole_or_out_of_bounds_is_refused() -> None:
     for given in (1, 3, np.int64(2)):
         check_whole_number("processes", given, least=1, most=3)
     for given, expected in (
@@ -90,7 +90,7 @@ def test_whole_numbers_have_bounds() -> None:
 
 
 @pytest.mark.parametrize("given", [[1], "a", {1: 2}])
-def test_what_maps_no_keys_is_refused(given: object) -> None:
+def test_a_value_that_is_no_mapping_is_refused(given: object) -> None:
     check_mapping("values", {"a": 1}, "{'a': 1}")
     with pytest.raises(ConfigError, match=r"^values: got .*\n  expected: a mapping, such as {'a': 1}$"):
         check_mapping("values", given, "{'a': 1}")

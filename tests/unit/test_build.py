@@ -1,4 +1,4 @@
-"""What the digest of a build has to see."""
+"""The digest of a build covers engines and packages that have an effect on episodes."""
 
 from importlib.metadata import EntryPoint, EntryPoints, version
 from pathlib import Path

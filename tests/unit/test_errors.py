@@ -6,7 +6,7 @@ from throwcollect.dataset.findings import Finding
 from throwcollect.errors import DatasetError, ForeignPlanError
 
 
-def test_an_error_about_a_dataset_has_its_facts_as_fields_and_tells_them_in_order() -> None:
+def test_a_dataset_error_has_its_facts_as_fields_and_in_its_message() -> None:
     error = DatasetError("a chunk is cut off", path=Path("a/b.mcap"), place="byte 17", expected="90 bytes")
     assert (error.path, error.place, error.problem) == (Path("a/b.mcap"), "byte 17", "a chunk is cut off")
     assert str(error) == "a/b.mcap: byte 17: a chunk is cut off\n  expected: 90 bytes"
@@ -14,7 +14,7 @@ def test_an_error_about_a_dataset_has_its_facts_as_fields_and_tells_them_in_orde
     assert str(Finding.of("b.mcap", error)) == "b.mcap: byte 17: a chunk is cut off\n  expected: 90 bytes"
 
 
-def test_whoever_knows_where_it_happened_adds_that_and_loses_nothing() -> None:
+def test_locate_adds_the_place_to_an_error_and_keeps_its_type_and_facts() -> None:
     inner = ForeignPlanError("chunk: its CRC differs", place="byte 9", expected="5", evidence="6", hint="copy it again")
     outer = inner.locate(Path("x.mcap"), "trial 4")
     assert type(outer) is ForeignPlanError

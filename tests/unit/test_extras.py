@@ -25,7 +25,7 @@ def without_scipy(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "scipy", None)
 
 
-def test_a_module_is_imported_when_something_of_it_is_used(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_lazy_module_is_imported_at_its_first_use(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delitem(sys.modules, "colorsys", raising=False)
     module = lazily("colorsys")
     assert "colorsys" not in sys.modules
@@ -33,32 +33,32 @@ def test_a_module_is_imported_when_something_of_it_is_used(monkeypatch: pytest.M
     assert module.rgb_to_hsv is sys.modules["colorsys"].rgb_to_hsv
 
 
-def test_an_unknown_attribute_of_it_is_an_error_as_ever() -> None:
+def test_an_unknown_attribute_of_a_lazy_module_is_an_attribute_error() -> None:
     with pytest.raises(AttributeError, match="rgb_to_taste"):
         _ = lazily("colorsys").rgb_to_taste
 
 
-def test_a_missing_package_is_told_with_the_extra_that_brings_it(without_scipy) -> None:
+def test_a_missing_package_is_an_error_that_names_its_extra(without_scipy) -> None:
     with pytest.raises(MissingExtraError) as raised:
         _ = lazily("scipy.io").savemat
     assert str(raised.value) == "this needs scipy, which is not installed\n  try: pip install 'throwcollect[collect]'"
     assert (raised.value.package, raised.value.extra, raised.value.exit_code) == ("scipy", "collect", 2)
 
 
-def test_where_another_extra_brings_it_too_that_one_is_told(without_scipy) -> None:
+def test_a_missing_package_of_several_extras_names_the_requested_one(without_scipy) -> None:
     with pytest.raises(MissingExtraError, match=r"throwcollect\[export\]"):
         _ = lazily("scipy.io", extra="export").savemat
     with pytest.raises(MissingExtraError, match=r"throwcollect\[export\]"):
         require("numpy", "scipy", extra="export")
 
 
-def test_whoever_expects_an_import_error_gets_one(without_scipy) -> None:
+def test_a_missing_extra_is_an_import_error(without_scipy) -> None:
     with pytest.raises(ImportError), explain_missing():
         import scipy  # noqa: F401
     assert issubclass(MissingExtraError, ThrowcollectError)
 
 
-def test_a_missing_module_that_no_extra_brings_is_not_explained_away() -> None:
+def test_a_missing_module_of_no_extra_stays_an_import_error() -> None:
     with pytest.raises(ModuleNotFoundError, match="throwcollect_of_tomorrow") as raised, explain_missing():
         import throwcollect_of_tomorrow  # noqa: F401
     assert not isinstance(raised.value, MissingExtraError)
@@ -72,7 +72,9 @@ def needy(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
     return lazily("needy")
 
 
-def test_a_library_that_the_system_lacks_is_told_with_what_has_it(needy: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_missing_system_library_is_an_error_that_names_its_package(
+    needy: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(extras, "_SYSTEM_LIBRARY_OF", {"needy": ("libneedy.so.1", "libneedy1")})
     with pytest.raises(MissingLibraryError) as raised:
         _ = needy.anything
@@ -84,7 +86,7 @@ def test_a_library_that_the_system_lacks_is_told_with_what_has_it(needy: Any, mo
 
 
 @pytest.mark.parametrize("libraries", [{}, {"needy": ("libc.so.6", "libc6")}])
-def test_any_other_failure_of_an_import_is_an_error_as_ever(
+def test_any_other_failure_of_an_import_stays_an_import_error(
     libraries: dict[str, tuple[str, str]], needy: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(extras, "_SYSTEM_LIBRARY_OF", libraries)
@@ -98,7 +100,7 @@ def test_a_missing_package_does_not_count_as_installed(without_scipy) -> None:
 
 
 @pytest.mark.parametrize(("version", "wheel"), [((3, 11, 9), True), ((3, 12, 0), False)])
-def test_where_pybullet_has_no_wheel_the_hint_is_another_python(
+def test_without_a_wheel_of_pybullet_the_hint_is_another_python(
     version: tuple[int, int, int], wheel: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(sys, "version_info", version)
@@ -108,7 +110,7 @@ def test_where_pybullet_has_no_wheel_the_hint_is_another_python(
 
 
 @pytest.mark.parametrize(("version", "wheel"), [((3, 10, 13), False), ((3, 11, 9), True), ((3, 14, 0), True)])
-def test_where_mujoco_has_no_wheel_the_hint_is_another_python_or_engine(
+def test_without_a_wheel_of_mujoco_the_hint_is_another_python_or_engine(
     version: tuple[int, int, int], wheel: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(sys, "version_info", version)
@@ -119,5 +121,5 @@ def test_where_mujoco_has_no_wheel_the_hint_is_another_python_or_engine(
     )
 
 
-def test_every_package_of_the_table_is_there_for_the_tests() -> None:
+def test_every_package_of_the_extras_is_installed_for_the_tests() -> None:
     assert [package for package in EXTRA_OF if find_spec(package) is None] == []

@@ -19,7 +19,7 @@ def write_twice(path: Path) -> None:
             write_all(second, b"the second one")
 
 
-def test_of_two_who_write_one_file_at_once_the_last_one_succeeds_and_the_other_is_told(tmp_path: Path) -> None:
+def test_of_two_writers_of_one_file_the_last_succeeds_and_the_other_fails(tmp_path: Path) -> None:
     path = tmp_path / "file"
     with pytest.raises(OSError, match="another process writes it, too"):
         write_twice(path)
@@ -40,7 +40,7 @@ def test_a_new_directory_has_the_permissions_that_the_user_gives_to_others(
     assert stat.S_IMODE((tmp_path / "new").stat().st_mode) == mode
 
 
-def test_a_directory_that_was_made_keeps_its_permissions(tmp_path: Path) -> None:
+def test_an_existing_directory_keeps_its_permissions(tmp_path: Path) -> None:
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine").chmod(0o2750)
     with new_directory(tmp_path / "mine"):
@@ -48,7 +48,9 @@ def test_a_directory_that_was_made_keeps_its_permissions(tmp_path: Path) -> None
     assert stat.S_IMODE((tmp_path / "mine").stat().st_mode) == 0o2750
 
 
-def test_what_cannot_be_replaced_is_refused_before_the_work(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_replacing_the_working_directory_is_refused_before_the_work(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.chdir(tmp_path)
     for spelling in (Path(), tmp_path):
         with pytest.raises(ConfigError, match="is the working directory"), new_directory(spelling):

@@ -30,6 +30,6 @@ def test_a_child_dies_with_its_parent_whenever_that_dies(
     parent_lives_s: float, child_waits_s: float, said: str
 ) -> None:
     program = CHILD.format(parent_lives_s=parent_lives_s, child_waits_s=child_waits_s)
-    # It ends when nobody has its output open any more, which is when the child is gone.
+    # `run` returns when no process has the output open any more, which is when the child has ended.
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=60, check=False)
     assert (done.stdout, done.stderr) == (said, "")

@@ -62,7 +62,7 @@ def test_installed_packages_are_asked_once_for_all_families(monkeypatch: pytest.
     members._table.cache_clear()
 
 
-def test_a_member_that_there_is_not_is_an_error() -> None:
+def test_an_unknown_member_is_an_error() -> None:
     with pytest.raises(KeyError, match="hand"):
         load_member("robots", "hand")
 
@@ -75,7 +75,7 @@ def test_a_configuration_may_name_a_robot_of_another_package(tmp_path: Path) -> 
     assert "name: planar_arm" in done.stdout
 
 
-def test_joints_are_those_of_the_robot_that_the_configuration_names(tmp_path: Path) -> None:
+def test_an_unknown_joint_of_a_robot_of_another_package_is_an_error(tmp_path: Path) -> None:
     path = tmp_path / "arm.yaml"
     path.write_text(ARM.replace("elbow_joint: 0.3", "elbow: 0.3"))
     done = with_plugins("config", str(path))
@@ -83,7 +83,7 @@ def test_joints_are_those_of_the_robot_that_the_configuration_names(tmp_path: Pa
     assert f"{path}:4: task.end.elbow: the planar arm has no joint 'elbow'; did you mean 'elbow_joint'?" in done.stderr
 
 
-def test_without_postures_of_its_own_a_robot_gets_none_of_another_one(tmp_path: Path) -> None:
+def test_a_robot_without_postures_does_not_get_those_of_talos(tmp_path: Path) -> None:
     path = tmp_path / "arm.yaml"
     path.write_text("trials: 4\nrobot: {name: planar_arm}\n")
     done = with_plugins("config", str(path))
@@ -97,7 +97,7 @@ def test_without_postures_of_its_own_a_robot_gets_none_of_another_one(tmp_path: 
     ]
 
 
-def test_with_a_robot_that_there_is_not_its_joints_are_not_complained_of(tmp_path: Path) -> None:
+def test_an_unknown_robot_is_an_error_without_complaints_about_joints(tmp_path: Path) -> None:
     path = tmp_path / "arm.yaml"
     path.write_text(ARM.replace("planar_arm", "planar_hand"))
     done = with_plugins("config", str(path))
@@ -134,7 +134,7 @@ class Aimless(TaskConfig):
         ("tasks", "broken:Aimless", ": broken:Aimless lacks until"),
     ],
 )
-def test_a_broken_member_of_another_package_is_told_with_the_name_of_the_package(
+def test_a_broken_member_is_an_error_that_names_its_package(
     family: str, value: str, said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "broken.py").write_text(BROKEN)
@@ -165,7 +165,7 @@ def test_two_packages_with_a_member_of_one_name_are_refused(tmp_path: Path, monk
     members._table.cache_clear()
 
 
-def test_an_engine_that_is_broken_is_told_before_a_run_begins(tmp_path: Path) -> None:
+def test_a_broken_engine_is_an_error_before_a_run_begins(tmp_path: Path) -> None:
     install(tmp_path, "somebodys", "engines", "not_there:Engine")
     path = os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")])
     (tmp_path / "throws.yaml").write_text(
@@ -185,7 +185,7 @@ def test_an_engine_that_is_broken_is_told_before_a_run_begins(tmp_path: Path) ->
 
 
 @pytest.mark.parametrize("debug", ["", "1"])
-def test_what_a_member_of_another_package_raises_is_told_as_a_fault_of_that_package(
+def test_an_exception_in_a_member_is_reported_as_a_fault_of_its_package(
     debug: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     install(tmp_path, "somebodys", "tasks", "some:Task")
@@ -200,7 +200,7 @@ def test_what_a_member_of_another_package_raises_is_told_as_a_fault_of_that_pack
 @pytest.mark.parametrize(
     ("name", "error"), [("throw", KeyError("elbow")), ("mine", DatasetError("torn")), ("mine", OSError(28, "full"))]
 )
-def test_faults_of_our_own_and_errors_on_purpose_are_let_through(name: str, error: Exception) -> None:
+def test_faults_of_our_own_members_and_intended_errors_pass_unchanged(name: str, error: Exception) -> None:
     with pytest.raises(type(error)) as caught, explain_failure("tasks", name, "write it", passing=(OSError,)):
         raise error
     assert caught.value is error

@@ -1,4 +1,4 @@
-"""What tells a command of ours from somebody's program."""
+"""Commands of throwcollect are told from programs of users that import it."""
 
 import os
 import re
@@ -53,7 +53,7 @@ def test_numerical_libraries_start_no_threads_in_a_command() -> None:
 
 
 @pytest.mark.parametrize("version", [(3, 10), (3, 11)])
-def test_nothing_of_the_working_directory_is_run(
+def test_a_command_imports_no_module_from_the_working_directory(
     version: tuple[int, int], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     for name in ("queue", "types", "runpy", "signal", "numpy", "throwcollect"):
@@ -65,10 +65,10 @@ def test_nothing_of_the_working_directory_is_run(
         assert "throwcollect" in done.stdout
 
 
-def test_all_processes_of_ours_are_started_like_that() -> None:
+def test_only_own_process_builds_commands_of_the_interpreter() -> None:
     sources = Path(throwcollect.__file__).parent.rglob("*.py")
     asked = {path.name for path in sources if re.search(r'sys\.executable, "-[mc]"', path.read_text(encoding="utf-8"))}
-    # The other one only names processes for `ps`.
+    # `node_server.py` only writes such words as the title of a process, for `ps`.
     assert asked == {"own_process.py", "node_server.py"}
 
 

@@ -1,4 +1,4 @@
-"""The shop window: what `throwcollect.__all__` lists, what the documents describe, and what importing it costs."""
+"""The public names of throwcollect: their list, their documentation, and the cost of importing them."""
 
 import ast
 import inspect
@@ -16,11 +16,11 @@ from throwcollect.runs import prepare, resume
 
 ROOT = Path(__file__).parents[2]
 OWN = "throwcollect:"
-"""What stands before the name of a module that is public as a whole."""
+"""Prefix of a module that is public as a whole."""
 DOCUMENTS = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
 
 
-def test_the_list_and_what_is_shown_and_described_agree() -> None:
+def test_dir_and_the_documentation_list_the_public_names() -> None:
     described = re.findall(r"^\| `(\w+)[`(]", (ROOT / "docs" / "python.md").read_text(encoding="utf-8"), re.MULTILINE)
     assert dir(throwcollect) == throwcollect.__all__ == sorted(throwcollect.__all__)
     assert sorted(described) == throwcollect.__all__
@@ -39,12 +39,12 @@ def test_functions_have_the_parameters_that_are_described() -> None:
     assert described == {name: list(inspect.signature(getattr(throwcollect, name)).parameters) for name in described}
     described = read_signatures("runs.md")
     assert described["runs.prepare"] == list(inspect.signature(prepare).parameters)
-    # The last one is for the launcher.
+    # The last parameter is for the launcher, and not documented.
     assert described["runs.resume"] == list(inspect.signature(resume).parameters)[:-1]
 
 
 @pytest.mark.parametrize("face", [throwcollect, runs], ids=lambda face: face.__name__)
-def test_type_checkers_read_what_is_imported(face: ModuleType) -> None:
+def test_type_checkers_see_the_same_names_as_lazy_imports(face: ModuleType) -> None:
     tree = ast.parse(inspect.getsource(face))
     (block,) = (each for each in tree.body if isinstance(each, ast.If))
     imported = {
@@ -57,7 +57,7 @@ def test_type_checkers_read_what_is_imported(face: ModuleType) -> None:
 
 
 @pytest.mark.parametrize("face", [throwcollect, runs], ids=lambda face: face.__name__)
-def test_everything_that_is_public_can_be_taken_and_says_what_it_does(face: ModuleType) -> None:
+def test_every_public_name_can_be_imported_and_has_a_docstring(face: ModuleType) -> None:
     assert len(face.__all__) > 10
     for name in face.__all__:
         if name != "__version__":
@@ -66,7 +66,7 @@ def test_everything_that_is_public_can_be_taken_and_says_what_it_does(face: Modu
             assert taken.__doc__, name
 
 
-def test_importing_it_loads_nothing_else() -> None:
+def test_importing_throwcollect_loads_no_other_package() -> None:
     script = (
         "import sys; before = set(sys.modules); import throwcollect; "
         "print(*sorted(name for name in set(sys.modules) - before "
@@ -76,7 +76,7 @@ def test_importing_it_loads_nothing_else() -> None:
     assert said.stdout.split() == ["throwcollect", "throwcollect.version"]
 
 
-def test_documents_import_nothing_from_inside() -> None:
+def test_documents_import_from_no_inner_module() -> None:
     inside = [
         f"{path.name}: {line}"
         for path in DOCUMENTS

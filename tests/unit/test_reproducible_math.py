@@ -37,7 +37,7 @@ def show(name: str, *arrays: object) -> str:
 
 
 def compute() -> Iterator[str]:
-    """Hashes of everything that is computed with numbers before a simulation gets it."""
+    """Hashes of all arrays that are computed before a simulation gets them."""
     for path in sorted((ROOT / "configs").glob("*.yaml")):
         plan = make_plan(load(path), directory=path.parent)
         yield show(path.name, *([*trial.values.values()] for trial in plan.trials[:100]))
@@ -74,7 +74,7 @@ def test_plans_and_motions_are_the_same_on_another_processor() -> None:
         (lambda bases: power(bases, 1.7), lambda bases: bases**1.7, np.linspace(0, 50, 999)),
     ],
 )
-def test_functions_are_those_of_numpy_up_to_rounding(
+def test_functions_equal_those_of_numpy_up_to_rounding(
     ours: Callable[..., NDArray[np.float64]], numpys: Callable[..., NDArray[np.float64]], values: NDArray[np.float64]
 ) -> None:
     np.testing.assert_allclose(ours(values), numpys(values), rtol=1e-15, atol=1e-15)
@@ -83,12 +83,12 @@ def test_functions_are_those_of_numpy_up_to_rounding(
     assert ours(values[:0]).shape == (0,)
 
 
-def test_powers_of_zero() -> None:
+def test_power_accepts_zero_as_base() -> None:
     np.testing.assert_array_equal(power(np.array([0.0, 1.0]), 0.0), [1.0, 1.0])
     np.testing.assert_array_equal(power(np.array([0.0, 2.0]), 3.0), [0.0, 8.0])
 
 
-def test_products_of_matrices_are_broadcast() -> None:
+def test_matmul_broadcasts_stacks_of_matrices() -> None:
     randomness = np.random.default_rng(0)
     left, right = randomness.random((2, 3)), randomness.random((7, 3, 4))
     np.testing.assert_allclose(matmul(left, right), left @ right, rtol=1e-14)
@@ -96,7 +96,7 @@ def test_products_of_matrices_are_broadcast() -> None:
     assert matmul(left, right[:0]).shape == (0, 2, 4)
 
 
-def test_solutions_of_symmetric_positive_definite_systems() -> None:
+def test_solve_solves_symmetric_positive_definite_systems() -> None:
     randomness = np.random.default_rng(0)
     roots = randomness.standard_normal((9, 4, 6))
     matrices, right = roots @ roots.swapaxes(1, 2), randomness.standard_normal((9, 4, 2))
@@ -107,7 +107,7 @@ def test_solutions_of_symmetric_positive_definite_systems() -> None:
     assert math.isclose(solve(tiny, np.ones((1, 1))).item(), 1e300)
 
 
-def test_sums_are_those_of_every_python() -> None:
-    # `sum` gives 1.0 from Python 3.12 on.
+def test_add_up_gives_the_same_sum_on_every_python() -> None:
+    # `sum` returns 1.0 from Python 3.12 on.
     assert add_up([0.1] * 10) == 0.9999999999999999
     assert add_up(iter(())) == 0.0

@@ -47,14 +47,14 @@ def make_key(directory: Path) -> RunKey:
     return key
 
 
-def test_a_key_is_for_its_owner_alone(tmp_path: Path) -> None:
+def test_only_the_owner_can_read_a_key(tmp_path: Path) -> None:
     key = make_key(tmp_path / "key")
     assert stat.S_IMODE(key.directory.stat().st_mode) == 0o700
     assert stat.S_IMODE(key.private_key.stat().st_mode) == 0o600
     assert sorted(path.name for path in key.directory.iterdir()) == ["certificate.pem", "key.pem"]
 
 
-def test_only_who_has_the_key_of_a_router_is_let_in(tmp_path: Path) -> None:
+def test_a_router_accepts_only_clients_with_its_key(tmp_path: Path) -> None:
     key, other = make_key(tmp_path / "one"), make_key(tmp_path / "other")
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
@@ -68,7 +68,7 @@ def test_only_who_has_the_key_of_a_router_is_let_in(tmp_path: Path) -> None:
                 pass
 
 
-def test_signatures_are_of_one_key_and_one_text(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_signature_is_valid_only_for_its_key_and_text(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(KEY_VARIABLE, str(make_key(tmp_path / "one").directory))
     signer = Signer.of_environment()
     signature = signer.sign(b"an ", b"episode")
@@ -79,13 +79,13 @@ def test_signatures_are_of_one_key_and_one_text(tmp_path: Path, monkeypatch: pyt
     assert not Signer(b"").has_signed(signature, b"an episode")
 
 
-def test_a_key_that_is_not_there_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_missing_key_is_an_error_that_names_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(KEY_VARIABLE, str(tmp_path / "gone"))
     with pytest.raises(ConfigError, match=r"the key of the run cannot be read: .*gone/key.pem: No such file"):
         Signer.of_environment()
 
 
-def test_a_key_is_made_again_from_its_secret(tmp_path: Path) -> None:
+def test_a_key_can_be_made_again_from_its_secret(tmp_path: Path) -> None:
     one, other = RunKey(tmp_path / "one"), RunKey(tmp_path / "other")
     one.create()
     assert len(one.secret) == 32
@@ -95,7 +95,7 @@ def test_a_key_is_made_again_from_its_secret(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("secret", [bytes(32), b"\xff" * 32])
-def test_what_is_no_secret_makes_no_key(tmp_path: Path, secret: bytes) -> None:
+def test_an_invalid_secret_makes_no_key(tmp_path: Path, secret: bytes) -> None:
     with pytest.raises(ConfigError, match="no key of this secret"):
         RunKey(tmp_path / "key").create(secret)
     assert not (tmp_path / "key").exists()

@@ -59,7 +59,7 @@ def test_results_come_in_order_from_several_processes() -> None:
     assert multiprocessing.active_children() == []
 
 
-def test_processes_of_others_are_left_alone() -> None:
+def test_processes_that_the_caller_started_are_left_alone() -> None:
     found = work_side_by_side(range(4), begin, (3,), processes=2, doing="counts", fork=True)
     next(found)
     mine = multiprocessing.get_context("fork").Process(target=time.sleep, args=[60])
@@ -74,19 +74,19 @@ def test_processes_of_others_are_left_alone() -> None:
         mine.join()
 
 
-def test_threads_leave_the_processes_of_each_other_alone() -> None:
+def test_two_threads_leave_the_processes_of_each_other_alone() -> None:
     before = dict(os.environ)
 
     def nap(duration_s: float) -> list[int]:
         return list(work_side_by_side(range(4), begin_nap, (SlowlySent(duration_s),), processes=2, doing="naps"))
 
     with ThreadPoolExecutor(2) as threads:
-        # The one that ends first must not end the other.
+        # The thread that ends first must not end the processes of the other one.
         assert list(threads.map(nap, [0.0, 1.0])) == [[0, 1, 2, 3]] * 2
     assert dict(os.environ) == before
 
 
-def test_one_process_or_one_piece_needs_no_other() -> None:
+def test_one_process_or_one_piece_of_work_stays_in_the_caller() -> None:
     assert list(work_side_by_side([1, 2], begin, (1,), processes=1, doing="counts")) == [
         (1, os.getpid()),
         (2, os.getpid()),
@@ -95,7 +95,7 @@ def test_one_process_or_one_piece_needs_no_other() -> None:
     assert list(work_side_by_side([], begin, (1,), processes=8, doing="counts")) == []
 
 
-def test_what_a_process_raises_arrives() -> None:
+def test_an_exception_in_a_process_reaches_the_caller() -> None:
     with pytest.raises(ConfigError, match="nothing to begin with"):
         list(work_side_by_side(range(4), begin_badly, (), processes=2, doing="counts"))
 
@@ -105,7 +105,7 @@ def test_a_process_that_is_killed_is_named() -> None:
         list(work_side_by_side(range(40), begin_death, (), processes=2, doing="counts"))
 
 
-def test_results_are_given_after_something_else_was_done() -> None:
+def test_processes_start_before_results_are_read_and_end_with_the_block() -> None:
     with working_side_by_side(range(4), begin, (3,), processes=2, doing="counts") as found:
         processes = {process.pid for process in multiprocessing.active_children()}
         assert {process for _, process in found} <= processes
@@ -129,7 +129,7 @@ def test_processes_are_forked_off_one_without_other_threads_of_python() -> None:
 
 
 @pytest.mark.skipif(sys.version_info < (3, 11), reason="Python knows no way")
-def test_nothing_of_the_working_directory_is_run(tmp_path: Path) -> None:
+def test_processes_import_no_module_from_the_working_directory(tmp_path: Path) -> None:
     for name in ("multiprocessing", "runpy", "types", "queue"):
         (tmp_path / f"{name}.py").write_text("raise SystemExit('a file of the working directory was run')\n")
     program = (
@@ -138,7 +138,7 @@ def test_nothing_of_the_working_directory_is_run(tmp_path: Path) -> None:
         "print(*work_side_by_side(range(4), operator.methodcaller, ('bit_length',), processes=2, doing='counts'))\n"
     )
     words = [sys.executable, "-P", "-c", program]
-    # Python hands this switch on to processes of its own, but a command of ours is started without it.
+    # Python hands -P on to its child processes, but a command of throwcollect starts without it.
     for switch in (words, [sys.executable, "-c", f"import sys; del sys.path[0]\n{program}"]):
         done = subprocess.run(switch, cwd=tmp_path, capture_output=True, text=True, timeout=60, check=False)
         assert (done.stdout, done.stderr) == ("0 1 2 2\n", "")
@@ -159,8 +159,8 @@ def find_tests() -> dict[str, str]:
 
 @pytest.mark.parametrize("fork", [False, True])
 @pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGKILL])
-def test_the_end_of_the_one_that_asked_ends_all_at_once(how: signal.Signals, fork: bool) -> None:
-    # A group of its own, as Ctrl-C reaches all processes of a terminal.
+def test_all_processes_end_with_their_caller(how: signal.Signals, fork: bool) -> None:
+    # The processes have a group of their own, as Ctrl-C reaches all processes of a terminal.
     with subprocess.Popen(
         [sys.executable, "-c", ASLEEP.format(fork=fork)],
         stdout=subprocess.PIPE,
@@ -182,5 +182,5 @@ def test_the_end_of_the_one_that_asked_ends_all_at_once(how: signal.Signals, for
             assert time.monotonic() < started + 60
             time.sleep(0.02)
         told = asking.stderr.read() if how == signal.SIGINT else ""
-    # No other process has something to say.
+    # Only the caller prints a traceback, and no other process does.
     assert told.count("Traceback") == (how == signal.SIGINT)

@@ -1,4 +1,4 @@
-"""Single throws in this process."""
+"""Single throws by `Simulator`, in this process or in several."""
 
 import re
 import subprocess
@@ -25,7 +25,7 @@ def simulator() -> Iterator[Simulator]:
         yield simulator
 
 
-def test_a_throw_does_not_depend_on_those_before_it(simulator: Simulator) -> None:
+def test_a_throw_does_not_depend_on_earlier_throws(simulator: Simulator) -> None:
     first = simulator.throw(POINT)
     other = simulator.throw({"ball.mass_kg": 0.05})
     again = simulator.throw(POINT)
@@ -34,7 +34,7 @@ def test_a_throw_does_not_depend_on_those_before_it(simulator: Simulator) -> Non
     assert np.array_equal(first.ball.position, again.ball.position)
 
 
-def test_a_simulator_that_is_closed_says_so_and_may_be_closed_again() -> None:
+def test_a_closed_simulator_refuses_throws_and_may_be_closed_again() -> None:
     with Simulator(ROOT / "configs" / "quickstart.yaml") as simulator:
         pass
     simulator.close()
@@ -43,7 +43,7 @@ def test_a_simulator_that_is_closed_says_so_and_may_be_closed_again() -> None:
             throw()
 
 
-def test_the_number_of_the_trial_is_in_the_stamps_alone(simulator: Simulator) -> None:
+def test_the_trial_number_changes_only_the_stamps(simulator: Simulator) -> None:
     first, second = simulator.throw(POINT), simulator.throw(POINT, trial=1)
     assert (first.trial, second.trial) == (0, 1)
     assert first.joints.stamps_ns[0] < second.joints.stamps_ns[0]
@@ -51,7 +51,7 @@ def test_the_number_of_the_trial_is_in_the_stamps_alone(simulator: Simulator) ->
     assert np.array_equal(first.joints.effort, second.joints.effort)
 
 
-def test_a_throw_has_all_that_one_of_a_dataset_has(simulator: Simulator) -> None:
+def test_a_throw_has_the_row_events_and_samples_of_a_stored_one(simulator: Simulator) -> None:
     throw = simulator.throw(POINT)
     assert (throw.outcome, throw.reason, throw.recorded, throw.parameters) == ("landed", None, True, POINT)
     assert throw.row["samples"] == len(throw.ball) == len(throw.joints)
@@ -60,7 +60,7 @@ def test_a_throw_has_all_that_one_of_a_dataset_has(simulator: Simulator) -> None
     assert repr(throw).startswith("Throw(0: landed at x = ")
 
 
-def test_a_throw_at_a_target_is_the_same_and_says_by_how_much_it_missed(simulator: Simulator) -> None:
+def test_a_target_adds_only_the_miss_to_a_throw(simulator: Simulator) -> None:
     plain = simulator.throw(POINT)
     throw = simulator.throw(POINT, target={"target_x_m": 1.4, "target_y_m": -0.2})
     assert throw.target == {"target_x_m": 1.4, "target_y_m": -0.2}
@@ -83,12 +83,12 @@ def test_a_throw_at_a_target_is_the_same_and_says_by_how_much_it_missed(simulato
         ({"x": 1.4}, "x: the task throw has no such target"),
     ],
 )
-def test_what_is_no_target_is_told(simulator: Simulator, target: dict[str, float], sentence: str) -> None:
+def test_an_invalid_target_is_an_error(simulator: Simulator, target: dict[str, float], sentence: str) -> None:
     with pytest.raises(ConfigError, match=sentence):
         simulator.throw(POINT, target=target)
 
 
-def test_several_processes_give_the_same_throws_whatever_becomes_of_the_file(tmp_path: Path) -> None:
+def test_several_processes_give_the_same_throws_without_the_file(tmp_path: Path) -> None:
     path = tmp_path / "throws.yaml"
     path.write_text((ROOT / "configs" / "quickstart.yaml").read_text() + "\nsim: {engine: ballistic}\n")
     simulator = Simulator(path)
@@ -100,13 +100,13 @@ def test_several_processes_give_the_same_throws_whatever_becomes_of_the_file(tmp
     together = [next(throws) for _ in points]
     assert [throw.row for throw in together] == alone
     assert together[0].ball.position.shape == (alone[0]["samples"], 3)
-    # They come before the error, as those of this process do.
+    # The throws come before the error, as they do in one process.
     with pytest.raises(PlanError, match=r"^points\[3\]: .*" + TOO_FAST):
         next(throws)
     simulator.close()
 
 
-def test_the_throws_before_one_that_is_refused_are_given_out(simulator: Simulator) -> None:
+def test_throws_before_a_refused_point_are_returned(simulator: Simulator) -> None:
     throws = simulator.throw_many([{}, REFUSED])
     assert next(throws).trial == 0
     with pytest.raises(PlanError, match=TOO_FAST):
@@ -121,7 +121,7 @@ def test_the_throws_before_one_that_is_refused_are_given_out(simulator: Simulato
         (3, r"points\[1\]: got 3\n  expected: a mapping, such as {'task\.duration_s': 1\.1}"),
     ],
 )
-def test_of_many_points_the_one_that_is_wrong_is_named(
+def test_a_wrong_point_of_many_is_named_by_its_index(
     simulator: Simulator, point: dict[str, float], message: str
 ) -> None:
     throws = simulator.throw_many([{}, point])
@@ -138,12 +138,14 @@ def test_of_many_points_the_one_that_is_wrong_is_named(
         ({"ball.mass_kg": -1.0}, "ball.mass_kg: should be a number above 0"),
     ],
 )
-def test_wrong_values_are_named(simulator: Simulator, values: dict[str, float], message: str) -> None:
+def test_a_wrong_key_or_value_is_an_error_that_names_the_key(
+    simulator: Simulator, values: dict[str, float], message: str
+) -> None:
     with pytest.raises(ConfigError, match=re.escape(message)):
         simulator.throw(values)
 
 
-def test_there_are_no_numbers_but_those_of_trials(simulator: Simulator) -> None:
+def test_numbers_of_trials_and_processes_out_of_range_are_refused(simulator: Simulator) -> None:
     with pytest.raises(ConfigError, match="trial: got -1\n  expected: 0 to 9999999"):
         simulator.throw(trial=-1)
     with pytest.raises(ConfigError, match="trial: got 10000000"):
@@ -152,7 +154,7 @@ def test_there_are_no_numbers_but_those_of_trials(simulator: Simulator) -> None:
         next(simulator.throw_many([{}], processes=0))
 
 
-def test_lists_are_not_taken_letter_by_letter(simulator: Simulator) -> None:
+def test_a_text_or_mapping_in_place_of_a_list_is_refused(simulator: Simulator) -> None:
     with pytest.raises(ConfigError, match=r"^overrides: 'task\.duration_s=1' is a text"):
         Simulator(ROOT / "configs" / "quickstart.yaml", overrides="task.duration_s=1")
     with pytest.raises(ConfigError, match=r"^points: {'task\.duration_s': 1\.1.* is a mapping"):
@@ -168,24 +170,24 @@ def test_lists_are_not_taken_letter_by_letter(simulator: Simulator) -> None:
         ({"target": {"target_x_m": "a", "target_y_m": 0.0}}, "target_x_m: should be a number from .*, got 'a'"),
     ],
 )
-def test_what_is_of_another_kind_is_told_by_its_name(simulator: Simulator, arguments, message: str) -> None:
+def test_an_argument_of_a_wrong_type_is_named(simulator: Simulator, arguments, message: str) -> None:
     with pytest.raises(ConfigError, match=f"^{message}"):
         simulator.throw(**arguments)
 
 
-def test_values_are_a_mapping_for_all_who_ask(simulator: Simulator) -> None:
+def test_find_refusal_and_throw_many_check_their_arguments(simulator: Simulator) -> None:
     with pytest.raises(ConfigError, match=r"^values: got \[1\]"):
         simulator.find_refusal([1])
     with pytest.raises(ConfigError, match=r"^processes: got 1\.5\n  expected: a whole number, 1 or more"):
         next(simulator.throw_many([{}], processes=1.5))
 
 
-def test_a_configuration_that_is_not_there_is_named(tmp_path: Path) -> None:
+def test_a_missing_configuration_is_an_error_that_names_it(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match=re.escape(f"{tmp_path / 'no.yaml'}: no such file")):
         Simulator(tmp_path / "no.yaml")
 
 
-def test_the_program_of_the_page_runs_and_says_nothing_else(tmp_path: Path) -> None:
+def test_the_program_of_the_page_runs_without_error_output(tmp_path: Path) -> None:
     (program,) = re.findall(r"```python\n(.*?)```", PAGE, flags=re.DOTALL)
     (tmp_path / "program.py").write_text(program)
     said = subprocess.run(

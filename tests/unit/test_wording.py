@@ -7,7 +7,7 @@ from throwcollect.wording import command, format_count, is_text, join_names, pri
 
 
 @pytest.mark.parametrize(("number", "said"), [(0, "0 trials"), (1, "1 trial"), (2, "2 trials")])
-def test_one_alone_is_singular(number: int, said: str) -> None:
+def test_a_count_of_one_is_singular(number: int, said: str) -> None:
     assert format_count(number, "trial") == said
 
 
@@ -15,16 +15,16 @@ def test_one_alone_is_singular(number: int, said: str) -> None:
     ("names", "said"),
     [("", ""), ("a", "a"), ("ab", "a and b"), ("abc", "a, b and c"), ("abcdefgh", "a, b, c, d, e and 3 more")],
 )
-def test_names_stand_in_a_sentence_unless_they_are_many(names: str, said: str) -> None:
+def test_join_names_counts_the_names_after_the_fifth(names: str, said: str) -> None:
     assert join_names(names) == said
 
 
-def test_a_recommended_command_can_be_typed_as_it_is() -> None:
+def test_a_recommended_command_is_quoted_for_the_shell() -> None:
     assert command("resume", Path("my data/it's")) == """throwcollect resume 'my data/it'"'"'s'"""
     assert command("wait", "--run", "throws-1a2b") == "throwcollect wait --run throws-1a2b"
 
 
-def test_all_recommended_commands_are_made_so() -> None:
+def test_no_module_writes_a_recommended_command_by_hand() -> None:
     sources = Path(__file__).parents[2] / "src" / "throwcollect"
     by_hand = re.compile(
         r"throwcollect (up|resume|down|wait|stop|scale|logs|events|dataset|config|plan)\b[a-zA-Z -]*\{"
@@ -33,11 +33,11 @@ def test_all_recommended_commands_are_made_so() -> None:
     assert not found
 
 
-def test_a_message_is_printed_without_what_would_steer_a_terminal_and_without_end() -> None:
+def test_a_printed_message_is_escaped_for_terminals_and_shortened() -> None:
     assert printable("no run 'a\x1b[2J\udcff'\n  try: x") == "no run 'a\\x1b[2J\\udcff'\n  try: x"
     assert printable("a" + 5000 * "b" + "c") == "a" + 499 * "b" + " [...] " + 499 * "b" + "c"
 
 
-def test_a_name_that_is_no_text_is_told_from_one_that_is() -> None:
+def test_is_text_rejects_a_name_that_cannot_be_encoded() -> None:
     assert is_text("größe")
     assert not is_text("a\udcff")

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from throwcollect.errors import ConfigError
 
 READ: list[str] = []
-"""What a process has read; another one has it only if it is forked off."""
+"""Values that a process has read; another process has them only if it was forked off."""
 
 
 def begin(factor: int) -> Callable[[int], tuple[int, int]]:
@@ -30,7 +30,7 @@ def begin_death() -> Callable[[int], None]:
 
 
 class SlowlySent(float):
-    """Takes so long to be sent to a process that several threads start theirs at the same time."""
+    """A value that is so slow to be sent to a process that several threads start theirs at the same time."""
 
     def __reduce__(self) -> tuple[type[float], tuple[float]]:
         time.sleep(0.2)

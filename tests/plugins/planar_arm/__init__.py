@@ -1,1 +1,1 @@
-"""A robot of somebody else's, in a package of its own."""
+"""A robot of another package, for tests."""

@@ -1,1 +1,1 @@
-"""A task of somebody else's, in a package of its own."""
+"""A task of another package, for tests."""

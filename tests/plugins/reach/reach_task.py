@@ -1,4 +1,4 @@
-"""The task of reaching: the robot moves, and what the ball does is of no interest."""
+"""The task of reaching: the robot moves, and the ball does not matter."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace

@@ -15,7 +15,7 @@ def goal(*joints):
     return goal
 
 
-def test_a_client_listens_to_what_it_uses_only(rig):
+def test_a_client_subscribes_only_to_topics_that_it_uses(rig):
     async def execute(_handle):
         return await Future()
 

@@ -25,7 +25,7 @@ def table():
     return table
 
 
-def test_only_the_moves_of_the_state_machine_are_possible():
+def test_a_goal_makes_only_the_transitions_of_the_state_machine():
     paths = {
         S.STATUS_ACCEPTED: [],
         S.STATUS_EXECUTING: [GoalEvent.EXECUTE],
@@ -46,7 +46,7 @@ def test_only_the_moves_of_the_state_machine_are_possible():
     assert moves == {(1, 2), (1, 3), (2, 3), (2, 4), (2, 6), (3, 4), (3, 5), (3, 6)}
 
 
-def test_an_impossible_move_is_refused_in_words(table):
+def test_an_impossible_transition_is_an_error_with_the_reason(table):
     goal = table[KEYS[3]]
     with pytest.raises(RuntimeError, match=r"goal 0404.* is succeeded and cannot be aborted"):
         goal.advance(GoalEvent.ABORT, 0)
@@ -67,7 +67,7 @@ def test_an_impossible_move_is_refused_in_words(table):
         (b"x" * 16, 9, 0, [0, 1, 2]),
     ],
 )
-def test_a_wish_to_cancel_means_the_goals_that_the_protocol_says(table, key, stamp_s, code, meant):
+def test_a_cancel_request_selects_goals_as_the_protocol_says(table, key, stamp_s, code, meant):
     assert table.select(info(key, stamp_s)) == (code, [table[KEYS[i]] for i in meant])
 
 

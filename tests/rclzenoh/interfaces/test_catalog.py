@@ -70,6 +70,6 @@ def test_unknown_names_are_refused(name):
         type_hash(name)
 
 
-def test_an_unknown_name_is_answered_with_similar_ones():
+def test_an_unknown_name_is_an_error_that_suggests_a_similar_one():
     with pytest.raises(ValueError, match="did you mean 'std_srvs/srv/Trigger'"):
         type_hash("std_srvs/srv/Triger")

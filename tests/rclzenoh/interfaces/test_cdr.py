@@ -65,7 +65,7 @@ def check_against_rosbags(name, store, random):
 )
 @settings(deadline=None, max_examples=3)
 @given(random=st.randoms(use_true_random=False))
-def test_bytes_equal_those_of_rosbags(store, package, random):
+def test_serialized_messages_equal_those_of_rosbags(store, package, random):
     for name in [name for name in store.fielddefs if name.startswith(f"{package}/msg/")]:
         check_against_rosbags(name, store, random)
 
@@ -73,7 +73,7 @@ def test_bytes_equal_those_of_rosbags(store, package, random):
 @pytest.mark.parametrize("name", OURS)
 @settings(deadline=None, max_examples=10)
 @given(random=st.randoms(use_true_random=False))
-def test_bytes_of_our_definitions_equal_those_of_rosbags(store, name, random):
+def test_serialized_messages_of_our_definitions_equal_those_of_rosbags(store, name, random):
     check_against_rosbags(name, store, random)
 
 
@@ -92,7 +92,7 @@ def test_received_sequences_may_be_changed_and_share_nothing_with_the_data():
     assert deserialize(data, joints).position.tolist() == [1.0, 2.0]
 
 
-def test_remembered_names_belong_to_one_message():
+def test_remembered_joint_names_are_not_shared_between_messages():
     joints = get_message("sensor_msgs/msg/JointState")
     data = serialize(joints(name=["a", "b"]))
     first, second = deserialize(data, joints), deserialize(data, joints)
@@ -102,7 +102,7 @@ def test_remembered_names_belong_to_one_message():
 
 
 @pytest.mark.parametrize("length", range(4, 60))
-def test_nothing_is_remembered_of_data_that_is_cut_off(length):
+def test_truncated_data_leaves_no_remembered_names(length):
     state = get_message("sensor_msgs/msg/JointState")
     message = state(name=["arm_right_1_joint", "arm_right_2_joint"], position=[1.0, 2.0])
     data = serialize(message)
@@ -113,13 +113,13 @@ def test_nothing_is_remembered_of_data_that_is_cut_off(length):
 
 
 @pytest.mark.parametrize("more", [bytes(3), bytes(64), b"\x07" * 8])
-def test_what_follows_a_message_is_left_alone(more):
+def test_bytes_after_a_message_are_ignored(more):
     string = get_message("std_msgs/msg/String")
     assert deserialize(serialize(string(data="abc")) + more, string).data == "abc"
 
 
 @pytest.mark.parametrize("data", [b"", b"\x00", b"\x00\x01", b"\x00\x01\x00", bytes(4), b"\x01\x01\x00\x00abcd"])
-def test_other_encapsulations_are_refused(data):
+def test_data_that_is_not_little_endian_cdr_is_refused(data):
     with pytest.raises(ValueError, match="not little-endian CDR"):
         deserialize(data, get_message("std_msgs/msg/String"))
 
@@ -163,7 +163,7 @@ def test_a_number_that_does_not_fit_is_refused():
         serialize(time)
 
 
-def test_bounded_strings_of_arrays_are_checked_one_by_one(monkeypatch):
+def test_each_bounded_string_of_an_array_is_checked(monkeypatch):
     monkeypatch.setattr("rclzenoh.interfaces.catalog._FIELDDEFS", {**_FIELDDEFS})
     name = "made_up_msgs/msg/Bounded"
     catalog._add_message("made_up_msgs/msg/Bounded", ["string<=3[5] names\nstring<=2[] more\n"])

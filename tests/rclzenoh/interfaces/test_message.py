@@ -13,7 +13,7 @@ Float32MultiArray = get_message("std_msgs/msg/Float32MultiArray")
 UInt64MultiArray = get_message("std_msgs/msg/UInt64MultiArray")
 
 
-def test_fields_have_defaults_of_their_own():
+def test_messages_do_not_share_their_default_values():
     first, second = JointState(), JointState()
     first.header.frame_id = "base"
     first.name.append("a")
@@ -22,7 +22,7 @@ def test_fields_have_defaults_of_their_own():
 
 
 @pytest.mark.parametrize("value", [[1, 2.5], (1, 2.5), np.array([1, 2.5]), array.array("d", [1, 2.5])])
-def test_number_sequences_become_arrays_whatever_they_were_set_from(value):
+def test_any_sequence_of_numbers_becomes_an_array(value):
     message = JointState(position=value)
     assert message.position.dtype == np.float64
     assert message.position.tolist() == [1.0, 2.5]
@@ -30,7 +30,7 @@ def test_number_sequences_become_arrays_whatever_they_were_set_from(value):
     assert message.velocity.tolist() == [1.0, 2.5]
 
 
-def test_bytes_become_octets():
+def test_bytes_become_an_array_of_octets():
     assert Uuid(uuid=bytes(range(16))).uuid.tolist() == list(range(16))
 
 
@@ -47,7 +47,7 @@ def test_an_array_of_the_right_type_is_not_copied():
         ("ab", TypeError, "expected"),
     ],
 )
-def test_what_is_no_sequence_of_numbers_is_refused(value, error, match):
+def test_a_value_that_is_no_sequence_of_numbers_is_refused(value, error, match):
     with pytest.raises(error, match=match):
         JointState(position=value)
 
@@ -68,7 +68,7 @@ def test_floats_that_would_become_infinite_are_refused(value):
     assert (data[0], np.isnan(data[1]), data[2]) == (np.inf, True, 0)
 
 
-def test_small_and_very_large_numbers_stand_beside_one_another():
+def test_an_array_of_uint64_holds_small_and_very_large_numbers():
     numbers = [0, 2**63, 2**64 - 1]
     assert UInt64MultiArray(data=numbers).data.tolist() == numbers
     for wrong in ([-1, 2**63], [0, 2**64]):
@@ -82,7 +82,7 @@ def test_floats_are_not_taken_for_integers():
         Uuid(uuid=[0.5] * 16)
 
 
-def test_misspelt_fields_are_refused_and_the_known_ones_named():
+def test_a_misspelt_field_is_an_error_that_lists_the_known_ones():
     with pytest.raises(TypeError, match="no field 'positions'; known: header, name, position"):
         JointState(positions=[1.0])
     with pytest.raises(AttributeError, match="positions"):
@@ -107,7 +107,7 @@ def test_a_message_shows_its_fields():
     assert repr(get_message("geometry_msgs/msg/Point")(x=1.0)) == "geometry_msgs.msg.Point(x=1.0, y=0.0, z=0.0)"
 
 
-def test_field_types_are_told_as_rosidl_does():
+def test_field_types_are_named_as_in_rosidl():
     assert JointState.get_fields_and_field_types()["position"] == "sequence<double>"
     assert JointState.get_fields_and_field_types()["header"] == "std_msgs/Header"
     assert Uuid.get_fields_and_field_types() == {"uuid": "uint8[16]"}

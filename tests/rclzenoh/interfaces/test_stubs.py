@@ -1,4 +1,4 @@
-"""Files that scripts have written are those that they would write now."""
+"""Generated files in the repository match the output of their scripts."""
 
 import importlib.util
 from pathlib import Path
@@ -23,17 +23,17 @@ def generator():
     return load_script(GENERATOR)
 
 
-def test_the_messages_of_jazzy_are_those_of_rosbags():
+def test_the_file_of_jazzy_messages_matches_its_script():
     script = load_script(PACKAGING / "jazzy_messages.py")
     assert script.PATH.read_text(encoding="utf-8") == script.jazzy(), "python packaging/jazzy_messages.py writes it"
 
 
-def test_the_stubs_are_those_of_the_definitions(generator):
+def test_the_committed_stubs_match_the_definitions(generator):
     for path, text in generator.stubs().items():
         assert path.read_text(encoding="utf-8") == text, f"python packaging/{GENERATOR.name} writes {path.name} again"
 
 
-def test_a_part_of_a_typed_interface_has_to_be_typed_itself(generator, monkeypatch):
+def test_a_typed_interface_with_an_untyped_part_is_an_error(generator, monkeypatch):
     monkeypatch.setattr(generator, "MESSAGES", {"Header": "std_msgs/msg/Header"})
     with pytest.raises(ValueError, match="builtin_interfaces/msg/Time is part of a typed interface"):
         generator.stubs()
@@ -47,7 +47,7 @@ def test_a_part_of_a_typed_interface_has_to_be_typed_itself(generator, monkeypat
         (action, typed_names.ACTIONS, get_action),
     ],
 )
-def test_typed_names_are_those_of_the_classes(module, names, get):
+def test_typed_names_lead_to_the_interface_classes(module, names, get):
     assert {name: getattr(module, name) for name in names} == {name: get(full) for name, full in names.items()}
     with pytest.raises(AttributeError, match="has no attribute 'Nothing'"):
         _ = module.Nothing

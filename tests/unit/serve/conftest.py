@@ -44,7 +44,7 @@ def collected(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @dataclass
 class Served:
-    """An application, its keys, and what it is about."""
+    """An application with its keys and its instances."""
 
     app: Access
     keys: Keys
@@ -79,7 +79,7 @@ def served(catalogue: Catalogue, tmp_path: Path) -> Served:
 
 @pytest.fixture
 def client(served: Served) -> TestClient:
-    # It is not entered, as what goes on besides requests is none of most tests' business.
+    # The client is not entered as a context, so background tasks of the application do not run.
     return served.client()
 
 
@@ -118,7 +118,7 @@ def remember(tmp_path: Path) -> Iterator[Remember]:
 
 @pytest.fixture
 def begun(monkeypatch: pytest.MonkeyPatch, remember: Remember) -> list[dict[str, Any]]:
-    """What runs are begun from; they live at once, and do nothing."""
+    """A list of the orders of runs, filled by a stand-in that begins runs which live but do nothing."""
     asked: list[dict[str, Any]] = []
 
     def begin(config: Path, **options: Any) -> Run:

@@ -117,7 +117,7 @@ function watch(lacks) {
   return { watching, station, note, put, asked: () => asked.splice(0) };
 }
 
-test("a description that could not be had is asked for again with the next state", async () => {
+test("a missing description is asked for again with the next state", async () => {
   for (const what of ["scene", "urdf"]) {
     const lacks = new Set([what]);
     const { watching, station, note, put, asked } = watch(lacks);
@@ -138,7 +138,7 @@ test("a description that could not be had is asked for again with the next state
   }
 });
 
-test("what a run lacks that is watched no longer is not told", async () => {
+test("a note about missing parts of a run goes away when nobody watches it", async () => {
   const { watching, note, put } = watch(new Set(["scene", "urdf"]));
   const whole = put();
   watching.put(undefined);
@@ -146,7 +146,7 @@ test("what a run lacks that is watched no longer is not told", async () => {
   assert.equal(note.text, "");
 });
 
-test("an answer that comes late does not take the place of what was chosen since", async () => {
+test("a late answer does not replace the log that was chosen since", async () => {
   const answers = new Map();
   const ask = (_method, path) => new Promise((resolve) => answers.set(path.split("/").at(-1), (text) => resolve({ text: async () => text })));
   const records = new RunRecords({ ask });
@@ -171,7 +171,7 @@ function countThirds(map, farthest) {
   return [0, 1, 2].map((third) => dots.filter((x) => Math.min(2, Math.floor((x / farthest) * 3 + 1e-9)) === third).length);
 }
 
-test("of many landings of a collection that goes on, those that are drawn are evenly chosen", () => {
+test("the map draws an even selection of very many landings", () => {
   const map = new LandingMap(() => {});
   // Every landing is a millimetre farther than the one before; every fourth ball is dropped.
   const throws = Array.from({ length: 80_000 }, (_, i) => (i % 4 ? [i / 1000, 0, "landed", i] : [null, null, "dropped", i]));
@@ -211,7 +211,7 @@ function follow() {
   return { landings, server, put, asked };
 }
 
-test("the legend of a finished dataset counts all of its throws, on the map or not", async () => {
+test("the legend of a finished dataset counts all throws, also those that are not on the map", async () => {
   const { landings, server, put } = follow();
   const found = { landings: [[1, 0, "landed", 0], [2, 0, "landed", 2]], total: 4, outcomes: { landed: 4, dropped: 7 }, following: 0, is_finished: true, has_more: false };
   server.answer = async () => found;
@@ -235,7 +235,7 @@ test("the grid of the map has some lines, however far away a target is", () => {
   }
 });
 
-test("a landing among very many throws that have none is drawn", () => {
+test("the map draws a single landing among very many dropped throws", () => {
   const map = new LandingMap(() => {});
   map.addAll(Array.from({ length: 30_000 }, (_, i) => [null, null, "dropped", i]));
   assert.equal(get("map-text").textContent, "None of these throws has landed.");
@@ -244,7 +244,7 @@ test("a landing among very many throws that have none is drawn", () => {
   assert.equal(get("legend").textContent, "dropped 30000, landed 1");
 });
 
-test("landings that could not be had without a connection are asked for again", async () => {
+test("the page asks again for landings after a lost connection", async () => {
   const { landings, server, put, asked } = follow();
   const summary = {};
   for (const facts of [{ summary }, { summary: null }]) {
@@ -263,7 +263,7 @@ test("landings that could not be had without a connection are asked for again", 
   landings.begin(null);
 });
 
-test("a problem is told once, and several all of them", () => {
+test("a single problem is shown once, and several problems are all shown", () => {
   const place = makeElement();
   const one = { key: "trials", message: "should be above 0" };
   showProblem(place, new Problem(422, { title: "trials: should be above 0", problems: [one] }));
@@ -277,7 +277,7 @@ test("a problem is told once, and several all of them", () => {
   assert.equal(place.textContent, "the request is wrongtrials: should be above 0no such filetry: ask");
 });
 
-test("a zoom of the last seconds ends with them, and one of replays stays from throw to throw", async () => {
+test("a zoom of a replay stays from throw to throw, and one of live values ends with the live view", async () => {
   const panel = new PlotPanel({ simulation: "sim_0", field: "ball", name: "z", link: "hand" }, false, () => {});
   const zoomIn = made.find(({ textContent }) => textContent === "+");
   const makeThrow = (trial) => ({

@@ -22,7 +22,7 @@ const bytes = readFileSync(process.env.THROW);
 const thrown = () => decodeThrow(bytes.buffer.slice(bytes.byteOffset, bytes.byteOffset + bytes.length));
 const near = (a, b) => assert.ok(Math.abs(a - b) < 1e-6, `${a} is not ${b}`);
 
-test("a throw is decoded as it was encoded", () => {
+test("decodeThrow restores an encoded throw", () => {
   const { trial, outcome, joints, samples, duration, landing } = thrown();
   assert.deepEqual({ trial, outcome, joints, samples, landing }, {
     trial: 7, outcome: "landed", joints: ["elbow", "wrist"], samples: 3, landing: [1.5, -0.25, 0],
@@ -30,7 +30,7 @@ test("a throw is decoded as it was encoded", () => {
   near(duration, 0.02);
 });
 
-test("between two samples, joints and ball are between both", () => {
+test("joints and ball are interpolated between two samples", () => {
   jointsAt(thrown(), 0.005).forEach((value, i) => near(value, [0.5, 10.5][i]));
   ballAt(thrown(), 0.015).forEach((value, i) => near(value, [1.5, 2.5, 3.5][i]));
   assert.deepEqual(jointsAt(thrown(), 99), [2, 12]);
@@ -50,7 +50,7 @@ test("a panel goes to the nearest place where it covers no other one", () => {
   assert.deepEqual(placeApart(box, [], { most: 50, lowest: 0 }), { left: 100, top: 4 });
 });
 
-test("velocities are slopes, and efforts are not made up", () => {
+test("velocities come from positions, and there is no series of efforts", () => {
   seriesOf(thrown(), "velocity", "wrist").forEach((value) => near(value, 100));
   assert.deepEqual([...seriesOf(thrown(), "ball", "z")], [2, 3, 4]);
   assert.equal(seriesOf(thrown(), "effort", "wrist"), null);
@@ -71,7 +71,7 @@ test("a newer throw waits for the end of the one that is shown", () => {
   assert.deepEqual(began, [1, 3]);
 });
 
-test("slow replays take as much longer, and one that stands still stays", () => {
+test("a slow replay takes longer, and a replay that was moved by hand stands still", () => {
   const playback = new Playback(() => {});
   playback.put({ ...thrown(), simulation: "sim_0", duration: 1 });
   playback.speed = 0.1;
@@ -82,13 +82,13 @@ test("slow replays take as much longer, and one that stands still stays", () => 
   near(playback.at("sim_0").time, 0.5);
 });
 
-test("collections that want successes count successes", () => {
+test("the progress of a collection until enough successes counts successes", () => {
   const progress = { ended: 30, total: 100, outcomes: { landed: 12, dropped: 18 }, wanted: null, success: "landed" };
   assert.deepEqual(steps(progress), [30, 100]);
   assert.deepEqual(steps({ ...progress, wanted: 10 }), [10, 10]);
 });
 
-test("simulations are in the order of their numbers", () => {
+test("simulations are sorted by their numbers", () => {
   assert.deepEqual(inOrder(["sim_10", "sim_2", "sim_1"]), ["sim_1", "sim_2", "sim_10"]);
 });
 
@@ -107,7 +107,7 @@ test("a collection around a place lands around its distance, and at its height",
   });
 });
 
-test("a topic is announced once for each connection, and whoever may not publish is told", () => {
+test("a topic is advertised once for each connection, and a refusal is reported", () => {
   const sent = [];
   const told = [];
   let events;
@@ -141,19 +141,19 @@ test("a coarse mesh keeps its extent with fewer triangles, and edges stay sharp"
   assert.ok(box.getAttribute("position").count > 8);
 });
 
-test("a run lives from its plan to its end", () => {
+test("a run counts as living while it is planning, starting or running", () => {
   const statuses = ["planning", "starting", "running", "ended", "died"];
   assert.deepEqual(statuses.map((status) => lives({ status })), [true, true, true, false, false]);
 });
 
-test("a container is watched by nobody who has not asked for it", () => {
+test("a container can be watched only if the address names it", () => {
   const runs = [["ear", "container", "running"], ["talos", "session", "running"], ["old", "collection", "ended"]];
   const instances = runs.map(([id, kind, status]) => ({ id, kind, status }));
   assert.deepEqual(watchable(instances, [null]), ["talos"]);
   assert.deepEqual(watchable(instances, ["old", "ear"]), ["ear", "talos", "old"]);
 });
 
-test("a model is told in sentences, before and after it was adapted", () => {
+test("a model is described in sentences, before and after it was adapted", () => {
   const model = {
     learned_from: "quick", throws: 1021, error: 0.0021, parameters: ["task.duration_s"], targets: ["landing_x_m", "landing_y_m"],
     adaptation: null, score: null,
@@ -166,14 +166,14 @@ test("a model is told in sentences, before and after it was adapted", () => {
   assert.match(describe({ ...model, adaptation: { ...adaptation, throws: 1, before: [0.1], after: [] } }), /by 1 throw \(bias\): .* 10\.00 cm from their prediction before \(median\)/);
 });
 
-test("errors are rows, those in another world behind those in the own one", () => {
+test("errors of a score become rows, first those in the own world, then those in another one", () => {
   const errors = { unit: "m", median: 0.01, share90: 0.02, largest: null, others: [] };
   const rows = tabulate({ trained: [{ trained_on: 30, errors }], adapted: [{ real_throws: 0, method: "none", errors }, { real_throws: 1, method: "offset", errors }] });
   assert.deepEqual(rows.map(([text]) => text), ["learned from 30 throws", "other world, not adapted", "other world, 1 throw there (offset)"]);
   assert.deepEqual(rows[0].slice(1), ["1.00\u00a0cm", "2.00\u00a0cm", "–"]);
 });
 
-test("misses are told in the unit of their targets", () => {
+test("misses are shown in the unit of their targets", () => {
   const angle = { unit: "rad", median: Math.PI / 180, share90: Math.PI / 90, largest: null, others: [] };
   const several = { unit: "m", median: 0.01, share90: 0.02, largest: null, others: [angle, { unit: "s", median: 0.5, share90: 1, largest: null }] };
   const rows = tabulate({ trained: [{ trained_on: 30, errors: angle }, { trained_on: 60, errors: several }], adapted: [] });
@@ -181,7 +181,7 @@ test("misses are told in the unit of their targets", () => {
   assert.deepEqual(rows[1].slice(1), ["1.00\u00a0cm, 1.00°, 0.5\u00a0s", "2.00\u00a0cm, 2.00°, 1\u00a0s", "–"]);
 });
 
-test("what is drawn of a model is told as well", () => {
+test("the landings that are drawn of a model are also described in words", () => {
   assert.equal(describeModel(null), "");
   const throws = [{ target: [1, 0], place: [1, 0.01] }, { target: [1, 1], place: null }];
   assert.match(describeModel({ name: "quick", reached: [[1, 0]], throws }), /^Grey: 1 .* quick .* 2 targets, .* 10 times as long; at 1 of them no throw landed\.$/);

@@ -1,4 +1,4 @@
-"""Who is let in, and who is not: one test for each way of trying."""
+"""Access to the server by tokens, codes, origins and names of hosts: one test for each way in."""
 
 import logging
 from collections.abc import Iterator
@@ -24,7 +24,7 @@ def problem_of(answer: Any, status: int) -> str:
 
 
 @pytest.mark.parametrize("token", ["", "wrong", "wröng"])
-def test_nobody_without_a_token_gets_anything(served: Served, token: str) -> None:
+def test_requests_without_a_valid_token_are_refused(served: Served, token: str) -> None:
     client = served.client("")
     headers = {"Authorization": f"Bearer {token}".encode("latin-1")} if token else {}
     for path in (STATE, "/api/v1/instances", "/openapi.json", "/api/v1/nothing", "/%61pi/v1/state"):
@@ -33,14 +33,14 @@ def test_nobody_without_a_token_gets_anything(served: Served, token: str) -> Non
         assert answer.headers["www-authenticate"] == "Bearer"
 
 
-def test_a_token_in_the_address_counts_for_sockets_alone(served: Served) -> None:
+def test_a_token_in_the_address_is_accepted_only_for_sockets(served: Served) -> None:
     client = served.client("")
     assert client.get(f"{STATE}?token={served.keys.full}").status_code == 401
     with served.socket(f"{STATE}?token={served.keys.full}") as socket:
         assert socket.receive_json()["version"] == 1
 
 
-def test_anybody_may_have_the_page_and_know_that_it_serves(served: Served) -> None:
+def test_the_page_and_the_health_route_need_no_token(served: Served) -> None:
     client = served.client("")
     assert client.get("/api/v1/health").json()["status"] == "ok"
     assert "html" in client.get("/").headers["content-type"]
@@ -48,7 +48,7 @@ def test_anybody_may_have_the_page_and_know_that_it_serves(served: Served) -> No
         assert client.get(path).status_code == 404, path
 
 
-def test_every_answer_forbids_what_a_page_does_not_need(served: Served) -> None:
+def test_every_answer_has_restrictive_security_headers(served: Served) -> None:
     for answer in (served.client().get("/"), served.client().get(STATE), served.client("").get(STATE)):
         assert "default-src 'self'" in answer.headers["content-security-policy"]
         assert "frame-ancestors 'none'" in answer.headers["content-security-policy"]
@@ -56,17 +56,17 @@ def test_every_answer_forbids_what_a_page_does_not_need(served: Served) -> None:
         assert not [name for name in answer.headers if name.startswith("access-control") or name == "set-cookie"]
 
 
-def test_the_page_connects_to_this_server_alone(served: Served) -> None:
+def test_the_policy_lets_the_page_connect_only_to_this_server(served: Served) -> None:
     def connections(**headers: str) -> str:
         policy = served.client("").get("/", headers=headers).headers["content-security-policy"]
         return next(rule for rule in policy.split("; ") if rule.startswith("connect-src"))
 
     assert connections() == f"connect-src 'self' ws://{HOST} wss://{HOST}"
-    # What a stranger names is not repeated.
+    # The policy does not repeat an unknown name of a host.
     assert connections(Host="evil.example; script-src *") == "connect-src 'self'"
 
 
-def test_who_may_only_look_changes_nothing(served: Served) -> None:
+def test_a_read_only_token_cannot_change_anything(served: Served) -> None:
     client = served.client(served.keys.read_only)
     assert client.get(STATE).status_code == 200
     for method, path, content in (
@@ -81,25 +81,25 @@ def test_who_may_only_look_changes_nothing(served: Served) -> None:
         assert problem_of(answer, 403) == "this token may only look"
 
 
-def test_who_may_only_look_slows_no_simulation_down(served: Served) -> None:
+def test_a_read_only_token_cannot_slow_down_a_simulation(served: Served) -> None:
     path = "/api/v1/instances/a/live/sim_0"
     with served.socket(path, served.keys.read_only) as socket, pytest.raises(WebSocketDisconnect) as end:
         socket.receive_text()
     assert (end.value.code, end.value.reason) == (4403, "this token may only look")
 
 
-def test_pages_of_others_get_nothing(served: Served) -> None:
+def test_requests_from_pages_of_other_origins_are_refused(served: Served) -> None:
     client = served.client()
     for origin in ("http://evil.example", "null", f"http://{HOST}.evil.example", "http://127.0.0.1"):
         for path in (STATE, "/", "/api/v1/health", "/api/v1/exchange"):
             assert "origin" in problem_of(client.get(path, headers={"Origin": origin}), 403)
 
 
-def test_our_own_page_may_connect(served: Served) -> None:
+def test_requests_from_the_page_of_the_server_are_accepted(served: Served) -> None:
     assert served.client().get(STATE, headers={"Origin": f"http://{HOST}"}).status_code == 200
 
 
-def test_a_name_that_is_not_ours_gets_nothing(served: Served) -> None:
+def test_requests_with_a_foreign_host_name_are_refused(served: Served) -> None:
     client = served.client()
     for host in ("evil.example", "evil.example:8080", "127.0.0.1", "127.0.0.1:80", ""):
         for path in (STATE, "/", "/api/v1/health"):
@@ -114,7 +114,7 @@ def parts(size: int) -> Iterator[bytes]:
 
 @pytest.mark.parametrize("path", ["/api/v1/instances", "/api/v1/exchange"])
 @pytest.mark.parametrize("with_length", [True, False])
-def test_a_body_that_is_too_long_is_not_taken(served: Served, path: str, with_length: bool) -> None:
+def test_a_body_that_is_too_long_is_refused(served: Served, path: str, with_length: bool) -> None:
     content = 1_001_000 * b" " if with_length else parts(1_001_000)
     answer = served.client().post(path, content=content, headers={"Content-Type": "application/json"})
     assert problem_of(answer, 413) == "a body may have 1000000 bytes"
@@ -127,7 +127,7 @@ def test_a_body_of_the_largest_size_is_read(served: Served, with_length: bool) -
     assert answer.status_code == 422
 
 
-def test_a_length_that_is_none_is_refused(served: Served) -> None:
+def test_a_malformed_content_length_is_refused(served: Served) -> None:
     client = served.client()
     for length in ("-1", "1e3", "0x10", ""):
         assert problem_of(client.get(STATE, headers={"Content-Length": length}), 413)
@@ -142,7 +142,9 @@ def test_a_socket_without_a_token_is_not_opened(served: Served) -> None:
 
 
 @pytest.mark.parametrize(("headers", "status"), [({"Origin": "http://evil.example"}, 403), ({"Host": "evil"}, 421)])
-def test_a_socket_of_somebody_else_is_not_opened(served: Served, headers: dict[str, str], status: int) -> None:
+def test_a_socket_with_a_foreign_origin_or_host_is_refused(
+    served: Served, headers: dict[str, str], status: int
+) -> None:
     with (
         pytest.raises(WebSocketDenialResponse) as refused,
         served.socket(STATE, served.keys.full, headers=headers),
@@ -166,7 +168,7 @@ def exchange(client: TestClient, code: str) -> Any:
     return client.post("/api/v1/exchange", json={"code": code})
 
 
-def test_one_socket_too_many_is_not_opened(served: Served, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_socket_beyond_the_limit_is_refused(served: Served, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(access, "_MOST_SOCKETS", 1)
     with served.socket(STATE, served.keys.full) as first:
         first.receive_text()
@@ -177,7 +179,7 @@ def test_one_socket_too_many_is_not_opened(served: Served, monkeypatch: pytest.M
         after.receive_text()
 
 
-def test_a_code_is_exchanged_once(served: Served) -> None:
+def test_a_code_can_be_exchanged_only_once(served: Served) -> None:
     code = served.client().post("/api/v1/codes").json()["code"]
     anybody = served.client("")
     assert exchange(anybody, code).json() == {"token": served.keys.full}
@@ -198,7 +200,7 @@ def test_a_code_lasts_ten_minutes(monkeypatch: pytest.MonkeyPatch) -> None:
     assert keys.exchange(late) is None
 
 
-def test_codes_that_nobody_exchanged_are_not_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_expired_codes_are_forgotten(monkeypatch: pytest.MonkeyPatch) -> None:
     now = 1000.0
     monkeypatch.setattr(access, "time", SimpleNamespace(monotonic=lambda: now))
     keys = Keys()
@@ -208,9 +210,7 @@ def test_codes_that_nobody_exchanged_are_not_kept(monkeypatch: pytest.MonkeyPatc
     assert len(keys._codes) == 1
 
 
-def test_each_request_leaves_a_line_without_what_follows_the_path(
-    served: Served, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_the_log_line_of_a_request_has_no_query_and_no_token(served: Served, caplog: pytest.LogCaptureFixture) -> None:
     caplog.set_level(logging.INFO, "throwcollect.serve")
     full, read_only = served.keys.full, served.keys.read_only
     served.client().get("/api/v1/health?token=abc")
@@ -218,7 +218,7 @@ def test_each_request_leaves_a_line_without_what_follows_the_path(
     served.client(read_only).post("/api/v1/codes")
     served.client("").get(STATE)
     with served.socket(f"{STATE}?token={read_only}"):
-        # It is written when the socket is opened, as it may be open for days.
+        # The line is written when a socket opens, as it may stay open for days.
         assert caplog.messages[-1] == "SOCKET /api/v1/state 101 read-only"
     with pytest.raises(WebSocketDenialResponse), served.socket(f"{STATE}?token=guessed"):
         pass
@@ -235,7 +235,7 @@ def test_each_request_leaves_a_line_without_what_follows_the_path(
     assert not [line for line in caplog.messages if full in line or read_only in line]
 
 
-def test_what_fails_unexpectedly_leaves_a_line_and_a_problem(
+def test_an_unexpected_error_gives_a_log_line_and_a_problem_response(
     served: Served, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     caplog.set_level(logging.INFO, "throwcollect.serve")

@@ -1,4 +1,4 @@
-"""Catalogues, and what their messages say."""
+"""Catalogues, and messages about mistakes in them."""
 
 from pathlib import Path
 
@@ -22,7 +22,7 @@ def write(directory: Path, text: str) -> Path:
     return path
 
 
-def test_components_are_read(directory: Path) -> None:
+def test_a_catalogue_is_read_with_its_components(directory: Path) -> None:
     first = "{config: small.yaml, pretty_name: Throws of A, max_instances: 3}"
     catalogue = Catalogue.read(write(directory, f"components:\n  a: {first}\n  b: {{session: small.yaml}}\n"))
     a, b = catalogue.get("a"), catalogue.get("b")
@@ -38,7 +38,7 @@ def test_components_are_read(directory: Path) -> None:
     assert error.value.expected == "one of a, b"
 
 
-def test_a_container_has_what_the_catalogue_says(directory: Path) -> None:
+def test_a_container_component_is_read_with_all_its_keys(directory: Path) -> None:
     (directory / "a.urdf").write_text("<robot/>")
     text = (
         "components:\n  a:\n    image: x\n    command: [run, it]\n    environment: {LAB: north}\n    networks: [lab]\n"
@@ -49,14 +49,14 @@ def test_a_container_has_what_the_catalogue_says(directory: Path) -> None:
     assert (a.kind, a.source, a.urdf) == ("container", ContainerSpec("x", ("run", "it"), node), directory / "a.urdf")
 
 
-def test_a_configuration_is_the_only_component(directory: Path) -> None:
+def test_a_configuration_alone_gives_a_catalogue_of_one_component(directory: Path) -> None:
     catalogue = Catalogue.find(directory / "small.yaml")
     assert [(each.name, each.kind, each.max_instances) for each in catalogue.components.values()] == [
         ("small", "collection", 1)
     ]
 
 
-def test_without_a_catalogue_nothing_can_be_begun(directory: Path) -> None:
+def test_without_a_catalogue_every_component_is_unknown(directory: Path) -> None:
     catalogue = Catalogue.find(directory / "none.yaml")
     with pytest.raises(NotFoundError, match="no component 'a'") as error:
         catalogue.get("a")
@@ -105,7 +105,7 @@ def test_without_a_catalogue_nothing_can_be_begun(directory: Path) -> None:
         ("components: {a: \n", "not valid YAML"),
     ],
 )
-def test_mistakes_are_told_with_line_and_key(directory: Path, text: str, message: str) -> None:
+def test_mistakes_in_a_catalogue_are_reported_with_line_and_key(directory: Path, text: str, message: str) -> None:
     path = write(directory, text)
     with pytest.raises(ConfigError) as error:
         Catalogue.read(path)
@@ -113,7 +113,7 @@ def test_mistakes_are_told_with_line_and_key(directory: Path, text: str, message
     assert message.replace("DIRECTORY", str(directory)) in str(error.value)
 
 
-def test_mistakes_in_a_configuration_are_told_with_its_own_line(directory: Path) -> None:
+def test_mistakes_in_a_configuration_are_reported_with_its_own_line(directory: Path) -> None:
     (directory / "small.yaml").write_text("name: small\ntrails: 3\n")
     path = write(directory, "components:\n  a:\n    session: small.yaml\n")
     with pytest.raises(ConfigError) as error:

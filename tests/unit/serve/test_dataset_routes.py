@@ -1,4 +1,4 @@
-"""What clients get of a dataset, and what they do not."""
+"""Routes by which clients get files, archive and landings of a dataset."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def directory(collected: Path, tmp_path: Path, remember: Remember) -> Path:
     return directory
 
 
-def test_files_are_those_of_the_dataset(client: TestClient, directory: Path) -> None:
+def test_the_listed_files_are_those_of_the_dataset(client: TestClient, directory: Path) -> None:
     listed = client.get(f"{URL}/a/files").json()
     assert {"config.yaml", "throws.parquet"} <= {each["path"] for each in listed}
     for each in listed:
@@ -40,7 +40,9 @@ def test_files_are_those_of_the_dataset(client: TestClient, directory: Path) -> 
     assert client.get(f"{URL}/a/files/throws.parquet", headers={"Range": "bytes=99999999-"}).status_code == 416
 
 
-def test_nothing_else_is_given(client: TestClient, directory: Path, tmp_path: Path) -> None:
+def test_files_that_do_not_belong_to_the_dataset_are_not_found(
+    client: TestClient, directory: Path, tmp_path: Path
+) -> None:
     (tmp_path / "secret").write_text("secret")
     (directory / "notes.txt").write_text("mine")
     paths = [
@@ -59,7 +61,9 @@ def test_nothing_else_is_given(client: TestClient, directory: Path, tmp_path: Pa
 
 
 @pytest.mark.parametrize("name", ["throws.parquet", "README.md", "datapackage.json"])
-def test_a_link_leads_nowhere(client: TestClient, directory: Path, tmp_path: Path, name: str) -> None:
+def test_a_symbolic_link_in_a_dataset_is_not_followed(
+    client: TestClient, directory: Path, tmp_path: Path, name: str
+) -> None:
     (tmp_path / "secret").write_text("secret")
     (directory / name).unlink()
     (directory / name).symlink_to(tmp_path / "secret")
@@ -70,7 +74,7 @@ def test_a_link_leads_nowhere(client: TestClient, directory: Path, tmp_path: Pat
         assert "secret\n" not in answer.text
 
 
-def test_the_archive_is_the_dataset(client: TestClient, directory: Path) -> None:
+def test_the_archive_holds_all_files_of_the_dataset(client: TestClient, directory: Path) -> None:
     answer = client.get(f"{URL}/a/dataset.tar")
     assert answer.headers["content-disposition"] == 'attachment; filename="a.tar"'
     with tarfile.open(fileobj=io.BytesIO(answer.content)) as archive:
@@ -79,7 +83,7 @@ def test_the_archive_is_the_dataset(client: TestClient, directory: Path) -> None
     assert client.get(f"{URL}/a/dataset.tar").content == answer.content
 
 
-def test_landings_and_the_report_are_made_of_it(client: TestClient, directory: Path) -> None:
+def test_the_landings_of_a_finished_dataset_are_returned(client: TestClient, directory: Path) -> None:
     found = client.get(f"{URL}/a/landings").json()
     landings = found["landings"]
     assert [(outcome, trial) for _, _, outcome, trial in landings] == [("landed", 0), ("landed", 1), ("landed", 2)]
@@ -87,21 +91,23 @@ def test_landings_and_the_report_are_made_of_it(client: TestClient, directory: P
     assert (found["total"], found["is_finished"], found["has_more"]) == (3, True, False)
 
 
-def test_of_many_landings_some_are_given(client: TestClient, directory: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_too_many_landings_are_thinned_out(
+    client: TestClient, directory: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(dataset_routes, "_MOST_LANDINGS", 2)
     found = client.get(f"{URL}/a/landings").json()
     assert (found["total"], [trial for *_, trial in found["landings"]]) == (3, [0, 2])
     assert found["outcomes"] == {"landed": 3}
 
 
-def test_landings_are_given_while_they_come(client: TestClient, directory: Path, remember: Remember) -> None:
-    """Those of a dataset that grows are the same as those of the finished one, in parts and in order of arrival."""
+def test_landings_of_a_growing_dataset_come_in_parts(client: TestClient, directory: Path, remember: Remember) -> None:
+    """A growing dataset gives the same landings as the finished one, but in parts and in order of arrival."""
     finished = client.get(f"{URL}/a/landings").json()["landings"]
     remember("growing", directory=str(directory))
     journal = directory / "logs" / "journal.jsonl"
     lines = journal.read_bytes().splitlines(keepends=True)
     commits = [number for number, line in enumerate(lines) if b'"commit"' in line]
-    # The last of the first two lines is being written.
+    # The journal ends within the second commit, as if it was just being written.
     journal.write_bytes(b"".join(lines[: commits[1]]) + lines[commits[1]][:-20])
     first = client.get(f"{URL}/growing/landings").json()
     assert (len(first["landings"]), first["is_finished"], first["has_more"]) == (1, False, False)
@@ -112,7 +118,7 @@ def test_landings_are_given_while_they_come(client: TestClient, directory: Path,
     assert (last["landings"], last["following"]) == ([], then["following"])
 
 
-def test_a_long_journal_is_given_in_parts(
+def test_landings_of_a_long_journal_come_in_parts(
     client: TestClient, directory: Path, remember: Remember, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     remember("growing", directory=str(directory))
@@ -128,7 +134,7 @@ def test_a_long_journal_is_given_in_parts(
     assert (len(landings), asked > 2) == (3, True)
 
 
-def test_without_a_journal_nothing_has_landed(client: TestClient, directory: Path, remember: Remember) -> None:
+def test_without_a_journal_there_are_no_landings(client: TestClient, directory: Path, remember: Remember) -> None:
     remember("growing", directory=str(directory))
     (directory / "logs" / "journal.jsonl").unlink()
     assert client.get(f"{URL}/growing/landings").json()["landings"] == []
@@ -138,7 +144,7 @@ def test_without_a_journal_nothing_has_landed(client: TestClient, directory: Pat
     assert refused.json()["title"].endswith(", got '-1'")
 
 
-def test_what_is_not_finished_is_not_given(client: TestClient, directory: Path, remember: Remember) -> None:
+def test_files_of_an_unfinished_dataset_are_refused(client: TestClient, directory: Path, remember: Remember) -> None:
     remember("growing", directory=str(directory))
     remember("torn", **make_end_fields(exit_code=3))
     remember("session", **make_end_fields(kind="session"))
@@ -151,16 +157,16 @@ def test_what_is_not_finished_is_not_given(client: TestClient, directory: Path, 
             assert client.get(f"{URL}/{name}/{what}").status_code == 404, (name, what)
 
 
-def test_a_dataset_that_somebody_goes_on_with_is_not_given(
+def test_files_of_a_dataset_that_another_run_continues_are_refused(
     client: TestClient, directory: Path, remember: Remember
 ) -> None:
-    """Another run collects into the directory of one that has ended."""
+    """A second run collects into the directory of an ended one."""
     assert client.get(f"{URL}/a/files").status_code == 200
     remember("again", directory=str(directory))
     assert client.get(f"{URL}/a/files").status_code == 409
 
 
-def test_a_damaged_manifest_is_told(client: TestClient, directory: Path) -> None:
+def test_a_damaged_manifest_is_an_error(client: TestClient, directory: Path) -> None:
     manifest = json.loads((directory / "datapackage.json").read_text())
     manifest["resources"][0]["path"] = "../secret"
     (directory / "datapackage.json").write_text(json.dumps(manifest))

@@ -1,4 +1,4 @@
-"""How programs find the server that lives, and no other."""
+"""Programs find a living server by its file, and ignore files of dead ones."""
 
 from __future__ import annotations
 
@@ -60,8 +60,8 @@ def test_a_server_is_found_as_long_as_it_serves(state: Path) -> None:
         assert not (state / "serve.json").exists()
 
 
-def test_what_a_killed_server_has_left_is_not_believed(state: Path) -> None:
-    """Somebody else may have its port by now, or its pid."""
+def test_the_file_of_a_killed_server_is_ignored(state: Path) -> None:
+    """Another process may have the port or the pid of the killed server by now."""
     with answering() as address:
         text = json.dumps(vars(address))
         code = (
@@ -83,13 +83,13 @@ def test_a_damaged_file_names_no_server(state: Path, text: str) -> None:
 @pytest.mark.parametrize(
     "url", ["http://127.0.0.1:1", "http://127.0.0.1:x", "", "nonsense", "http://[::1", "http://a b:80"]
 )
-def test_a_server_that_does_not_answer_is_none(url: str) -> None:
+def test_a_server_that_does_not_answer_is_not_found(url: str) -> None:
     with publish(Address(url, "full", "read-only", 1)):
         assert find_server() is None
 
 
 @pytest.mark.parametrize(("status", "text"), [(500, b"{}"), (200, b"<html>"), (200, b"[]"), (421, b"{}")])
-def test_what_answers_otherwise_is_no_server(status: int, text: bytes) -> None:
+def test_a_wrong_health_answer_is_not_taken_for_a_server(status: int, text: bytes) -> None:
     with answering(status, text) as address, publish(address):
         assert find_server() is None
         with pytest.raises(WorkerError, match="the server does not answer"):
@@ -102,7 +102,7 @@ def test_the_second_of_two_servers_is_found_when_the_first_has_ended(state: Path
             with publish(second):
                 assert find_server() == first
             assert find_server() == first
-            # It has left before its turn came, so it is not found afterwards.
+            # The second server has ended before the first one, so it is not found afterwards.
         waiting = replace(second, pid=2)
         with publish(waiting):
             for _ in range(200):
@@ -112,7 +112,7 @@ def test_the_second_of_two_servers_is_found_when_the_first_has_ended(state: Path
             assert find_server() == waiting
 
 
-def test_a_full_disk_is_told(state: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_publishing_an_address_on_a_full_disk_is_an_error(state: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def fail(path: Path, data: bytes) -> None:
         raise DatasetError("cannot be written: No space left on device", path=path)
 
@@ -121,14 +121,14 @@ def test_a_full_disk_is_told(state: Path, monkeypatch: pytest.MonkeyPatch) -> No
         pass
 
 
-def test_a_page_has_a_code_and_names_a_run() -> None:
+def test_the_address_of_the_page_has_a_code_and_names_the_run() -> None:
     with answering() as address:
         assert make_page_address(address, "small-1") == f"{address.url}/#code=abc&run=small-1"
         assert make_page_address(address) == f"{address.url}/#code=abc"
         assert "full" not in make_page_address(address)
 
 
-def test_what_keeps_a_server_from_starting_is_told(
+def test_a_server_that_fails_to_start_is_an_error_with_its_output(
     state: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     script = tmp_path / "python"

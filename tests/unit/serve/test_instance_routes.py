@@ -1,4 +1,4 @@
-"""What clients may say to the routes of instances, in which form, and what they are answered."""
+"""Requests to the routes of instances: their form, and the answers to malformed ones."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ URL = "/api/v1/instances"
         "throws",
     ],
 )
-def test_a_request_of_another_form_is_refused(client: TestClient, begun: list[dict[str, Any]], wish: Any) -> None:
+def test_a_body_with_wrong_keys_or_types_is_refused(client: TestClient, begun: list[dict[str, Any]], wish: Any) -> None:
     answer = client.put(f"{URL}/a", json=wish)
     assert answer.status_code == 422
     assert answer.json()["problems"]
@@ -65,7 +65,7 @@ def test_a_request_of_another_form_is_refused(client: TestClient, begun: list[di
         ([], "", "the body should be {component: …}, got an empty list"),
     ],
 )
-def test_what_is_wrong_with_a_body_is_told_as_with_a_configuration(
+def test_a_wrong_key_of_a_body_is_reported_as_in_a_configuration(
     client: TestClient, wish: Any, key: str, message: str
 ) -> None:
     answer = client.put(f"{URL}/a", content=json.dumps(wish).encode(), headers={"Content-Type": "application/json"})
@@ -80,7 +80,7 @@ def test_what_is_wrong_with_a_body_is_told_as_with_a_configuration(
     )
 
 
-def test_each_key_of_a_body_is_told(client: TestClient) -> None:
+def test_every_wrong_key_of_a_body_is_reported(client: TestClient) -> None:
     answer = client.put(f"{URL}/a", json={"simulations": 0, "image": "ubuntu"})
     assert [each["key"] for each in answer.json()["problems"]] == ["image", "component", "simulations"]
     scaled = client.patch(f"{URL}/a", json={"simulations": "x"}).json()
@@ -88,14 +88,14 @@ def test_each_key_of_a_body_is_told(client: TestClient) -> None:
     assert client.post("/api/v1/exchange", json={"code": 3}).json()["title"] == "code: should be text, got 3"
 
 
-def test_a_body_that_is_no_json_is_told_in_one_sentence(client: TestClient) -> None:
+def test_a_body_that_is_no_json_gets_one_sentence(client: TestClient) -> None:
     torn = client.put(f"{URL}/a", content=b"{", headers={"Content-Type": "application/json"}).json()
     assert torn["title"].startswith("the body is not valid JSON: ")
     untold = client.put(f"{URL}/a", content=b"{}").json()
     assert untold["title"] == "the body should be JSON, and the header Content-Type should be application/json"
 
 
-def test_what_is_no_json_is_refused(client: TestClient) -> None:
+def test_a_body_that_is_no_json_is_refused(client: TestClient) -> None:
     for content in (
         b"{",
         b"\xff",
@@ -108,34 +108,34 @@ def test_what_is_no_json_is_refused(client: TestClient) -> None:
 
 
 @pytest.mark.parametrize("name", ["-rf", "A", "a.b", "a b", "ä", 64 * "a", "a%0A", "%00", "..%2fa", ".."])
-def test_ids_of_strange_form_begin_nothing(client: TestClient, begun: list[dict[str, Any]], name: str) -> None:
+def test_a_malformed_id_begins_no_instance(client: TestClient, begun: list[dict[str, Any]], name: str) -> None:
     assert client.put(f"{URL}/{name}", json={"component": "throws"}).status_code in (404, 405, 422)
     assert not begun
     assert client.get(f"{URL}/{name}").status_code == 404 or name == ".."
     assert client.get(f"{URL}/{name}/events").status_code == 404
 
 
-def test_a_component_that_is_none_is_not_found(client: TestClient) -> None:
+def test_an_unknown_component_is_not_found(client: TestClient) -> None:
     answer = client.put(f"{URL}/a", json={"component": "nothing"})
     assert (answer.status_code, answer.json()["expected"]) == (404, "one of throws, talos")
     assert client.get("/api/v1/components/nothing").status_code == 404
     assert client.get("/api/v1/components/talos").json()["kind"] == "session"
 
 
-def test_an_id_is_chosen_for_who_has_none(client: TestClient) -> None:
+def test_a_request_without_an_id_gets_one(client: TestClient) -> None:
     answer = client.post(URL, json={"component": "throws"})
     assert answer.status_code == 202
     assert answer.headers["location"] == f"{URL}/{answer.json()['id']}"
     assert client.get(answer.headers["location"]).status_code == 200
 
 
-def test_an_id_that_is_chosen_fits_however_long_the_name_of_the_component_is() -> None:
+def test_a_chosen_id_is_valid_even_for_a_long_component_name() -> None:
     for name in ("c", "c" * 63):
         assert re.fullmatch(NAME, make_id(name))
         assert make_id(name).startswith(name[:51])
 
 
-def test_logs_and_events_are_read_where_they_lie(client: TestClient, remember: Remember, tmp_path: Path) -> None:
+def test_logs_and_events_of_an_instance_can_be_read(client: TestClient, remember: Remember, tmp_path: Path) -> None:
     remember("a")
     assert client.get(f"{URL}/a/log/sim_0").status_code == 404
     assert client.get(f"{URL}/a/events").content == b""

@@ -1,4 +1,4 @@
-"""What clients may ask of instances, without any process."""
+"""Requests about instances, without any process of a run."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def put(client: TestClient, name: str, **wish: Any) -> Any:
     return client.put(f"{URL}/{name}", json={"component": "throws", **wish})
 
 
-def test_the_same_request_again_changes_nothing(
+def test_a_repeated_request_begins_no_second_instance(
     client: TestClient, begun: list[dict[str, Any]], tmp_path: Path
 ) -> None:
     wish = {"simulations": 3, "set": {"task.duration_s": 1.1, "sim.engine": "ballistic"}}
@@ -43,7 +43,7 @@ def test_the_same_request_again_changes_nothing(
     assert len(begun) == 1
 
 
-def test_an_id_whose_dataset_is_still_there_is_taken(
+def test_an_id_with_an_existing_dataset_is_refused(
     client: TestClient, begun: list[dict[str, Any]], tmp_path: Path
 ) -> None:
     left = tmp_path / "datasets" / "a"
@@ -56,16 +56,16 @@ def test_an_id_whose_dataset_is_still_there_is_taken(
     assert put(client, "b").status_code == 202
 
 
-def test_there_are_never_more_than_may_live(client: TestClient, remember: Remember) -> None:
+def test_a_component_never_has_more_than_max_instances(client: TestClient, remember: Remember) -> None:
     remember("old", **make_end_fields(origin=Origin("throws")))
     assert [put(client, name).status_code for name in ("a", "b", "c")] == [202, 202, 409]
-    # Those of another component, and runs that commands have begun, do not count.
+    # Instances of another component and runs of commands do not count.
     remember("by-hand")
     assert client.put(f"{URL}/d", json={"component": "talos"}).status_code == 202
     assert client.put(f"{URL}/e", json={"component": "talos"}).json()["hint"] == "stop one of d"
 
 
-def test_a_resumed_collection_counts(client: TestClient, remember: Remember, tmp_path: Path) -> None:
+def test_a_resumed_collection_counts_as_an_instance(client: TestClient, remember: Remember, tmp_path: Path) -> None:
     directory = tmp_path / "datasets" / "old"
     directory.mkdir(parents=True)
     (directory / "config.yaml").write_text("name: small\n")
@@ -106,12 +106,12 @@ def test_a_complete_collection_is_not_resumed(
     assert (said.status_code, said.json()["title"]) == (409, "the dataset of run old is complete")
     assert said.headers["content-type"] == "application/problem+json"
     assert begun == []
-    # A dataset that has lost a file is no complete one.
+    # A dataset that lacks a file is not complete.
     next(directory.glob("*.mcap")).unlink()
     assert client.post("/api/v1/collections/old/resume").status_code == 202
 
 
-def test_what_can_be_resumed_is_told(
+def test_the_state_says_which_collections_can_be_resumed(
     client: TestClient, begun: list[dict[str, Any]], collected: Path, remember: Remember, tmp_path: Path
 ) -> None:
     def list_resumable() -> dict[str, bool]:
@@ -141,7 +141,7 @@ def test_what_can_be_resumed_is_told(
         assert client.post(f"/api/v1/collections/{name}/resume").status_code == (202 if resumable[name] else 409), name
 
 
-def test_a_container_may_join_a_run(
+def test_a_container_can_join_a_run(
     served: Served, remember: Remember, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     orders: list[ContainerOrder] = []
@@ -202,7 +202,7 @@ def test_a_container_may_join_a_run(
         ("a..b", 1),
     ],
 )
-def test_some_keys_are_the_operators_alone(
+def test_a_client_cannot_set_keys_of_the_operator(
     client: TestClient, begun: list[dict[str, Any]], key: str, value: Any
 ) -> None:
     answer = put(client, "a", set={"trials": 2, key: value})
@@ -211,7 +211,7 @@ def test_some_keys_are_the_operators_alone(
     assert not begun
 
 
-def test_what_has_ended_cannot_be_stopped_or_scaled(client: TestClient, remember: Remember) -> None:
+def test_an_ended_instance_cannot_be_stopped_or_scaled(client: TestClient, remember: Remember) -> None:
     remember("over", **make_end_fields())
     for name, status in (("over", 409), ("nobody", 404)):
         assert client.delete(f"{URL}/{name}").status_code == status
@@ -219,7 +219,7 @@ def test_what_has_ended_cannot_be_stopped_or_scaled(client: TestClient, remember
     assert client.patch(f"{URL}/over", json={"simulations": 257}).status_code == 422
 
 
-def test_one_whose_launcher_died_is_cleared_but_not_changed(client: TestClient, remember: Remember) -> None:
+def test_an_instance_with_a_dead_launcher_can_be_cleared_but_not_scaled(client: TestClient, remember: Remember) -> None:
     remember("dead", lives=False)
     told = client.patch(f"{URL}/dead", json={"simulations": 1})
     assert (told.status_code, told.headers["content-type"]) == (409, "application/problem+json")
@@ -228,7 +228,7 @@ def test_one_whose_launcher_died_is_cleared_but_not_changed(client: TestClient, 
     assert [client.get(f"{URL}/dead").status_code, client.delete(f"{URL}/dead").status_code] == [404, 404]
 
 
-def test_a_run_that_is_stopping_is_not_told_again(
+def test_a_stopping_run_is_not_stopped_again(
     client: TestClient, remember: Remember, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     told: list[str] = []
@@ -245,7 +245,7 @@ def test_a_run_that_is_stopping_is_not_told_again(
     assert client.get(f"{URL}/b").json()["stopping"] is True
 
 
-def test_all_that_clients_have_begun_are_stopped_and_nothing_else(
+def test_stopping_all_instances_leaves_runs_of_commands_alone(
     client: TestClient, remember: Remember, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     told: list[str] = []
@@ -258,7 +258,7 @@ def test_all_that_clients_have_begun_are_stopped_and_nothing_else(
     assert (answer.status_code, answer.json(), told) == (202, ["begun"], ["begun"])
 
 
-def test_records_that_cannot_be_read_are_told_of(client: TestClient, state: Path, remember: Remember) -> None:
+def test_an_unreadable_record_is_an_error_with_a_hint(client: TestClient, state: Path, remember: Remember) -> None:
     remember("newer", **make_end_fields())
     path = state / "runs" / "newer.json"
     path.write_text(json.dumps({**json.loads(path.read_text()), "version": 2}))
@@ -268,12 +268,12 @@ def test_records_that_cannot_be_read_are_told_of(client: TestClient, state: Path
         assert answer.status_code == 409
         assert said in answer.json()["title"]
         assert answer.json()["hint"].startswith("throwcollect down --run")
-    # All else goes on.
+    # Other routes still work.
     assert client.get(URL).json() == []
     assert client.get("/api/v1/state").json()["instances"] == []
 
 
-def test_the_state_tells_of_all_that_live_and_the_latest_that_are_over(client: TestClient, remember: Remember) -> None:
+def test_the_state_lists_living_instances_and_the_latest_ended_ones(client: TestClient, remember: Remember) -> None:
     for number in range(103):
         remember(f"over-{number}", **make_end_fields())
     nodes = (NodeState("router", "running", 0, "1", ""), NodeState("sim_0", "running", 0, "2", ""))
@@ -295,10 +295,10 @@ def test_the_state_tells_of_all_that_live_and_the_latest_that_are_over(client: T
     assert client.get("/api/v1/state").json() == found
 
 
-def test_the_state_tells_how_far_a_plan_is(client: TestClient, remember: Remember) -> None:
+def test_the_state_shows_the_progress_of_planning(client: TestClient, remember: Remember) -> None:
     remember("large", planning=Planning(1200, 30000))
     remember("killed", lives=False, planning=Planning(7, 30000))
     found = {each["id"]: (each["status"], each["planning"]) for each in client.get(URL).json()}
     assert found == {"large": ("planning", {"checked": 1200, "trials": 30000}), "killed": ("died", None)}
-    # It counts as one that lives.
+    # A run that is planning counts as living.
     assert client.get("/api/v1/state").json()["instances"][0]["id"] == "large"

@@ -1,4 +1,4 @@
-"""Simulations that are slowed down to be watched, by several servers, some of which are killed."""
+"""Servers slow simulations down for watchers and restore their speed, even after one of the servers is killed."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ SIM = NodeState("sim_0", "running", 0, "7", "")
 
 
 class Simulation:
-    """A simulation that does not move, and how fast that is."""
+    """A stand-in for a simulation, which records the speeds that it is asked for."""
 
     def __init__(self) -> None:
         self.asked: list[tuple[str, float]] = []
@@ -58,14 +58,14 @@ def notes(state: Path, name: str = "a") -> list[str]:
 SLOW, FAST = ("/sim_0/sim_0", 1.0), ("/sim_0/sim_0", 0.0)
 
 
-def test_the_last_who_leaves_gives_the_speed_back(
+def test_the_last_watcher_restores_the_speed(
     remember: Remember, tmp_path: Path, state: Path, simulation: Simulation
 ) -> None:
     run = make(remember, tmp_path)
     one, other = take(run, "sim_0"), take(run, "sim_0")
     one.let_go()
     assert simulation.asked == [SLOW, SLOW]
-    # Another server, which begins meanwhile, leaves alone what somebody watches.
+    # Another server that starts meanwhile does not restore the speed of a watched simulation.
     let_go_of_left()
     assert simulation.asked == [SLOW, SLOW]
     assert notes(state) == ["sim_0"]
@@ -76,23 +76,25 @@ def test_the_last_who_leaves_gives_the_speed_back(
     assert simulation.asked[3:] == [SLOW, FAST]
 
 
-def test_the_speed_is_that_of_the_configuration(remember: Remember, tmp_path: Path, simulation: Simulation) -> None:
+def test_the_restored_speed_is_that_of_the_configuration(
+    remember: Remember, tmp_path: Path, simulation: Simulation
+) -> None:
     run = make(remember, tmp_path, more="sim: {real_time_factor: 3.0}\nrun: {simulations: 1, root_namespace: true}\n")
     take(run, "sim_0").let_go()
     assert simulation.asked == [("/sim_0", 1.0), ("/sim_0", 3.0)]
 
 
-def test_the_successor_of_a_killed_server_lets_go(
+def test_the_next_server_restores_speeds_after_a_killed_one(
     remember: Remember, tmp_path: Path, state: Path, simulation: Simulation
 ) -> None:
-    # Its locks went with it.
+    # Closing the lock stands for the death of the server that held it.
     os.close(take(make(remember, tmp_path), "sim_0").lock)
     let_go_of_left()
     assert simulation.asked == [SLOW, FAST]
     assert notes(state) == []
 
 
-def test_what_does_not_answer_is_tried_again(
+def test_restoring_the_speed_is_tried_again_if_a_simulation_does_not_answer(
     remember: Remember, tmp_path: Path, state: Path, simulation: Simulation
 ) -> None:
     hold = take(make(remember, tmp_path), "sim_0")
@@ -108,7 +110,7 @@ def test_what_does_not_answer_is_tried_again(
 
 
 @pytest.mark.parametrize("way", ["silent", "unwilling"])
-def test_one_that_was_not_slowed_down_is_let_go_of(
+def test_the_speed_is_restored_even_if_slowing_down_failed(
     remember: Remember, tmp_path: Path, state: Path, simulation: Simulation, way: str
 ) -> None:
     run = make(remember, tmp_path)
@@ -117,12 +119,14 @@ def test_one_that_was_not_slowed_down_is_let_go_of(
         take(run, "sim_0")
     simulation.answers = simulation.agrees = True
     let_go_of_left()
-    # It may have heard it after all.
+    # The simulation may have slowed down although it did not answer.
     assert simulation.asked[-1] == FAST
     assert notes(state) == []
 
 
-def test_only_simulations_that_run_are_slowed_down(remember: Remember, tmp_path: Path, simulation: Simulation) -> None:
+def test_only_running_simulations_can_be_slowed_down(
+    remember: Remember, tmp_path: Path, simulation: Simulation
+) -> None:
     run = make(remember, tmp_path)
     over = make(remember, tmp_path, "over", **make_end_fields())
     for each, name in ((run, "sim_1"), (run, "../key"), (run, ""), (over, "sim_0")):
@@ -131,7 +135,7 @@ def test_only_simulations_that_run_are_slowed_down(remember: Remember, tmp_path:
     assert simulation.asked == []
 
 
-def test_a_run_that_vanishes_while_it_is_watched_needs_nothing(
+def test_a_vanished_run_is_not_asked_to_restore_its_speed(
     remember: Remember, tmp_path: Path, simulation: Simulation
 ) -> None:
     directory = tmp_path / "datasets" / "a"

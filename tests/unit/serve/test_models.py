@@ -1,4 +1,4 @@
-"""Models as clients see them."""
+"""Routes by which clients list models and aim with them."""
 
 from __future__ import annotations
 
@@ -22,18 +22,18 @@ def models(tmp_path: Path) -> Path:
     return tmp_path / "models"
 
 
-def test_without_a_directory_there_are_none(client: TestClient) -> None:
+def test_without_a_directory_no_models_are_listed(client: TestClient) -> None:
     assert client.get(URL).json() == []
 
 
-def test_models_are_listed_and_nothing_else(client: TestClient, models: Path) -> None:
+def test_only_models_are_listed(client: TestClient, models: Path) -> None:
     (models / "notes").mkdir()
     make_model(models / ".hidden")
     (models / "a file").write_text("")
     assert client.get(URL).json() == ["quick"]
 
 
-def test_a_model_is_told(client: TestClient, models: Path) -> None:
+def test_a_model_is_described_with_parameters_targets_and_throws(client: TestClient, models: Path) -> None:
     found = client.get(f"{URL}/quick").json()
     assert (found["learned_from"], found["throws"], found["error"]) == ("quick", 400, 0.002)
     assert (found["parameters"], found["targets"], found["given"]) == (list(KEYS), list(TARGETS), [])
@@ -41,12 +41,12 @@ def test_a_model_is_told(client: TestClient, models: Path) -> None:
     assert found["score"] is found["adaptation"] is None
 
 
-def test_many_throws_are_told_by_some_of_them(client: TestClient, models: Path) -> None:
+def test_a_model_of_many_throws_shows_a_selection_of_them(client: TestClient, models: Path) -> None:
     make_model(models / "many", throws=5000)
     assert 1000 < len(client.get(f"{URL}/many").json()["reached"]) <= 2000
 
 
-def test_a_score_is_told_once_it_is_there(client: TestClient, models: Path) -> None:
+def test_a_model_shows_its_score_once_it_is_written(client: TestClient, models: Path) -> None:
     assert client.get(f"{URL}/quick").json()["score"] is None
     errors = Errors(throws=1, missed=0, median=0.01, share90=0.01, largest=0.01)
     throws = [ThrowAtTarget(target=[1.0, 0.0], place=[1.0, 0.01])]
@@ -63,48 +63,48 @@ def test_a_score_is_told_once_it_is_there(client: TestClient, models: Path) -> N
     assert client.get(f"{URL}/quick").json()["score"] == score.model_dump(mode="json")
 
 
-def test_aiming_finds_parameters(served: Served, models: Path) -> None:
-    # Whoever may only look may aim: it changes nothing.
+def test_a_read_only_client_can_aim_at_a_target(served: Served, models: Path) -> None:
+    # Aiming changes nothing, so a read-only client may do it.
     found = served.client(served.keys.read_only).get(f"{URL}/quick/aim", params={"at": [0.25, -0.5]}).json()
     assert found["reachable"]
     assert found["parameters"] == pytest.approx({"task.a": 0.25, "task.b": -0.5})
     assert found["predicted"] == pytest.approx([0.25, -0.5])
 
 
-def test_what_is_out_of_reach_is_told(client: TestClient, models: Path) -> None:
+def test_a_target_out_of_reach_is_reported_with_the_nearest_point(client: TestClient, models: Path) -> None:
     found = client.get(f"{URL}/quick/aim", params={"at": [3, 3]}).json()
     assert not found["reachable"]
     assert found["nearest"] == pytest.approx([1, 1], abs=0.1)
 
 
 @pytest.mark.parametrize("at", [[], [1], [1, 2, 3], ["nan", 0], ["inf", 0], ["x", 0], [0] * 17])
-def test_what_is_no_target_is_refused(client: TestClient, models: Path, at: list[Any]) -> None:
+def test_a_malformed_target_is_refused(client: TestClient, models: Path, at: list[Any]) -> None:
     answer = client.get(f"{URL}/quick/aim", params={"at": at})
     assert answer.status_code == 422, answer.text
 
 
-def test_the_number_that_is_none_is_named(client: TestClient, models: Path) -> None:
+def test_a_coordinate_that_is_no_number_is_named(client: TestClient, models: Path) -> None:
     answer = client.get(f"{URL}/quick/aim", params={"at": ["0", "x"]}).json()
     assert answer["title"] == "at.1: should be a number, got 'x'"
     assert "expected" in client.get(f"{URL}/quick/aim", params={"at": [0] * 17}).json()
 
 
 @pytest.mark.parametrize("name", ["none", "..", "..%2fquick", "%00", ".hidden", "quick%2f", 300 * "a"])
-def test_nothing_else_is_read(client: TestClient, models: Path, name: str) -> None:
+def test_names_that_are_no_models_are_not_found(client: TestClient, models: Path, name: str) -> None:
     make_model(models.parent / "models2")
     make_model(models / ".hidden")
     for path in (name, f"{name}/aim?at=0&at=0"):
         assert client.get(f"{URL}/{path}").status_code == 404, path
 
 
-def test_a_damaged_model_is_told(client: TestClient, models: Path) -> None:
+def test_a_damaged_model_is_an_error(client: TestClient, models: Path) -> None:
     (models / "quick" / "model.json").write_text("{}")
     answer = client.get(f"{URL}/quick")
     assert answer.status_code == 500
     assert "version" in answer.json()["title"]
 
 
-def test_a_link_leads_nowhere(client: TestClient, models: Path, tmp_path: Path) -> None:
+def test_a_symbolic_link_in_a_model_is_not_followed(client: TestClient, models: Path, tmp_path: Path) -> None:
     (tmp_path / "secret").write_text("secret")
     (models / "quick" / "model.json").unlink()
     (models / "quick" / "model.json").symlink_to(tmp_path / "secret")

@@ -1,4 +1,4 @@
-"""The files of the page: nothing comes from elsewhere, nothing is missing, and libraries are as they were fetched."""
+"""The page names only its own files, none is missing, and its libraries are unchanged."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def tags() -> list[tuple[str, dict[str, str | None]]]:
     return parser.found
 
 
-def test_libraries_are_as_they_were_fetched() -> None:
+def test_libraries_match_their_recorded_digests() -> None:
     lines = (VENDOR / "SHA256SUMS").read_text().splitlines()
     wanted = {path: digest for digest, path in (line.split(maxsplit=1) for line in lines)}
     found = {
@@ -53,19 +53,19 @@ def test_each_library_has_its_licence() -> None:
 
 
 @pytest.mark.parametrize("path", OWN, ids=lambda path: path.name)
-def test_no_file_of_ours_names_another_host(path: Path) -> None:
+def test_no_file_of_the_page_names_another_host(path: Path) -> None:
     hosts = [host.strip("\"'(") for host in _HOST.findall(path.read_text(encoding="utf-8"))]
     assert [host for host in hosts if host not in _NAMESPACES] == []
 
 
 @pytest.mark.parametrize("path", SCRIPTS, ids=lambda path: path.name)
-def test_modules_import_what_is_there(path: Path) -> None:
+def test_modules_import_only_existing_files(path: Path) -> None:
     for target in _IMPORT.findall(path.read_text(encoding="utf-8")):
         assert target.startswith("."), f"{path.name} imports {target}, and browsers find paths alone"
         assert (path.parent / target).is_file(), f"{path.name} imports {target}"
 
 
-def test_the_page_refers_to_what_is_there(tags: list[tuple[str, dict[str, str | None]]]) -> None:
+def test_the_page_refers_only_to_existing_files(tags: list[tuple[str, dict[str, str | None]]]) -> None:
     references = [
         value
         for _, attributes in tags
@@ -76,12 +76,12 @@ def test_the_page_refers_to_what_is_there(tags: list[tuple[str, dict[str, str | 
     assert [value for value in references if not (PAGE / value).is_file()] == []
 
 
-def test_the_policy_lets_the_page_be(tags: list[tuple[str, dict[str, str | None]]]) -> None:
+def test_the_page_has_no_inline_scripts_that_the_policy_forbids(tags: list[tuple[str, dict[str, str | None]]]) -> None:
     assert all(attributes.get("src") for tag, attributes in tags if tag == "script"), "no script may be in the page"
     assert not [name for _, attributes in tags for name in attributes if name.startswith("on")]
 
 
-def test_scripts_find_the_elements_that_they_look_for(tags: list[tuple[str, dict[str, str | None]]]) -> None:
+def test_the_page_has_the_elements_that_its_scripts_look_for(tags: list[tuple[str, dict[str, str | None]]]) -> None:
     ids = [attributes["id"] for _, attributes in tags if "id" in attributes]
     assert len(ids) == len(set(ids))
     asked = {
@@ -90,7 +90,7 @@ def test_scripts_find_the_elements_that_they_look_for(tags: list[tuple[str, dict
     assert asked - set(ids) == set()
 
 
-def test_what_people_use_has_a_name(tags: list[tuple[str, dict[str, str | None]]]) -> None:
+def test_every_input_of_the_page_has_a_label(tags: list[tuple[str, dict[str, str | None]]]) -> None:
     labelled = {attributes.get("for") for tag, attributes in tags if tag == "label"}
     text = (PAGE / "index.html").read_text(encoding="utf-8")
     for tag, attributes in tags:
@@ -101,5 +101,5 @@ def test_what_people_use_has_a_name(tags: list[tuple[str, dict[str, str | None]]
         assert wrapped or name in labelled or attributes.get("aria-label"), f"#{name} has no label"
 
 
-def test_our_modules_are_short() -> None:
+def test_modules_of_the_page_are_not_too_long() -> None:
     assert {path.name: n for path in OWN if (n := len(path.read_text(encoding="utf-8").splitlines())) > 400} == {}

@@ -1,4 +1,4 @@
-"""What modules of the page compute and show: messages of the server, replays, coarse meshes, landings, plots."""
+"""Modules of the page: messages of the server, replays, coarse meshes, landings and plots."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ PAGE = Path(app.__file__).parent / "page"
 
 @pytest.mark.skipif(shutil.which("node") is None, reason="needs node, which reads modules without a browser")
 @pytest.mark.parametrize("path", sorted(PAGE.glob("*.js")), ids=lambda path: path.name)
-def test_modules_can_be_parsed(path: Path) -> None:
+def test_node_can_parse_every_module_of_the_page(path: Path) -> None:
     command = ["node", "--input-type=module", "--check"]
     done = subprocess.run(
         command, input=path.read_bytes(), env={**os.environ, "NODE_OPTIONS": ""}, capture_output=True, check=False
@@ -27,7 +27,7 @@ def test_modules_can_be_parsed(path: Path) -> None:
 
 
 @pytest.mark.parametrize("script", ["page_modules.mjs", "page_elements.mjs"])
-def test_modules_do_what_they_should(tmp_path: Path, script: str) -> None:
+def test_the_javascript_tests_of_the_page_pass(tmp_path: Path, script: str) -> None:
     if (node := shutil.which("node")) is None:
         pytest.skip("needs node, which runs modules of the page without a browser")
     header = {"trial": 7, "outcome": "landed", "joints": ["elbow", "wrist"], "samples": 3, "rate_hz": 100.0}
@@ -37,7 +37,7 @@ def test_modules_do_what_they_should(tmp_path: Path, script: str) -> None:
         struct.pack("<I", len(text)) + text + b"\0" * (-len(text) % 4) + struct.pack(f"<{len(numbers)}f", *numbers)
     )
     (tmp_path / "throw").write_bytes(message)
-    # Without what an installation by hand has node read first.
+    # NODE_OPTIONS may name a module that node would load first.
     environment = {
         **os.environ,
         "PAGE": str(PAGE),

@@ -1,4 +1,4 @@
-"""Errors as answers."""
+"""Errors become problem responses of the server."""
 
 import json
 
@@ -37,7 +37,7 @@ def test_each_kind_of_error_has_a_status(error: ThrowcollectError, status: int) 
     assert json.loads(response.body)["status"] == status
 
 
-def test_all_facts_of_an_error_are_told() -> None:
+def test_a_problem_response_has_all_facts_of_an_error() -> None:
     problems = [Problem("should be 1", key="trials", line=3), Problem("unknown key", key="trails")]
     found = json.loads(answer(ConfigError(problems, expected="one", hint="mend it")).body)
     assert (found["expected"], found["hint"]) == ("one", "mend it")

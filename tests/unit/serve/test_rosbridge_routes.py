@@ -1,4 +1,4 @@
-"""Whom the sockets of rosbridge turn away, and with which words."""
+"""The sockets of rosbridge turn some clients away, with a code and a reason."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ def end_of(served: Served, path: str) -> tuple[int, str]:
     return end.value.code, end.value.reason
 
 
-def test_a_client_of_no_run_is_told_why(served: Served) -> None:
+def test_a_client_without_a_living_run_is_turned_away_with_the_reason(served: Served) -> None:
     assert end_of(served, "/rosbridge/nope") == (4404, "no run nope")
     assert end_of(served, "/") == (4404, "no run lives; the path /rosbridge/RUN names one")
 
 
-def test_a_client_of_a_run_that_is_over_does_not_wait_for_good(served: Served, remember: Remember) -> None:
+def test_a_client_of_an_ended_run_is_turned_away_for_good(served: Served, remember: Remember) -> None:
     remember("over", **make_end_fields())
     assert end_of(served, "/rosbridge/over") == (4404, "run over has ended")
 
 
-def test_one_client_too_many_is_told_to_try_later(
+def test_a_client_beyond_the_limit_is_told_to_try_later(
     served: Served, remember: Remember, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     remember("busy")
@@ -40,7 +40,7 @@ def test_one_client_too_many_is_told_to_try_later(
     )
 
 
-def test_a_reason_has_as_many_bytes_as_fit_into_a_frame(served: Served, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_long_reason_is_cut_to_fit_into_a_close_frame(served: Served, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(rosbridge_routes, "_find_only_run", lambda: _fail("ä" * 100))
     assert end_of(served, "/") == (4404, "ä" * 61)
 

@@ -1,4 +1,4 @@
-"""The process that serves, before it does."""
+"""The process of the server fails to start at an unusable address."""
 
 from __future__ import annotations
 
@@ -13,6 +13,6 @@ from throwcollect.serve.server_process import serve
 
 
 @pytest.mark.parametrize("host", ["é..b", "no host", "192.0.2.1"])
-def test_where_nobody_can_be_served_is_told(served: Served, host: str) -> None:
+def test_serving_at_an_unusable_host_is_an_error(served: Served, host: str) -> None:
     with pytest.raises(ConfigError, match=f"--host {host} --port 0: nobody can be served there: "):
         serve(served.instances, Models(Path()), host=host, port=0, tell=lambda *_: None)

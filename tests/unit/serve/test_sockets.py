@@ -1,4 +1,4 @@
-"""Sockets that only tell, by the server that the product has."""
+"""Sockets that only send, on the real server."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ FRAME = bytes(2**20)
 
 @dataclass
 class Teller:
-    """Tells whoever comes the same again and again, and counts how often it could, by client."""
+    """Sends the same frame to each client again and again, and counts the sent frames by client."""
 
     told: list[int] = field(default_factory=list)
     url: str = ""
@@ -62,7 +62,7 @@ def teller() -> Iterator[Teller]:
     thread.join(20)
 
 
-def test_who_never_reads_is_waited_for_and_holds_up_nobody(teller: Teller) -> None:
+def test_a_client_that_never_reads_does_not_block_others(teller: Teller) -> None:
     # Nobody reads the rest of the frames, for which closing would wait ten seconds.
     with (
         connect(teller.url, max_queue=1, max_size=None, close_timeout=0.1),
@@ -70,7 +70,7 @@ def test_who_never_reads_is_waited_for_and_holds_up_nobody(teller: Teller) -> No
     ):
         for _ in range(200):
             assert quick.recv(timeout=20) == FRAME
-        # What the buffers of the connection hold, of the kernel as well.
+        # A stalled client gets only as many frames as the buffers of connection and kernel hold.
         stalled, reading = teller.told
         assert stalled < 30 < reading
         time.sleep(0.5)

@@ -1,4 +1,4 @@
-"""What the state tells of the catalogue."""
+"""Components of the catalogue in the state of the server."""
 
 from pathlib import Path
 
@@ -25,13 +25,13 @@ _HEIGHT = "scene.landing_height_m: {min: 0, max: 0.5}"
         ),
     ],
 )
-def test_a_collection_tells_what_its_throws_can_be_aimed_at(tmp_path: Path, sweep: str, targets: list[str]) -> None:
+def test_the_state_lists_the_possible_targets_of_a_collection(tmp_path: Path, sweep: str, targets: list[str]) -> None:
     config = tmp_path / "small.yaml"
     config.write_text(CONFIG + sweep)
     catalogue = tmp_path / "catalogue.yaml"
     catalogue.write_text("components: {throws: {config: small.yaml}, talos: {session: small.yaml}}\n")
     lookout = Lookout(Catalogue.read(catalogue))
     assert [each.targets for each in lookout.look().components] == [targets, []]
-    # Its file may get worse, and is then told of when an instance is started.
+    # The file may be damaged later; the error then comes when an instance is started.
     config.write_text("name: [")
     assert lookout.look().components[0].targets == []

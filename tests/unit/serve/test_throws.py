@@ -1,4 +1,4 @@
-"""The newest throws, as the page takes them, and the thread that hears them."""
+"""The newest throws, as they are sent to the page, and the thread that listens for them."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def watch(run: Run, scenario: Callable[[ThrowWatch], Awaitable[None]]) -> None:
     assert not threads()
 
 
-def test_the_page_is_told_all_of_a_throw(collected: Path) -> None:
+def test_an_encoded_throw_holds_its_result_values_and_samples(collected: Path) -> None:
     episode = next(iter(Dataset.open(collected).episodes()))
     samples = episode.samples()
     result = {"outcome": "landed", "landing_x_m": 1.0, "landing_y_m": -0.5, "landing_z_m": 0.02}
@@ -86,7 +86,7 @@ def test_the_page_is_told_all_of_a_throw(collected: Path) -> None:
     assert json.loads(told[4 : 4 + int.from_bytes(told[:4], "little")])["landing"] is None
 
 
-def test_values_are_those_of_the_plan(collected: Path, tmp_path: Path) -> None:
+def test_planned_values_come_from_the_plan(collected: Path, tmp_path: Path) -> None:
     values = PlannedValues(collected)
     for trial in Dataset.open(collected).plan.trials:
         assert values.of(trial.number) == trial.values
@@ -95,14 +95,14 @@ def test_values_are_those_of_the_plan(collected: Path, tmp_path: Path) -> None:
     assert PlannedValues(tmp_path).of(0) == {}
 
 
-def test_there_is_one_thread_as_long_as_anybody_listens(remember: Remember, listeners: list[Any]) -> None:
+def test_listeners_share_one_thread_until_the_last_leaves(remember: Remember, listeners: list[Any]) -> None:
     remember("a")
 
     async def scenario(heard: ThrowWatch) -> None:
         async with heard.throws(), heard.throws():
             assert len(threads()) == 1
         assert heard.is_idle
-        # Who comes while the thread ends gets one of its own, and does not keep that one.
+        # A listener that comes while the thread ends gets a new thread.
         async with heard.throws():
             while (len(threads()), len(listeners)) != (1, 2):
                 await asyncio.sleep(0.01)
@@ -110,7 +110,7 @@ def test_there_is_one_thread_as_long_as_anybody_listens(remember: Remember, list
     watch(Records().get("a"), scenario)
 
 
-def test_a_run_that_vanishes_keeps_no_core_busy(
+def test_a_vanished_run_is_looked_for_without_busy_waiting(
     remember: Remember, listeners: list[Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     opened = remember("a")
@@ -134,7 +134,9 @@ def test_a_run_that_vanishes_keeps_no_core_busy(
     watch(run, scenario)
 
 
-def test_who_is_slow_gets_the_newest_and_who_is_late_the_last(remember: Remember, listeners: list[Any]) -> None:
+def test_a_slow_listener_gets_the_newest_throw_and_a_late_one_the_last(
+    remember: Remember, listeners: list[Any]
+) -> None:
     remember("a")
 
     async def scenario(heard: ThrowWatch) -> None:
@@ -152,7 +154,7 @@ def test_who_is_slow_gets_the_newest_and_who_is_late_the_last(remember: Remember
     watch(Records().get("a"), scenario)
 
 
-def test_what_somebody_else_publishes_is_left_out(remember: Remember, listeners: list[Any]) -> None:
+def test_messages_that_are_no_signed_episodes_are_ignored(remember: Remember, listeners: list[Any]) -> None:
     run = remember("a")
     heard = ThrowWatch(Records().get("a"))
     assert run.key.directory.exists()

@@ -1,4 +1,4 @@
-"""What viewers are told of the robot and the scene, and where its meshes come from."""
+"""Routes by which viewers get the scene, and the robot with its meshes."""
 
 from __future__ import annotations
 
@@ -14,7 +14,9 @@ from throwcollect.robots.talos import TALOS
 URL = "/api/v1/instances"
 
 
-def test_viewers_are_told_of_the_scene(client: TestClient, remember: Remember, tmp_path: Path) -> None:
+def test_the_scene_has_its_heights_and_the_range_of_targets(
+    client: TestClient, remember: Remember, tmp_path: Path
+) -> None:
     directory = tmp_path / "datasets" / "a"
     remember("a")
     assert client.get(f"{URL}/a/scene").status_code == 404
@@ -31,7 +33,7 @@ def test_viewers_are_told_of_the_scene(client: TestClient, remember: Remember, t
     assert client.get(f"{URL}/a/scene").json() == aimed
 
 
-def test_meshes_are_had_by_their_content_which_never_changes(
+def test_meshes_can_be_fetched_by_digest_and_cached_for_ever(
     client: TestClient, remember: Remember, tmp_path: Path
 ) -> None:
     directory = tmp_path / "datasets" / "a"
@@ -50,7 +52,7 @@ def test_meshes_are_had_by_their_content_which_never_changes(
     assert client.get(f"{URL}/nobody/meshes").status_code == 404
 
 
-def test_meshes_come_from_packages_of_robots_alone(served: Served) -> None:
+def test_meshes_come_only_from_packages_of_robots(served: Served) -> None:
     client = served.client()
     base = "/api/v1/meshes"
     mesh = "example-robot-data/robots/talos_data/meshes/head/head_1.stl"

@@ -1,4 +1,4 @@
-"""Who is told of what, and when."""
+"""Watchers get the state of the server and each change of it."""
 
 import asyncio
 import json
@@ -15,7 +15,7 @@ from throwcollect.serve.watching import StateWatch
 
 
 class World:
-    """What there is to be seen, and how often somebody has looked."""
+    """A stand-in for instances and records, which counts how often they are read."""
 
     def __init__(self) -> None:
         self.instances = 0
@@ -47,7 +47,7 @@ async def read(states: Any) -> tuple[int, str]:
     return found["revision"], found["components"][0]["instances"][0]
 
 
-def test_a_client_is_told_the_state_and_then_each_change() -> None:
+def test_a_watcher_gets_the_state_and_then_each_change() -> None:
     async def scenario(world: World, watch: StateWatch) -> None:
         async with aclosing(watch.states()) as states:
             assert await read(states) == (1, "0")
@@ -57,7 +57,7 @@ def test_a_client_is_told_the_state_and_then_each_change() -> None:
     run(scenario)
 
 
-def test_nothing_is_told_while_nothing_changes() -> None:
+def test_an_unchanged_state_is_not_sent_again() -> None:
     async def scenario(world: World, watch: StateWatch) -> None:
         async with aclosing(watch.states()) as states:
             await anext(states)
@@ -68,7 +68,7 @@ def test_nothing_is_told_while_nothing_changes() -> None:
     run(scenario)
 
 
-def test_one_who_is_slow_gets_the_latest_alone() -> None:
+def test_a_slow_watcher_gets_only_the_latest_state() -> None:
     async def scenario(world: World, watch: StateWatch) -> None:
         async with aclosing(watch.states()) as slow, aclosing(watch.states()) as quick:
             await anext(slow)
@@ -81,7 +81,7 @@ def test_one_who_is_slow_gets_the_latest_alone() -> None:
     run(scenario)
 
 
-def test_thirty_listeners_are_looked_for_once() -> None:
+def test_thirty_watchers_share_one_loop_that_reads_the_records() -> None:
     async def scenario(world: World, watch: StateWatch) -> None:
         listeners = [watch.states() for _ in range(30)]
         for each in listeners:
@@ -101,7 +101,7 @@ def test_thirty_listeners_are_looked_for_once() -> None:
     run(scenario)
 
 
-def test_records_that_cannot_be_read_for_a_while_end_nothing() -> None:
+def test_watching_goes_on_after_records_were_unreadable() -> None:
     async def scenario(world: World, watch: StateWatch) -> None:
         async with aclosing(watch.states()) as states:
             await anext(states)
@@ -115,8 +115,8 @@ def test_records_that_cannot_be_read_for_a_while_end_nothing() -> None:
     run(scenario)
 
 
-def test_what_was_seen_before_is_never_told_after() -> None:
-    """Many ask at once; who has looked late must not be overtaken by who has looked early and takes long."""
+def test_an_older_state_is_never_returned_after_a_newer_one() -> None:
+    """Of many concurrent requests, one that read early and takes long must not replace the result of a later one."""
 
     async def scenario(world: World, watch: StateWatch) -> None:
         async def ask() -> int:

@@ -9,7 +9,7 @@ def intervals(*steps):
     return log.intervals(lambda step: 10 * step)
 
 
-def test_an_interval_starts_with_the_first_step_with_force_and_ends_with_the_first_without():
+def test_a_contact_lasts_from_the_first_step_with_force_to_the_first_without():
     assert intervals([], ["spoon"], ["spoon"], [], []) == (Contact("spoon", 10, 30),)
 
 
@@ -26,7 +26,7 @@ def test_contacts_are_ordered_by_start_then_by_name():
     )
 
 
-def test_the_bodies_that_press_now_are_known():
+def test_the_log_knows_the_bodies_that_touch_now():
     log = ContactLog()
     log.update(frozenset(["spoon", "head_2_link"]), 1)
     assert sorted(log.bodies) == ["head_2_link", "spoon"]

@@ -1,4 +1,4 @@
-"""What goals hear of their progress, whenever the action server gets round to making their handles."""
+"""Goals get feedback on their whole course, even if the action server makes their handles late."""
 
 from types import SimpleNamespace
 from typing import Any
@@ -49,7 +49,7 @@ def action(simulation: Simulation, monkeypatch: pytest.MonkeyPatch) -> Controlle
 
 
 def advance(simulation: Simulation, action: ControllerAction) -> None:
-    """A slice of 50 ms, and what is told after it."""
+    """Advance by a slice of 50 ms, and send the feedback that follows."""
     assert action.watched
     simulation.advance(watched=True)
     for _, result in simulation.pop_results():
@@ -59,7 +59,7 @@ def advance(simulation: Simulation, action: ControllerAction) -> None:
 
 
 @pytest.mark.parametrize("slices_before", [0, 1, 3])
-def test_nothing_is_lost_for_a_goal_whose_handle_comes_after_time_has_passed(
+def test_a_goal_with_a_late_handle_gets_all_its_feedback(
     slices_before: int, simulation: Simulation, action: ControllerAction
 ) -> None:
     server: Any = action._server
@@ -72,7 +72,7 @@ def test_nothing_is_lost_for_a_goal_whose_handle_comes_after_time_has_passed(
     assert handle.told == [50, 100, 150, 200, 250]
 
 
-def test_a_goal_that_ended_before_its_handle_came_hears_of_its_own_time_alone(
+def test_a_goal_that_ended_before_its_handle_gets_only_its_own_feedback(
     simulation: Simulation, action: ControllerAction
 ) -> None:
     server: Any = action._server
@@ -100,7 +100,7 @@ def test_the_result_of_a_leased_goal_is_not_that_of_a_client(simulation: Simulat
     assert action._goals[1].result.result().error_string == "simulation was reset"
 
 
-def test_a_trajectory_that_was_stamped_decades_ago_is_told_of(simulation: Simulation) -> None:
+def test_feedback_on_a_trajectory_stamped_decades_ago_can_be_serialized(simulation: Simulation) -> None:
     message = goal(ARM, 1.0).trajectory
     message.header.stamp.sec = -(2**31) + 1
     message.points = message.points[-1:]

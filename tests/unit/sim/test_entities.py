@@ -17,7 +17,7 @@ from throwcollect.sim.world import World
 CONFIG = Config()
 TURNED = (0.0, 0.0, 0.6, 0.8)
 LOPSIDED = '<inertia ixx="1" iyy="2" izz="2.5" ixy="0.3" ixz="0" iyz="0.1"/>'
-"""The engine locates such a body by axes that are not those of the link."""
+"""Inertia of a body whose axes, by which the engine locates it, are not those of the link."""
 
 
 def within(kind: int, *points: tuple[float, float, float]) -> EntityFilters:
@@ -38,7 +38,7 @@ def no_mesh(filename):
 
 @pytest.fixture(scope="module", params=["bullet", "mujoco"])
 def shared(request: pytest.FixtureRequest) -> Iterator[World]:
-    # A world keeps the engine that it began with.
+    # A world keeps the engine with which it was made.
     world = World(Config.model_validate({"sim": {"engine": request.param}}))
     yield world
     world.close()
@@ -65,7 +65,7 @@ def assert_same(state: BodyState, other: BodyState) -> None:
         assert getattr(state, name) == pytest.approx(getattr(other, name), abs=2e-6), name
 
 
-def test_the_ball_can_be_put_somewhere_and_the_robot_cannot(entities: Entities) -> None:
+def test_the_ball_can_be_placed_and_the_robot_cannot(entities: Entities) -> None:
     entities.place("ball", BodyState((1.0, 0.0, 1.0)), frame="", accelerates=False)
     assert entities.state("ball").position == (1.0, 0.0, 1.0)
     with pytest.raises(RequestError, match="talos is fixed to the world"):
@@ -75,7 +75,7 @@ def test_the_ball_can_be_put_somewhere_and_the_robot_cannot(entities: Entities) 
         entities.state("table")
 
 
-def test_a_body_is_where_its_root_link_is_wherever_its_mass_may_be(entities: Entities) -> None:
+def test_the_pose_of_a_body_is_that_of_its_root_link_not_of_its_mass(entities: Entities) -> None:
     start = BodyState((1.0, 2.0, 3.0), TURNED)
     entities.add("crate", model(box(origin="0.1 0.2 -0.05", inertia=LOPSIDED)), start, "")
     assert_same(entities.state("crate"), start)
@@ -117,13 +117,13 @@ def test_joints_hold_with_the_effort_of_their_limits(world: World, entities: Ent
     assert entities.bounds("pendulum")[1] == pytest.approx((1.0, 0.05, 0.05), abs=0.01)
 
 
-def test_something_without_shape_has_no_bounds_and_is_nowhere(entities: Entities) -> None:
+def test_an_entity_without_shape_has_no_bounds_and_is_in_no_region(entities: Entities) -> None:
     entities.add("frame", model("<robot name='f'><link name='world'/></robot>"), BodyState((0.0, 0.0, 0.0)), "")
     assert entities.bounds("frame") is None
     assert select(entities, sphere((0.0, 0.0, 0.0), 1e3)) == ["ball", "talos"]
 
 
-def test_categories_follow_from_what_it_is(entities: Entities) -> None:
+def test_the_category_of_an_entity_follows_from_its_mass_and_joints(entities: Entities) -> None:
     for name, text in (("crate", box()), ("table", box(mass=0)), ("pendulum", pendulum())):
         entities.add(name, model(text), BodyState((5.0, 0.0, 5.0)), name)
     categories = [entities.info(name).category for name in entities.names]
@@ -131,7 +131,7 @@ def test_categories_follow_from_what_it_is(entities: Entities) -> None:
     assert categories == [moving, robot, moving, still, robot]
 
 
-def test_what_is_said_about_what_is_gone_is_forgotten(world: World, entities: Entities) -> None:
+def test_the_info_of_a_removed_entity_is_forgotten(world: World, entities: Entities) -> None:
     entities.add("crate", model(box()), BodyState((5.0, 0.0, 5.0)), "a crate")
     entities.set_info("crate", EntityInfo(Category.HUMAN, tags=("odd",)))
     entities.set_info("ball", EntityInfo(Category.OBJECT))
@@ -143,7 +143,7 @@ def test_what_is_said_about_what_is_gone_is_forgotten(world: World, entities: En
     assert entities.info("crate") == EntityInfo(Category.DYNAMIC_OBJECT, "another")
 
 
-def test_regions_touch_boxes(entities: Entities) -> None:
+def test_a_region_selects_a_box_that_it_touches(entities: Entities) -> None:
     entities.add("crate", model(box("2 2 2", mass=0)), BodyState((10.0, 0.0, 5.0)), "")
 
     def found(region: EntityFilters) -> bool:

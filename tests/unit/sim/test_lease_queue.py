@@ -1,4 +1,4 @@
-"""Which trial a simulation does next, whatever a coordinator asks for meanwhile."""
+"""The order in which a simulation does leased trials, while a coordinator changes the leases."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -54,7 +54,7 @@ def end_trial(queue: LeaseQueue, runner: Runner) -> None:
     assert queue.begin_next() is None
 
 
-def test_trials_are_done_in_order() -> None:
+def test_leased_trials_are_done_in_order() -> None:
     queue, runner = queue_of(A, B, C)
     assert queue.begin_next() is None
     assert runner.begun == [0]
@@ -66,7 +66,7 @@ def test_trials_are_done_in_order() -> None:
     assert queue.hand_over() is None
 
 
-def test_the_trial_that_runs_goes_on_if_it_is_asked_for_again() -> None:
+def test_the_running_trial_goes_on_if_it_is_leased_again() -> None:
     queue, runner = queue_of(A, B)
     queue.replace([A, C])
     assert queue.begin_next() is None
@@ -75,7 +75,7 @@ def test_the_trial_that_runs_goes_on_if_it_is_asked_for_again() -> None:
     assert runner.begun == [0, 2]
 
 
-def test_the_trial_that_runs_is_dropped_if_nobody_wants_it() -> None:
+def test_the_running_trial_is_dropped_if_its_lease_is_gone() -> None:
     queue, runner = queue_of(A, B)
     queue.replace([C])
     assert queue.begin_next() is None
@@ -85,7 +85,7 @@ def test_the_trial_that_runs_is_dropped_if_nobody_wants_it() -> None:
     assert (runner.begun, runner.dropped) == ([0, 2], 2)
 
 
-def test_what_was_done_is_not_done_again_for_a_list_that_came_late() -> None:
+def test_a_late_list_of_leases_does_not_repeat_an_ended_trial() -> None:
     queue, runner = queue_of(A)
     end_trial(queue, runner)
     queue.replace([A, B])
@@ -93,7 +93,7 @@ def test_what_was_done_is_not_done_again_for_a_list_that_came_late() -> None:
     assert runner.begun == [0, 1]
 
 
-def test_a_trial_that_cannot_be_begun_is_refused_and_the_next_one_begins() -> None:
+def test_a_trial_that_cannot_begin_is_refused_and_the_next_one_begins() -> None:
     runner = Runner()
     queue = LeaseQueue(runner)  # type: ignore[arg-type]
     queue.replace([BAD, A])
@@ -102,7 +102,7 @@ def test_a_trial_that_cannot_be_begun_is_refused_and_the_next_one_begins() -> No
     assert (runner.begun, runner.dropped) == ([0], 1)
 
 
-def test_a_trial_whose_yield_is_worthless_is_refused() -> None:
+def test_a_trial_whose_episode_is_unusable_is_refused() -> None:
     queue, runner = queue_of(A, B)
     runner.yields = ThrowcollectError("not finite")
     assert queue.hand_over() == TrialRefusal(A.token, "not finite")
@@ -110,7 +110,7 @@ def test_a_trial_whose_yield_is_worthless_is_refused() -> None:
     assert runner.begun == [0, 1]
 
 
-def test_a_trial_by_hand_is_handed_over_like_any_other() -> None:
+def test_an_episode_without_a_lease_is_handed_over_as_well() -> None:
     queue, runner = queue_of()
     runner.yields = "an episode"
     assert queue.hand_over() == "an episode"

@@ -1,4 +1,4 @@
-"""Limbs of a simulation: how their controllers are set up, and what is told of them."""
+"""Limbs of a simulation: the configuration and the published state of their controllers."""
 
 import numpy as np
 import pytest
@@ -59,14 +59,14 @@ def test_talos_has_a_goal_tolerance_and_no_path_tolerance() -> None:
     assert set(parameters.constraints.joints) == set(parameters.joints)
 
 
-def test_joints_brake_if_the_configuration_says_so() -> None:
+def test_the_configuration_can_make_joints_brake_when_a_goal_is_cancelled() -> None:
     parameters = parameters_of(HEAD, hold="decelerate", max_deceleration_radps2=7.0)
     assert parameters.measures_velocity
     assert set(parameters.constraints.joints.values()) == {JointConstraints(goal=0.02, max_deceleration_on_cancel=7.0)}
 
 
 @pytest.mark.parametrize("seconds", [0.1, 0.7])
-def test_a_result_comes_before_time_goes_on(seconds: float) -> None:
+def test_a_result_comes_at_the_same_time_in_slices_and_in_steps(seconds: float) -> None:
     ends = []
     for go_on in (lambda world: world.advance(watched=False), lambda world: world.step(1)):
         world, results = simulation(), []
@@ -80,7 +80,7 @@ def test_a_result_comes_before_time_goes_on(seconds: float) -> None:
     assert ends[0] == ends[1]
 
 
-def test_whoever_watches_gets_the_state_of_every_control_period() -> None:
+def test_a_watched_limb_yields_the_state_of_every_control_period() -> None:
     world = simulation()
     world.watch([ARM, HEAD])
     world.submit(ARM, 1, goal(0.5))
@@ -95,7 +95,7 @@ def test_whoever_watches_gets_the_state_of_every_control_period() -> None:
     assert world.limbs[ARM].pop_states() == []
 
 
-def test_whoever_watches_later_gets_no_states_of_before() -> None:
+def test_watching_a_limb_again_yields_no_earlier_states() -> None:
     world = simulation()
     world.watch([ARM])
     world.submit(ARM, 1, goal(0.5))
@@ -105,7 +105,7 @@ def test_whoever_watches_later_gets_no_states_of_before() -> None:
     assert world.limbs[ARM].pop_states() == []
 
 
-def test_watching_changes_nothing() -> None:
+def test_watching_a_limb_does_not_change_its_motion() -> None:
     positions = []
     for watched in ([], [ARM, HEAD]):
         world = simulation()
@@ -150,7 +150,7 @@ def test_joints_can_brake_when_a_goal_is_cancelled() -> None:
     assert state.actual.positions[ELBOW] == pytest.approx(state.output.positions[ELBOW], abs=0.005)
 
 
-def test_velocities_alone_that_would_move_a_locked_joint_are_refused_by_name() -> None:
+def test_a_velocity_that_would_move_a_locked_joint_is_refused_by_name() -> None:
     limb = simulation().limbs[HEAD]
     joints = TALOS.controllers[HEAD]
     still, turning = ([TrajectoryPoint(10**9, velocities=[0.0, speed])] for speed in (0.0, 0.1))

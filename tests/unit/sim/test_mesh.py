@@ -64,7 +64,7 @@ def test_meshes_that_cannot_be_used_are_refused_by_their_names(name, content, re
     assert name in str(refused.value)
 
 
-def test_what_is_no_file_and_what_is_too_large_is_refused(tmp_path):
+def test_a_missing_or_too_large_mesh_file_is_refused(tmp_path):
     (tmp_path / "directory.stl").mkdir()
     with pytest.raises(RequestError, match="no such file"):
         read_mesh(tmp_path / "directory.stl")

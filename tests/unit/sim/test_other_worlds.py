@@ -1,4 +1,4 @@
-"""Robots that differ from the one that somebody believes to have."""
+"""Robots that differ from their nominal model, in joint offsets, clock, motors, spoon or strength."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def shift_m(found: Throw, nominal: Throw) -> np.ndarray:
     return found.events.landing.position[:2] - nominal.events.landing.position[:2]
 
 
-def test_a_joint_with_another_zero_says_that_it_does_as_told(nominal: Throw) -> None:
+def test_a_joint_with_an_offset_reports_the_commanded_angle(nominal: Throw) -> None:
     found = throw(f"robot.joint_offsets={{{ELBOW}: 0.06, torso_1_joint: 0.05}}")
     column = found.joints.names.index(ELBOW)
     assert found.joints.position[0, column] == pytest.approx(nominal.joints.position[0, column], abs=1e-9)
@@ -66,7 +66,7 @@ def test_a_spoon_that_sits_farther_out_throws_farther(nominal: Throw) -> None:
     assert again.row["landing_x_m"] == nominal.row["landing_x_m"]
 
 
-def test_a_weak_robot_throws_if_one_believes_that_it_is_strong() -> None:
+def test_a_weak_robot_throws_unless_its_actual_limits_are_checked() -> None:
     with pytest.raises(PlanError, match="its limit is"):
         throw("robot.effort_scale=0.5", feasibility="actual")
     found = throw("robot.effort_scale=0.5")

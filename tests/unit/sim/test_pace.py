@@ -1,4 +1,4 @@
-"""Slices of time that are as long in simulated as in real time, times a factor."""
+"""Time slices: simulated time goes on at real time times a factor."""
 
 import pytest
 
@@ -7,7 +7,7 @@ from throwcollect.sim.pace import Pace, long_slice_steps, slice_steps
 
 
 class Clock:
-    """Time that passes only when somebody sleeps or works."""
+    """A clock that goes on only when the code under test sleeps or a test works."""
 
     def __init__(self) -> None:
         self.now = 1000.0
@@ -39,16 +39,18 @@ def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
         (1000.0, 500, 2, 25),
     ],
 )
-def test_a_slice_is_as_long_as_there_is_nothing_to_tell(factor: float, hz: int, period: int, steps: int) -> None:
+def test_the_length_of_a_time_slice_follows_from_factor_rate_and_sample_period(
+    factor: float, hz: int, period: int, steps: int
+) -> None:
     assert slice_steps(factor, hz, period, 0) == steps
 
 
 @pytest.mark.parametrize(("factor", "steps"), [(1.0, 25), (0.2, 5), (0.001, 1), (5.0, 125), (1e300, 250)])
-def test_while_nobody_listens_a_slice_is_as_long_as_requests_can_wait(factor: float, steps: int) -> None:
+def test_without_listeners_a_time_slice_is_as_long_as_requests_can_wait(factor: float, steps: int) -> None:
     assert long_slice_steps(factor, 500, 0.5) == steps
 
 
-def test_a_slice_ends_with_the_period() -> None:
+def test_a_time_slice_ends_with_the_sample_period() -> None:
     assert slice_steps(1.0, 500, 5, 3) == 2
     assert slice_steps(0.001, 500, 5, 3) == 1
 
@@ -61,7 +63,7 @@ def run(pace: Pace, clock: Clock, *, since_ns: int, work_s: float, factor: float
     return clock.now
 
 
-def test_what_is_done_between_slices_does_not_add_up(clock: Clock) -> None:
+def test_time_spent_between_slices_does_not_add_up(clock: Clock) -> None:
     keeper, ends = Pace(), []
     for number in range(100):
         clock.now += 0.001
@@ -69,7 +71,7 @@ def test_what_is_done_between_slices_does_not_add_up(clock: Clock) -> None:
     assert ends[-1] - ends[0] == pytest.approx(99 * 0.004)
 
 
-def test_a_slice_that_took_too_long_is_caught_up_with(clock: Clock) -> None:
+def test_a_time_slice_that_took_too_long_is_caught_up_with(clock: Clock) -> None:
     keeper = Pace()
     first = run(keeper, clock, since_ns=0, work_s=0.0)
     assert run(keeper, clock, since_ns=4_000_000, work_s=0.010) == pytest.approx(first + 0.010)
@@ -80,7 +82,7 @@ def test_a_slice_that_took_too_long_is_caught_up_with(clock: Clock) -> None:
 @pytest.mark.parametrize(
     ("since_ns", "pause_s", "factor"), [(4_000_000, 1.0, 1.0), (0, 0.0, 1.0), (50_000_000, 0.0, 1.0)]
 )
-def test_after_a_rest_or_a_reset_pace_is_kept_from_the_present_on(
+def test_after_a_rest_or_a_reset_pace_is_kept_from_the_present_time(
     since_ns: int, pause_s: float, factor: float, clock: Clock
 ) -> None:
     keeper = Pace()
@@ -93,6 +95,6 @@ def test_after_a_rest_or_a_reset_pace_is_kept_from_the_present_on(
     )
 
 
-def test_slow_motion_takes_longer(clock: Clock) -> None:
+def test_a_time_slice_in_slow_motion_takes_longer(clock: Clock) -> None:
     began_s = clock.now
     assert run(Pace(), clock, since_ns=0, work_s=0.0, factor=0.1) == pytest.approx(began_s + 0.040)

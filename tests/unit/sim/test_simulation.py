@@ -69,7 +69,7 @@ def test_the_clock_stands_still_until_every_awaited_controller_has_a_goal(simula
     assert simulation.now_ns == CONFIG.trial_start_ns(0)
 
 
-def test_a_trajectory_that_is_no_goal_waits_for_the_awaited_goals(simulation: Simulation) -> None:
+def test_a_trajectory_without_a_goal_waits_for_the_awaited_goals(simulation: Simulation) -> None:
     simulation.trial.setup = TrialSetup(0, (ARM,), CONFIG)
     simulation.reset()
     assert simulation.follow(HEAD, goal(HEAD).trajectory) is None
@@ -118,7 +118,7 @@ def test_joints_are_at_the_trajectory_when_their_sample_is_taken(simulation: Sim
     assert np.abs(samples.position[:, 10] - wanted).max() < 1e-4
 
 
-def test_what_a_controller_desires_and_measures_is_of_the_same_instant(simulation: Simulation) -> None:
+def test_desired_and_measured_state_of_a_controller_are_of_the_same_instant(simulation: Simulation) -> None:
     simulation.submit(ARM, 1, goal(ARM, 2.0, arm_right_4_joint=-0.5))
     simulation.step(500)
     state, now_ns = simulation.observe(ARM).state(simulation.now_ns), simulation.now_ns
@@ -136,7 +136,7 @@ def test_a_goal_that_moves_a_locked_joint_is_refused_by_name(simulation: Simulat
     assert not simulation.running
 
 
-def test_a_limb_of_locked_joints_still_carries_out_goals_that_keep_it_where_it_is(simulation: Simulation) -> None:
+def test_a_locked_limb_carries_out_a_goal_that_does_not_move_it(simulation: Simulation) -> None:
     assert simulation.submit(HEAD, 5, goal(HEAD, duration_s=0.2)) is None
     run(simulation)
     assert [(name, result.status) for name, result in simulation.pop_results()] == [(HEAD, GoalStatus.SUCCEEDED)]
@@ -154,7 +154,7 @@ def test_without_a_trial_the_run_ends_when_limbs_and_ball_are_at_rest(simulation
     assert [result.status for _, result in simulation.pop_results()] == [GoalStatus.SUCCEEDED] * 2
 
 
-def test_a_trajectory_that_is_no_goal_ends_its_run_too(simulation: Simulation) -> None:
+def test_a_run_of_a_trajectory_without_a_goal_ends(simulation: Simulation) -> None:
     assert simulation.follow(ARM, swing().trajectory) is None
     run(simulation)
     assert simulation.now_ns > 1e9
@@ -171,7 +171,7 @@ def test_a_reset_aborts_goals_and_goes_back_to_the_start(simulation: Simulation)
     assert not simulation.running
 
 
-def test_a_cancelled_goal_stops_where_it_is(simulation: Simulation) -> None:
+def test_a_cancelled_goal_stops_the_limb_where_it_is(simulation: Simulation) -> None:
     assert simulation.submit(ARM, 1, swing()) is None
     for _ in range(10):
         simulation.advance(watched=True)
@@ -189,7 +189,7 @@ def test_while_paused_steps_advance_the_clock_exactly(simulation: Simulation) ->
     assert simulation.now_ns == 10 * 10**9 // CONFIG.sim.physics_hz
 
 
-def test_steps_that_are_asked_for_are_taken_slice_by_slice(simulation: Simulation) -> None:
+def test_requested_steps_are_taken_slice_by_slice(simulation: Simulation) -> None:
     simulation.set_state(StateCode.PAUSED)
     request = simulation.request_steps(60)
     assert simulation.running
@@ -204,13 +204,13 @@ def test_steps_that_are_asked_for_are_taken_slice_by_slice(simulation: Simulatio
     assert simulation.now_ns == 60 * 10**9 // CONFIG.sim.physics_hz
 
 
-def test_steps_are_refused_unless_it_is_paused(simulation: Simulation) -> None:
+def test_steps_are_refused_unless_the_simulation_is_paused(simulation: Simulation) -> None:
     with pytest.raises(RequestError, match="paused only; it is PLAYING") as refused:
         simulation.request_steps(1)
     assert refused.value.reason == "RESULT_OPERATION_FAILED"
 
 
-def test_no_steps_need_no_time(simulation: Simulation) -> None:
+def test_a_request_for_zero_steps_is_over_at_once(simulation: Simulation) -> None:
     simulation.set_state(StateCode.PAUSED)
     assert simulation.request_steps(0).is_over
     assert not simulation.running
@@ -224,7 +224,7 @@ def test_no_steps_need_no_time(simulation: Simulation) -> None:
         (lambda simulation: simulation.set_state(StateCode.QUITTING), "the simulation is QUITTING now"),
     ],
 )
-def test_steps_end_when_something_comes_in_between(interrupt, reason: str, simulation: Simulation) -> None:
+def test_a_reset_or_quitting_interrupts_steps(interrupt, reason: str, simulation: Simulation) -> None:
     simulation.set_state(StateCode.PAUSED)
     request = simulation.request_steps(10**9)
     simulation.advance(watched=True)
@@ -233,7 +233,7 @@ def test_steps_end_when_something_comes_in_between(interrupt, reason: str, simul
     assert not simulation.running
 
 
-def test_taking_away_what_was_spawned_does_not_end_steps(simulation: Simulation) -> None:
+def test_removing_spawned_entities_does_not_end_steps(simulation: Simulation) -> None:
     simulation.set_state(StateCode.PAUSED)
     request = simulation.request_steps(30)
     simulation.reset(Scope.SPAWNED)
@@ -243,7 +243,7 @@ def test_taking_away_what_was_spawned_does_not_end_steps(simulation: Simulation)
 
 
 @pytest.mark.parametrize("scope", [Scope.TIME, Scope.STATE, Scope.STATE | Scope.SPAWNED])
-def test_only_time_and_state_together_begin_a_trial(scope: Scope, simulation: Simulation) -> None:
+def test_only_a_reset_of_time_and_state_together_begins_a_trial(scope: Scope, simulation: Simulation) -> None:
     trial(simulation)
     simulation.advance(watched=True)
     simulation.reset(scope)
@@ -290,7 +290,7 @@ def test_set_points_are_kept_with_each_sample_when_they_are_recorded() -> None:
     simulation.world.close()
 
 
-def test_the_last_look_of_a_trial_tells_the_results_that_it_brings() -> None:
+def test_a_result_that_comes_with_the_episode_is_still_reported() -> None:
     config = Config.model_validate({"record": {"topics": ["joint_states", "ball/odometry", "controller_state"]}})
     simulation = Simulation(config)
     trial(simulation)
@@ -322,7 +322,7 @@ def test_a_real_time_factor_holds_the_clock_back(simulation: Simulation) -> None
 
 
 @pytest.mark.parametrize(("leased", "watched", "samples"), [(True, False, 12), (True, True, 1), (False, False, 1)])
-def test_slices_of_real_time_are_long_where_nobody_waits_for_messages(
+def test_a_leased_trial_without_listeners_advances_in_long_slices(
     simulation: Simulation, *, leased: bool, watched: bool, samples: int
 ) -> None:
     if leased:
@@ -337,7 +337,7 @@ def test_slices_of_real_time_are_long_where_nobody_waits_for_messages(
     simulation.end_lease()
 
 
-def test_samples_are_told_one_by_one_also_after_steps_that_ended_between_them(simulation: Simulation) -> None:
+def test_samples_come_one_by_one_after_steps_that_ended_between_two(simulation: Simulation) -> None:
     simulation.state = StateCode.PAUSED
     simulation.request_steps(3)
     simulation.advance(watched=True)
@@ -351,7 +351,7 @@ def test_samples_are_told_one_by_one_also_after_steps_that_ended_between_them(si
     assert len(simulation.fresh_samples()) == 1
 
 
-def test_after_a_reset_that_fails_the_clock_stands_still_until_another_one_succeeds() -> None:
+def test_after_a_failed_reset_the_clock_stands_still_until_one_succeeds() -> None:
     config = Config.model_validate({"sim": {"engine": "ballistic"}, "tool": {"cup_floor_radius_m": 0.006}})
     simulation = Simulation(config)
     simulation.trial.setup = TrialSetup(0, (), config)

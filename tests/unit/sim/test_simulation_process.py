@@ -1,4 +1,4 @@
-"""The simulation that is made before the node that takes it is forked off."""
+"""A process makes a simulation ahead, before the node that takes it is forked off."""
 
 from collections.abc import Iterator
 from unittest.mock import Mock
@@ -19,14 +19,14 @@ def nothing_made() -> Iterator[None]:
     simulation_process._made.clear()
 
 
-def test_what_was_made_ahead_is_taken_once() -> None:
+def test_a_simulation_made_ahead_is_taken_once() -> None:
     simulation_process.make_ahead(CONFIG)
     [made] = simulation_process._made
     assert simulation_process._take(CONFIG.model_copy()) is made
     assert simulation_process._take(CONFIG) is not made
 
 
-def test_what_was_made_for_another_configuration_is_closed() -> None:
+def test_a_simulation_made_ahead_for_another_configuration_is_closed() -> None:
     simulation_process.make_ahead(OTHER)
     [made] = simulation_process._made
     made.world.close = Mock()
@@ -34,7 +34,7 @@ def test_what_was_made_for_another_configuration_is_closed() -> None:
     made.world.close.assert_called_once_with()
 
 
-def test_no_world_is_made_ahead_that_cannot_be_forked(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_world_that_cannot_be_forked_is_not_made_ahead(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(simulation_process.load_member("engines", "ballistic"), "can_be_forked", False)
     simulation_process.make_ahead(CONFIG)
     assert not simulation_process._made

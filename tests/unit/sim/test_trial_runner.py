@@ -1,4 +1,4 @@
-"""What a simulation makes of a trial that it is asked for: episode, result and conditions."""
+"""The trial runner turns a leased trial into episode, result and conditions."""
 
 from collections.abc import Iterator
 
@@ -37,7 +37,7 @@ def finish(runner: TrialRunner, simulation: Simulation) -> Delivery:
 
 
 @pytest.mark.parametrize("engine", ["ballistic", "bullet"])
-def test_a_trial_is_judged_as_whoever_reads_it_judges_it(engine: str) -> None:
+def test_a_trial_has_the_result_that_judging_its_episode_gives(engine: str) -> None:
     config = Config.model_validate({"sim": {"engine": engine}})
     simulation = Simulation(config)
     runner = TrialRunner(simulation)
@@ -56,7 +56,7 @@ def test_a_trial_is_judged_as_whoever_reads_it_judges_it(engine: str) -> None:
     simulation.world.close()
 
 
-def test_what_cannot_be_begun_is_an_error(simulation: Simulation, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_trial_that_cannot_begin_is_an_error(simulation: Simulation, monkeypatch: pytest.MonkeyPatch) -> None:
     runner = TrialRunner(simulation)
     with pytest.raises(ConfigError):
         runner.begin(0, {"ball.colour": 1.0})
@@ -67,7 +67,7 @@ def test_what_cannot_be_begun_is_an_error(simulation: Simulation, monkeypatch: p
         runner.begin(0, {})
 
 
-def test_numbers_that_are_not_finite_are_not_handed_over(
+def test_an_episode_with_numbers_that_are_not_finite_is_an_error(
     simulation: Simulation, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     runner = TrialRunner(simulation)
@@ -85,7 +85,7 @@ def test_numbers_that_are_not_finite_are_not_handed_over(
         finish(runner, simulation)
 
 
-def test_a_trial_that_is_dropped_yields_nothing(simulation: Simulation) -> None:
+def test_a_dropped_trial_yields_no_episode(simulation: Simulation) -> None:
     runner = TrialRunner(simulation)
     runner.begin(0, VALUES)
     simulation.advance(watched=False)
@@ -96,7 +96,7 @@ def test_a_trial_that_is_dropped_yields_nothing(simulation: Simulation) -> None:
     assert simulation.now_ns == 0
 
 
-def test_what_is_set_up_meanwhile_is_of_the_next_trial_alone(simulation: Simulation) -> None:
+def test_a_setup_during_a_trial_is_only_for_the_next_one(simulation: Simulation) -> None:
     runner = TrialRunner(simulation)
     simulation.trial.setup = TrialSetup(3, (), with_values(CONFIG, {"ball.mass_kg": 0.05}))
     simulation.reset()
@@ -111,7 +111,7 @@ def test_what_is_set_up_meanwhile_is_of_the_next_trial_alone(simulation: Simulat
     assert conditions_from_json(delivery.conditions).values == {"ball.mass_kg": 0.05}
 
 
-def test_what_is_set_up_after_a_leased_trial_begins_with_the_configuration(simulation: Simulation) -> None:
+def test_after_a_leased_trial_the_setup_is_the_configuration_again(simulation: Simulation) -> None:
     runner = TrialRunner(simulation)
     runner.begin(3, VALUES)
     finish(runner, simulation)

@@ -46,7 +46,7 @@ def test_a_body_with_mass_moves_and_one_without_is_fixed():
     assert model(box().replace('"body"', '"world"')).is_static
 
 
-def test_the_mass_of_what_is_rigidly_attached_to_the_root_counts():
+def test_the_mass_of_links_rigidly_attached_to_the_root_counts():
     heavy = box().replace("<robot", "<x").split(">", 1)[1].replace("</robot>", "")
     on_frame = robot(A, heavy, joint(child="body"))
     assert not model(on_frame).is_fixed
@@ -59,7 +59,7 @@ def test_a_robot_that_is_fixed_can_have_joints_that_move():
     assert (hanging.name, hanging.joints, hanging.is_fixed, hanging.is_static) == ("pendulum", 1, True, False)
 
 
-def test_only_what_is_understood_is_passed_on():
+def test_unknown_elements_of_a_description_are_left_out():
     text = robot(
         "<link name='a'><visual/><plugin/><collision><geometry><sphere radius='1'/></geometry></collision></link>"
     )
@@ -84,7 +84,7 @@ def test_meshes_are_read_once_and_exact_only_where_they_never_move():
     assert "concave" not in model(robot(f"<link name='a'>{mass}{shapes}</link>"), read_mesh).urdf
 
 
-def test_moments_of_inertia_become_those_of_a_body():
+def test_impossible_moments_of_inertia_are_corrected():
     assert inertia(box(inertia=INERTIA.format(1, 2, 2.5))) == [1, 2, 2.5]
     assert inertia(box(mass=2.0, inertia=INERTIA.format(0, 0, 0))) == pytest.approx([2e-6, 2e-6, 2e-6], rel=0.01)
     assert inertia(box(inertia=INERTIA.format(1, 1, 9))) == pytest.approx([1, 1, 2], rel=0.01)
@@ -139,14 +139,14 @@ def test_limits_without_bounds_become_numbers_that_the_engine_can_take():
         (robot("<link name='a'><collision/></link>"), "a collision without geometry"),
     ],
 )
-def test_descriptions_that_make_no_sense_are_refused(text, words):
+def test_malformed_descriptions_are_refused(text, words):
     with pytest.raises(RequestError, match=words) as refused:
         model(text)
     assert refused.value.reason == "RESOURCE_PARSE_ERROR"
 
 
 @pytest.mark.parametrize(("text", "kind"), [("<sdf/>", "SDFormat"), ("<mujoco/>", "MJCF"), ("<html/>", "<html>")])
-def test_other_formats_are_named(text, kind):
+def test_another_format_than_urdf_is_refused_by_name(text, kind):
     with pytest.raises(RequestError, match=kind) as refused:
         model(text)
     assert refused.value.reason == "UNSUPPORTED_FORMAT"

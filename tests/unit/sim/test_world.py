@@ -39,7 +39,7 @@ def same(first, second):
 
 @pytest.fixture(scope="module", params=["bullet", "mujoco"])
 def world(request):
-    # A world keeps the engine that it began with.
+    # A world keeps the engine with which it was made.
     made = World(config(sim={"engine": request.param}))
     yield made
     made.close()
@@ -99,7 +99,7 @@ def test_joints_are_at_the_command_at_the_end_of_each_step(world):
         assert world.joints()[0] == pytest.approx(command, abs=1e-4)
 
 
-def test_step_by_step_equals_all_at_once(world):
+def test_running_commands_one_by_one_equals_running_all_at_once(world):
     at_once = throw(world)
     world.reset(CONFIG)
     for command in motion(CONFIG, world.moving):
@@ -122,7 +122,7 @@ def test_the_ground_does_not_touch_a_ball_that_lands_at_height_zero(world):
     assert samples.ball_linear_velocity[-1, 0] == samples.ball_linear_velocity[-20, 0]
 
 
-def test_on_demand_steps_go_on_after_the_end(world):
+def test_steps_go_on_after_the_end_of_a_throw_on_demand(world):
     throw(world)
     assert world.run([motion(CONFIG, world.moving)[-1]] * 10, stop_at_end=False) == 10
     assert world.end_reason == "landed"
@@ -178,7 +178,7 @@ def test_a_delay_of_whole_periods_shifts_the_commands(world):
     assert same(world.samples(), shifted)
 
 
-def test_a_fraction_of_a_period_is_interpolated(world):
+def test_a_delay_of_a_fraction_of_a_period_interpolates_the_commands(world):
     commands = motion(CONFIG, world.moving)
     start = [start_posture(CONFIG)[joint] for joint in world.moving]
     before = [start, *commands]
@@ -192,7 +192,7 @@ def test_a_fraction_of_a_period_is_interpolated(world):
     assert same(world.samples(), shifted)
 
 
-def test_effort_is_limited(world):
+def test_effort_scale_limits_the_effort_of_a_joint(world):
     weak = throw(world, config(robot={"effort_scale": 0.5}))
     elbow = TALOS.joints.index("arm_right_4_joint")
     assert np.abs(weak.effort[:, elbow]).max() == pytest.approx(17.86 / 2, rel=1e-9)
@@ -222,7 +222,7 @@ def test_a_ball_on_the_robot_touches_the_link_by_name(world):
 
 
 @pytest.mark.parametrize(("restitution", "least", "most"), [(0.0, 0.0, 0.001), (0.8, 0.5, 0.81)])
-def test_the_ball_bounces_as_its_own_restitution_says(restitution, least, most):
+def test_the_bounce_of_the_ball_follows_its_restitution(restitution, least, most):
     trial = config(scene={"landing_height_m": 1.9}, ball={"restitution": restitution})
     world = World(trial)
     world.ball = BodyState((1.0, 0.0, 0.5))
@@ -232,7 +232,7 @@ def test_the_ball_bounces_as_its_own_restitution_says(restitution, least, most):
     world.close()
 
 
-def test_other_locked_angles_rebuild_the_robot(world):
+def test_a_reset_with_another_posture_rebuilds_the_robot(world):
     world.reset(config(robot={"posture": {"torso_2_joint": 0.3}}))
     leaning = world.samples()
     world.reset(CONFIG)

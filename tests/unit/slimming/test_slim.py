@@ -1,4 +1,4 @@
-"""What the image's scripts take out of packages, and what they leave."""
+"""The scripts of the image remove unneeded files from packages and keep the others."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def elf(*needed: str) -> bytes:
     return header + load + table + names + dynamic + b"symbols" * 50
 
 
-def test_needed_libraries_are_those_that_the_loader_reports(library: bytes) -> None:
+def test_list_needed_reads_the_libraries_that_an_elf_file_needs(library: bytes) -> None:
     from elf import list_needed
 
     assert list_needed(elf("libb.so.1", "libc.so.6")) == ["libb.so.1", "libc.so.6"]
@@ -69,7 +69,7 @@ def test_a_stripped_library_is_shorter_and_still_loads(library: bytes, tmp_path:
     assert list_needed(shorter) == list_needed(library)
     path = tmp_path / "stripped.so"
     path.write_bytes(shorter)
-    # Its functions call Python's, so it is loaded into a Python of its own.
+    # The library calls functions of Python, so another Python process loads it.
     code = "import ctypes, sys; print(ctypes.PyDLL(sys.argv[1]).PyInit_pybullet is not None)"
     ended = subprocess.run([sys.executable, "-c", code, str(path)], capture_output=True, text=True, check=True)
     assert ended.stdout == "True\n"
@@ -119,7 +119,7 @@ def test_a_file_stays_if_a_node_may_load_it(path: str, stays: bool) -> None:
     assert is_kept(path) is stays
 
 
-def test_every_file_of_our_own_packages_stays_but_what_type_checkers_read() -> None:
+def test_only_pyi_files_of_our_own_packages_are_removed() -> None:
     from slim import is_kept
 
     source = ROOT / "src"
@@ -127,7 +127,7 @@ def test_every_file_of_our_own_packages_stays_but_what_type_checkers_read() -> N
     assert {path.suffix for path in gone} == {".pyi"}
 
 
-def test_of_libraries_those_stay_that_a_module_loads_by_whatever_way() -> None:
+def test_libraries_that_no_module_reaches_are_superfluous() -> None:
     from slim import find_unreached
 
     files = {
@@ -157,7 +157,7 @@ def test_libraries_that_ros_loads_by_name_stay_with_what_they_need() -> None:
     assert superfluous == {"data/lib/libtf2_msgs__rosidl_typesupport_introspection_cpp.so", "data/lib/libfastcdr.so"}
 
 
-def test_of_libraries_that_several_wheels_of_ros_hold_one_copy_stays() -> None:
+def test_of_a_library_in_several_ros_wheels_one_copy_stays() -> None:
     from slim import find_repeated
 
     files = [
@@ -169,7 +169,7 @@ def test_of_libraries_that_several_wheels_of_ros_hold_one_copy_stays() -> None:
     assert find_repeated(files) == {"ros_rcl.libs/libssl-60.so.1"}
 
 
-def test_an_environment_with_ros_is_slimmed_beside_its_packages_too(tmp_path: Path) -> None:
+def test_slimming_covers_the_other_directories_of_an_environment_with_ros(tmp_path: Path) -> None:
     from slim import slim
 
     packages = tmp_path / "lib" / "python3.11" / "site-packages"
@@ -190,7 +190,7 @@ def test_an_environment_with_ros_is_slimmed_beside_its_packages_too(tmp_path: Pa
     )
 
 
-def test_a_directory_is_slimmed_and_slimming_it_again_changes_nothing(tmp_path: Path) -> None:
+def test_slimming_a_directory_again_changes_nothing(tmp_path: Path) -> None:
     from slim import slim
 
     for name, content in {
@@ -231,7 +231,7 @@ def fill(downloads: Path) -> None:
         wheel.writestr("two-1.dist-info/RECORD", "")
 
 
-def test_wheels_are_written_anew_with_lists_of_what_is_in_them(wheelhouse: ModuleType, tmp_path: Path) -> None:
+def test_repacked_wheels_have_correct_lists_of_their_files(wheelhouse: ModuleType, tmp_path: Path) -> None:
     before, after = tmp_path / "before", tmp_path / "after"
     before.mkdir()
     after.mkdir()
@@ -286,14 +286,14 @@ def test_a_download_that_fails_leaves_the_wheelhouse_as_it_was(
     assert [path.name for path in tmp_path.iterdir()] == ["old.whl"]
 
 
-def test_a_directory_with_anything_else_in_it_is_not_replaced(wheelhouse: ModuleType, tmp_path: Path) -> None:
+def test_a_wheelhouse_with_other_files_is_not_replaced(wheelhouse: ModuleType, tmp_path: Path) -> None:
     (tmp_path / "thesis.tex").write_text("")
     with pytest.raises(SystemExit, match=r"holds thesis.tex, which is no wheel"):
         wheelhouse.main(tmp_path)
     assert (tmp_path / "thesis.tex").exists()
 
 
-def test_wheels_of_ros_are_added_if_wanted_but_for_what_is_there(
+def test_ros_wheels_are_added_on_request_unless_another_version_exists(
     wheelhouse: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def collect(directory: Path) -> None:
@@ -313,7 +313,7 @@ def test_wheels_of_ros_are_added_if_wanted_but_for_what_is_there(
         assert sorted(path.name for path in target.glob("*.whl")) == found
 
 
-def test_the_wheels_are_those_of_the_dependencies_of_the_project() -> None:
+def test_the_wheelhouse_requires_the_dependencies_of_the_project() -> None:
     import wheelhouse
 
     wanted = wheelhouse.requirements()

@@ -24,7 +24,7 @@ _COLUMNS: list[tuple[pa.DataType, list[Any]]] = [
 
 @pytest.mark.parametrize(("kind", "values"), _COLUMNS)
 @pytest.mark.parametrize("rows", [0, 1, 8, 9])
-def test_columns_are_those_of_arrow(kind: pa.DataType, values: list[Any], rows: int) -> None:
+def test_a_made_column_equals_that_of_arrow(kind: pa.DataType, values: list[Any], rows: int) -> None:
     column = make_column(values[:rows], kind)
     column.validate(full=True)
     expected = pa.array(values[:rows], kind)
@@ -32,14 +32,14 @@ def test_columns_are_those_of_arrow(kind: pa.DataType, values: list[Any], rows: 
     assert column.null_count == expected.null_count
 
 
-def test_tables_are_written_as_those_of_arrow() -> None:
+def test_a_made_table_is_written_as_that_of_arrow() -> None:
     schema = pa.schema([pa.field(f"column {index}", kind) for index, (kind, _) in enumerate(_COLUMNS)])
     arrays = [pa.array(values, kind) for kind, values in _COLUMNS]
     assert _encode(make_table([values for _, values in _COLUMNS], schema)) == _encode(pa.table(arrays, schema))
 
 
 @pytest.mark.parametrize(("kind", "value"), [(pa.int64(), 1.5), (pa.float64(), "1"), (pa.int64(), "1")])
-def test_values_of_another_kind_are_refused(kind: pa.DataType, value: object) -> None:
+def test_values_of_a_wrong_type_are_refused(kind: pa.DataType, value: object) -> None:
     with pytest.raises(TypeError):
         make_column([value], kind)
 
@@ -58,26 +58,26 @@ def _encode(table: pa.Table) -> bytes:
 
 @pytest.mark.parametrize(("kind", "values"), _COLUMNS)
 @pytest.mark.parametrize("cut", [0, 1, 3])
-def test_validity_is_that_of_arrow(kind: pa.DataType, values: list[Any], cut: int) -> None:
+def test_read_validity_returns_which_values_are_not_null(kind: pa.DataType, values: list[Any], cut: int) -> None:
     column = make_column(values, kind).slice(cut)
     assert read_validity(column).tolist() == [value is not None for value in values[cut:]]
 
 
 @pytest.mark.parametrize(("kind", "values"), [each for each in _COLUMNS if each[0] != pa.string()])
 @pytest.mark.parametrize("cut", [0, 1, 3, 9])
-def test_the_range_is_that_of_arrow(kind: pa.DataType, values: list[Any], cut: int) -> None:
+def test_find_range_equals_min_max_of_arrow(kind: pa.DataType, values: list[Any], cut: int) -> None:
     column = pa.chunked_array([make_column(values, kind).slice(cut)])
     expected = tuple(pc.min_max(column).as_py().values())
     assert find_range(column) == (None if expected == (None, None) else expected)
 
 
-def test_the_range_is_that_of_all_pieces_of_a_column_without_nan() -> None:
+def test_find_range_covers_all_chunks_and_ignores_nan() -> None:
     column = pa.chunked_array([make_column(values, pa.float64()) for values in ([2.0, None], [], [float("nan"), -1.0])])
     assert find_range(column) == tuple(pc.min_max(column).as_py().values()) == (-1.0, 2.0)
     assert find_range(pa.chunked_array([], pa.int64())) is None
 
 
-def test_values_are_counted_over_all_pieces_of_a_column(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_values_are_counted_over_all_chunks_of_a_column(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("throwcollect.sweep.arrow_column._VALUES_AT_ONCE", 2)
     column = pa.chunked_array([make_column(values, pa.string()) for values in (["a", None, "b"], [], ["a", "a"])])
     assert count_values(column) == {"a": 3, "b": 1, None: 1}

@@ -37,13 +37,13 @@ def test_digests_are_sha_256_over_the_effective_keys_in_order():
     assert digests(Config())[0] == hashlib.sha256(text.encode()).hexdigest()
 
 
-def test_it_does_not_matter_whether_a_value_was_swept_or_fixed():
+def test_a_swept_and_a_fixed_value_give_the_same_digest():
     fixed = with_values(Config(), {"ball.mass_kg": 0.2, "task.duration_s": 1.0})
     no_points = Points((), np.empty((1, 0)))
     assert digests(fixed, no_points, (6,)) == digests(Config())[1:]
 
 
-def test_a_key_that_came_later_counts_where_it_is_not_the_default():
+def test_a_newer_key_changes_a_digest_only_if_it_is_not_the_default():
     points = Points(("robot.motor_lag_s",), np.array([[0.0], [0.01]]))
     default, late = digests(Config(), points, (5, 5))
     no_points = Points((), np.empty((1, 0)))
@@ -69,7 +69,7 @@ def test_a_key_that_came_later_counts_where_it_is_not_the_default():
         {"sweep": SweepConfig(parameters={"ball.mass_kg": Range(min=0.1, max=0.2)}, target=TARGET)},
     ],
 )
-def test_what_does_not_change_samples_does_not_change_digests(changes):
+def test_keys_without_effect_on_samples_do_not_change_digests(changes):
     assert digests(Config().model_copy(update=changes)) == digests(Config())
 
 
@@ -86,11 +86,11 @@ def test_what_does_not_change_samples_does_not_change_digests(changes):
         {"controllers": ControllersConfig(hold="command")},
     ],
 )
-def test_what_changes_samples_changes_all_digests(changes):
+def test_keys_with_an_effect_on_samples_change_all_digests(changes):
     assert not set(digests(Config().model_copy(update=changes))) & set(digests(Config()))
 
 
-def test_values_and_seed_of_a_trial_change_its_digest_alone():
+def test_values_and_seed_of_a_trial_change_only_its_digest():
     first, second = digests(Config())
     other = Points(POINTS.keys, np.array([[0.1, 1.0], [0.2, np.nextafter(1.0, 2.0)]]))
     assert digests(Config(), other)[0] == first
@@ -99,20 +99,20 @@ def test_values_and_seed_of_a_trial_change_its_digest_alone():
     assert digests(Config(), seeds=(5, 7))[1] != second
 
 
-def test_the_digest_of_a_configuration_is_over_everything_but_how_it_is_run():
+def test_the_digest_of_a_configuration_leaves_out_how_it_is_run():
     otherwise = Config(run=RunConfig(simulations=9), containers=ContainersConfig(volume="throws"))
     assert config_digest(otherwise) == config_digest(Config())
     assert config_digest(Config(name="other")) != config_digest(Config())
 
 
-def test_a_plan_made_before_the_section_controllers_still_belongs_to_its_configuration():
+def test_a_configuration_older_than_the_section_controllers_keeps_its_digest():
     before = "09626b408b776e79ab4ff485411deb75f2b6615377a41e80b715b04bdb842333"
     assert config_digest(Config(name="old", record=RECORD_OF_OLD)) == before
     other = ControllersConfig(hold="command")
     assert config_digest(Config(name="old", record=RECORD_OF_OLD, controllers=other)) != before
 
 
-def test_a_plan_made_before_targets_still_belongs_to_its_configuration():
+def test_a_configuration_older_than_targets_keeps_its_digest():
     sweep = SweepConfig(parameters={"ball.mass_kg": Range(min=0.1, max=0.2)})
     before = "ad57f77989d00389417c918c12a5291022ea27e8bca7c3da9f188a4a58b1b461"
     config = Config(name="old", sweep=sweep, record=RECORD_OF_OLD)

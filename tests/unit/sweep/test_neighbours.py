@@ -18,7 +18,7 @@ class CountingTree(cKDTree):  # type: ignore[misc]
         super().__init__(points)
 
 
-def test_neighbours_are_those_of_one_tree_however_many_trees_there_are(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_neighbours_from_several_trees_equal_those_of_one_tree(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(neighbours, "_FEW", 16)
     random = np.random.default_rng(1)
     points, places = random.random((1200, 3)), random.random((50, 3))
@@ -36,7 +36,7 @@ def test_neighbours_are_those_of_one_tree_however_many_trees_there_are(monkeypat
     assert trees == {1, 2, 3, 4}
 
 
-def test_of_points_that_are_equally_far_the_first_come_first(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_of_equally_far_points_the_first_ones_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(neighbours, "_FEW", 4)
     found = Neighbours(1)
     found.append(np.array([[0.0], [9.0], [1.0], [9.0], [1.0]]))

@@ -33,7 +33,7 @@ def test_trials_are_numbered_from_zero_and_differ():
     assert all(trial.refused is None for trial in plan.trials)
 
 
-def test_the_configuration_of_a_trial_has_its_values_and_nothing_else_changed():
+def test_the_configuration_of_a_trial_differs_only_in_its_values():
     plan = make_plan(make_config())
     trial = plan.trials[3]
     config = plan.config_of(trial)
@@ -42,14 +42,14 @@ def test_the_configuration_of_a_trial_has_its_values_and_nothing_else_changed():
     assert config.task.end == plan.config.task.end
 
 
-def test_seeds_depend_on_root_seed_and_number_alone():
+def test_seeds_depend_only_on_root_seed_and_trial_number():
     seeds = [trial.seed for trial in make_plan(make_config(4)).trials]
     assert [trial.seed for trial in make_plan(make_config(8)).trials][:4] == seeds
     assert not set(seeds) & {trial.seed for trial in make_plan(make_config(4, seed=1)).trials}
     assert seeds == [int(child.generate_state(1, np.uint64)[0]) for child in np.random.SeedSequence(0).spawn(4)]
 
 
-def test_more_trials_keep_the_earlier_ones():
+def test_a_longer_plan_keeps_the_earlier_trials():
     assert make_plan(make_config(11)).trials[:5] == make_plan(make_config(5)).trials
 
 
@@ -61,7 +61,7 @@ def test_the_check_refuses_single_trials_with_its_reason():
         assert trial.refused == heavy(plan.config_of(trial))
 
 
-def test_a_configuration_error_of_the_check_is_a_reason_too():
+def test_a_configuration_error_of_the_check_refuses_the_trial():
     def check(config: Config) -> str | None:
         if reason := heavy(config):
             raise ConfigError(reason)
@@ -84,7 +84,7 @@ def test_a_plan_of_refused_trials_is_an_error_that_lists_the_commonest_reasons()
         make_plan(config, check=check)
 
 
-def test_a_list_is_read_from_beside_the_configuration(tmp_path):
+def test_a_list_of_points_is_read_from_beside_the_configuration(tmp_path):
     (tmp_path / "list.csv").write_text("ball.mass_kg\n0.5\n0.6\n0.7\n")
     config = Config(trials=2, sweep=SweepConfig(sampler="list", file="list.csv"))
     plan = make_plan(config, directory=tmp_path)
@@ -93,7 +93,7 @@ def test_a_list_is_read_from_beside_the_configuration(tmp_path):
         make_plan(config.model_copy(update={"trials": 4}), directory=tmp_path)
 
 
-def test_a_sweep_of_nothing_is_an_error():
+def test_a_sweep_without_parameters_is_an_error():
     with pytest.raises(PlanError, match=r"^sweep\.parameters: nothing is swept"):
         make_plan(Config(trials=3))
 
@@ -104,7 +104,7 @@ rows = st.tuples(finite, finite, st.integers(0, 2**64 - 1), st.one_of(st.none(),
 
 @settings(deadline=None, max_examples=40)
 @given(st.lists(rows, min_size=1, max_size=20))
-def test_a_plan_comes_back_from_disk_as_it_was(tmp_path_factory, rows):
+def test_a_written_plan_is_read_back_equal(tmp_path_factory, rows):
     path = tmp_path_factory.getbasetemp() / "plan.parquet"
     trials = [
         Trial(number, {"ball.mass_kg": mass, "task.duration_s": duration}, seed, f"{number:064x}", refused)
@@ -115,14 +115,14 @@ def test_a_plan_comes_back_from_disk_as_it_was(tmp_path_factory, rows):
     assert Plan.read(path, make_config()) == plan
 
 
-def test_equal_plans_are_equal_bytes_and_nothing_else_is_left_behind(tmp_path):
+def test_equal_plans_give_equal_files_and_no_temporary_ones(tmp_path):
     for name in ("a", "b"):
         make_plan(make_config(), check=heavy).write(tmp_path / name)
     assert (tmp_path / "a").read_bytes() == (tmp_path / "b").read_bytes()
     assert sorted(os.listdir(tmp_path)) == ["a", "b"]
 
 
-def test_the_file_has_one_column_per_swept_key(tmp_path):
+def test_the_file_of_a_plan_has_one_column_per_swept_key(tmp_path):
     plan = make_plan(make_config(), check=heavy)
     plan.write(tmp_path / "plan.parquet")
     table = pq.read_table(tmp_path / "plan.parquet")
@@ -138,7 +138,7 @@ def test_the_file_has_one_column_per_swept_key(tmp_path):
     assert table["ball.mass_kg"].to_pylist() == [trial.values["ball.mass_kg"] for trial in plan.trials]
 
 
-def test_a_plan_may_be_read_for_another_way_of_running_but_not_for_another_configuration(tmp_path):
+def test_a_plan_can_be_read_with_other_run_keys_but_not_with_another_seed(tmp_path):
     path = tmp_path / "plan.parquet"
     make_plan(make_config()).write(path)
     other_run = make_config().model_copy(update={"run": RunConfig(simulations=9)})
@@ -166,7 +166,7 @@ def test_a_plan_that_cannot_be_written_is_an_error(tmp_path):
         make_plan(make_config()).write(tmp_path / "nowhere" / "plan.parquet")
 
 
-def test_cuts_are_noticed_and_so_are_flipped_bits_that_matter(tmp_path):
+def test_a_cut_plan_or_one_with_relevant_flipped_bits_is_an_error(tmp_path):
     path = tmp_path / "plan.parquet"
     plan = make_plan(make_config(), check=heavy)
     plan.write(path)
@@ -185,7 +185,7 @@ def test_cuts_are_noticed_and_so_are_flipped_bits_that_matter(tmp_path):
     assert noticed > 100
 
 
-def test_foreign_tables_are_no_plans(tmp_path):
+def test_a_table_that_is_no_plan_is_an_error(tmp_path):
     path = tmp_path / "plan.parquet"
     pq.write_table(pa.table({"trial": [0]}), path)
     with pytest.raises(
@@ -207,13 +207,13 @@ def test_foreign_tables_are_no_plans(tmp_path):
         Plan.read(path, make_config())
 
 
-def test_values_to_choose_from_are_planned_as_well():
+def test_a_plan_draws_from_a_list_of_values_as_well():
     config = Config(trials=4, sweep=SweepConfig(parameters={"ball.friction": Values(values=[0.1, 0.2])}))
     assert sorted(trial.values["ball.friction"] for trial in make_plan(config).trials) == [0.1, 0.1, 0.2, 0.2]
 
 
 @pytest.mark.parametrize("text", [b"9", b"\xff", b"2/2"])
-def test_a_plan_that_is_no_slice_of_any_is_damaged(tmp_path, text):
+def test_a_plan_with_a_malformed_slice_is_damaged(tmp_path, text):
     path = tmp_path / "plan.parquet"
     make_plan(make_config()).write(path)
     table = pq.read_table(path)

@@ -36,20 +36,20 @@ def problems(path) -> list[str]:
     return [str(problem).replace(f"{path.parent}/", "") for problem in caught.value.problems]
 
 
-def test_rows_are_trials_and_columns_are_keys(csv):
+def test_rows_of_a_csv_file_are_trials_and_columns_are_keys(csv):
     points = read_points(csv("\ufeffball.mass_kg, task.duration_s\r\n0.1, 1\r\n\r\n2e-1,1.5\r\n"), Config())
     assert points.keys == ("ball.mass_kg", "task.duration_s")
     assert points.values.tolist() == [[0.1, 1.0], [0.2, 1.5]]
 
 
-def test_parquet_holds_the_same(parquet):
+def test_rows_of_a_parquet_file_are_trials_and_columns_are_keys(parquet):
     path = parquet({"ball.mass_kg": pa.array([0.1, 0.2]), "task.duration_s": pa.array([1, 2], pa.int16())})
     points = read_points(path, Config())
     assert points.keys == ("ball.mass_kg", "task.duration_s")
     assert points.values.tolist() == [[0.1, 1.0], [0.2, 2.0]]
 
 
-def test_what_pandas_numbers_rows_by_is_no_key(tmp_path):
+def test_the_row_numbers_of_pandas_are_not_taken_for_a_key(tmp_path):
     pandas = pytest.importorskip("pandas")
     frame = pandas.DataFrame({"ball.mass_kg": [0.1, 0.9, 0.2, 0.3], "task.duration_s": [1.0, 1.0, 1.5, 2.0]})
     path = tmp_path / "list.parquet"
@@ -117,11 +117,11 @@ def test_what_pandas_numbers_rows_by_is_no_key(tmp_path):
         ),
     ],
 )
-def test_wrong_tables_are_named_with_their_lines(csv, content, messages):
+def test_problems_of_a_csv_file_name_their_lines(csv, content, messages):
     assert problems(csv(content)) == messages
 
 
-def test_a_long_table_of_nonsense_is_not_listed_in_full(csv):
+def test_problems_of_a_long_file_are_not_listed_in_full(csv):
     assert len(problems(csv(HEADER + "1,x\n" + "x,y\n" * 1000))) == 20
     assert len(problems(csv(HEADER + "9,9\n" * 1000))) == 20
 
@@ -158,11 +158,11 @@ def test_a_long_table_of_nonsense_is_not_listed_in_full(csv):
         ),
     ],
 )
-def test_wrong_parquet_is_named_with_its_columns(parquet, columns, messages):
+def test_problems_of_a_parquet_file_name_their_columns(parquet, columns, messages):
     assert problems(parquet(columns)) == messages
 
 
-def test_files_that_are_no_table(tmp_path):
+def test_a_file_that_is_no_table_is_a_problem(tmp_path):
     assert problems(tmp_path / "missing.csv") == ["sweep.file: there is no file missing.csv"]
     (tmp_path / "directory.csv").mkdir()
     assert problems(tmp_path / "directory.csv") == ["sweep.file: should be a file, got the directory directory.csv"]
@@ -177,7 +177,7 @@ def test_files_that_are_no_table(tmp_path):
 TARGETED = "task.duration_s,target_y_m,target_x_m\n"
 
 
-def test_targets_are_no_keys_and_a_row_may_have_none(csv):
+def test_columns_of_targets_are_no_keys_and_may_be_empty_in_a_row(csv):
     points = read_points(csv(TARGETED + "1.0,-0.2,1.4\n1.1,,\n1.2, ,\n"), Config())
     assert points.keys == ("task.duration_s",)
     assert points.values.tolist() == [[1.0], [1.1], [1.2]]
@@ -185,7 +185,7 @@ def test_targets_are_no_keys_and_a_row_may_have_none(csv):
     assert [points.targets.row(number) for number in range(3)] == [{"target_x_m": 1.4, "target_y_m": -0.2}, {}, {}]
 
 
-def test_parquet_holds_the_same_targets(csv, tmp_path):
+def test_targets_survive_the_way_through_a_parquet_file(csv, tmp_path):
     points = read_points(csv(TARGETED + "1.0,-0.2,1.4\n1.1,,\n"), Config())
     path = tmp_path / "points.parquet"
     path.write_bytes(encode_points(points))
@@ -235,11 +235,11 @@ def test_parquet_holds_the_same_targets(csv, tmp_path):
         ),
     ],
 )
-def test_wrong_targets_are_named_with_their_lines(csv, content, messages):
+def test_problems_of_targets_in_a_csv_file_name_their_lines(csv, content, messages):
     assert problems(csv(content)) == messages
 
 
-def test_wrong_targets_in_parquet_are_named_with_their_rows(parquet):
+def test_problems_of_targets_in_a_parquet_file_name_their_rows(parquet):
     columns = {
         "task.duration_s": [1.0, 1.0, 1.0, 1.0],
         "target_x_m": [1.4, None, float("nan"), float("inf")],
@@ -254,7 +254,7 @@ def test_wrong_targets_in_parquet_are_named_with_their_rows(parquet):
     assert problems(text) == ["list.parquet: target_x_m: should be a column of numbers, got string"]
 
 
-def test_a_task_without_targets_takes_none(csv, monkeypatch):
+def test_columns_of_targets_are_refused_for_a_task_without_targets(csv, monkeypatch):
     monkeypatch.setattr(ThrowConfig, "target_columns", ())
     assert problems(csv(TARGETED + "1,1,1\n")) == [
         "list.csv:1: target_y_m: the task throw has no such target; it has none",

@@ -1,4 +1,4 @@
-"""Rounds beside the file of a plan: it is as if they were in it, whatever becomes of who writes them."""
+"""The file of rounds beside a plan counts as part of it, even if its writer died."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def path(tmp_path: Path) -> Path:
     return path
 
 
-def test_a_plan_has_the_rounds_beside_it(path: Path) -> None:
+def test_reading_a_plan_includes_the_file_of_rounds_beside_it(path: Path) -> None:
     assert 0 < len(WHOLE.trials[3:].refused) < 4
     plan = Plan.read(path, CONFIG)
     assert plan == WHOLE
@@ -39,12 +39,12 @@ def test_a_plan_has_the_rounds_beside_it(path: Path) -> None:
     assert Plan.read(path, CONFIG) == WHOLE
 
 
-def test_a_round_that_was_cut_off_anywhere_is_not_there(path: Path) -> None:
+def test_a_round_that_was_cut_off_is_left_out(path: Path) -> None:
     rounds = path.with_name("plan.rounds.part")
     data = rounds.read_bytes()
     ends = [place for place, byte in enumerate(data, 1) if byte == ord("\n")]
     assert len(ends) == 2
-    # Around the end of a round every byte counts, and within it one in ten is enough.
+    # Every cut around the end of a round is tested, and every tenth one within it.
     near = {end + by for end in ends for by in (-2, -1, 0, 1)}
     for size in sorted({*range(0, len(data), 10), *near} & {*range(len(data) + 1)}):
         rounds.write_bytes(data[:size])
@@ -52,7 +52,7 @@ def test_a_round_that_was_cut_off_anywhere_is_not_there(path: Path) -> None:
         assert len(Plan.read(path, CONFIG).trials) == (3, 5, 7)[there], size
 
 
-def test_rounds_that_the_file_of_the_plan_has_already_are_passed_over(path: Path) -> None:
+def test_rounds_that_the_plan_file_has_already_are_left_out(path: Path) -> None:
     data = path.with_name("plan.rounds.part").read_bytes()
     WHOLE.write(path)
     path.with_name("plan.rounds.part").write_bytes(data)
@@ -73,7 +73,7 @@ def test_rounds_that_the_file_of_the_plan_has_already_are_passed_over(path: Path
         {"refused": [None]},
     ],
 )
-def test_what_is_no_round_of_the_plan_is_refused(path: Path, change: dict[str, object]) -> None:
+def test_a_round_that_does_not_fit_the_plan_is_refused(path: Path, change: dict[str, object]) -> None:
     rounds = path.with_name("plan.rounds.part")
     first, second = rounds.read_bytes().splitlines(keepends=True)
     rounds.write_text(json.dumps(json.loads(first) | change) + "\n" + second.decode())
@@ -84,7 +84,7 @@ def test_what_is_no_round_of_the_plan_is_refused(path: Path, change: dict[str, o
         Plan.read(path, CONFIG)
 
 
-def test_a_link_in_its_place_is_not_followed(path: Path, tmp_path: Path) -> None:
+def test_a_symbolic_link_in_place_of_the_file_of_rounds_is_not_followed(path: Path, tmp_path: Path) -> None:
     rounds = path.with_name("plan.rounds.part")
     rounds.rename(tmp_path / "elsewhere")
     rounds.symlink_to(tmp_path / "elsewhere")
@@ -94,7 +94,7 @@ def test_a_link_in_its_place_is_not_followed(path: Path, tmp_path: Path) -> None
         append_round(path, ROUNDS[1])
 
 
-def test_a_full_disk_costs_the_round_alone(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_full_disk_loses_only_the_round_being_written(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path.with_name("plan.rounds.part").unlink()
     append_round(path, ROUNDS[1])
     write = os.write

@@ -18,7 +18,7 @@ LANDED = throw(make_plan(configuration()).trials[0])
 FAILED = ThrowResult(ThrowOutcome.RECAUGHT)
 
 
-def test_the_analytic_thrower_throws() -> None:
+def test_the_throw_of_the_test_helper_lands() -> None:
     assert LANDED.outcome is ThrowOutcome.LANDED
 
 
@@ -29,14 +29,14 @@ def growing(**options: object) -> tuple[Rounds, list[Trial]]:
     return rounds, list(trials)
 
 
-def test_a_plan_begins_with_two_rounds_that_depend_on_nothing() -> None:
+def test_a_plan_begins_with_two_rounds_without_results() -> None:
     config = configuration(trials=None, landed=1000)
     points = draw_points(config, directory=Path()).values
     assert [list(trial.values.values()) for trial in make_plan(config).trials] == points[:128].tolist()
     assert len(points) == 10_000
 
 
-def test_a_round_is_due_when_all_but_the_one_before_have_ended() -> None:
+def test_a_round_is_due_when_all_rounds_but_the_last_have_ended() -> None:
     rounds, _ = growing()
     for number in range(64, 128):
         rounds.tell(number, LANDED)
@@ -47,7 +47,7 @@ def test_a_round_is_due_when_all_but_the_one_before_have_ended() -> None:
     assert rounds.due
 
 
-def test_refused_trials_are_not_waited_for() -> None:
+def test_a_round_does_not_wait_for_refused_trials() -> None:
     config = configuration()
     rounds = Rounds(config)
     trials = make_plan(config).trials
@@ -55,7 +55,7 @@ def test_refused_trials_are_not_waited_for() -> None:
     assert rounds.due
 
 
-def test_results_of_the_round_before_change_nothing() -> None:
+def test_results_of_the_last_round_do_not_change_the_next_one() -> None:
     drawn = []
     for last in (LANDED, FAILED, None):
         rounds, trials = growing()
@@ -69,7 +69,7 @@ def test_results_of_the_round_before_change_nothing() -> None:
     assert drawn[0] == drawn[1] == drawn[2]
 
 
-def test_a_result_that_is_told_twice_counts_once() -> None:
+def test_a_result_that_is_reported_twice_counts_once() -> None:
     rounds, _ = growing(target=None, landed=65)
     for number in [*range(64), *range(64)]:
         rounds.tell(number, LANDED)
@@ -77,7 +77,7 @@ def test_a_result_that_is_told_twice_counts_once() -> None:
     assert not rounds.over
 
 
-def test_no_round_follows_when_enough_have_landed_without_those_of_the_round_before() -> None:
+def test_no_round_follows_when_enough_landed_without_the_last_round() -> None:
     rounds, _ = growing(trials=None, target=None, landed=64)
     for number in range(128):
         assert not rounds.over
@@ -108,7 +108,7 @@ def test_until_ends_when_trials_are_used_up() -> None:
     assert len(collect(configuration(trials=None, target=None, landed=20), throw=lambda _: FAILED)) == 200
 
 
-def test_a_grid_until_enough_have_landed_has_no_more_than_its_points() -> None:
+def test_a_grid_ends_with_its_points_even_if_too_few_landed() -> None:
     axes = {
         "task.duration_s": {"min": 1.0, "max": 2.0, "count": 15},
         "ball.friction": {"values": [0.1 * i for i in range(10)]},
@@ -117,7 +117,7 @@ def test_a_grid_until_enough_have_landed_has_no_more_than_its_points() -> None:
     assert len(collect(config, throw=lambda _: FAILED)) == 150
 
 
-def test_target_needs_a_number_of_trials() -> None:
+def test_a_sweep_with_a_target_needs_a_number_of_trials() -> None:
     with pytest.raises(PlanError, match=r"^trials: missing; the sampler sobol draws any number of trials$"):
         Rounds(configuration(trials=None))
 
@@ -135,14 +135,14 @@ def test_the_order_in_which_trials_end_does_not_matter(options: dict[str, int]) 
 
 
 @pytest.mark.parametrize("rounds", [2, 3, 4, 7])
-def test_a_collection_that_is_left_goes_on_as_if_it_had_not_been(rounds: int) -> None:
+def test_an_interrupted_collection_goes_on_with_the_same_trials(rounds: int) -> None:
     config = configuration(trials=500)
     left = collect(config, rounds=rounds)
     assert len(left) == 64 * rounds
     assert go_on(config, left) == collect(config)
 
 
-def test_a_collection_may_go_on_beyond_its_last_round_which_was_cut_short() -> None:
+def test_a_collection_may_go_on_beyond_its_shortened_last_round() -> None:
     few, more = configuration(trials=330), configuration(trials=500)
     begun = collect(few)
     assert len(begun) == 330

@@ -39,7 +39,7 @@ def test_the_configuration_names_these_samplers_and_two_more():
 @given(
     st.lists(parameters, min_size=1, max_size=3), st.integers(1, 70), st.integers(0, 2**32 - 1), st.sampled_from(NAMES)
 )
-def test_points_are_inside_what_they_are_drawn_from(declared, trials, seed, sampler):
+def test_drawn_values_lie_within_their_range_or_list(declared, trials, seed, sampler):
     values = draw(dict(zip(KEYS, declared, strict=False)), sampler=sampler, trials=trials, seed=seed)
     assert values.shape == (trials, len(declared))
     for parameter, column in zip(declared, values.T, strict=True):
@@ -54,7 +54,7 @@ SPREAD = {"task.duration_s": Range(min=1, max=3), "ball.mass_kg": Range(min=0.01
 
 @settings(deadline=None, max_examples=30)
 @given(st.integers(1, 300), st.integers(1, 300), st.sampled_from(["uniform", "sobol"]))
-def test_more_trials_keep_the_earlier_ones(few, more, sampler):
+def test_drawing_more_points_keeps_the_earlier_ones(few, more, sampler):
     few, more = sorted((few, more))
     np.testing.assert_array_equal(
         draw(SPREAD, sampler=sampler, trials=more)[:few], draw(SPREAD, sampler=sampler, trials=few)
@@ -62,19 +62,19 @@ def test_more_trials_keep_the_earlier_ones(few, more, sampler):
 
 
 @pytest.mark.parametrize("sampler", NAMES)
-def test_the_root_seed_decides(sampler):
+def test_points_depend_on_the_root_seed(sampler):
     np.testing.assert_array_equal(draw(SPREAD, sampler=sampler, seed=3), draw(SPREAD, sampler=sampler, seed=3))
     assert (draw(SPREAD, sampler=sampler, seed=3) != draw(SPREAD, sampler=sampler, seed=4)).all()
 
 
 @pytest.mark.parametrize("sampler", ["sobol", "latin_hypercube"])
-def test_each_of_as_many_strips_as_trials_holds_one_point(sampler):
+def test_sobol_and_latin_hypercube_put_one_point_into_each_strip(sampler):
     strips = np.floor((draw(SPREAD, sampler=sampler, trials=32)[:, 0] - 1) / 2 * 32)
     assert sorted(strips) == list(range(32))
 
 
 @pytest.mark.parametrize("sampler", ["sobol", "latin_hypercube"])
-def test_values_to_choose_from_get_equal_shares(sampler):
+def test_values_of_a_list_get_equal_shares(sampler):
     column = draw({"ball.mass_kg": Values(values=[0.1, 0.2, 0.3, 0.4])}, sampler=sampler, trials=64)[:, 0]
     assert np.unique(column, return_counts=True)[1].tolist() == [16, 16, 16, 16]
 
@@ -85,7 +85,7 @@ def test_a_logarithmic_scale_spreads_the_logarithm():
 
 
 @pytest.mark.parametrize("trials", [1, 3, 100])
-def test_numbers_that_are_no_power_of_two_cause_no_warning(trials):
+def test_a_number_of_trials_that_is_no_power_of_two_causes_no_warning(trials):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         assert len(draw(SPREAD, trials=trials)) == trials
@@ -118,7 +118,7 @@ def test_the_first_points_of_an_endless_grid_need_no_endless_memory():
         draw(endless, sampler="grid", trials=None)
 
 
-def test_a_grid_beyond_all_numbers_of_points_still_has_first_ones():
+def test_the_first_points_of_a_grid_beyond_64_bits_can_be_drawn():
     endless = {f"ball.{key}": Range(min=0.01, max=0.02, count=10**7) for key in ("mass_kg", "radius_m", "friction")}
     assert draw(endless, sampler="grid", trials=2)[0].tolist() == [0.01, 0.01, 0.01]
     with pytest.raises(PlanError, match="the grid has 1000000000000000000000 points"):
@@ -131,7 +131,7 @@ def test_more_trials_than_a_grid_has_are_an_error():
 
 
 @pytest.mark.parametrize("sampler", ["sobol", "grid"])
-def test_nothing_to_sweep_is_an_error(sampler):
+def test_drawing_points_without_parameters_is_an_error(sampler):
     with pytest.raises(PlanError, match=r"^sweep\.parameters: nothing is swept\n  expected: at least one key"):
         draw({}, sampler=sampler)
 
@@ -143,7 +143,7 @@ def test_drawing_needs_a_number_of_trials():
 
 @pytest.mark.parametrize("seed", [0, 7])
 @pytest.mark.parametrize("count", [1, 2, 3, 50])
-def test_latin_hypercubes_are_those_of_scipy(count, seed):
+def test_latin_hypercubes_equal_those_of_scipy(count, seed):
     from scipy.stats import qmc
 
     expected = qmc.LatinHypercube(4, seed=np.random.default_rng(seed)).random(count)
@@ -156,7 +156,7 @@ def test_more_keys_than_a_sobol_sequence_has_dimensions_are_refused():
         UNIT_SAMPLERS["sobol"](4, 1025, np.random.default_rng(0))
 
 
-def test_drawing_a_plan_imports_nothing_large():
+def test_drawing_points_imports_neither_scipy_nor_pyarrow():
     code = (
         "import sys, numpy as np, throwcollect.sweep.plan; "
         "from throwcollect.sweep.samplers import UNIT_SAMPLERS; "
@@ -169,7 +169,7 @@ def test_drawing_a_plan_imports_nothing_large():
 @settings(deadline=None, max_examples=50)
 @given(parameters, st.floats(0, 1, exclude_max=True))
 @example(Range(min=1e-6, max=1.0000000000000002e-6, scale="log"), 0.0)
-def test_places_are_where_values_are_spread_from(parameter, place):
+def test_places_is_the_inverse_of_spread(parameter, place):
     found = places(parameter, spread(parameter, np.array([place])))[0]
     if isinstance(parameter, Values):
         # Equal values of a set cannot be told apart.
@@ -181,11 +181,11 @@ def test_places_are_where_values_are_spread_from(parameter, place):
         assert 0 <= found <= 1
 
 
-def test_until_draws_ten_times_as_many_points_as_should_land_unless_trials_says_otherwise():
+def test_until_without_trials_draws_ten_times_as_many_points_as_should_land():
     sweep = SweepConfig(parameters=SPREAD)
     assert len(draw_points(Config(until={"landed": 30}, sweep=sweep), directory=HERE).values) == 300
     assert len(draw_points(Config(trials=40, until={"landed": 30}, sweep=sweep), directory=HERE).values) == 40
 
 
-def test_a_place_that_is_rounded_to_1_has_the_last_of_the_values():
+def test_a_place_of_1_gives_the_last_value_of_a_list():
     assert spread(Values(values=[2.0, 5.0]), np.array([0.0, 0.75, 1.0])).tolist() == [2.0, 5.0, 5.0]

@@ -38,7 +38,7 @@ def test_slices_are_the_plan_in_whole_shards(trials: int, per_shard: int, data: 
 
 
 @given(st.integers(1, 500), st.integers(1, 40), st.integers(2, 600))
-def test_of_a_plan_with_too_few_shards_it_is_said_how_small_they_must_be(
+def test_a_plan_with_too_few_shards_is_an_error_with_the_size_they_need(
     trials: int, per_shard: int, count: int
 ) -> None:
     assume(-(-trials // per_shard) < count)
@@ -52,7 +52,7 @@ def test_of_a_plan_with_too_few_shards_it_is_said_how_small_they_must_be(
         assert Slice(0, count).trials_of(trials, trials_per_shard=int(smaller))
 
 
-def test_a_slice_is_written_as_it_is_read() -> None:
+def test_a_slice_is_printed_as_it_is_parsed() -> None:
     assert Slice.parse("3/8") == Slice(3, 8)
     assert str(Slice(3, 8)) == "3/8"
 
@@ -68,12 +68,12 @@ def test_a_slice_is_written_as_it_is_read() -> None:
         ("", "INDEX/COUNT"),
     ],
 )
-def test_what_is_no_slice_is_refused(text: str, message: str) -> None:
+def test_a_malformed_slice_is_refused(text: str, message: str) -> None:
     with pytest.raises(ConfigError, match=message):
         Slice.parse(text)
 
 
-def test_there_are_no_more_slices_than_shards(plan: Plan) -> None:
+def test_more_slices_than_shards_are_refused(plan: Plan) -> None:
     with pytest.raises(ConfigError, match=r"record.trials_per_shard: 10 trials are 4 shards of 3.*5 slices"):
         plan.slice_of(Slice(0, 5))
 
@@ -94,9 +94,7 @@ def test_a_slice_can_be_read_from_the_file_of_the_plan_and_from_its_own(plan: Pl
     assert Plan.read(tmp_path / "part.parquet", plan.config) == part
 
 
-def test_a_plan_that_does_not_begin_with_0_is_refused_unless_it_says_that_it_is_a_slice(
-    plan: Plan, tmp_path: Path
-) -> None:
+def test_a_plan_without_trial_0_that_is_no_slice_is_refused(plan: Plan, tmp_path: Path) -> None:
     Plan(plan.config, plan.trials[3:]).write(tmp_path / "plan.parquet")
     with pytest.raises(DatasetError, match="not numbered from 0"):
         Plan.read(tmp_path / "plan.parquet", plan.config)

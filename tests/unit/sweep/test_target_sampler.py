@@ -82,7 +82,7 @@ def test_throws_at_the_same_cells_differ_in_their_parameters(spread: list[Trial]
     assert np.median(distances[:, 1]) > 0.06
 
 
-def test_heights_are_targets_too() -> None:
+def test_throws_are_spread_over_heights_as_well() -> None:
     target = {"distance_m": {**DISTANCE, "bins": 6}, "height_m": {"min": 0.0, "max": 0.5, "bins": 4}}
     counted = counts(collect(configuration(trials=512, target=target)), target).reshape(6, 4)
     sobol = counts(make_plan(configuration(trials=512, target=None)).trials, target).reshape(6, 4)
@@ -90,7 +90,7 @@ def test_heights_are_targets_too() -> None:
     assert counted.min() > 2 * sobol.min()
 
 
-def test_sets_of_values_and_fixed_ranges_may_take_part() -> None:
+def test_lists_of_values_and_fixed_ranges_can_be_swept_as_well() -> None:
     parameters = {
         **PARAMETERS,
         "ball.friction": {"values": [0.1, 0.4, 0.9]},
@@ -109,7 +109,7 @@ def test_trials_stay_within_their_ranges(spread: list[Trial]) -> None:
         assert max(values) <= declared["max"]
 
 
-def test_while_almost_nothing_lands_sobol_goes_on() -> None:
+def test_rounds_stay_sobol_while_almost_no_throw_lands() -> None:
     config = configuration(trials=320)
 
     def unlucky(trial: Trial) -> ThrowResult:
@@ -119,7 +119,7 @@ def test_while_almost_nothing_lands_sobol_goes_on() -> None:
     assert collect(config, throw=unlucky) == list(sobol)
 
 
-def test_trials_are_those_of_every_version(spread: list[Trial]) -> None:
+def test_drawn_trials_are_the_same_in_every_version(spread: list[Trial]) -> None:
     digest = hashlib.sha256("".join(trial.digest for trial in spread).encode())
     assert digest.hexdigest().startswith("64cb783eb30cac70"), "datasets of earlier versions could not be gone on with"
 
@@ -131,7 +131,7 @@ def test_another_seed_gives_other_trials(spread: list[Trial]) -> None:
     assert not {trial.digest for trial in other} & {trial.digest for trial in spread}
 
 
-def test_another_process_draws_the_same(spread: list[Trial]) -> None:
+def test_another_process_draws_the_same_trials(spread: list[Trial]) -> None:
     script = (
         "from tests.unit.sweep.thrower import collect, configuration\n"
         "print(collect(configuration(trials=192))[-1].digest)"
@@ -143,7 +143,7 @@ def test_another_process_draws_the_same(spread: list[Trial]) -> None:
 CELLS = Cells(TargetConfig.model_validate({"distance_m": {"min": 1, "max": 3, "bins": 4}, "hit_angle_rad": HIT_ANGLE}))
 
 
-def test_a_place_is_in_bins_of_distance_from_the_base_and_hit_angle() -> None:
+def test_a_landing_has_a_place_by_distance_and_hit_angle_in_units_of_bins() -> None:
     trial = make_plan(configuration()).trials[0]
     result = throw(trial)
     assert result.landing is not None
@@ -154,7 +154,7 @@ def test_a_place_is_in_bins_of_distance_from_the_base_and_hit_angle() -> None:
     assert np.isnan(CELLS.place(trial.values, ThrowResult(ThrowOutcome.TIMEOUT))).all()
 
 
-def test_both_ends_of_the_bins_are_inside() -> None:
+def test_the_outermost_bins_include_their_outer_ends() -> None:
     places = np.array([[0.0, 0.0], [4.0, 8.0], [3.99, 0.0], [4.01, 0.0], [-1e-9, 0.0], [np.nan, np.nan]])
     assert CELLS.cells_of(places).tolist() == [0, 31, 24, -1, -1, -1]
     assert CELLS.corners(np.array([0, 31])).tolist() == [[0, 0], [3, 7]]
@@ -176,14 +176,14 @@ def test_the_thinnest_cells_come_first_and_throws_under_way_count() -> None:
     assert 1 not in choose(3, landed=[3, 0, 3, 3], asked=[0, 9, 0, 0])
 
 
-def test_each_further_miss_doubles_the_wait() -> None:
+def test_each_further_miss_of_a_cell_doubles_its_wait() -> None:
     assert 0 in choose(4, missed=[1, 0, 0, 0])
     assert 0 not in choose(20, missed=[4, 0, 0, 0])
     assert 0 in choose(3 * 7 + 4, missed=[4, 0, 0, 0])
     assert 0 not in choose(1000, missed=[2000, 0, 0, 0])
 
 
-def test_the_edge_of_what_is_reached_comes_before_what_lies_beyond() -> None:
+def test_cells_at_the_edge_of_reach_come_before_cells_beyond() -> None:
     assert sorted(choose(3, away=[1, 5, 0, 1])) == [0, 2, 3]
 
 

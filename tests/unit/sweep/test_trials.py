@@ -1,4 +1,4 @@
-"""Trials in columns are what they would be one by one."""
+"""Trials in columns behave as a list of single trials."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def trials() -> Trials:
     return in_columns(LISTED)
 
 
-def test_they_are_a_sequence_of_trials() -> None:
+def test_trials_in_columns_behave_as_a_sequence() -> None:
     assert list(trials()) == LISTED
     assert [trials()[index] for index in range(-5, 5)] == LISTED + LISTED
     assert list(trials()[1:4]) == list(trials()[1:][:3]) == LISTED[1:4]
@@ -36,7 +36,7 @@ def test_they_are_a_sequence_of_trials() -> None:
 
 
 @pytest.mark.parametrize("changed", [{"seed": 1}, {"digest": "0" * 64}, {"refused": "too slow"}])
-def test_they_are_equal_if_all_of_each_is(changed: dict[str, object]) -> None:
+def test_trials_in_columns_are_equal_only_if_all_their_fields_are(changed: dict[str, object]) -> None:
     assert trials() == trials()
     assert trials()[1:] != trials()[:4]
     other = [*LISTED[:4], replace(LISTED[4], **changed)]  # type: ignore[arg-type]
@@ -46,7 +46,7 @@ def test_they_are_equal_if_all_of_each_is(changed: dict[str, object]) -> None:
     )
 
 
-def test_those_that_are_appended_do_not_change_what_was_taken_before() -> None:
+def test_appending_trials_does_not_change_parts_taken_before() -> None:
     grown = trials()[:2]
     before, values = grown[:], grown.values
     for index in range(2, 5):
@@ -60,7 +60,7 @@ def test_those_that_are_appended_do_not_change_what_was_taken_before() -> None:
         grown.extend(trials()[3:])
 
 
-def test_reasons_replace_those_that_were_there() -> None:
+def test_refuse_replaces_earlier_reasons() -> None:
     assert trials().refuse(["a", None, None, "b", None]).refused == {0: "a", 3: "b"}
 
 

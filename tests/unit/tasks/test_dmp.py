@@ -125,7 +125,7 @@ def test_motion_that_does_not_settle_is_refused():
 
 
 @pytest.mark.parametrize("alpha_x", [1e-20, 1e4])
-def test_motion_without_numbers_is_refused(alpha_x):
+def test_motion_with_numbers_that_are_not_finite_is_refused(alpha_x):
     family = DynamicMovementPrimitive(family="dmp", alpha_x=alpha_x)
     with pytest.raises(ConfigError, match=f"^the DMP of {ELBOW} leads to numbers that are not finite"):
         dmp_trajectory({ELBOW: -1.9}, {ELBOW: -0.5}, duration_s=1.0, family=family, points_hz=50)

@@ -1,4 +1,4 @@
-"""The motion to begin with of a robot of another package keeps the limits of its joints."""
+"""The first motion that `init` writes for a robot of another package keeps the limits of its joints."""
 
 from __future__ import annotations
 
@@ -45,9 +45,9 @@ def call_in(directory: Path, *arguments: str) -> subprocess.CompletedProcess[str
 @pytest.mark.parametrize(
     ("shoulder", "elbow"),
     [
-        # Its posture at rest is beyond the limit; it is slow.
+        # The shoulder rests beyond its limit, and the elbow is slow.
         ('lower="-1.0" upper="-0.05" velocity="20"', 'lower="-2.5" upper="2.5" velocity="0.3"'),
-        # It has less room than is swept elsewhere; it cannot move.
+        # The shoulder has less room than the usual sweep, and the elbow cannot move.
         ('lower="-0.1" upper="0.3" velocity="20"', 'lower="0" upper="0" velocity="20"'),
     ],
 )

@@ -40,7 +40,7 @@ def test_motion_starts_and_ends_at_rest_at_its_ends(gamma, duration_s, points_hz
 
 
 @pytest.mark.parametrize("gamma", [0.8, 1.0, 1.2, 2.7])
-def test_derivatives_are_those_of_the_formula(gamma):
+def test_velocities_and_accelerations_match_the_formula(gamma):
     points = trajectory(gamma)
     inner, h = points.times[1:-1], 1e-5
     before, at, after = (exact(inner + shift, gamma) for shift in (-h, 0, h))

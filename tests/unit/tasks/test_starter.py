@@ -1,4 +1,4 @@
-"""A configuration to begin with: complete, of what is installed, and nobody's work is lost."""
+"""A starter configuration is complete, names what is installed, and overwrites no file."""
 
 from __future__ import annotations
 
@@ -20,7 +20,9 @@ PLUGINS = Path(__file__).parents[2] / "plugins"
 
 
 @pytest.mark.parametrize("sampler", samplers())
-def test_every_sampler_has_one_that_gives_a_plan(sampler: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_starter_of_every_sampler_gives_a_plan(
+    sampler: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.chdir(tmp_path)
     init(sampler=sampler)
     config = load(DEFAULT_CONFIG)
@@ -29,7 +31,7 @@ def test_every_sampler_has_one_that_gives_a_plan(sampler: str, tmp_path: Path, m
 
 
 @pytest.mark.parametrize(("there", "engine"), [(True, "bullet"), (False, "mujoco")])
-def test_where_bullet_has_no_wheel_mujoco_simulates(
+def test_a_starter_names_mujoco_where_bullet_has_no_wheel(
     there: bool, engine: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("throwcollect.tasks.starter.has_wheel", lambda _package: there)
@@ -38,7 +40,7 @@ def test_where_bullet_has_no_wheel_mujoco_simulates(
     assert load(path).sim.engine == engine
 
 
-def test_a_file_that_is_there_stays(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_init_does_not_overwrite_an_existing_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "throws.csv").write_text("mine")
     with pytest.raises(ConfigError, match=r"throws\.csv: is there already"):
@@ -61,14 +63,14 @@ def init_with_plugins(directory: Path, *options: str) -> str:
     return done.stdout
 
 
-def test_a_robot_of_another_package_moves_from_its_posture_at_rest(tmp_path: Path) -> None:
+def test_a_starter_for_a_robot_of_another_package_has_no_joints_of_talos(tmp_path: Path) -> None:
     printed = init_with_plugins(tmp_path, "--robot", "planar_arm")
     assert "name: planar_arm" in printed
     assert "arm_right" not in printed
     assert "name: planar_arm # one of talos, planar_arm" in (tmp_path / DEFAULT_CONFIG).read_text(encoding="utf-8")
 
 
-def test_keys_that_only_the_task_has_are_written_with_what_they_mean(tmp_path: Path) -> None:
+def test_a_starter_explains_the_keys_of_its_task(tmp_path: Path) -> None:
     text = make_starter("talos", "throw", "sobol")[str(DEFAULT_CONFIG)]
     meaning = "The ball counts as released when it has been out of the spoon for this long"
     assert f"  recatch_gap_s: 0.02 # {meaning}\n" in text
@@ -78,7 +80,7 @@ def test_keys_that_only_the_task_has_are_written_with_what_they_mean(tmp_path: P
     assert not [line for line in lines if "recatch_gap_s" in line]
 
 
-def test_no_file_says_how_to_have_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_missing_configuration_is_an_error_that_names_init(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     with pytest.raises(ConfigError, match="throwcollect init writes one"):
         load(DEFAULT_CONFIG)
@@ -92,7 +94,9 @@ def test_no_file_says_how_to_have_one(tmp_path: Path, monkeypatch: pytest.Monkey
         (("talos", "throw", "halton"), "--sampler halton: no such sampler is installed\n  expected: grid or "),
     ],
 )
-def test_what_is_not_installed_is_told_with_what_is(names: tuple[str, str, str], said: str) -> None:
+def test_an_unknown_robot_task_or_sampler_is_an_error_with_the_known_ones(
+    names: tuple[str, str, str], said: str
+) -> None:
     with pytest.raises(ConfigError) as caught:
         make_starter(*names)
     assert str(caught.value).startswith(said)

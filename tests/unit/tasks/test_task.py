@@ -8,7 +8,7 @@ from throwcollect.robots.talos import TALOS
 from throwcollect.tasks.task import task_of
 
 
-def test_joints_are_the_moving_ones_in_the_order_of_the_robot():
+def test_a_trajectory_has_the_moving_joints_in_the_order_of_the_robot():
     points = task_of(Config()).trajectory()
     assert set(points.joints) == set(Config().task.end)
     assert list(points.joints) == [joint for joint in TALOS.joints if joint in points.joints]
@@ -22,7 +22,7 @@ def test_each_column_goes_from_the_start_to_the_end_of_its_joint():
     assert points.positions[-1].tolist() == [task.end[joint] for joint in points.joints]
 
 
-def test_family_is_that_of_the_task():
+def test_the_family_of_the_configuration_shapes_the_trajectory():
     config = Config(task={"trajectory": {"family": "dmp"}, "duration_s": 2.0})
     points = task_of(config).trajectory()
     assert points.positions[-1].tolist() == [config.task.end[joint] for joint in points.joints]

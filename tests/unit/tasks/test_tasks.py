@@ -1,4 +1,4 @@
-"""What holds for every task of the table, and for one of another package."""
+"""Properties of every task in the table, and of one of another package."""
 
 import sys
 from dataclasses import fields
@@ -25,7 +25,7 @@ of_every_task = pytest.mark.parametrize("section", SECTIONS, ids=lambda section:
 
 
 def fill(section: type[TaskConfig]) -> TaskConfig:
-    """The section as `throwcollect init` fills it, as a task need not have a motion by default."""
+    """Fill the section as `throwcollect init` does, since a task need not have a default motion."""
     if section is ReachConfig:
         return section()  # its package is not installed, so no configuration can name it
     start, end, duration_s = find_first_motion(Config().robot.name, section.model_fields["name"].default)
@@ -38,19 +38,19 @@ def make_task(section: type[TaskConfig]) -> Task:
 
 
 @of_every_task
-def test_it_has_the_outcomes_that_all_tasks_have_and_its_success(section: type[TaskConfig]) -> None:
+def test_a_task_has_the_common_outcomes_and_its_success(section: type[TaskConfig]) -> None:
     words = {each.value for each in make_task(section).outcomes}
     assert {LIMIT_VIOLATED, TRACKING_FAILED, LOST, fill(section).success} <= words
 
 
 @of_every_task
-def test_it_is_found_by_the_name_in_the_table(section: type[TaskConfig]) -> None:
+def test_the_name_of_a_task_leads_to_its_class(section: type[TaskConfig]) -> None:
     assert section.model_fields["name"].default == fill(section).name
     assert isinstance(make_task(section), Task)
 
 
 @of_every_task
-def test_every_measure_of_its_results_has_columns(section: type[TaskConfig]) -> None:
+def test_every_measure_of_a_task_has_columns(section: type[TaskConfig]) -> None:
     task = make_task(section)
     columns = [column.name for column in task.columns.columns]
     assert len(set(columns)) == len(columns)
@@ -61,7 +61,7 @@ def test_every_measure_of_its_results_has_columns(section: type[TaskConfig]) -> 
 
 
 @of_every_task
-def test_targets_are_wanted_of_what_it_measures_or_is_given(section: type[TaskConfig]) -> None:
+def test_targets_of_a_task_belong_to_measured_or_given_columns(section: type[TaskConfig]) -> None:
     measured = {column.name: column.kind for column in make_task(section).columns.columns}
     for each in section.target_columns:
         assert is_target(each.name)
@@ -73,7 +73,7 @@ def test_targets_are_wanted_of_what_it_measures_or_is_given(section: type[TaskCo
 
 
 @of_every_task
-def test_results_come_back_from_their_columns(section: type[TaskConfig]) -> None:
+def test_results_of_a_task_can_be_read_back_from_their_columns(section: type[TaskConfig]) -> None:
     task = make_task(section)
     lost = task.lose("nobody did it")
     assert isinstance(lost, Result)
@@ -88,7 +88,7 @@ def test_the_motion_ends_where_the_configuration_says(section: type[TaskConfig])
 
 
 @of_every_task
-def test_what_it_adds_to_a_report_can_be_loaded(section: type[TaskConfig]) -> None:
+def test_the_report_part_of_a_task_can_be_loaded(section: type[TaskConfig]) -> None:
     pytest.importorskip("plotly")
     if path := make_task(section).report:
         assert callable(load_object(path))

@@ -1,4 +1,4 @@
-"""What holds for every tool of the table."""
+"""Properties of every tool in the table."""
 
 import numpy as np
 import pytest

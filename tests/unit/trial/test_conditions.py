@@ -22,12 +22,12 @@ WITHOUT_EFFECT = {
 }
 
 
-def test_conditions_travel_as_text() -> None:
+def test_conditions_survive_the_way_through_json() -> None:
     assert conditions_from_json(WANTED.to_json()) == WANTED
 
 
 @pytest.mark.parametrize("text", ["", "{}", "[]", WANTED.to_json().replace("0.05", '"0.05"'), WANTED.to_json() + "x"])
-def test_what_is_no_text_of_conditions_is_refused(text: str) -> None:
+def test_malformed_conditions_are_refused(text: str) -> None:
     with pytest.raises(DatasetError, match="conditions of the episode: "):
         conditions_from_json(text)
 
@@ -48,7 +48,7 @@ def test_what_is_no_text_of_conditions_is_refused(text: str) -> None:
         ({"trajectory": "x"}, ["its controllers were given another trajectory"]),
     ],
 )
-def test_differences_are_named(changes: dict[str, object], said: list[str]) -> None:
+def test_each_difference_of_conditions_is_named(changes: dict[str, object], said: list[str]) -> None:
     assert list(replace(WANTED, **changes).differences(WANTED)) == said
 
 
@@ -59,7 +59,7 @@ def change(key: str, value: object) -> Config:
 
 
 @pytest.mark.parametrize("key", WITHOUT_EFFECT)
-def test_settings_leave_out_what_simulations_do_not_heed(key: str) -> None:
+def test_keys_that_simulations_ignore_do_not_change_the_settings_digest(key: str) -> None:
     assert Settings(change(key, WITHOUT_EFFECT[key])).digest == Settings(CONFIG).digest
 
 
@@ -80,13 +80,13 @@ def test_settings_leave_out_what_simulations_do_not_heed(key: str) -> None:
         ("task.start", {**CONFIG.task.start, "arm_right_4_joint": -1.8}),
     ],
 )
-def test_settings_cover_what_simulations_heed(key: str, value: object) -> None:
+def test_keys_that_simulations_use_change_the_settings_digest(key: str, value: object) -> None:
     before = values_by_key(CONFIG)
     assert before.get(key) != value
     assert Settings(change(key, value)).digest != Settings(CONFIG).digest
 
 
-def test_what_a_trial_replaces_is_named_key_by_key() -> None:
+def test_find_replaced_names_each_physics_key_that_a_trial_changes() -> None:
     settings = Settings(CONFIG)
     physics = sweepable_keys(CONFIG, Effect.PHYSICS)
     assert settings.find_replaced(CONFIG) == {}
@@ -95,6 +95,6 @@ def test_what_a_trial_replaces_is_named_key_by_key() -> None:
     assert settings.find_replaced(trial) == {"ball.mass_kg": 0.06, "task.start.arm_right_4_joint": -1.8}
 
 
-def test_a_build_has_one_digest() -> None:
+def test_the_digest_of_a_build_is_the_same_each_time() -> None:
     assert build_digest("bullet") == build_digest("bullet")
     assert len(build_digest("bullet")) == 64

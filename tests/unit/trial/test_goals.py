@@ -22,7 +22,7 @@ def test_each_moving_limb_gets_one_goal_over_all_of_its_joints() -> None:
         assert len(goal.trajectory.points) == len(TRAJECTORY.times)
 
 
-def test_joints_that_do_not_move_are_sent_where_they_are() -> None:
+def test_a_goal_keeps_resting_joints_at_their_posture() -> None:
     arm = trial_goals(TALOS, TRAJECTORY, POSTURE)[ARM].trajectory
     still = arm.joint_names.index("arm_right_3_joint")
     for point in arm.points:
@@ -30,7 +30,7 @@ def test_joints_that_do_not_move_are_sent_where_they_are() -> None:
         assert (point.velocities[still], point.accelerations[still]) == (0.0, 0.0)
 
 
-def test_moving_joints_are_sent_their_trajectory() -> None:
+def test_a_goal_has_the_trajectory_of_each_moving_joint() -> None:
     arm = trial_goals(TALOS, TRAJECTORY, POSTURE)[ARM].trajectory
     column, own = arm.joint_names.index("arm_right_4_joint"), TRAJECTORY.joints.index("arm_right_4_joint")
     sent = np.array([[point.positions[column], point.velocities[column]] for point in arm.points])
@@ -39,7 +39,7 @@ def test_moving_joints_are_sent_their_trajectory() -> None:
     assert np.allclose(stamps, TRAJECTORY.times, atol=1e-9)
 
 
-def test_the_digest_of_a_trajectory_covers_all_that_it_says() -> None:
+def test_the_digest_of_a_trajectory_covers_all_its_fields() -> None:
     nudged = np.nextafter(TRAJECTORY.positions, 9.0)
     changes = [
         replace(TRAJECTORY, joints=tuple(reversed(TRAJECTORY.joints))),

@@ -12,7 +12,7 @@ VALUES = {"ball.mass_kg": 0.05, "scene.gravity_mps2": 1.6}
 LEASE = Lease.make("/sim_0", 5, VALUES, SIGNER)
 
 
-def test_a_lease_is_told_from_every_other_one_by_its_token() -> None:
+def test_each_lease_has_a_token_of_its_own() -> None:
     assert LEASE.is_signed(SIGNER)
     assert Lease.make("/sim_0", 5, VALUES, SIGNER).token != LEASE.token
     assert replace(LEASE, values=dict(reversed(VALUES.items()))).is_signed(SIGNER)
@@ -30,22 +30,22 @@ def test_a_lease_is_told_from_every_other_one_by_its_token() -> None:
         {"signature": "é"},
     ],
 )
-def test_a_signature_stands_for_one_lease(change: dict[str, object]) -> None:
+def test_a_changed_lease_has_no_valid_signature(change: dict[str, object]) -> None:
     assert not replace(LEASE, **change).is_signed(SIGNER)
 
 
-def test_what_was_signed_with_another_key_is_refused() -> None:
+def test_a_lease_signed_with_another_key_is_refused() -> None:
     assert not LEASE.is_signed(Signer(b"another key"))
 
 
-def test_leases_travel_as_text() -> None:
+def test_leases_survive_the_way_through_json() -> None:
     leases = (LEASE, Lease.make("/sim_0", 7, {"task.duration_s": 0.1 + 0.2}, SIGNER))
     assert leases_from_json(leases_to_json(leases)) == leases
     assert leases_from_json("[]") == ()
 
 
 @pytest.mark.parametrize("text", ["", "{}", "[1]", "x", leases_to_json([LEASE]).replace("0.05", '"0.05"')])
-def test_what_is_no_list_of_leases_is_refused(text: str) -> None:
+def test_a_malformed_list_of_leases_is_refused(text: str) -> None:
     with pytest.raises(DatasetError, match="list of leases: "):
         leases_from_json(text)
 

@@ -1,4 +1,4 @@
-"""Small collections, as the tests of `dataset` have them."""
+"""Fixtures for small collections, shared with the tests of `dataset`."""
 
 from tests.unit.dataset.conftest import collected, collection, dataset, make_collection
 

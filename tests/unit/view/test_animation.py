@@ -1,4 +1,4 @@
-"""A throw drawn: as long as it was, with robot, ball and path in the picture, and a sentence where there is none."""
+"""An animation of a throw lasts as long as the throw, and shows robot, ball and path."""
 
 from __future__ import annotations
 
@@ -35,11 +35,11 @@ def written(collected: Path, tmp_path_factory: pytest.TempPathFactory) -> Animat
 
 @pytest.fixture(scope="module")
 def fast(collected: Path, tmp_path_factory: pytest.TempPathFactory) -> Animation:
-    """Fewer pictures than the whole throw has are drawn in less time."""
+    """A faster animation of the same throw, which has fewer pictures to draw."""
     return render(collected, tmp_path_factory.mktemp("fast") / "throw.GIF", trial=4, slow=0.4)
 
 
-def test_it_takes_as_long_as_the_throw(collected: Path, written: Animation) -> None:
+def test_an_animation_lasts_as_long_as_its_throw(collected: Path, written: Animation) -> None:
     throw = Dataset.open(collected).throws.to_pylist()[4]
     assert written.duration_s == pytest.approx(throw["landing_time_s"], abs=0.06)
     with Image.open(written.file) as file:
@@ -55,7 +55,7 @@ def test_the_robot_moves_and_the_path_grows(written: Animation) -> None:
     assert count_orange(first) < count_orange(middle) < count_orange(last)
 
 
-def test_slower_takes_longer(written: Animation, fast: Animation) -> None:
+def test_a_faster_animation_is_shorter_and_has_fewer_pictures(written: Animation, fast: Animation) -> None:
     assert fast.duration_s == pytest.approx(0.4 * written.duration_s, abs=0.11)
     assert fast.pictures < written.pictures / 2
     assert fast.file.read_bytes()[:6] == b"GIF89a"
@@ -90,14 +90,16 @@ def test_the_camera_sees_all_points_and_stands_no_farther_than_needed() -> None:
         ({"output": "throw.mp4"}, r"throw.mp4: no animated picture ends like this\n.*\.webp or \.gif"),
     ],
 )
-def test_what_cannot_be_drawn_is_told(collected: Path, tmp_path: Path, arguments: dict[str, Any], said: str) -> None:
+def test_an_unknown_trial_or_kind_of_picture_is_an_error(
+    collected: Path, tmp_path: Path, arguments: dict[str, Any], said: str
+) -> None:
     output = tmp_path / arguments.pop("output", "throw.webp")
     with pytest.raises(ConfigError, match=said):
         render(collected, output, **arguments)
     assert not output.exists()
 
 
-def test_a_trial_without_an_episode_is_told(make_collection: Any, tmp_path: Path) -> None:
+def test_drawing_a_trial_without_an_episode_is_an_error(make_collection: Any, tmp_path: Path) -> None:
     collection = make_collection()
     collection.refuse(1, "the arm would hit the head")
     trials = [number for number in range(7) if number != 1]

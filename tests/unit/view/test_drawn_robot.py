@@ -1,4 +1,4 @@
-"""Robots of other packages as viewers draw them: shapes that Talos has not, and packages that ROS does not know."""
+"""Viewers draw robots of other packages, with shapes that Talos lacks and packages that ROS does not know."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What viewers are given: each throw as it was recorded, and around it what no viewer could know."""
+"""The directory for viewers: each throw as it was recorded, and the scene and facts around it."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def test_every_record_of_the_recording_is_sound(written: View) -> None:
     assert examined.times[-1] - examined.times[0] == round(written.duration_s * 1e9)
 
 
-def test_the_directory_is_a_bag(written: View) -> None:
+def test_the_view_directory_is_a_rosbag(written: View) -> None:
     with Reader(written.recording.parent) as bag:
         counts = {connection.topic: connection.msgcount for connection in bag.connections}
     assert sum(counts.values()) == written.messages
@@ -75,7 +75,7 @@ def test_the_directory_is_a_bag(written: View) -> None:
     assert len({counts[topic] for topic in SAMPLED}) == 1
 
 
-def test_throws_follow_one_another_in_the_order_asked_for(collected: Path, messages: Messages) -> None:
+def test_throws_follow_one_another_in_the_chosen_order(collected: Path, messages: Messages) -> None:
     dataset = Dataset.open(collected)
     states, odometry = messages["/joint_states"], messages["/ball/odometry"]
     start = 1_000_000_000
@@ -111,7 +111,7 @@ def test_joints_are_shown_within_their_limits(collected: Path, messages: Message
         )
 
 
-def test_every_shape_moves_with_a_frame_that_is_there(messages: Messages) -> None:
+def test_every_shape_moves_with_an_existing_frame(messages: Messages) -> None:
     transforms = [each for topic in ("/tf", "/tf_static") for each in messages[topic][0][1].transforms]
     frames = {"world", *(each.child_frame_id for each in transforms)}
     drawn = [marker for topic in ("/view/robot", "/view/throws") for marker in messages[topic][0][1].markers]
@@ -122,7 +122,7 @@ def test_every_shape_moves_with_a_frame_that_is_there(messages: Messages) -> Non
     assert "world" not in moving
 
 
-def test_the_robot_holds_its_meshes_inside(messages: Messages) -> None:
+def test_the_recording_embeds_the_meshes_of_the_robot(messages: Messages) -> None:
     (_, description), (_, robot) = messages["/robot_description"][0], messages["/view/robot"][0]
     visuals = list(ElementTree.fromstring(description.data).iter("visual"))  # noqa: S314
     assert len(visuals) == len(robot.markers) > 50
@@ -206,7 +206,7 @@ def test_a_path_is_also_points_for_viewers_without_markers(collected: Path, mess
     assert np.array_equal(np.frombuffer(cloud.data.tobytes(), "<f4").reshape(-1, 3), positions.astype("f4"))
 
 
-def test_facts_are_the_row_of_the_table(messages: Messages, rows: list[dict[str, Any]]) -> None:
+def test_the_facts_of_a_throw_are_its_row_of_the_table(messages: Messages, rows: list[dict[str, Any]]) -> None:
     for (_, array), row in zip(messages["/view/facts"], rows, strict=True):
         (status,) = array.status
         facts = {pair.key: pair.value for pair in status.values}
@@ -223,7 +223,7 @@ def leaves(tree: Any) -> Iterator[str]:
         yield from (*leaves(tree["first"]), *leaves(tree["second"]))
 
 
-def test_the_layout_shows_what_is_in_the_recording(written: View, messages: Messages) -> None:
+def test_the_layout_shows_only_topics_of_the_recording(written: View, messages: Messages) -> None:
     layout = json.loads(written.layout.read_text())
     panels = layout["configById"]
     assert sorted(leaves(layout["layout"])) == sorted(panels)
@@ -284,7 +284,7 @@ def test_only_trials_with_an_episode_can_be_chosen(
     assert not (tmp_path / "view").exists()
 
 
-def test_what_is_already_there_is_left_alone(collected: Path, tmp_path: Path) -> None:
+def test_an_existing_directory_is_refused_and_left_alone(collected: Path, tmp_path: Path) -> None:
     (tmp_path / "view").mkdir()
     (tmp_path / "view" / "mine").write_text("mine")
     with pytest.raises(ConfigError, match="view: "):
@@ -292,7 +292,7 @@ def test_what_is_already_there_is_left_alone(collected: Path, tmp_path: Path) ->
     assert [path.name for path in tmp_path.rglob("*")] == ["view", "mine"]
 
 
-def test_a_failure_leaves_nothing_behind(collected: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_full_disk_leaves_no_files_behind(collected: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def full(*_: object) -> None:
         raise OSError(28, "No space left on device")
 

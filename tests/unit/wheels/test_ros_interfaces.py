@@ -31,7 +31,7 @@ def pins(lines: list[str]) -> dict[str, str]:
     return {each[1]: each[2] for each in found if each}
 
 
-def test_everything_is_pinned_and_all_say_the_same_versions() -> None:
+def test_all_ros_packages_are_pinned_to_the_same_versions() -> None:
     tried = pins((ROOT / "packaging" / "ros_constraints.txt").read_text().splitlines())
     document = tomllib.loads((PROJECT / "pyproject.toml").read_text())
     ours = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]["ros"]
@@ -43,7 +43,7 @@ def test_everything_is_pinned_and_all_say_the_same_versions() -> None:
     assert of_ros == {name: tried[name] for name in of_ros}
 
 
-def test_what_is_built_is_what_throwcollect_defines_of_these_packages() -> None:
+def test_the_built_packages_hold_exactly_the_definitions_of_throwcollect() -> None:
     from builder.project import PROJECT as BUILT
 
     names = [package.name for package in BUILT.packages]
@@ -98,7 +98,7 @@ def refusal(capsys: pytest.CaptureFixture[str]) -> str:
         ("sysconfig.get_path", lambda _: "/nowhere", "headers are missing (/nowhere/Python.h): install them"),
     ],
 )
-def test_a_machine_that_cannot_build_is_told_so_in_one_sentence(
+def test_a_machine_that_cannot_build_gets_one_sentence(
     where: str, value: object, sentence: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     import builder
@@ -110,7 +110,7 @@ def test_a_machine_that_cannot_build_is_told_so_in_one_sentence(
     assert sentence in refusal(capsys)
 
 
-def test_a_compiler_that_is_named_and_not_there_is_named_back(
+def test_a_missing_compiler_is_an_error_that_names_it(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setenv("CXX", "no-such-compiler -O3")

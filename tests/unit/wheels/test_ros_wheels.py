@@ -51,7 +51,9 @@ def test_wheels_are_collected_again_only_when_something_has_changed(
     assert not wheels.fill(directory)
 
 
-def test_two_who_ask_at_once_collect_once(wheels: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_two_concurrent_callers_collect_the_wheels_once(
+    wheels: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     directory = tmp_path / "wheels"
     begun, may_end = threading.Event(), threading.Event()
 
@@ -71,7 +73,7 @@ def test_two_who_ask_at_once_collect_once(wheels: ModuleType, tmp_path: Path, mo
         assert (first.result(10), second.result(10)) == (True, False)
 
 
-def test_a_collection_that_fails_is_begun_anew_next_time(
+def test_a_failed_collection_of_wheels_is_tried_again(
     wheels: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def fail(*_: object, **__: object) -> None:
@@ -84,14 +86,14 @@ def test_a_collection_that_fails_is_begun_anew_next_time(
         assert ended.value.code == 3
 
 
-def test_the_interfaces_are_built_and_not_asked_of_an_index(wheels: ModuleType) -> None:
+def test_the_requirements_leave_out_the_interfaces_that_are_built(wheels: ModuleType) -> None:
     assert [name.partition("=")[0] for name in wheels.requirements()] == [
         "ros-jazzy-rclpy[fastrtps]",
         "ros-jazzy-common-interfaces",
     ]
 
 
-def test_a_word_that_asks_for_help_is_no_directory(tmp_path: Path) -> None:
+def test_help_prints_the_usage_and_makes_no_directory(tmp_path: Path) -> None:
     script = ROOT / "packaging" / "ros_wheels.py"
     said = subprocess.run(
         [sys.executable, script, "--help"], cwd=tmp_path, capture_output=True, text=True, timeout=60, check=False

@@ -1,4 +1,4 @@
-"""A router, a node beside the bridge, and clients that remember what they are sent."""
+"""A router, a node beside the bridge, and clients that keep the frames that they get."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ PATIENCE_S = 30.0
 
 
 def wait_for(condition: Callable[[], Any], what: str = "") -> Any:
-    """What a condition gives as soon as it is true."""
+    """Wait until a condition is true, and return its value."""
     deadline = time.monotonic() + PATIENCE_S
     while not (found := condition()):
         assert time.monotonic() < deadline, f"did not happen: {what}"
@@ -40,12 +40,12 @@ def wait_for_listener(publisher: Any) -> None:
     """Wait until somebody listens to a publisher, and knows of it."""
     wait_for(publisher.get_subscription_count, f"somebody listens to {publisher.topic_name}")
     if ON_DDS:
-        # Each side finds the other, and cannot know when the other has found it.
+        # On DDS, neither side knows when the other one has found it.
         time.sleep(FOUND_BY_OTHERS_S)
 
 
 class Party:
-    """A client without a network, and what it was sent so far, read."""
+    """A client without a network, with the frames that it got so far, parsed."""
 
     def __init__(self, bridge: Bridge, *, read_only: bool = False) -> None:
         self.frames: list[str | bytes] = []
@@ -97,14 +97,14 @@ def bridge(connection: Connection) -> Iterator[Bridge]:
 
 @pytest.fixture(autouse=True)
 def _nothing_fails(caplog: pytest.LogCaptureFixture) -> Iterator[None]:
-    """What goes wrong in a bridge ends neither it nor a test, but is logged."""
+    """Check that the bridge has logged nothing: an error in it would fail neither the bridge nor a test."""
     yield
     assert [each.exc_info for each in caplog.records if each.name.startswith("throwcollect.serve")] == []
 
 
 @pytest.fixture(scope="session")
 def url(bridge: Bridge) -> Iterator[str]:
-    """Where the bridge is, over WebSockets."""
+    """Address of the bridge, over WebSockets."""
 
     async def route(websocket: WebSocket) -> None:
         await attend(websocket, bridge, read_only=False)
@@ -138,7 +138,7 @@ def context(connection: Connection) -> Iterator[Context]:
 
 @pytest.fixture
 def node(context: Context, bridge: Bridge) -> Iterator[Node]:
-    """A node of ROS, which spins; an embedded one the bridge sees no more when the next test begins."""
+    """A spinning node of ROS; the bridge does not see an embedded one any more when the next test begins."""
     node = Node("other", context=context)
     executor = SingleThreadedExecutor(context=context)
     executor.add_node(node)
@@ -156,7 +156,7 @@ def node(context: Context, bridge: Bridge) -> Iterator[Node]:
     thread.join()
     node.destroy_node()
     if uses_rclpy():
-        # What it has, such as actions, keeps a genuine node until Python collects it.
+        # Actions and others keep a genuine node alive until Python collects it, so waiting is useless.
         return
     observer = Party(bridge)
     wait_for(lambda: "/other" not in observer.call("rosapi/nodes")["nodes"], "the node is seen no more")

@@ -1,4 +1,4 @@
-"""Actions whose goals a client sends, and those that it offers."""
+"""Goals that a client sends to actions, and actions that it offers."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def send(party: Party, *joints: str, number: str = "g", **more: Any) -> None:
     party.ask(op="send_action_goal", **fields)
 
 
-def test_a_goal_is_sent_and_its_feedback_and_result_come_back(party: Party, arm: Arm) -> None:
+def test_a_client_sends_a_goal_and_gets_feedback_and_result(party: Party, arm: Arm) -> None:
     send(party, "a", feedback=True)
     feedback = party.next(op="action_feedback")
     assert (feedback["id"], feedback["action"], feedback["values"]["joint_names"]) == ("g", "follow", ["a"])
@@ -70,7 +70,7 @@ def test_a_goal_is_sent_and_its_feedback_and_result_come_back(party: Party, arm:
     }
 
 
-def test_a_goal_is_cancelled_and_feedback_comes_to_those_alone_who_want_it(party: Party, arm: Arm) -> None:
+def test_a_client_can_cancel_a_goal_and_gets_no_unwanted_feedback(party: Party, arm: Arm) -> None:
     send(party, "wait")
     party.ask(op="cancel_action_goal", id="g", action="follow")
     assert party.next(op="action_result")["status"] == CANCELED
@@ -89,14 +89,14 @@ def test_a_goal_is_cancelled_and_feedback_comes_to_those_alone_who_want_it(party
         ({"compression": "png"}, "no compression png"),
     ],
 )
-def test_a_goal_that_cannot_be_sent_is_answered_with_a_sentence(party: Party, arm: Arm, asked: Any, said: str) -> None:
+def test_a_goal_that_cannot_be_sent_fails_with_the_reason(party: Party, arm: Arm, asked: Any, said: str) -> None:
     send(party, **asked)
     answer = party.next(op="action_result", id="g")
     assert (answer["result"], answer["status"]) == (False, 0)
     assert said in answer["values"]
 
 
-def test_a_goal_is_given_up_when_its_action_has_gone(party: Party, arm: Arm) -> None:
+def test_a_goal_fails_when_its_action_disappears(party: Party, arm: Arm) -> None:
     send(party, "wait", feedback=True)
     party.next(op="action_feedback")
     arm.server.destroy()
@@ -105,9 +105,9 @@ def test_a_goal_is_given_up_when_its_action_has_gone(party: Party, arm: Arm) -> 
 
 @pytest.fixture
 def offer(party: Party, node: Node) -> Callable[[], Any]:
-    """What has a node send a goal to the action that the client offers; gives what came of it."""
+    """A function that lets a node send a goal to the action of the client, and returns the sent goal."""
     client = ActionClient(node, FJT, "/swing")
-    # The party of an earlier test may still be leaving, and a goal to its action is lost.
+    # The client of an earlier test may still be leaving, and a goal to its action would be lost.
     wait_for(lambda: not client.server_is_ready(), "the action of an earlier test is seen no more")
     party.ask(op="advertise_action", action="swing", type=KIND)
     assert client.wait_for_server(5)
@@ -142,7 +142,7 @@ def test_a_client_offers_an_action(party: Party, offer: Callable[[], Any]) -> No
     assert sent.end == (SUCCEEDED, "fine")
 
 
-def test_goals_of_a_client_end_as_it_says(party: Party, offer: Callable[[], Any]) -> None:
+def test_goals_of_an_offered_action_end_with_the_status_of_the_client(party: Party, offer: Callable[[], Any]) -> None:
     failed = offer()
     party.ask(op="action_result", **failed.answer, result=False)
     assert failed.end == (ABORTED, "")
@@ -157,7 +157,7 @@ def test_goals_of_a_client_end_as_it_says(party: Party, offer: Callable[[], Any]
     assert cancelled.end == (CANCELED, "")
 
 
-def test_what_is_wrong_with_an_answer_is_told(party: Party, offer: Callable[[], Any]) -> None:
+def test_a_client_is_told_what_is_wrong_with_its_feedback_or_result(party: Party, offer: Callable[[], Any]) -> None:
     sent = offer()
     for op, values, said in (
         ("action_feedback", {"joint": 1}, "joint: no such field"),
@@ -178,7 +178,7 @@ def test_goals_are_aborted_when_the_action_is_withdrawn_and_when_the_client_leav
     sent = offer()
     party.ask(op="unadvertise_action", action="swing")
     assert sent.end == (ABORTED, "")
-    # On DDS, services that somebody would call are among the names, too.
+    # On DDS, the names also include services that have only clients.
     wait_for(lambda: "/swing" not in party.call("rosapi/action_servers")["action_servers"])
 
 
@@ -198,6 +198,6 @@ def test_goals_are_aborted_when_the_last_client_leaves(connection: Connection, n
     client.destroy()
 
 
-def test_an_action_of_a_node_is_not_offered_once_more(party: Party, arm: Arm) -> None:
+def test_a_client_cannot_offer_an_action_that_a_node_has(party: Party, arm: Arm) -> None:
     party.ask(op="advertise_action", action="/follow", type=KIND)
     assert "/follow is offered already" in party.next(op="status")["msg"]

@@ -58,7 +58,7 @@ class Talker:
         self.publisher.publish(String(data=text))
 
 
-def test_what_a_client_has_and_asks_for_survives_the_router(routers: Routers) -> None:
+def test_topics_services_and_actions_of_a_client_survive_a_router_restart(routers: Routers) -> None:
     bridge = Bridge(routers.connection)
     party = Party(bridge)
     party.ask(op="subscribe", topic="/words", type="std_msgs/String")
@@ -116,7 +116,7 @@ def test_each_bridge_is_in_its_own_run(routers: Routers, bridge: Bridge, connect
         talker.context.try_shutdown()
 
 
-def test_a_bridge_whose_context_was_ended_joins_again(routers: Routers) -> None:
+def test_a_bridge_joins_the_run_again_after_its_context_was_shut_down(routers: Routers) -> None:
     bridge = Bridge(routers.connection)
     party = Party(bridge)
     party.call("rosapi/get_time")
@@ -127,7 +127,7 @@ def test_a_bridge_whose_context_was_ended_joins_again(routers: Routers) -> None:
     bridge.close()
 
 
-def test_a_bridge_that_is_closed_leaves_nothing_and_takes_nothing(routers: Routers) -> None:
+def test_a_closed_bridge_withdraws_its_topics_and_ignores_requests(routers: Routers) -> None:
     bridge = Bridge(routers.connection)
     party = Party(bridge)
     party.ask(op="advertise", topic="/mine", type="std_msgs/String")

@@ -1,4 +1,4 @@
-"""What frames say, whichever way they say it, and frames that say nothing."""
+"""Frames of rosbridge in each of their formats, and malformed frames."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def content(frame: str | bytes) -> Any:
     return read_frame(frame).any("msg")
 
 
-def test_json_cbor_and_bytes_say_the_same_of_every_message() -> None:
+def test_json_cbor_and_raw_bytes_of_every_message_are_equivalent() -> None:
     assert len(message_names()) > 250
     random = random_numbers.Random(16)
     for name in message_names():
@@ -57,7 +57,7 @@ def test_json_cbor_and_bytes_say_the_same_of_every_message() -> None:
             assert again == message, (name, form)
 
 
-def test_octets_and_numbers_are_written_as_rosbridge_writes_them() -> None:
+def test_octets_and_numbers_are_written_as_in_rosbridge() -> None:
     values: dict[str, Any] = {
         "std_msgs/msg/UInt8MultiArray": (b"\0\1", base64.b64encode(b"\0\1").decode(), b"\0\1"),
         "std_msgs/msg/ByteMultiArray": (b"\0\1", [0, 1], b"\0\1"),
@@ -98,7 +98,7 @@ def test_octets_and_numbers_are_written_as_rosbridge_writes_them() -> None:
         (bytes.fromhex("a2626f70677075626c697368636d7367d81c81d81d00"), "topic should be a text, got nothing"),
     ],
 )
-def test_a_frame_that_says_nothing_is_told_in_a_sentence(party: Party, frame: str | bytes, said: str) -> None:
+def test_a_malformed_frame_gets_an_error_status(party: Party, frame: str | bytes, said: str) -> None:
     party.client.receive(frame)
     told = party.next(op="status")
     assert told["level"] == "error"
@@ -109,14 +109,14 @@ def test_a_frame_that_says_nothing_is_told_in_a_sentence(party: Party, frame: st
 @given(
     frame=st.one_of(st.binary(max_size=60), st.text(max_size=60), st.dictionaries(st.text(), st.none()).map(json.dumps))
 )
-def test_whatever_comes_is_read_or_refused(frame: str | bytes) -> None:
+def test_any_frame_is_read_or_refused(frame: str | bytes) -> None:
     try:
         assert isinstance(read_frame(frame), BridgeRequest)
     except ConfigError:
         return
 
 
-def test_status_messages_come_from_the_level_on_that_is_asked_for(party: Party) -> None:
+def test_status_messages_come_from_the_requested_level_on(party: Party) -> None:
     for level in ("none", "error"):
         party.ask(op="set_level", level=level)
         party.ask(op="nothing")
@@ -129,7 +129,7 @@ def part(number: object, total: object, data: object = "x", name: object = "a") 
     return BridgeRequest({"op": "fragment", "id": name, "num": number, "total": total, "data": data})
 
 
-def test_parts_in_any_order_become_a_frame(party: Party) -> None:
+def test_fragments_in_any_order_become_a_frame(party: Party) -> None:
     frame = json_text({"op": "call_service", "id": "whole", "service": "/rosapi/get_ros_version"})
     parts = list(fragments(frame, 7, "1"))
     for each in [*parts[::-2], *parts[::2], parts[1]]:
@@ -139,7 +139,7 @@ def test_parts_in_any_order_become_a_frame(party: Party) -> None:
     assert party.next(id="whole")["values"]["version"] == 2
 
 
-def test_parts_that_do_not_fit_together_are_refused_and_forgotten() -> None:
+def test_fragments_that_do_not_fit_together_are_refused() -> None:
     whole = Reassembly()
     for wrong in (part(1, 1), part(0, 0), part(0, 10**9), part(0, 2, 7), part(0, 2, name=None), part(-1, 2)):
         with pytest.raises(ConfigError, match="fragment: "):
@@ -154,7 +154,7 @@ def test_parts_that_do_not_fit_together_are_refused_and_forgotten() -> None:
     assert whole.add(part(0, 1, "x" * (LONGEST_FRAME - 100))) is not None
 
 
-def test_the_parts_of_types_are_found() -> None:
+def test_array_parts_splits_an_array_type_into_element_and_sizes() -> None:
     assert array_parts("sequence<double, 5>") == ("double", 5, None)
     assert array_parts("sequence<std_msgs/Header>") == ("std_msgs/Header", None, None)
     assert array_parts("float[36]") == ("float", None, 36)
@@ -162,6 +162,6 @@ def test_the_parts_of_types_are_found() -> None:
 
 
 @pytest.mark.parametrize(("name", "values"), [("Float64", 10**400), ("Float64MultiArray", [10**400])])
-def test_a_number_that_no_float_can_be_is_refused(name: str, values: object) -> None:
+def test_a_number_too_large_for_a_float_is_refused(name: str, values: object) -> None:
     with pytest.raises(ConfigError, match=r"data: should be .*double"):
         fill(message_class(f"std_msgs/msg/{name}")(), {"data": values})

@@ -19,7 +19,7 @@ PACKAGES = {
     "@foxglove/roslibjs": "0.0.3",
     "@lichtblick/rosmsg": "1.0.0",
     "@lichtblick/rosmsg2-serialization": "1.0.0",
-    # That one reads with it, but names it for its developers alone.
+    # The package above needs this one, but lists it only as a development dependency.
     "@lichtblick/cdr": "1.0.1",
 }
 
@@ -29,7 +29,7 @@ def program() -> Path:
     """The program beside the libraries."""
     if shutil.which("node") is None:
         pytest.skip("there is no Node.js")
-    # Lichtblick is a page, and has the sockets of its browser.
+    # Lichtblick runs in a browser and uses its WebSocket, which Node.js must have here.
     has_sockets = subprocess.run(["node", "--experimental-websocket", "-e", ""], capture_output=True, check=False)
     if has_sockets.returncode:
         pytest.skip("Node.js has no WebSocket; it has one from 20.10 on")

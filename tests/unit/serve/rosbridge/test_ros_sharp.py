@@ -103,18 +103,18 @@ NEEDED = {
     "action_feedback": {"id", "action", "values"},
     "action_result": {"id", "action", "values", "status", "result"},
 }
-"""Fields that it looks up in what it gets."""
+"""Fields that ROS# looks up in each operation that it gets."""
 
 
 def hear(party: Party, op: str) -> Any:
-    """What ROS# makes of the next frame with an operation."""
+    """The next frame with this operation, as ROS# reads it."""
     fields = party.next(op=op)
     assert NEEDED[op] <= set(fields)
     assert all(isinstance(frame, str) and frame.isascii() for frame in party.frames)
     return fields
 
 
-def test_what_is_published_is_heard_letter_for_letter(party: Party, node: Node) -> None:
+def test_ros_sharp_hears_published_text_letter_for_letter(party: Party, node: Node) -> None:
     publisher = node.create_publisher(String, "/sharp/echo", 10)
     party.client.receive(SUBSCRIBE)
     wait_for_listener(publisher)
@@ -125,7 +125,7 @@ def test_what_is_published_is_heard_letter_for_letter(party: Party, node: Node) 
     wait_for(lambda: not publisher.get_subscription_count())
 
 
-def test_what_it_publishes_is_heard(party: Party, node: Node) -> None:
+def test_nodes_hear_messages_that_ros_sharp_publishes(party: Party, node: Node) -> None:
     words: list[Any] = []
     scans: list[Any] = []
     node.create_subscription(String, "/sharp/words", words.append, 10)
@@ -136,7 +136,7 @@ def test_what_it_publishes_is_heard(party: Party, node: Node) -> None:
     ):
         party.client.receive(advertise)
         wait_for(lambda topic=topic: node.count_publishers(topic))  # type: ignore[misc]
-        # What is said before a subscription has found the publisher is heard by nobody.
+        # A message is lost if the subscription has not found the publisher yet, so it is sent again.
         wait_for(lambda: party.client.receive(publish) or heard)  # noqa: B023
     assert words[0].data == "grüße ° 度"
     assert scans[0].ranges.tolist() == [1.5, pytest.approx(0.1), pytest.approx(3e-8)]
@@ -145,7 +145,7 @@ def test_what_it_publishes_is_heard(party: Party, node: Node) -> None:
     wait_for(lambda: not node.count_publishers("/sharp/words"))
 
 
-def test_services_are_called_both_ways(party: Party, node: Node) -> None:
+def test_ros_sharp_calls_and_offers_services(party: Party, node: Node) -> None:
     lamp = node.create_client(SetBool, "/sharp/lamp")
 
     async def ask_back(request: Any, response: Any) -> Any:
@@ -168,7 +168,7 @@ def test_services_are_called_both_ways(party: Party, node: Node) -> None:
     wait_for(lambda: not lamp.service_is_ready())
 
 
-def test_a_goal_is_sent_and_cancelled(party: Party, node: Node) -> None:
+def test_ros_sharp_sends_a_goal_and_gets_feedback_and_result(party: Party, node: Node) -> None:
     def follow(handle: Any) -> Any:
         handle.publish_feedback(FJT.Feedback(joint_names=handle.request.trajectory.joint_names))
         handle.succeed()
@@ -185,7 +185,9 @@ def test_a_goal_is_sent_and_cancelled(party: Party, node: Node) -> None:
 
 
 @pytest.mark.parametrize(("end", "status", "text"), [(RESULT, 4, "followed"), (CANCELLED, 5, "stopped")])
-def test_a_goal_is_followed_and_cancelled(party: Party, node: Node, end: bytes, status: int, text: str) -> None:
+def test_ros_sharp_offers_an_action_whose_goals_succeed_or_are_cancelled(
+    party: Party, node: Node, end: bytes, status: int, text: str
+) -> None:
     party.client.receive(OFFER_ACTION)
     client = ActionClient(node, FJT, "/sharp/follow")
     assert client.wait_for_server(10)
@@ -209,7 +211,7 @@ def test_a_goal_is_followed_and_cancelled(party: Party, node: Node, end: bytes, 
     wait_for(lambda: not client.server_is_ready())
 
 
-def test_a_robot_is_imported(party: Party, node: Node) -> None:
+def test_ros_sharp_imports_the_description_of_a_robot(party: Party, node: Node) -> None:
     urdf = '<?xml version="1.0"?>\n<robot name="grün"/>'
     node.declare_parameter("robot_description", urdf)
     wait_for(lambda: "/other/get_parameters" in party.call("rosapi/services")["services"])
@@ -217,7 +219,7 @@ def test_a_robot_is_imported(party: Party, node: Node) -> None:
     assert json.loads(hear(party, "service_response")["values"]["value"]) == "file_server2"
     party.client.receive(GET_DESCRIPTION.replace(b"sim_0/sim_0", b"other"))
     value = hear(party, "service_response")["values"]["value"]
-    # Of JSON it knows quotation marks and ends of lines.
+    # ROS# decodes only quotation marks and ends of lines of JSON.
     assert value[1:-1].replace('\\"', '"').replace("\\n", "\n") == urdf
     party.client.receive(HAS)
     assert hear(party, "service_response")["values"] == {"exists": False}

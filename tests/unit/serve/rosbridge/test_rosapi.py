@@ -1,4 +1,4 @@
-"""What clients are told of the ROS graph."""
+"""The services of rosapi, by which clients look at the ROS graph."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ SetBool: Any = get_service("std_srvs/srv/SetBool")
 
 @pytest.fixture
 def graph(node: Node, party: Party) -> Node:
-    """A node that has one of everything, with what nobody is to be told of."""
+    """A node that has one of everything, and topics that rosapi must hide."""
     node.create_publisher(JointState, "/states", 10)
     for hidden in ("/_hidden", "/sim_0/episode", "/part/_of/it"):
         node.create_publisher(String, hidden, 10)
@@ -41,7 +41,7 @@ def graph(node: Node, party: Party) -> Node:
     return node
 
 
-def test_topics_are_told_with_their_types_and_without_what_is_hidden(party: Party, graph: Node) -> None:
+def test_rosapi_lists_topics_with_types_and_without_hidden_ones(party: Party, graph: Node) -> None:
     told = party.call("/rosapi/topics")
     topics = dict(zip(told["topics"], told["types"], strict=True))
     assert topics == {
@@ -59,7 +59,7 @@ def test_topics_are_told_with_their_types_and_without_what_is_hidden(party: Part
     assert party.call("/rosapi/subscribers", topic="/orders") == {"subscribers": ["/other"]}
 
 
-def test_services_are_told_with_their_types_and_nodes(party: Party, graph: Node) -> None:
+def test_rosapi_lists_services_with_types_and_nodes(party: Party, graph: Node) -> None:
     services = party.call("/rosapi/services")["services"]
     assert "/lamp" in services
     assert not [each for each in services if "/_action/" in each]
@@ -72,7 +72,7 @@ def test_services_are_told_with_their_types_and_nodes(party: Party, graph: Node)
     assert party.call("/rosapi/service_node", service="/none") == {"node": ""}
 
 
-def test_nodes_are_told_with_all_that_they_have(party: Party, graph: Node) -> None:
+def test_rosapi_lists_nodes_with_their_topics_and_services(party: Party, graph: Node) -> None:
     assert party.call("/rosapi/nodes") == {"nodes": ["/other"]}
     details = party.call("/rosapi/node_details", node="/other")
     assert details["subscribing"] == ["/orders"]
@@ -83,7 +83,7 @@ def test_nodes_are_told_with_all_that_they_have(party: Party, graph: Node) -> No
     assert party.call("/rosapi/node_details", node="/gone") == empty
 
 
-def test_definitions_are_told_with_those_of_all_that_is_in_them(party: Party) -> None:
+def test_rosapi_describes_a_type_with_all_nested_types(party: Party) -> None:
     first, *others = party.call("/rosapi/message_details", type="sensor_msgs/JointState")["typedefs"]
     assert first == {
         "type": "sensor_msgs/JointState",
@@ -111,7 +111,7 @@ def test_definitions_are_told_with_those_of_all_that_is_in_them(party: Party) ->
     assert odometry[0]["fieldarraylen"] == [-1, 36]
 
 
-def test_time_and_version_are_told(party: Party) -> None:
+def test_rosapi_returns_the_time_and_the_ros_version(party: Party) -> None:
     now = party.call("/rosapi/get_time")["time"]
     assert now["sec"] + now["nanosec"] * 1e-9 == pytest.approx(time.time(), abs=60)
     assert party.call("/rosapi/get_ros_version") == {"version": 2, "distro": "jazzy"}
@@ -127,7 +127,7 @@ def test_parameters_are_listed_read_and_set(party: Party, graph: Node) -> None:
     assert party.call("/rosapi/get_param", name="/other:none", default_value="7") == {"value": "7"}
     assert party.call("/rosapi/get_param", name="/gone:none", default_value="[1]") == {"value": "[1]"}
     assert party.call("/rosapi/get_param", name="/gone:none", default_value="no JSON") == {"value": '"no JSON"'}
-    # JavaScript knows no other one.
+    # JavaScript has only one kind of number, so a whole one must be accepted for a double.
     assert party.call("/rosapi/set_param", name="/other:mass", value="1")["successful"]
     assert graph.get_parameter("mass").value == 1.0
     assert party.call("/rosapi/set_param", name="/other:names", value='["b", "c"]')["successful"]
@@ -152,7 +152,7 @@ def test_parameters_are_listed_read_and_set(party: Party, graph: Node) -> None:
         ("service_request_details", {"type": 7}, "type should be a text, got 7"),
     ],
 )
-def test_what_cannot_be_told_is_answered_with_a_sentence(
+def test_a_wrong_call_of_rosapi_fails_with_the_reason(
     party: Party, graph: Node, service: str, arguments: Any, said: str
 ) -> None:
     def judge(parameters: list[Parameter]) -> SetParametersResult:
@@ -182,7 +182,7 @@ def reader(mesh_bridge: Bridge) -> Iterator[Party]:
 MESH = "example-robot-data/robots/talos_data/meshes/head/head_1.stl"
 
 
-def test_meshes_of_the_robot_are_read_even_by_who_may_only_look(reader: Party) -> None:
+def test_a_read_only_client_can_read_meshes_of_the_robot(reader: Party) -> None:
     path = TALOS.share() / MESH
     found = reader.call("/file_server/get_file", name=f"package://{MESH}")
     assert base64.b64decode(found["value"]) == path.read_bytes()
@@ -203,7 +203,7 @@ def test_meshes_of_the_robot_are_read_even_by_who_may_only_look(reader: Party) -
         "file:///etc/passwd",
     ],
 )
-def test_no_other_file_is_read(reader: Party, name: str) -> None:
+def test_paths_other_than_files_of_robot_packages_are_refused(reader: Party, name: str) -> None:
     reader.ask(op="call_service", id="f", service="/file_server/get_file", args={"name": name})
     answer = reader.next(id="f")
     assert answer["result"] is False
@@ -223,7 +223,7 @@ def test_no_other_file_is_read(reader: Party, name: str) -> None:
         {"op": "cancel_action_goal", "action": "/t"},
     ],
 )
-def test_who_may_only_look_changes_nothing(reader: Party, asked: Any) -> None:
+def test_a_read_only_client_cannot_change_anything(reader: Party, asked: Any) -> None:
     reader.client.receive(json.dumps({"id": "x", **asked}))
     told = reader.next(id="x")
     assert "this client may only look" in (told.get("msg") or told["values"])

@@ -15,7 +15,7 @@ from throwcollect.ros import Node
 
 @pytest.fixture
 def ros(url: str) -> Iterator[Any]:
-    # Twisted, the other way, begins once in a process.
+    # The default transport, Twisted, can be started only once in a process.
     ros = roslibpy.Ros(url, transport="asyncio")
     ros.run(10)
     yield ros

@@ -39,7 +39,7 @@ def test_a_service_is_called_with_arguments_by_name_or_in_their_order(party: Par
     }
 
 
-def test_an_answer_comes_in_cbor_or_in_parts_if_that_is_wanted(party: Party, lamp: Any) -> None:
+def test_an_answer_comes_in_cbor_or_in_fragments_on_request(party: Party, lamp: Any) -> None:
     party.ask(op="call_service", service="/lamp", args={"data": True}, compression="cbor")
     wait_for(lambda: isinstance(party.frames[-1], bytes))
     assert cbor2.loads(party.frames[-1])["values"] == {"success": True, "message": "switched"}
@@ -61,7 +61,7 @@ def test_an_answer_comes_in_cbor_or_in_parts_if_that_is_wanted(party: Party, lam
         ({"service": "/rosapi/nothing"}, "nobody offers a service /rosapi/nothing"),
     ],
 )
-def test_a_call_that_cannot_be_made_is_answered_with_a_sentence(party: Party, lamp: Any, asked: Any, said: str) -> None:
+def test_a_call_that_cannot_be_made_fails_with_the_reason(party: Party, lamp: Any, asked: Any, said: str) -> None:
     party.ask(op="call_service", id="c", **asked)
     answer = party.next(op="service_response", id="c")
     assert answer["result"] is False
@@ -78,7 +78,7 @@ def test_a_call_that_cannot_be_made_is_answered_with_a_sentence(party: Party, la
         ("set_parameters_atomically", [[{"name": "trial.leases"}]]),
     ],
 )
-def test_leases_of_trials_can_be_neither_read_nor_set(party: Party, node: Node, service: str, arguments: Any) -> None:
+def test_a_client_can_neither_read_nor_set_leases(party: Party, node: Node, service: str, arguments: Any) -> None:
     name = f"{node.get_fully_qualified_name()}/{service}"
     wait_for(lambda: name in party.call("rosapi/services")["services"])
     party.ask(op="call_service", id="c", service=name, args=arguments)
@@ -87,7 +87,7 @@ def test_leases_of_trials_can_be_neither_read_nor_set(party: Party, node: Node, 
     assert "trial.leases: nobody but the coordinator may have this parameter" in answer["values"]
 
 
-def test_a_call_is_given_up_in_time_or_when_its_service_has_gone(party: Party, node: Node) -> None:
+def test_a_call_fails_after_its_timeout_or_when_its_service_disappears(party: Party, node: Node) -> None:
     async def wait(_request: Any, _response: Any) -> Any:
         return await Future()
 
@@ -119,7 +119,7 @@ def test_a_client_offers_a_service(party: Party, node: Node) -> None:
     assert "waits for an answer" in party.next(op="status")["msg"]
 
 
-def test_an_answer_that_is_none_is_told_and_one_that_has_failed_has_defaults(party: Party, node: Node) -> None:
+def test_a_malformed_answer_is_reported_and_a_failed_one_gives_defaults(party: Party, node: Node) -> None:
     party.ask(op="advertise_service", service="/clock", type="std_srvs/SetBool")
     future = call(node)
     answer = {"op": "service_response", "id": party.next(op="call_service")["id"], "service": "/clock"}
@@ -130,7 +130,7 @@ def test_an_answer_that_is_none_is_told_and_one_that_has_failed_has_defaults(par
     assert future.result() == SetBool.Response()
 
 
-def test_a_service_can_be_withdrawn_and_offered_again_but_not_in_place_of_one_of_a_node(
+def test_a_client_can_offer_a_service_again_but_not_one_of_a_node(
     bridge: Bridge, party: Party, node: Node, lamp: Any
 ) -> None:
     party.ask(op="advertise_service", service="/lamp", type="std_srvs/SetBool")

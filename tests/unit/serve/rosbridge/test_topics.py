@@ -29,7 +29,7 @@ LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
 def words(node: Node, topic: str = "/words") -> Callable[..., None]:
-    """What publishes texts once somebody listens."""
+    """A function that publishes a text once somebody listens."""
     publisher = node.create_publisher(String, topic, 10)
 
     def say(*texts: str) -> None:
@@ -44,14 +44,14 @@ def data(party: Party) -> list[str]:
     return [each["msg"]["data"] for each in party.got() if each["op"] == "publish"]
 
 
-def test_a_topic_is_heard_by_the_name_that_the_client_has_for_it(party: Party, node: Node) -> None:
+def test_messages_carry_the_topic_name_that_the_client_used(party: Party, node: Node) -> None:
     say = words(node)
     party.ask(op="subscribe", topic="words", type="std_msgs/String")
     say("a")
     assert party.next(op="publish") == {"op": "publish", "topic": "words", "msg": {"data": "a"}}
 
 
-def test_whoever_comes_late_hears_a_latched_topic_even_after_others(bridge: Bridge, party: Party, node: Node) -> None:
+def test_each_late_client_hears_a_latched_topic(bridge: Bridge, party: Party, node: Node) -> None:
     node.create_publisher(String, "/latched", LATCHED).publish(String(data="urdf"))
     other = Party(bridge)
     for each in (party, other):
@@ -71,7 +71,7 @@ def test_a_topic_that_is_published_later_is_heard_from_its_first_message(
     publisher = node.create_publisher(String, "/soon", 10)
     wait_for_listener(publisher)
     publisher.publish(String(data="first"))
-    # Before the bridge gets to what has come, it looks around: that it does once a second.
+    # The bridge looks at the graph once a second, so it does that before it handles the message.
     time.sleep(1.1)
     go_on.set()
     assert party.next(op="publish")["msg"]["data"] == "first"
@@ -104,7 +104,7 @@ def test_a_topic_that_turns_out_to_be_latched_is_heard_from_its_beginning(party:
         ({"topic": "parameter_events"}, "it tells the signed leases"),
     ],
 )
-def test_what_cannot_be_heard_is_told_in_a_sentence(party: Party, node: Node, asked: Any, said: str) -> None:
+def test_an_impossible_subscription_gets_an_error_status(party: Party, node: Node, asked: Any, said: str) -> None:
     wait_for(lambda: "/rosout" in party.call("rosapi/topics")["topics"])
     party.ask(op="subscribe", id="s", **asked)
     told = party.next(op="status")
@@ -134,7 +134,7 @@ def test_the_lowest_throttle_and_the_longest_queue_of_a_client_count(party: Part
     party.call("rosapi/get_time")
     time.sleep(0.01)
     say(*"defgh")
-    # What does not fit into the queue is left out, the oldest first.
+    # A full queue drops its oldest messages.
     party.next(msg={"data": "h"})
     assert data(party)[0] == "a"
     assert data(party)[-2:] == ["g", "h"]
@@ -146,7 +146,7 @@ def test_the_lowest_throttle_and_the_longest_queue_of_a_client_count(party: Part
     assert data(party)[before:] in ([], ["i"])
 
 
-def test_what_waits_in_a_queue_comes_at_even_times_however_late_each_is(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_queued_messages_are_sent_at_even_times_despite_late_timers(monkeypatch: pytest.MonkeyPatch) -> None:
     now = 100.0
     monkeypatch.setattr(subscriptions, "time", SimpleNamespace(monotonic=lambda: now))
     waiting: list[tuple[float, Callable[[], None]]] = []
@@ -166,7 +166,7 @@ def test_what_waits_in_a_queue_comes_at_even_times_however_late_each_is(monkeypa
     assert [time_s for _, time_s in sent[1:]] == pytest.approx([100.005 + 0.03 * number for number in range(1, 20)])
 
 
-def test_of_50_a_second_a_plot_that_wants_30_gets_30(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_throttle_of_33_ms_passes_30_of_50_messages_a_second(monkeypatch: pytest.MonkeyPatch) -> None:
     now = 100.0
     monkeypatch.setattr(subscriptions, "time", SimpleNamespace(monotonic=lambda: now))
     waiting: list[tuple[float, Callable[[], None]]] = []
@@ -184,7 +184,7 @@ def test_of_50_a_second_a_plot_that_wants_30_gets_30(monkeypatch: pytest.MonkeyP
     assert len(sent) == pytest.approx(1800, abs=60)
 
 
-def test_a_message_comes_in_parts_that_are_no_longer_than_wanted(party: Party, node: Node) -> None:
+def test_a_long_message_comes_in_fragments_of_the_requested_size(party: Party, node: Node) -> None:
     say = words(node)
     party.ask(op="subscribe", topic="/words", type="std_msgs/String", fragment_size=100)
     say("ä" * 1000)
@@ -195,7 +195,7 @@ def test_a_message_comes_in_parts_that_are_no_longer_than_wanted(party: Party, n
     assert json.loads("".join(each["data"] for each in parts))["msg"] == {"data": "ä" * 1000}
 
 
-def test_messages_come_as_cbor_with_typed_arrays_or_as_they_are(party: Party, node: Node) -> None:
+def test_messages_come_as_cbor_with_typed_arrays_or_as_raw_bytes(party: Party, node: Node) -> None:
     publisher = node.create_publisher(JointState, "/states", 10)
     message = JointState(name=["a", "b"], position=[1.5, math.nan])
     for compression in ("cbor", "cbor-raw"):
@@ -220,7 +220,7 @@ def listen_by(node: Node, kind: Any, topic: str, qos: Any = 10) -> list[Any]:
     return heard
 
 
-def test_messages_are_published_in_json_and_cbor_and_what_is_left_out_has_defaults(party: Party, node: Node) -> None:
+def test_published_json_and_cbor_get_defaults_for_missing_fields(party: Party, node: Node) -> None:
     heard = listen_by(node, Image, "/image")
     wait_for(lambda: "/image" in party.call("rosapi/topics")["topics"])
     party.ask(op="advertise", topic="image", type="sensor_msgs/Image")
@@ -235,7 +235,7 @@ def test_messages_are_published_in_json_and_cbor_and_what_is_left_out_has_defaul
     assert second.header.stamp.sec == pytest.approx(time.time(), abs=60)
 
 
-def test_whoever_publishes_without_announcing_it_publishes_what_the_topic_has(party: Party, node: Node) -> None:
+def test_publishing_without_advertising_uses_the_type_of_the_topic(party: Party, node: Node) -> None:
     heard = listen_by(node, PointStamped, "/target")
     wait_for(lambda: "/target" in party.call("rosapi/topics")["topics"])
     party.ask(op="publish", topic="/target", msg={"point": {"x": 1, "y": None}})
@@ -243,7 +243,7 @@ def test_whoever_publishes_without_announcing_it_publishes_what_the_topic_has(pa
     assert (heard[0].point.x, math.isnan(heard[0].point.y)) == (1.0, True)
 
 
-def test_a_latched_message_reaches_who_comes_late_until_it_is_withdrawn(party: Party, node: Node) -> None:
+def test_a_latched_message_reaches_late_subscribers_until_it_is_withdrawn(party: Party, node: Node) -> None:
     party.ask(op="advertise", topic="/map", type="std_msgs/String", latch=True)
     party.ask(op="publish", topic="/map", msg={"data": "here"})
     party.call("rosapi/get_time")
@@ -270,7 +270,7 @@ def test_a_latched_message_reaches_who_comes_late_until_it_is_withdrawn(party: P
         ({"op": "publish", "topic": "/sim_0/episode", "msg": {}}, "nobody but the coordinator may have this topic"),
     ],
 )
-def test_what_cannot_be_published_is_told_in_a_sentence(party: Party, asked: Any, said: str) -> None:
+def test_an_impossible_publication_gets_an_error_status(party: Party, asked: Any, said: str) -> None:
     party.ask(op="advertise", topic="/t", type="std_msgs/String")
     party.ask(id=9, **asked)
     told = party.next(op="status")
@@ -278,7 +278,7 @@ def test_what_cannot_be_published_is_told_in_a_sentence(party: Party, asked: Any
     assert said in told["msg"]
 
 
-def test_who_leaves_takes_everything_along(bridge: Bridge, node: Node) -> None:
+def test_a_leaving_client_withdraws_its_topics_services_and_actions(bridge: Bridge, node: Node) -> None:
     party = Party(bridge)
     party.ask(op="advertise", topic="/mine", type="std_msgs/String")
     party.ask(op="subscribe", topic="/yours", type="std_msgs/String")

@@ -20,7 +20,7 @@ from throwcollect.serve.rosbridge.websocket import Outbox
 String: Any = get_message("std_msgs/msg/String")
 Trigger: Any = get_service("std_srvs/srv/Trigger")
 WHOLE = QoSProfile(history=HistoryPolicy.KEEP_ALL)
-"""Other publishers drop long messages on the way to the bridge when the machine is busy."""
+"""A profile that loses no message: by default, long messages to the bridge are dropped on a busy machine."""
 
 
 def hear(socket: ClientConnection) -> Any:
@@ -28,7 +28,7 @@ def hear(socket: ClientConnection) -> Any:
     return json.loads(socket.recv(PATIENCE_S))
 
 
-def test_topics_are_listed_heard_and_services_called(url: str, node: Node) -> None:
+def test_a_client_lists_and_hears_topics_and_calls_services(url: str, node: Node) -> None:
     def switch(_request: Any, response: Any) -> Any:
         response.success, response.message = True, "on"
         return response
@@ -71,13 +71,13 @@ def test_a_frame_that_is_too_long_ends_the_connection(url: str) -> None:
             hear(socket)
 
 
-def test_who_does_not_read_loses_the_oldest_frames_and_holds_up_nobody(url: str, node: Node) -> None:
+def test_a_slow_client_loses_the_oldest_frames_and_does_not_block_others(url: str, node: Node) -> None:
     publisher = node.create_publisher(String, "/many", WHOLE)
     subscribe = json.dumps({"op": "subscribe", "topic": "/many", "type": "std_msgs/String"})
     with connect(url, max_queue=1) as slow, connect(url) as quick:
         for each in (slow, quick):
             each.send(subscribe)
-            # What follows is answered when the bridge has taken in this subscription, and not that of the other alone.
+            # When the bridge answers this frame, it has taken in the subscription of this client.
             each.send(json.dumps({"op": "nothing"}))
             assert hear(each)["op"] == "status"
         wait_for_listener(publisher)
@@ -96,8 +96,8 @@ def test_who_does_not_read_loses_the_oldest_frames_and_holds_up_nobody(url: str,
         assert "the oldest are dropped" in statuses[0]
 
 
-def test_memory_for_who_never_reads_is_bounded(url: str, node: Node) -> None:
-    """Far more is published than may wait; this process is publisher, bridge and both clients."""
+def test_memory_for_a_client_that_never_reads_is_bounded(url: str, node: Node) -> None:
+    """This publishes far more than may wait; the process is publisher, bridge and both clients."""
     publisher = node.create_publisher(String, "/much", WHOLE)
     subscribe = json.dumps({"op": "subscribe", "topic": "/much", "type": "std_msgs/String"})
     process, text, memory = psutil.Process(), "x" * 2**20, []
@@ -117,11 +117,11 @@ def test_memory_for_who_never_reads_is_bounded(url: str, node: Node) -> None:
             while not hear(quick)["msg"]["data"].startswith(f"{number} "):
                 pass
             memory.append(process.memory_info().rss)
-        # As much waits after 100 MiB as may.
+        # After 100 MiB, the queue of the stalled client is full.
         assert max(memory) - max(memory[:100]) < 2**25, [each >> 20 for each in memory[::25]]
 
 
-def test_what_waits_to_be_sent_is_bounded_in_number_and_in_bytes(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_outbox_is_bounded_in_frames_and_in_bytes(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(websocket, "MOST_FRAMES", 10)
     monkeypatch.setattr(websocket, "MOST_BYTES", 1200)
 

@@ -33,20 +33,20 @@ def discrete_throw(config):
 
 
 @pytest.mark.parametrize("config", [Config(), DRAG, Config(scene={"gravity_mps2": 1.62})])
-def test_flight_as_the_physics_computes_it_has_no_residual(config):
+def test_a_flight_in_steps_of_the_physics_has_no_residual(config):
     assert math.ceil(RELEASE_S * 250) == RELEASED
     samples, header = discrete_throw(config)
     assert flight_residual(samples, header, config=config) < 1e-12
 
 
-def test_wrong_gravity_and_forgotten_drag_show():
+def test_wrong_gravity_or_forgotten_drag_gives_a_residual():
     samples, header = discrete_throw(DRAG)
     assert 1e-3 < flight_residual(samples, header, config=Config()) < 0.1
     samples, header = discrete_throw(Config())
     assert flight_residual(samples, header, config=Config(scene={"gravity_mps2": 9.80665})) > 1e-4
 
 
-def test_a_displaced_sample_shows_by_its_distance():
+def test_a_displaced_sample_gives_its_distance_as_residual():
     samples, header = discrete_throw(Config())
     samples.ball_position[250] += [0, 3e-6, 4e-6]
     assert flight_residual(samples, header, config=Config()) == pytest.approx(5e-6, rel=1e-6)
@@ -61,7 +61,7 @@ def test_flight_ends_with_the_first_contact():
     assert flight_residual(samples, touched, config=Config()) < 1e-12
 
 
-def test_motion_is_compared_from_the_recatch_gap_on():
+def test_the_residual_counts_only_samples_after_the_recatch_gap():
     samples, header = discrete_throw(Config())
     free = math.ceil((RELEASE_S + Config().task.recatch_gap_s) * 250)
     samples.ball_position[:free] += 0.1
@@ -70,7 +70,7 @@ def test_motion_is_compared_from_the_recatch_gap_on():
     assert flight_residual(samples, header, config=Config()) > 0.05
 
 
-def test_there_is_no_residual_without_a_flight():
+def test_a_throw_without_a_flight_has_no_residual():
     samples, header = episode(contacts=(("spoon", 0.0, None),))
     assert flight_residual(samples, header, config=Config()) is None
     samples, header = episode(contacts=(("spoon", 0.0, 1.4),))

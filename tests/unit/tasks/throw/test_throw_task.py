@@ -30,7 +30,7 @@ def judge(samples, header, config=None):
     return task.judge(samples, header, task.trajectory())
 
 
-def test_landed_throw_has_all_its_numbers():
+def test_a_landed_throw_has_all_its_measures():
     result = judge(*episode())
     assert (result.outcome, result.reason) == (ThrowOutcome.LANDED, None)
     assert result.release.time_s == pytest.approx(RELEASE_S, abs=1e-9)
@@ -52,7 +52,7 @@ def test_landed_throw_has_all_its_numbers():
     assert result.velocity_peak.share == pytest.approx(0.686, abs=2e-3)
 
 
-def test_a_joint_with_limits_of_0_that_rests_spoils_no_result(monkeypatch):
+def test_a_resting_joint_with_limits_of_0_does_not_spoil_the_result(monkeypatch):
     limits = joint_limits(TALOS)
     zero = {name: np.where(np.arange(32) == GRIPPER, 0.0, getattr(limits, name)) for name in ("velocity", "effort")}
     expected = judge(*episode())
@@ -125,7 +125,7 @@ def test_ball_that_stays_in_the_spoon_is_not_released():
     assert result.velocity_peak is not None
 
 
-def test_ball_that_had_left_the_spoon_before_the_start_is_dropped_even_if_the_spoon_hits_it_later():
+def test_ball_that_left_the_spoon_before_the_start_is_dropped():
     lost = "the ball had left the spoon before the start, in the sim.settle_s = 0.05 s for settling"
     result = judge(*episode(contacts=()))
     assert (result.outcome, result.reason, result.release) == (ThrowOutcome.DROPPED, lost, None)
@@ -141,7 +141,7 @@ def test_ball_on_a_bounce_at_the_start_is_in_the_spoon():
     assert judge(samples, header).outcome is ThrowOutcome.LANDED
 
 
-def test_ball_that_leaves_a_still_spoon_is_dropped_with_the_evidence_and_keeps_its_landing():
+def test_ball_that_leaves_a_still_spoon_is_dropped_with_the_evidence():
     """Only the left arm moves, and the ball leaves the right hand."""
     task = {"start": {**Config().task.start, "arm_left_4_joint": -1.9}, "end": {"arm_left_4_joint": -0.5}}
     config = Config(task=task)
@@ -180,7 +180,7 @@ def test_ball_that_rolls_on_over_the_rim_of_a_spoon_that_brakes_is_thrown():
 
 
 def test_ball_that_is_thrown_downwards_is_thrown():
-    """It lost energy on the way down, which says nothing about whether the spoon threw it."""
+    """A ball that loses energy on the way down may still be thrown by the spoon."""
     start, end = dict(Config().task.start), dict(Config().task.end)
     config = Config(task={"start": {**start, **end}, "end": {joint: start[joint] for joint in end}})
     samples, header = episode(config)
@@ -218,7 +218,7 @@ def test_link_that_is_still_touched_after_the_release_is_hit():
     assert judge(*episode(contacts=(("arm_right_7_link", 0.6, RELEASE_S), HELD))).outcome is ThrowOutcome.LANDED
 
 
-def test_what_the_ball_touches_after_landing_does_not_count():
+def test_contacts_after_the_landing_do_not_count():
     contacts = (HELD, ("ground", landing_time(RADIUS), 1.38), ("leg_left_6_link", 1.39, None))
     assert judge(*episode(contacts=contacts)).outcome is ThrowOutcome.LANDED
 
@@ -258,7 +258,7 @@ def test_impact_on_the_ground_does_not_bend_the_landing_just_above_it(drag):
     assert judge(free, header, config).landing.time_s != pytest.approx(undisturbed.landing.time_s, abs=1e-5)
 
 
-def test_crossing_upwards_is_no_landing():
+def test_crossing_the_landing_plane_upwards_is_no_landing():
     origin = np.array([0.0, 0.0, 0.9])
     config = Config(scene={"landing_height_m": 1.0})
     velocity = np.array([1.0, 0.0, 4.0])

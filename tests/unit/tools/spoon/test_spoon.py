@@ -60,7 +60,7 @@ def tilt_up(tilt, azimuth=0.0):
 
 @pytest.mark.parametrize(("walls", "turn"), [(4, np.pi / 4), (6, np.pi / 6), (9, np.pi)])
 @pytest.mark.parametrize("radius", [0.006, 0.025, 0.07, 0.09])
-def test_a_cup_is_left_between_two_walls_when_it_is_tilted_by_the_slope_of_the_upright_one(walls, turn, radius):
+def test_a_ball_leaves_between_two_walls_at_a_tilt_equal_to_the_upright_slope(walls, turn, radius):
     tool = Spoon(SpoonConfig(cup_walls=walls))
     slope = tool.way_out(radius, tilt_up(0.0))
     # The way between two walls rises away from the axis, so a tilt away from it lowers it.
@@ -80,7 +80,7 @@ def test_the_normals_of_the_walls_bound_the_tilts_at_which_the_ball_stays():
             assert (tool.way_out(0.025, up) > 0) == inside
 
 
-def test_a_deeper_cup_and_a_ball_on_a_narrower_rim_hold_differently():
+def test_the_way_out_depends_on_depth_and_floor_of_the_cup_and_on_the_ball():
     upright = tilt_up(0.0)
     assert Spoon(SpoonConfig(cup_depth_m=0.05)).way_out(0.025, upright) > Spoon(SpoonConfig()).way_out(0.025, upright)
     assert Spoon(SpoonConfig()).way_out(0.1, upright) < Spoon(SpoonConfig()).way_out(0.025, upright)
