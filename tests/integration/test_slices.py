@@ -113,6 +113,14 @@ def interrupt_after(directory: Path, text: str, size: int) -> Path:
     return attempt
 
 
+def count_kept(directory: Path, slice: Slice) -> int:
+    """Collect a slice, and return how many episodes of an earlier attempt are kept."""
+    onlooker = Listener()
+    collect_slice(directory, slice, overrides=INPROCESS, onlooker=onlooker)
+    (kept,) = [line for line in onlooker.lines if "of an earlier collection" in line]
+    return int(kept.split()[1])
+
+
 def test_joined_slices_give_the_files_of_one_collection(frozen: Path, whole: Path) -> None:
     collect(frozen, "2/3", "0/3", "1/3")
     join(frozen)
@@ -133,9 +141,7 @@ def test_a_finished_slice_has_few_files(frozen: Path) -> None:
 def test_an_interrupted_slice_goes_on_with_its_recordings(frozen: Path, whole: Path) -> None:
     interrupt_after(frozen, "0/2", 50_000)
     assert not find_finished(frozen)
-    onlooker = Listener()
-    collect_slice(frozen, Slice(0, 2), overrides=INPROCESS, onlooker=onlooker)
-    assert any("of an earlier collection" in line for line in onlooker.lines)
+    assert count_kept(frozen, Slice(0, 2)) > 0
     collect(frozen, "1/2")
     join(frozen)
     assert fingerprints(frozen) == fingerprints(whole)
@@ -155,23 +161,26 @@ def test_a_repeated_attempt_takes_over_the_largest_stopped_one(frozen: Path, who
     (dead / "small_00000.mcap.part").write_bytes((attempt / "small_00000.mcap").read_bytes()[:1000])
     early = frozen / SLICES / "0-of-2.attempt-a"
     dead.rename(early)
-    onlooker = Listener()
-    collect_slice(frozen, slice, overrides=INPROCESS, onlooker=onlooker)
-    (kept,) = [line for line in onlooker.lines if "of an earlier collection" in line]
-    assert int(kept.split()[1]) >= 3
+    assert count_kept(frozen, slice) >= 3
     assert find_attempts(frozen, slice) == [early]
     collect(frozen, "1/2")
     join(frozen)
     assert fingerprints(frozen) == fingerprints(whole)
 
 
-def test_a_damaged_recording_of_an_attempt_does_not_change_the_dataset(frozen: Path, whole: Path) -> None:
-    attempt = interrupt_after(frozen, "0/2", 50_000)
+def test_a_damaged_recording_of_an_attempt_does_not_change_the_dataset(
+    frozen: Path, whole: Path, tmp_path: Path
+) -> None:
+    attempt = interrupt_after(frozen, "0/2", 150_000)
+    sound = tmp_path / "sound"
+    shutil.copytree(frozen, sound)
     recording = max(attempt.glob("*.mcap*"), key=lambda path: path.stat().st_size)
     data = bytearray(recording.read_bytes())
     data[len(data) // 2 :] = bytes(len(data) - len(data) // 2)
     recording.write_bytes(data)
-    collect(frozen, "0/2", "1/2")
+    # Episodes of the damaged half are collected anew, all others are kept.
+    assert 0 < count_kept(frozen, Slice(0, 2)) < count_kept(sound, Slice(0, 2))
+    collect(frozen, "1/2")
     join(frozen)
     assert fingerprints(frozen) == fingerprints(whole)
 

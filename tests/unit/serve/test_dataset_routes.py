@@ -144,6 +144,20 @@ def test_without_a_journal_there_are_no_landings(client: TestClient, directory: 
     assert refused.json()["title"].endswith(", got '-1'")
 
 
+def test_the_report_of_a_finished_dataset_is_one_page_and_leaves_no_file(
+    client: TestClient, directory: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "scratch"))
+    (tmp_path / "scratch").mkdir()
+    before = sorted(directory.rglob("*"))
+    answer = client.get(f"{URL}/a/report")
+    assert (answer.status_code, answer.headers["content-type"]) == (200, "text/html; charset=utf-8")
+    assert "<title>" in answer.text
+    assert answer.text.rstrip().endswith("</html>")
+    assert sorted(directory.rglob("*")) == before
+    assert not list((tmp_path / "scratch").iterdir())
+
+
 def test_files_of_an_unfinished_dataset_are_refused(client: TestClient, directory: Path, remember: Remember) -> None:
     remember("growing", directory=str(directory))
     remember("torn", **make_end_fields(exit_code=3))
