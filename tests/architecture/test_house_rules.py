@@ -132,6 +132,23 @@ def test_the_rule_about_names_of_test_files_compares_whole_paths() -> None:
     assert not is_named_after_a_module(UNITS / "config" / "test_plan.py")
 
 
+PRONOUNS = r"its?|they|their|that|this|these|those|what\w*|which|who\w*|one_(?:that|of|who\w*)"
+WITHOUT_SUBJECT = re.compile(rf"def (test_(?:{PRONOUNS})_\w+|test_[a-z0-9]+)\(")
+"""The name of a test that begins with a pronoun, or is one word, does not say what failed."""
+
+
+def test_names_of_tests_begin_with_their_subject() -> None:
+    sources = sorted((ROOT / "tests").rglob("*.py"))
+    found = {name.name: WITHOUT_SUBJECT.findall(name.read_text(encoding="utf-8")) for name in sources}
+    assert {name: names for name, names in found.items() if names} == {}
+
+
+def test_the_rule_about_subjects_finds_pronouns_and_single_words() -> None:
+    for wrong in ("test_it_is_read", "test_what_is_missing_is_named", "test_one_that_died_is_seen", "test_chaos"):
+        assert WITHOUT_SUBJECT.findall(f"def {wrong}(") == [wrong]
+    assert not WITHOUT_SUBJECT.findall("def test_one_ready_simulation_is_enough(")
+
+
 CLOCK_OF_ALL = re.compile(r"""setattr\((?:\w+\.)*time, ["']|setattr\(["']time\.""")
 """Tests must not set the clock of the whole process, which stops threads of other tests, but that of a module."""
 
