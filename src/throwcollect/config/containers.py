@@ -16,7 +16,7 @@ from throwcollect.config.kinds import NUMBER_AS_TEXT, in_words, match
 from throwcollect.config.section import Section
 
 _LEAST_MEMORY = 6 * 1024**2
-"""The least that Docker engines accept."""
+"""Smallest limit of memory that Docker engines accept [bytes]."""
 
 _SIZE_UNITS = {"": 1, "b": 1, "k": 1024, "m": 1024**2, "g": 1024**3}
 _OWN_VARIABLES = (
@@ -78,7 +78,7 @@ def _mount(text: str) -> str:
 
 def _network(text: str) -> str:
     if text in ("host", "none") or text.startswith("container:"):
-        raise ValueError(f"{text} is refused; a network of the engine is joined besides the run's own")
+        raise ValueError(f"{text} is refused; name a network of the engine, which is joined besides the run's own")
     return text
 
 
@@ -150,7 +150,7 @@ class DeviceRequest(TypedDict, total=False):
     count: int
     """Number of devices; -1 for all."""
     device_ids: list[str]
-    """Devices by name, in the place of a number."""
+    """Names of devices, instead of a number."""
     capabilities: list[list[str]]
     """Alternatives of what the devices must be able to do, such as `[[gpu]]`."""
     options: dict[str, str]
@@ -158,7 +158,7 @@ class DeviceRequest(TypedDict, total=False):
 
 
 class ContainerOptions(TypedDict, total=False):
-    """Further keywords of `docker.containers.create` of the Docker SDK for Python; absent ones are the engine's."""
+    """Further keywords of `docker.containers.create` of the Docker SDK for Python; by default they are the engine's."""
 
     # Unknown keywords are errors. For those that Docker knows and we refuse, the message gives the reason.
     __pydantic_config__ = ConfigDict(**_OPTIONAL_KEYS, json_schema_extra={"refused": _REFUSED})  # type: ignore[misc]
@@ -181,23 +181,23 @@ class ContainerOptions(TypedDict, total=False):
     shm_size: Size
     """Size of /dev/shm."""
     tmpfs: dict[Annotated[str, AfterValidator(_tmpfs)], str]
-    """Further directories in memory and their mount options; those of /tmp join the ones it has."""
+    """Further directories in memory and their mount options; options for /tmp are added to those that it has anyway."""
     ulimits: dict[str, int]
     """Resource limits by their names, such as `nofile`."""
     sysctls: dict[str, str | int]
     """Kernel parameters of the container's namespaces."""
     pids_limit: PositiveInt
-    """Upper bound of threads and processes, in the place of 512."""
+    """Upper bound of threads and processes, instead of 512."""
     mem_reservation: Size
-    """Memory down to which it is shrunk when the host has little."""
+    """Memory to which the container is limited when the host runs short of it."""
     oom_score_adj: Annotated[int, Field(ge=-1000, le=1000)]
-    """How readily the kernel ends it when the host runs out of memory."""
+    """How readily the kernel ends the container when the host runs out of memory."""
     cpu_shares: PositiveInt
-    """Weight of its computing time; 1024 if absent."""
+    """Share of computing time, relative to that of other containers; 1024 if absent."""
     cpuset_mems: Cores
-    """NUMA nodes whose memory it uses."""
+    """NUMA nodes whose memory the container uses."""
     blkio_weight: Annotated[int, Field(ge=10, le=1000)]
-    """Weight of its disk access."""
+    """Share of disk access, relative to that of other containers."""
     devices: list[Device]
     """Graphics processors of the host as HOST:CONTAINER:PERMISSIONS, such as `/dev/dri:/dev/dri:rw`."""
     device_requests: list[DeviceRequest]
@@ -212,15 +212,16 @@ class NodeContainerConfig(Section):
     cpus: Annotated[float, Field(ge=0.01, le=10_000)] | None = None
     """Upper bound of processor time, in cores."""
     memory: Size | None = None
-    """Upper bound of memory; nothing is swapped out beyond it."""
+    """Upper bound of memory; the container gets no swap beyond it."""
     cpuset: Cores | None = None
-    """Cores it runs on; null: any, or one each where simulations fill all cores."""
+    """Cores that the container runs on; null: any core, but one core for each simulation if simulations fill all
+    cores."""
     environment: dict[Variable, str | int | float] = {}
     """Further environment variables."""
     mounts: list[Mount] = []
-    """Directories and files with data of the host that are there in the container, too; not below /data or /key."""
+    """Directories and files with data of the host that the container sees, too; none inside /data or /key."""
     networks: list[Network] = []
-    """Networks of the engine that it joins besides the run's own."""
+    """Networks of the engine that the container joins besides the run's own."""
     ports: dict[ContainerPort, HostPort] = {}
     """Ports of the container (`80`, `53/udp`) and those of 127.0.0.1 at which they are published."""
     options: ContainerOptions = {}
@@ -238,8 +239,8 @@ class ContainerSpec:
 
     Attributes:
         image: Its image.
-        command: The command that it runs; None for that of the image.
-        section: Everything else that it gets.
+        command: The command that it runs; None for the command of the image.
+        section: All its other properties.
     """
 
     image: str

@@ -40,7 +40,7 @@ class Document:
     Attributes:
         values: Plain dictionaries, lists, text, numbers, truth values and None.
         problems: Problems of the YAML and of overrides, which are known before the values are validated.
-        left_out: Locations of values that are None because a problem tells what is wrong with them.
+        left_out: Locations of values that are None because they were wrong; a problem says what was wrong with each.
     """
 
     def __init__(self, path: Path) -> None:
@@ -75,7 +75,7 @@ class Document:
         return Problem(sentence, join_key(location), self._path)
 
     def place(self, problem: Problem) -> Problem:
-        """Add the line of its key to a problem that has a key and no file."""
+        """Return a problem with the file and the line of its key, if it has a key but no file yet."""
         if problem.path or not problem.key:
             return problem
         location: Location = ()
@@ -125,7 +125,7 @@ class Document:
             self.problems.append(Problem(f"nothing of this name can be set; got {quote(text)}", key))
             return
         location = (*location, index)
-        # The lines of values that the override replaces do not hold any more.
+        # The override replaces these values, so they do not stand in lines of the file any more.
         self._lines = {known: line for known, line in self._lines.items() if known[: len(location)] != location}
         self._lines[location] = None
         holder[index] = self._plain(node, location)
@@ -209,7 +209,7 @@ def _text_of(path: Path) -> str:
         sentence = f"should be UTF-8 text, got the byte 0x{error.object[error.start]:02x}"
         raise ConfigError([Problem(sentence, path=path, line=line)]) from error
     except ValueError as error:
-        # A zero byte, for one, is refused by Python, which does not ask the system then.
+        # Python itself refuses some names before it asks the system, such as one with a zero byte.
         raise ConfigError([Problem("no file can have this name", path=path)]) from error
 
 
@@ -239,7 +239,7 @@ def _scalar(node: Node) -> Any:
     try:
         value = readers[tag](node)
     except (LookupError, ValueError) as error:
-        # Of a text that does not fit, ruamel looks for letters and words that are not there.
+        # ruamel looks for certain letters and words in the text, and raises these where it does not find them.
         raise ValueError(f"{quote(node.value)} is not of the kind {tag}") from error
     if isinstance(value, int) and value.bit_length() > _MOST_BITS:
         raise ValueError("the number is too large")
@@ -252,7 +252,7 @@ def _parts(key: str) -> tuple[str, ...]:
     if parts[:2] != _SWEPT or len(parts) < 3:
         return parts
     rest = parts[2:]
-    # What stands first is the swept key, or its beginning, also if it is called as a field is.
+    # The first part always belongs to the swept key, even if it has the name of a field, such as `min`.
     within = 1 if rest[-1] in _SWEPT_FIELDS and rest[1:] else 2 if rest[1:-1][-1:] == ("values",) else 0
     swept, field = rest[: len(rest) - within], rest[len(rest) - within :]
     return (*_SWEPT, ".".join(swept), *field)

@@ -12,7 +12,7 @@ _SYSTEM = (
     *("/run", "/sbin", "/sys", "/usr", "/var/backups", "/var/cache", "/var/lib", "/var/lock", "/var/log", "/var/mail"),
     *("/var/run", "/var/spool"),
 )
-"""Directories of the system; neither what is in them nor what holds them is data."""
+"""Directories of the system. Neither what is in them nor a directory that contains one of them may be mounted."""
 
 _SHARED = ("/home", "/tmp", "/var/tmp")  # noqa: S108
 """Directories that all users and programs share; directories in them may be data."""

@@ -120,7 +120,7 @@ def _check(values: dict[str, Any]) -> tuple[Config | None, list[KeyProblem], int
     Returns:
         The configuration, or None; the findings; and the number of further problems, which are only counted.
     """
-    # What is wrong is removed below, and the caller needs the values of the user.
+    # Wrong values are removed from this copy below; the caller still needs the values as the user wrote them.
     values = deepcopy(values)
     robot = _robot_of(values)
     found: list[KeyProblem] = []
@@ -135,10 +135,10 @@ def _check(values: dict[str, Any]) -> tuple[Config | None, list[KeyProblem], int
             fresh = findings(error, values)
             more += max(0, error.error_count() - MOST_EXAMINED)
         found += [finding for finding in fresh if not any(_about(finding, location) for location in replaced)]
-        # Two parts are a key in a section; three are a swept key, so that the others stay.
+        # Remove only the key of the section (two parts) or the swept key (three parts), so that the others stay.
         places = {finding.location[: 3 if finding.location[:2] == _PARAMETERS else 2] for finding in fresh}
         removed = {place for place in places if _remove(values, place)}
-        # Of a key that was written under a wrong name, the value is a default from now on, or is missing.
+        # A misspelt key now has its default under the right name, or is missing there.
         replaced |= places | {(*finding.location[:-1], finding.meant) for finding in fresh if finding.meant}
         # Without a known robot, each joint would be reported.
         if not removed or robot is None:
@@ -163,7 +163,7 @@ def _about(finding: KeyProblem, location: Location) -> bool:
 
 
 def _remove(values: dict[str, Any], location: Location) -> bool:
-    """Remove the value at a location, or else the section that lacks it; return whether there was one."""
+    """Remove the value at a location, or the section if it lacks that value; return whether anything was removed."""
     holder: Any = values
     for part in location[:-1]:
         holder = holder.get(part) if isinstance(holder, dict) else None
@@ -176,8 +176,8 @@ def _remove(values: dict[str, Any], location: Location) -> bool:
 def _sweep_findings(config: Config) -> Iterator[KeyProblem]:
     sampler = config.sweep.sampler
     if config.sweep.parameters and sampler != "grid" and config.trials is None and config.until is None:
-        until = f"until how many have {config.task.success}"
-        sentence = f"missing; the sampler {sampler} should know how many trials to draw, or {until}"
+        wanted = f"or (until) how many should have {config.task.success}"
+        sentence = f"missing; the sampler {sampler} should know how many trials to draw, {wanted}"
         yield KeyProblem(("trials",), sentence)
     for key, parameter in config.sweep.parameters.items():
         location: Location = (*_PARAMETERS, key)
@@ -196,9 +196,9 @@ def _sweep_findings(config: Config) -> Iterator[KeyProblem]:
 
 
 def _simulations_findings(config: Config) -> Iterator[KeyProblem]:
-    """Find a number of simulations that is asked for, and that a runtime cannot have.
+    """Report a number of simulations that was given by an override, and that the runtime cannot have.
 
-    The number in a file holds for whichever runtime the file is used with, and every dataset's file has one.
+    A number in a file is not reported, as the file may be used with any runtime, and the file of every dataset has one.
     """
     run = config.run
     # A wrong value was replaced by the default, which nobody has asked for.

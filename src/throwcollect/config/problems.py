@@ -38,7 +38,8 @@ class KeyProblem:
         location: The key, which need not exist.
         sentence: Says what is wrong, which value was given and which would be right.
         unknown: Whether the key itself is wrong, and not its value.
-        meant: Name of the key that stands for an unknown one: the most like it, or the only one there; empty if none.
+        meant: Name of the key that the user probably meant by an unknown one: the most similar, or the only one that
+            the section has; empty if there is none.
     """
 
     location: Location
@@ -112,7 +113,7 @@ def _findings(details: ErrorDetails, values: Any, above: Location, expected: Val
     if kind == "extra_forbidden":
         name, known = str(location[-1]), list(section.keys)
         refused = section.refused.get(name)
-        # Where a section has a single key, that is meant whatever is written.
+        # If a section has a single key, the user means that key, whatever they wrote.
         only = known[0] if len(known) == 1 else ""
         meant = "" if refused else _find_nearest(name, known) or only
         if name.isdecimal() and value is None:
@@ -136,16 +137,16 @@ def _findings(details: ErrorDetails, values: Any, above: Location, expected: Val
         words = " or ".join(f"'{each}'" for each in choices)
         yield KeyProblem((*location, tag), _should_be(words, value[tag], choices))
     else:
-        strange = "; no package that is installed brings it" if location in _MEMBERS else ""
+        no_match = "; no package that is installed brings it" if location in _MEMBERS else ""
         if location == _ENGINE and value == "auto":
-            strange = "; none is chosen by itself, as the same file would give other throws on another machine"
-        sentence = _should_be(str(shape), value, shape.choices, strange=strange)
+            no_match = "; none is chosen automatically, as the same file would give other throws on another machine"
+        sentence = _should_be(str(shape), value, shape.choices, no_match=no_match)
         yield KeyProblem(location, sentence + _radians(kind, shape, value))
 
 
-def _should_be(words: str, value: Any, choices: list[str], *, strange: str = "") -> str:
-    """Say what would be right, and which choice the user meant; if none is like the value, append `strange`."""
-    return f"should be {words}, got {quote(value)}{_did_you_mean(_find_nearest(value, choices)) or strange}"
+def _should_be(words: str, value: Any, choices: list[str], *, no_match: str = "") -> str:
+    """Say what would be right, and which choice the user meant; if none is like the value, append `no_match`."""
+    return f"should be {words}, got {quote(value)}{_did_you_mean(_find_nearest(value, choices)) or no_match}"
 
 
 def _find_nearest(value: Any, choices: Sequence[str]) -> str:

@@ -23,8 +23,8 @@ Units are part of the names; angles are in radians. A key that does not exist, a
 there twice are errors, and all of them are reported at once.
 
 `--set KEY=VALUE` replaces one key, such as `--set task.duration_s=1.1` or `--set 'record.topics=[joint_states,
-ball/odometry, clock]'`. The value is read as YAML; later ones win. Items of a list that the
-file has go by their index from 0; any other list is given as a whole.
+ball/odometry, clock]'`. The value is read as YAML; later ones win. An item of a list in
+the file is named by its index, from 0; a list that the file leaves out is given as a whole.
 """
 
 _SAMPLERS = """\
@@ -39,7 +39,7 @@ _SAMPLERS = """\
 | `list` | the rows of `sweep.file`; `trials` takes the first ones | same first points |
 
 The file of the sampler `list` is CSV (UTF-8, commas, a header line) or Parquet; its columns are named with dotted keys.
-A set of `values` is drawn from in equal shares. Everything is drawn from `seed`.
+Each of a set of `values` is drawn equally often. All draws follow from `seed`.
 
 With `sweep.target` or `until`, trials are added to the plan while it is collected: [targets.md](targets.md).
 """
@@ -88,24 +88,24 @@ def _sections(shape: ValueShape, prefix: str) -> Iterator[str]:
 
 
 def _discriminator(shape: ValueShape) -> str:
-    """What tells a section from its alternatives: a key with the only word that it takes, or else its first key."""
+    """Find what distinguishes a section from its alternatives: a key that takes one word, or else its first key."""
     words = (f"{name}: {child.node['const']}" for name, child in shape.keys.items() if "const" in child.node)
     return next(words, next(iter(shape.keys)))
 
 
 def _twins(shape: ValueShape, child: ValueShape) -> list[str]:
-    """Names of the sections that are of the same model as one of them."""
+    """List the sections in `shape` that have the same model as `child`, one of them."""
     title = _title(child)
     return [name for name, each in shape.keys.items() if title is not None and _title(each) == title]
 
 
 def _title(shape: ValueShape) -> str | None:
-    """Name of the model of a section, also of one that may be null; None if the shape is no section."""
+    """Find the name of the model of a section, even if the section may be null; None if the shape is no section."""
     return next((each.node.get("title") for each in shape.alternatives if each.keys), None)
 
 
 def _own_sentence(shape: ValueShape) -> str:
-    """The docstring of a section, and not of the key that holds it."""
+    """Find the docstring of a section itself, not of the key that holds it."""
     return str(json_schema()["$defs"][_title(shape)]["description"])
 
 

@@ -25,7 +25,7 @@ class Section(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
     def __deepcopy__(self, memo: dict[int, Any] | None = None) -> Self:
-        """The section itself, as its values never change; Pydantic copies those of keys that are left out."""
+        """Return the section itself, as its values never change; Pydantic copies defaults of keys that are left out."""
         return self
 
     def _find_contradictions(self) -> Iterator[tuple[str, str]]:
@@ -64,7 +64,7 @@ def any_of(sections: Mapping[str, type[Section]], choose: Callable[[Any], Any]) 
         choose: Finds that name in the value; anything else is an error.
     """
     kinds = list(dict.fromkeys(sections.values()))
-    # Pydantic takes a discriminator for unions alone.
+    # Pydantic accepts a discriminator only for a union.
     if len(kinds) == 1:
         return kinds[0]
 
@@ -79,7 +79,7 @@ def any_of(sections: Mapping[str, type[Section]], choose: Callable[[Any], Any]) 
 
 
 def list_sections(kind: Any) -> Iterator[type[Section]]:
-    """List the sections that a value of some type may be; those that are items of it are left out.
+    """List the sections that a value of some type may be; sections that are items of a list or a mapping are left out.
 
     Args:
         kind: The type, such as that of a field; with `any_of`, it has several.

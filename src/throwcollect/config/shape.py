@@ -11,7 +11,7 @@ from throwcollect.config.schema import Config
 from throwcollect.units import unit_of_name
 
 _MOST_DIGITS = 9
-"""No list of a configuration is so long; of thousands of digits, Python makes no number."""
+"""Most digits of an index: no list of a configuration is longer, and Python refuses numbers of thousands of digits."""
 
 _NOUNS = {"number": "a number", "integer": "a whole number", "string": "text", "boolean": "true or false"}
 
@@ -54,11 +54,11 @@ class ValueShape:
 
     @property
     def choices(self) -> list[str]:
-        """The words that are allowed, if not any text is."""
+        """The words that are allowed; empty if any text is."""
         return [word for shape in self.alternatives for word in _list_words(shape.node)]
 
     def child(self, part: str | int) -> ValueShape:
-        """The shape of the value under a key or an index; that of any value if there should be none."""
+        """Find the shape of the value under a key or an index; it allows anything if there should be no value."""
         for shape in self.alternatives:
             rest = shape.node.get("items" if isinstance(part, int) else "additionalProperties")
             if node := shape.node.get("properties", {}).get(part) or rest:

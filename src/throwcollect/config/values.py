@@ -20,7 +20,7 @@ AnySection = TypeVar("AnySection", bound=Section)
 
 
 def with_values(config: Config, values: Mapping[str, float]) -> Config:
-    """Make a configuration with some of its values replaced, such as that of one trial.
+    """Make a configuration with some of its values replaced, such as the configuration of one trial.
 
     Args:
         config: The configuration, which stays as it is.

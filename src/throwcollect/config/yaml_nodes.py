@@ -30,7 +30,8 @@ class _Scanner(Scanner):
         return super().fetch_more_tokens()
 
     def scan_flow_scalar_non_spaces(self, double: Any, start_mark: Any) -> Any:
-        # The digits after \U may be any, and those after \u half of a character, which no file can hold.
+        # The digits after \U may name no character, and those after \u half of a surrogate pair, which no file can
+        # hold.
         try:
             parts = super().scan_flow_scalar_non_spaces(double, start_mark)
             "".join(parts).encode()

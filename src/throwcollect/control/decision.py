@@ -39,7 +39,7 @@ class Judge:
     """Judges the updates of one trajectory.
 
     Attributes:
-        tolerances: Those in force.
+        tolerances: The tolerances in force.
         timeout_ns: How long after the end the joints are stopped [ns]; 0 never.
         joints: Names of the joints.
     """
@@ -49,7 +49,7 @@ class Judge:
     joints: Sequence[str]
 
     def decide(self, motion: Motion, measured: JointState, *, first: bool) -> Decision | None:
-        """Judge one update; None while the trajectory goes on, or its end waits for the joints.
+        """Judge one update; None while the trajectory goes on, or has ended but the joints are not there yet.
 
         In the `first` update of a motion, the path is checked even if the end has come.
         """

@@ -78,7 +78,7 @@ class Curve:
 
 
 def interpolate(waypoints: Waypoints, start: JointState, start_ns: int) -> Curve:
-    """Curve from a start state through the points; if the first point's time has come, it begins there instead.
+    """Make a curve from a start state through the points; if the first point's time has come, it begins there instead.
 
     Args:
         waypoints: The points.
@@ -101,7 +101,7 @@ def quintic(
     a0: NDArray[np.float64],
     a1: NDArray[np.float64],
 ) -> tuple[NDArray[np.float64], ...]:
-    """Polynomials of degree 5 in the share of a segment that has passed, from what they are at both ends.
+    """Find polynomials of degree 5 in the share of a segment that has passed, from their values at both ends.
 
     Args:
         step: End minus start [rad]; all arguments have the same shape.

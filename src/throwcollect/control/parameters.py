@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from throwcollect.errors import ConfigError, Problem
 
 _LONGEST_S = 1e10
-"""Longest time that counts: no stamp of ROS is so late, and parameters may be as large as floats are."""
+"""Longest time that is used: a parameter may be any float, but no stamp of ROS is later than this."""
 
 
 @dataclass(frozen=True)
@@ -99,5 +99,5 @@ class ControllerParameters:
 
 
 def to_nanoseconds(seconds: float) -> int:
-    """A time that a parameter says, in nanoseconds."""
+    """Convert the time in a parameter to nanoseconds; a time that is too long is cut."""
     return round(min(seconds, _LONGEST_S) * 1e9)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from throwcollect.control.interpolation import Curve
 
 _BLOCK = 4096
-"""Points that are computed at once: whole throws, yet bounded for trajectories that end in years."""
+"""Points that are computed at once: enough for whole throws, but limited, as a trajectory may end in years."""
 
 
 class Grid:

@@ -1,4 +1,4 @@
-"""Points of a trajectory in a controller's joint order, with all that they leave out filled in."""
+"""Points of a trajectory in a controller's joint order, with values for everything that the trajectory leaves out."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class Waypoints:
 def arrange(
     trajectory: Trajectory, joints: Sequence[str], command: NDArray[np.float64], start: JointState, start_ns: int
 ) -> Waypoints:
-    """Points of a valid trajectory for all joints of the controller, in the controller's order.
+    """Bring the points of a valid trajectory into the controller's order, with values for all of its joints.
 
     Args:
         trajectory: The trajectory that was asked for.
@@ -92,7 +92,7 @@ def _integrate(
     """Fill in positions, and velocities too where a point has accelerations alone, by the trapezoidal rule."""
     positions, velocities, content = waypoints.positions.copy(), waypoints.velocities.copy(), waypoints.content.copy()
     still = np.zeros(positions.shape[1])
-    # If the time of the first point is over, the joints are taken to be there, so nothing is integrated backwards.
+    # If the time of the first point has passed, the joints count as being there, so nothing is integrated backwards.
     time_ns = min(start_ns, int(waypoints.times_ns[0]))
     p = start.positions
     v, a = still if start.velocities is None else start.velocities, still

@@ -76,7 +76,7 @@ class FrameTree:
 def read_frames(urdf: str, *, base_height: float) -> FrameTree:
     """Read the frames of a robot whose root link is at a height above the ground [m].
 
-    They are cached, as several parts of a process need those of its only robot.
+    They are cached, as several parts of a process need the frames of its only robot.
 
     Raises:
         ConfigError: If the text is not a URDF, or a joint of it is neither fixed nor revolute.

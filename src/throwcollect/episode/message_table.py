@@ -45,7 +45,7 @@ _STAMP_OFFSET = 4
 
 
 class RecordPlace(NamedTuple):
-    """Place of a record in a chunk; that in the first row is the place of the records of its channel in each row."""
+    """Place of a record in a chunk. The records of a channel have the same place in each row as in the first."""
 
     offset: int
     size: int
@@ -54,10 +54,10 @@ class RecordPlace(NamedTuple):
 def _find_records(
     contents: bytes | bytearray | memoryview, *, shortest: int, wrong: str
 ) -> Iterator[tuple[int, RecordPlace]]:
-    """Find the places of Message records that follow each other, with their channels; none is below `shortest` bytes.
+    """Find the channels and places of Message records that follow each other, each of at least `shortest` bytes.
 
     Raises:
-        DatasetError: If the contents are anything else, with `wrong` for what they are.
+        DatasetError: If the contents are anything else; `wrong` says in the message what they are.
     """
     offset = 0
     while offset < len(contents):
@@ -244,7 +244,7 @@ class MessageList:
         stamps = np.empty(len(self), STAMP)
         put_stamps(stamps, "stamp", self.stamps_ns + by_ns)
         for time in ("log_time", "publish_time"):
-            # Times are unsigned, and the way may be negative.
+            # Times are unsigned, but `by_ns` may be negative.
             self.headers[time] = self.headers[time].astype(np.int64) + by_ns
         self._scatter(MESSAGE_HEADER.size + _STAMP_OFFSET, stamps)
         self._scatter(0, self.headers)

@@ -83,7 +83,7 @@ def read_stamps(rows: Rows, prefix: str) -> NDArray[np.int64]:
 def rotate(quaternion_xyzw: NDArray[np.float64], *vectors: NDArray[np.float64], inverse: bool) -> NDArray[np.float64]:
     """Turn vectors, each of shape ``(n, 3)``, by unit quaternions, shape ``(n, 4)``, or in the opposite direction.
 
-    It is done element by element, so a row's result does not depend on other rows.
+    This is computed element by element, so the result of a row does not depend on other rows.
 
     Returns:
         Shape ``(len(vectors), n, 3)``.

@@ -45,7 +45,7 @@ class BulletBodies(Bodies):
     def add(self, name: str, model: BodyModel, start: BodyState) -> None:
         """Put a body into the world; see `Bodies.add`."""
         client = self._client
-        # This is noted before the body is loaded, because one that Bullet refuses may leave something behind, too.
+        # This is set before the body is loaded, because a body that Bullet refuses may leave traces, too.
         self.leave_traces = True
         body = _load(client, model, start)
         self._bodies[name] = body, model

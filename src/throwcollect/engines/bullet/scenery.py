@@ -137,7 +137,7 @@ def boxes(client: int, body: int) -> list[Box]:
 
 
 def set_physics(client: int, scenery: Scenery, ball: int, physics: Physics) -> None:
-    """Set time step, solver, gravity, masses and surfaces; all of them, so that none of the trial before remains."""
+    """Set time step, solver, gravity, masses and surfaces: all of them, so that none of an earlier trial remains."""
     pybullet.setPhysicsEngineParameter(
         fixedTimeStep=1 / physics.hz,
         numSolverIterations=physics.solver_iterations,
@@ -159,7 +159,7 @@ def set_physics(client: int, scenery: Scenery, ball: int, physics: Physics) -> N
         **undamped,
     )
     for body, link in scenery.names:
-        # Bullet multiplies restitutions: with 1 here, that of the ball alone counts.
+        # Bullet multiplies restitutions: with 1 here, only the restitution of the ball counts.
         pybullet.changeDynamics(
             body,
             link,

@@ -99,8 +99,8 @@ class MujocoBodies(Bodies):
             text, body.links = _number_links(body.model.urdf)
             child = read_urdf(text, body.model.encode_meshes())
             for joint in child.joints:
-                # MuJoCo reads the effort of a URDF's limit as a range of motor torques. It brakes the joint once it is
-                # dry friction.
+                # MuJoCo reads the effort limit of a URDF as a range of motor torques. Set as dry friction instead, it
+                # brakes the joint.
                 joint.frictionloss = max(joint.actfrcrange[1], 0.0)
                 joint.actfrclimited = mujoco.mjtLimited.mjLIMITED_FALSE
             if not body.model.is_fixed:
