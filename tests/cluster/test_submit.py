@@ -282,7 +282,7 @@ def test_the_site_says_what_all_its_datasets_have_in_common(
 def test_where_there_is_no_slurm_it_says_so(short: tuple[Path, dict[str, str]], slurm: Slurm, tmp_path: Path) -> None:
     data = tmp_path / "data"
     said = call(slurm, "submit", short[0], "--output", data, "--tasks", str(TASKS), expect=2, PATH="/nowhere")
-    assert "this is no machine that submits to Slurm" in said
+    assert "this machine cannot submit to Slurm" in said
     assert not data.exists()
 
 

@@ -23,14 +23,15 @@ if TYPE_CHECKING:
     from throwcollect.learning.score import Errors, Score
 
 _MOST_TOLD = 20
-"""Number of targets out of reach that are told; the others are counted."""
+"""Largest number of targets out of reach that are printed; further ones are only counted."""
 
 ModelArgument = Annotated[Path, typer.Argument(metavar="MODEL", help="Directory of the model.", readable=False)]
 ModelOption = Annotated[
     Path, typer.Option("--output", "-o", metavar="MODEL", help="Directory to write; must be new or empty.")
 ]
 ScatterOption = Annotated[
-    float, typer.Option("--scatter", help="Standard deviation of what is measured of a throw, in the targets' unit.")
+    float,
+    typer.Option("--scatter", help="Standard deviation of where throws with the same parameters end, in their unit."),
 ]
 
 
@@ -49,9 +50,9 @@ def fit(
         str | None,
         typer.Option("--given", metavar="KEY,...", help="What is given with a target; by default, as the task says."),
     ] = None,
-    kind: Annotated[str, typer.Option("--kind", help="local, or polynomial: without the nearest throws.")] = "local",
+    kind: Annotated[str, typer.Option("--kind", help="local, by the nearest throws, too; or polynomial.")] = "local",
     where: Annotated[
-        str | None, typer.Option("--where", metavar="CONDITION", help="Learn from throws of this kind alone.")
+        str | None, typer.Option("--where", metavar="CONDITION", help="Learn only from throws that fulfil it.")
     ] = None,
     onnx: Annotated[
         bool, typer.Option("--onnx", help="Write model.onnx, too: target to parameters, for a robot's controller.")
@@ -105,7 +106,7 @@ def aim(
         Path | None, typer.Option("--output", "-o", metavar="FILE", help="CSV file to write, for the sampler `list`.")
     ] = None,
     choose: Annotated[
-        str, typer.Option("--choose", help="Of several ways: nearest, least-effort or least-sensitive.")
+        str, typer.Option("--choose", help="Which of several throws: nearest, least-effort or least-sensitive.")
     ] = "nearest",
     json: JsonOption = False,
 ) -> None:
@@ -183,9 +184,9 @@ def throw(
 
 def score(
     directory: ModelArgument,
-    targets: Annotated[int, typer.Option("--targets", metavar="N", help="Number of targets of each seed.")] = 40,
-    seed: Annotated[int, typer.Option("--seed", help="The first seed of their choice.")] = 0,
-    seeds: Annotated[int, typer.Option("--seeds", metavar="N", help="Number of seeds, whose medians are taken.")] = 3,
+    targets: Annotated[int, typer.Option("--targets", metavar="N", help="Number of targets for each seed.")] = 40,
+    seed: Annotated[int, typer.Option("--seed", help="First seed; targets are chosen by it.")] = 0,
+    seeds: Annotated[int, typer.Option("--seeds", metavar="N", help="Number of seeds; their medians count.")] = 3,
     world: Annotated[
         Path | None,
         typer.Option(
@@ -196,7 +197,7 @@ def score(
     scatter: ScatterOption = 0.0,
     json: JsonOption = False,
 ) -> None:
-    """Throw at targets in simulation, and put into the model how it hits."""
+    """Throw at targets in simulation, and note in the model how well it hits."""
     from contextlib import ExitStack
 
     from throwcollect.learning.model import load_model
@@ -323,7 +324,7 @@ def _read_dataset(directory: Path, keys: Sequence[str], model: Model) -> list[Ro
 
 
 def _tell_out_of_reach(model: Model, aims: Sequence[Aim]) -> None:
-    """Tell which targets are out of reach, and why; of very many, the others are counted."""
+    """Print which targets are out of reach, and why; only count those beyond the first `_MOST_TOLD`."""
     from throwcollect.learning.reach import explain_reach
 
     far = [(number, aim) for number, aim in enumerate(aims, start=1) if not aim.reachable]

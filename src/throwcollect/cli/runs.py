@@ -54,7 +54,7 @@ def ps(
         for runtime, found in unrecorded:
             documents.append({"run": found.run_id, "runtime": runtime, "status": "unrecorded", **asdict(found)})
         documents += cluster_runs.list_queued(cluster_runs.make_document)
-        # Times have the form of those of events.
+        # Times are written as in events.
         print_json(documents, default=lambda time: time.isoformat(timespec="milliseconds"))
         return
     rows = [(_make_row(run), _node_lines(run, held.get(run.id))) for run in shown]
@@ -160,7 +160,7 @@ def stop(run: RunOption = None) -> None:
     with count_interruptions() as interruptions:
         found = control.stop(found, keep_on=lambda: not interruptions())
     if found.status == "running":
-        raise Interrupted(f"not waited for; run {found.id} is stopping all the same")
+        raise Interrupted(f"left; run {found.id} goes on stopping")
     error = describe_death(found) if found.status == "died" else found.record.error
     if error is not None and not isinstance(error, Interrupted):
         raise error
@@ -192,7 +192,7 @@ def down(
 
 
 def _find_submitted(run: str | None) -> ClusterRun | None:
-    """The submitted dataset that a command means; None if it means a run of this machine."""
+    """Find the submitted dataset that a command means; None if it means a run of this machine."""
     from throwcollect.runs.records import Records
 
     # A run of this machine comes first, and then the scheduler need not be asked, which would take time.
@@ -204,7 +204,7 @@ def _find_submitted(run: str | None) -> ClusterRun | None:
 
 
 def _find_run(named: str | None) -> Run:
-    """The run of this machine that a command is to look at."""
+    """Find the run of this machine that a command is to look at."""
     from throwcollect.runs.records import Records
     from throwcollect.runs.run_selection import find_run_to_watch
 
@@ -267,7 +267,7 @@ def _list_held_nodes(runtime: str, held: HeldRun) -> list[tuple[str, ...]]:
 
 
 def _handle(name: str) -> str:
-    """The noun for the handle of a node, such as "pid"; that of processes if the runtime is unknown on this machine."""
+    """Find the noun for the handle of a node; "pid" if this machine does not know the runtime."""
     from throwcollect.runtimes.registry import get_runtime
     from throwcollect.runtimes.runtime import Runtime
 
@@ -278,7 +278,7 @@ def _handle(name: str) -> str:
 
 
 def _table(rows: Sequence[tuple[tuple[str, ...], list[tuple[str, ...]]]]) -> Iterable[str]:
-    """Runs as one table, and below each run its nodes, indented."""
+    """Format runs as one table, with the nodes of each run below it, indented."""
     runs = _align([_HEADINGS, *(run for run, _ in rows)])
     nodes = iter(_align([line for _, lines in rows for line in lines]))
     yield runs[0]
@@ -294,6 +294,6 @@ def _align(rows: Sequence[Sequence[str]]) -> list[str]:
 
 
 def _age(since: datetime) -> str:
-    """The time since an instant, in its largest unit."""
+    """Write the time since an instant, in its largest unit."""
     seconds = max(0, int((datetime.now(timezone.utc) - since).total_seconds()))
     return next((f"{seconds // size} {unit}" for unit, size in _UNITS if seconds >= size), "0 s")

@@ -19,7 +19,7 @@ from throwcollect.dataset.directory import PLAN
 from throwcollect.errors import Interrupted
 
 _ENDING_S = 30
-"""Time that a task needs besides `run.grace_s` to end in order: to end nodes and close files."""
+"""Time that a task needs, besides `run.grace_s`, to shut down: to end nodes and close files."""
 _JOIN_MEMORY = "4G"
 _EXPANDED = re.compile(r"\$SLURM_|cluster\.scratch=|tcp/0\.0\.0\.0:\$PORT$")
 """Words in which the shell of the task replaces variables; all other words are quoted."""
@@ -95,8 +95,8 @@ class BatchScripts:
             f"Collects a dataset of throwcollect in one run on {nodes} nodes.",
             directives,
             ("--no-kill", self._requeue_flag),
-            # By its number, each job has a port of its own, as several jobs may share a node. From 32768 on, ports are
-            # those that Linux gives to connections that leave.
+            # The number of the job gives each job a port of its own, as several jobs may share a node. Ports from 32768
+            # on are left out, as Linux gives them to outgoing connections.
             "export PORT=$((20000 + SLURM_JOB_ID % 12768))",
             # A token of an earlier start of this job would lead the other tasks to a router that is gone.
             f"rm -f {token} {token}.over",
@@ -190,7 +190,7 @@ class BatchScripts:
             return " ".join(map(_in_shell, (*self.program, *words)))
         binds = [shlex.quote(f"--bind={bind}") for bind in (self.directory, *self.config.cluster.binds)]
         if self.config.cluster.scratch:
-            # It may have variables anywhere.
+            # Its path may have variables anywhere.
             binds.append(f'"--bind={self.config.cluster.scratch}"')
         image = shlex.quote(str(self.image))
         return " ".join(["apptainer --quiet exec --cleanenv", *binds, image, "throwcollect", *map(_in_shell, words)])
@@ -198,7 +198,7 @@ class BatchScripts:
 
 def _requeue(times: int, job: str) -> Iterator[str]:
     if times:
-        yield f"# {Interrupted.exit_code}: it was stopped in order, and goes on where it is started again."
+        yield f"# {Interrupted.exit_code}: it was stopped, and goes on where it left off when it is started again."
         yield f'if [ $code = {Interrupted.exit_code} ] && [ "${{SLURM_RESTART_COUNT:-0}}" -lt {times} ]; then'
         yield f'    scontrol requeue "{job}"'
         yield "fi"

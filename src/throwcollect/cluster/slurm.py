@@ -12,7 +12,7 @@ from throwcollect.cluster.site import site_path
 from throwcollect.errors import ConfigError, WorkerError
 
 MARK = "throwcollect:"
-"""Begin of the comment of our jobs; the directory of the dataset follows."""
+"""Beginning of the comment of our jobs; the directory of the dataset follows."""
 
 _PATIENCE_S = 60.0
 """Longest wait for a command of Slurm."""
@@ -109,8 +109,8 @@ def find_tasks() -> dict[str, list[ArrayTask]]:
         ConfigError: If there is no Slurm here.
         WorkerError: If it does not answer.
     """
-    # squeue fails if it is asked for a job that Slurm has forgotten, and not if it is asked for all jobs of this user.
-    # Number of the array, index in it, state, node, and reason.
+    # squeue would fail for a job that Slurm has forgotten, but never fails for all jobs of this user. Ask for number of
+    # the array, index in it, state, node, and reason.
     format_ = "%F|%K|%T|%N|%r"
     found: dict[str, list[ArrayTask]] = {}
     for line in _run("squeue", "--noheader", "--array", "--me", "--states=all", f"--format={format_}").splitlines():
@@ -211,7 +211,7 @@ def _run(program: str, *arguments: str, patience_s: float = _PATIENCE_S) -> str:
 
     Raises:
         ConfigError: If there is no such command.
-        WorkerError: If it fails or does not answer; the message has its own words.
+        WorkerError: If it fails or does not answer; the message quotes what it printed.
     """
     try:
         done = subprocess.run(
@@ -226,7 +226,7 @@ def _run(program: str, *arguments: str, patience_s: float = _PATIENCE_S) -> str:
         )
     except FileNotFoundError as error:
         raise ConfigError(
-            f"{program} is not there: this is no machine that submits to Slurm",
+            f"{program} is missing: this machine cannot submit to Slurm",
             hint="run this on a login node, or see docs/cluster.md for other schedulers",
         ) from error
     except subprocess.TimeoutExpired as error:

@@ -52,7 +52,7 @@ class ClusterConfig(Section):
     constraint: Word | None = None
     """Features that a node must have."""
     time: Time | None = None
-    """Time limit of a task; a task that comes near it stops in order, and is queued again (`requeue`)."""
+    """Time limit of a task; shortly before it, the task shuts down properly, and is queued again (`requeue`)."""
     memory: Memory | None = None
     """Memory of a task."""
     cores: Annotated[int, Field(ge=1, le=256)] = 1
@@ -71,4 +71,4 @@ class ClusterConfig(Section):
     scratch: Scratch | None = None
     """Directory on a disk of the node, such as `$TMPDIR`, in which a task collects before it hands its slice over."""
     requeue: Annotated[int, Field(ge=0, le=1000)] = 10
-    """How often a task that was stopped in order is queued again."""
+    """How often a task that was stopped, and has shut down properly, is queued again."""

@@ -10,9 +10,9 @@ PROGRESS_TOPIC = "/coordinator/progress"
 PROGRESS_QOS = ros.QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 SHOWN_QOS = ros.QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
-"""A slow subscriber misses some and delays nobody."""
+"""A slow subscriber misses some episodes, and delays nobody."""
 
 
 def make_shown_topic(simulation: str) -> str:
-    """Topic of the newest episode of a simulation, given the name of its node: the std_msgs/UInt8MultiArray it sent."""
+    """Name the topic on which the newest message of a simulation with an episode is repeated, by its node's name."""
     return f"/coordinator/shown/{simulation}"

@@ -64,14 +64,14 @@ def has_files(directory: Path) -> bool:
 
 
 def is_attempt(directory: Path) -> bool:
-    """Whether a directory is that of an attempt at a slice, which no other process knows (see `slice_directory`)."""
+    """Whether a directory belongs to an attempt at a slice, which no other process knows (see `slice_directory`)."""
     return ATTEMPT in directory.name
 
 
 def find_known_directory(directory: Path) -> Path | None:
-    """The directory of a dataset as its user knows it, which may have another path in this process, as in a container.
+    """Find the directory of a dataset as its user knows it; a process in a container may see it at another path.
 
-    It is None if the user cannot reach it, as in a volume.
+    It is None if the user cannot reach the dataset, as in a volume.
     """
     known = os.environ.get(DIRECTORY_VARIABLE, str(directory))
     return Path(known) if known else None

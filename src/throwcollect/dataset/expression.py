@@ -1,8 +1,8 @@
 """Conditions and numbers computed from the columns of a table, written as Python writes them.
 
-Python parses the text, and Arrow evaluates it here, so nothing of it ever runs. Names with dots are names of
-columns, ``weights.arm_right_4_joint[0]`` is the column ``weights.arm_right_4_joint.0``. A null stays null in
-comparisons and arithmetic, and a null condition is not fulfilled.
+Python only parses the text, and this module evaluates it with Arrow, so it is never run as code. Names with dots are
+names of columns, and ``weights.arm_right_4_joint[0]`` is the column ``weights.arm_right_4_joint.0``. A null stays null
+in comparisons and arithmetic, and a null condition is not fulfilled.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from throwcollect.arguments import show_value
 from throwcollect.errors import ConfigError, Problem
 
 _SHOWN = 100
-"""Characters of an expression that a message shows."""
+"""Most characters of an expression that a message shows."""
 
 _EXAMPLE = "outcome == 'landed' and landing_x_m > 1.5"
 
@@ -82,7 +82,7 @@ class Expression:
     Args:
         text: The expression.
         place: What messages begin with: the argument that the expression was given as, such as ``where``.
-        is_argument: Whether that is an argument, for which commands have an option.
+        is_argument: Whether `place` is an argument, for which commands have an option.
 
     Raises:
         ConfigError: If it is no expression, or no text; all methods raise it for what cannot be evaluated.
@@ -106,12 +106,12 @@ class Expression:
             raise self._error(0, "cannot be understood", example=True) from error
 
     def rows(self, table: pa.Table) -> list[int]:
-        """Numbers of the rows that fulfil the expression as a condition."""
+        """List the numbers of the rows that fulfil the expression as a condition."""
         found = self._evaluate(table, "a condition")
         return [number for number, holds in enumerate(found.to_pylist()) if holds]
 
     def numbers(self, table: pa.Table) -> list[float | None]:
-        """The expression's number in each row; None where it is null."""
+        """Compute the expression's number in each row; None where it is null."""
         values: list[float | None] = self._evaluate(table, "a number").to_pylist()
         return values
 
@@ -148,10 +148,10 @@ class _Evaluation:
         self._error = error
 
     def value(self, node: ast.expr) -> _Value:
-        """The value of a part.
+        """Compute the value of a part.
 
         Raises:
-            ConfigError: If it is no part that an expression may have.
+            ConfigError: If an expression may not have such a part.
         """
         match node:
             case ast.Constant():

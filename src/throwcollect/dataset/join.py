@@ -36,7 +36,7 @@ def join(directory: Path) -> None:
     """Make a finished dataset of its slices; one that is finished already stays as it is.
 
     Raises:
-        ConfigError: If the directory holds no slices, or some of another number of slices.
+        ConfigError: If the directory holds no slices, or slices I/N with different N.
         DatasetError: If a slice is missing, damaged or not of this plan, or the dataset cannot be written.
     """
     with hold_lock(directory, needed=False):
@@ -46,10 +46,10 @@ def join(directory: Path) -> None:
 
 
 def _count_slices(directory: Path, finished: Collection[Slice]) -> int:
-    """The number of slices that a dataset was cut into.
+    """Find the number of slices that a dataset was cut into.
 
     Raises:
-        ConfigError: If none is finished, or they are of different numbers of slices.
+        ConfigError: If none is finished, or there are slices I/N with different N.
     """
     counts = sorted({each.count for each in finished})
     if not counts:
@@ -119,7 +119,7 @@ def _move(source: Path, target: Path, entry: FileEntry) -> FileSummary:
     try:
         with open(open_regular(target), "rb") as file:
             size = os.fstat(file.fileno()).st_size
-            # To hash it again would mean to read all recordings of the dataset in one process.
+            # Only the size is checked: hashing would mean to read all recordings of the dataset in one process.
             if size != entry.bytes:
                 raise DatasetError(f"has {size} bytes", path=target, expected=f"{entry.bytes}, as its slice says")
             summary = make_reader(file).get_summary()

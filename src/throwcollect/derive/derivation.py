@@ -53,15 +53,15 @@ class Derived:
     digest: str
 
     def as_dict(self) -> dict[str, Any]:
-        """The same for JSON."""
+        """Return the same as a dictionary, for JSON."""
         return asdict(self)
 
 
 def derive(sources: Sequence[Source], output: Path, *, name: str | None = None) -> Derived:
     """Make the dataset that consists of the trials of some others, at least one, in their order, renumbered from 0.
 
-    Its directory must not exist or be empty, and nothing is left there after an error. Without a name of its own, it
-    has that of the first source.
+    Its directory must be new or empty, and nothing is left there after an error. Without `name`, it has the name of the
+    first source.
 
     Raises:
         ConfigError: If there is no trial, the sources do not go together, or the directory cannot be used.

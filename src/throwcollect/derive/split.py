@@ -71,7 +71,7 @@ class Split:
     without_episode: Mapping[str, int]
 
     def as_dict(self) -> dict[str, Any]:
-        """The same for JSON."""
+        """Return the same as a dictionary, for JSON."""
         return asdict(self)
 
 
@@ -87,10 +87,10 @@ def split(
 
     Args:
         directory: The dataset.
-        output: Directory that gets one directory a part; it must not exist or be empty.
+        output: Directory that gets one directory for each part; it must be new or empty.
         fractions: Names of the parts and their shares of the cells: ``train=0.8,test=0.2``, or a mapping of them.
-        cells: Axes of the space that is cut into cells: an expression on columns of the table of throws (see
-            `dataset.expression`) and the width of the cells along it, each: ``landing_x_m=0.05``.
+        cells: Axes of the space that is cut into cells. Each is an expression on columns of the table of throws (see
+            `dataset.expression`) and the width of the cells along this axis, such as ``landing_x_m=0.05``.
         seed: Seed of the choice, 0 or more.
 
     Raises:
@@ -124,7 +124,7 @@ def assign(
     shares = _read_shares(fractions)
     places = _find_cells(cells, everything.dataset.throws.take(everything.trials))
     config, points = list_of_trials([everything])
-    # Seeds follow from the numbers of trials, on which the part of a trial must not depend.
+    # All seeds are taken as 0: they follow from the numbers of trials, on which the part of a trial must not depend.
     contents = trial_digests(config, points, [0] * len(points.values))
     members: dict[str, dict[int, Cell | None]] = {name: {} for name in shares}
     for trial, cell, digest in zip(everything.trials, places, contents, strict=True):
@@ -167,7 +167,7 @@ def _choose_part(hashed: str, shares: Mapping[str, Fraction], seed: int) -> str:
 
 
 def _write_shares(shares: object) -> str:
-    """Write a mapping as commands have it; shares as fractions, as a float that is a third makes no whole.
+    """Write a mapping as users of commands write it; as fractions, because floats of 1/3 would not add up to 1.
 
     Raises:
         ConfigError: If it is no mapping.
@@ -210,7 +210,7 @@ def _read_pair(text: str, argument: str, what: str) -> tuple[str, Fraction]:
     name, _, number = text.rpartition("=")
     try:
         value = Fraction(number) if _NUMBER.fullmatch(number) else None
-        # This is an error if the number is too large for a float, which all others can be made into.
+        # This raises an error if the number is too large for a float.
         float(value or 0)
     except (ValueError, ArithmeticError):
         value = None

@@ -128,7 +128,7 @@ def _save(path: Path, variables: Mapping[str, Any]) -> None:
 
 
 def _count_bytes(value: Any) -> int:
-    """Bytes of all numbers in nested structures."""
+    """Count the bytes of all numbers in nested structures."""
     if isinstance(value, dict):
         return sum(map(_count_bytes, value.values()))
     if isinstance(value, np.ndarray):

@@ -31,7 +31,7 @@ class ParquetSeries:
             self._writer = None
 
     def place(self) -> tuple[int, int]:
-        """Numbers of directory and file that the next table goes to."""
+        """Find the numbers of the directory and the file that the next table goes to."""
         if self.paths and self.paths[-1].stat().st_size >= MEGABYTES_PER_FILE * 2**20:
             self.close()
         # The last path is that of the open file, if one is open, and the next table goes there.

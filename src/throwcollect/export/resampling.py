@@ -13,7 +13,7 @@ interpolate = lazily("scipy.interpolate", extra="export")
 
 
 def count_resampled(samples: int, *, recorded_hz: int, rate_hz: int) -> int:
-    """Number of samples that `resample` gives for so many recorded ones."""
+    """Count the samples that `resample` makes of a number of recorded ones."""
     return (samples - 1) * rate_hz // recorded_hz + 1
 
 
