@@ -142,8 +142,8 @@ def read_bag_metadata(directory: Path) -> Mapping[str, Any]:
     path = directory / METADATA
     if not path.exists():
         if (directory / PLAN).is_file():
-            on = find_next_command(directory)
-            raise DatasetError(f"the dataset {on.state}: it has no {METADATA}", path=directory, hint=on.command)
+            found = find_next_command(directory)
+            raise DatasetError(f"the dataset {found.state}: it has no {METADATA}", path=directory, hint=found.command)
         raise DatasetError("holds no dataset", path=directory, hint=_name_nearby(directory))
     bag = from_yaml(path).get("rosbag2_bagfile_information")
     if not isinstance(bag, dict):

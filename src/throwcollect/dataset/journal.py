@@ -29,10 +29,11 @@ Event = Literal["opened", "exposed", "recovered", "planned", "lease", "commit", 
 - ``recovered``: the episodes that earlier processes had left were taken in: `episodes`.
 - ``planned``: trials were added to the plan: `trials` in all.
 - ``lease``: a trial was given to a simulation: `trial`, `simulation`.
-- ``commit``: the episode of a trial was written: `trial`, `outcome`, `digest`, and where it ended: columns that the
-task aims at. - ``fail``: a simulation did not hand over the episode of a trial: `trial`, `simulation`, `reason`. -
-``lost``: no simulation did, and the trial was given up: `trial`, `reason`. - ``shard``: a file was finished: `name`. -
-``finished``: the dataset was finished: `wall_s`, the real time that it took in all [s], as the data card has it.
+- ``commit``: the episode of a trial was written: `trial`, `outcome`, `digest`, and the columns that the task aims at.
+- ``fail``: a simulation did not hand over the episode of a trial: `trial`, `simulation`, `reason`.
+- ``lost``: no simulation did, and the trial was given up: `trial`, `reason`.
+- ``shard``: a file was finished: `name`.
+- ``finished``: the dataset was finished: `wall_s`, the real time that it took in all [s], as the data card has it.
 """
 
 

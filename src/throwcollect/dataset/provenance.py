@@ -135,7 +135,7 @@ def read_provenance(directory: Path) -> Provenance | None:
 
 @cache
 def _read_revision() -> str | None:
-    """Git revision of the clone that these sources lie in; None if there is none, or no git."""
+    """Find the Git revision of the clone that these sources lie in; None if there is none, or no git."""
     root = Path(__file__).parents[3]
     if not (root / ".git").exists():
         return None
@@ -144,8 +144,8 @@ def _read_revision() -> str | None:
     # Without tags, `--always` gives the whole hash of the revision.
     words += ["--always", "--abbrev=40", "--dirty", "--exclude=*"]
     with suppress(OSError, subprocess.SubprocessError):
-        said = subprocess.run(words, capture_output=True, text=True, timeout=_GIT_S, check=True)
-        return said.stdout.strip() or None
+        described = subprocess.run(words, capture_output=True, text=True, timeout=_GIT_S, check=True)
+        return described.stdout.strip() or None
     return None
 
 

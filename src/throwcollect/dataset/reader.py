@@ -82,7 +82,7 @@ class Dataset(Sequence[Throw]):
         try:
             throws = read_throws(path, plan)
         except DatasetError as error:
-            # The table follows from the recordings, so one that is damaged is mended as one that is missing.
+            # The table follows from the recordings, so a damaged one is made again in the same way as a missing one.
             error.hint = error.hint or command("dataset", "rebuild", path)
             raise
         return cls(path, plan, throws, bag)
@@ -281,7 +281,7 @@ class Dataset(Sequence[Throw]):
         return (stored.read() for stored in self._stored if stored is not None)
 
     def select(self, which: str | Iterable[Any]) -> Dataset:
-        """Some of the throws.
+        """Select some of the throws.
 
         Args:
             which: A condition on the columns of `throws` as `throwcollect dataset filter` takes it, such as
@@ -292,7 +292,7 @@ class Dataset(Sequence[Throw]):
             ConfigError: If it is none of these.
             DatasetError: If a trial is not among the throws.
         """
-        # These imports take long, and most who open a dataset select nothing.
+        # These imports take long, and most programs that open a dataset select nothing.
         import pyarrow.compute as pc
 
         from throwcollect.dataset.expression import Expression
@@ -327,11 +327,11 @@ class Dataset(Sequence[Throw]):
             columns: Which of `COLUMNS`; nothing else is copied.
             joints: Joints that the columns of joints have, in this order; None for all. `moving_joints` leaves out the
                 constant ones.
-            threads: How many of them work; None for one a core, up to 4.
+            threads: How many threads read; None for one for each core, up to 4.
 
         Raises:
             ConfigError: If there is no such column or joint, columns or joints are no list of names, or `threads` is no
-                number of them.
+                whole number above 0.
             DatasetError: If an episode is not where the table says, or it is damaged; CRCs are compared.
         """
         if threads is not None:

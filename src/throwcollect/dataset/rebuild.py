@@ -44,7 +44,7 @@ _MOST_CARD_BYTES = 10_000_000
 
 @dataclass(frozen=True)
 class Rejudged:
-    """A trial that is judged otherwise than the earlier table of throws says: its outcomes `before` and `after`."""
+    """A trial that is judged differently than in the earlier table of throws: its outcomes `before` and `after`."""
 
     trial: int
     before: str
@@ -57,7 +57,7 @@ class Rebuilt:
 
     Attributes:
         lost: Trials that should have an episode and have none.
-        rejudged: Trials whose outcome is another one than before.
+        rejudged: Trials whose outcome has changed.
     """
 
     trials: int
@@ -72,7 +72,7 @@ def rebuild(directory: Path) -> Rebuilt:
 
     They follow from the configuration, the plan and the recordings, which are checked as `verify` does. The earlier
     table, if it can be read, says why trials are lost and which recordings there should be. Where the recordings are
-    judged otherwise than it says, the data card gets the new numbers of outcomes.
+    judged differently than it says, the data card gets the new numbers of outcomes.
 
     Raises:
         DatasetError: If the plan or a recording is missing or damaged, ``config.yaml`` is not as the manifest says,
@@ -123,7 +123,7 @@ def _rebuild(directory: Path) -> Rebuilt:
     config = _read_config(directory)
     repair = command("dataset", "repair", directory, "OUTPUT")
     plan = _read_plan(directory, config, repair)
-    # This comes before `*.part` is looked for: earlier versions called an unfinished plan so, and it can be removed.
+    # This comes before the search for `*.part`, a name that earlier versions gave to unfinished plans, which may go.
     remove_unfinished(directory)
     if unfinished := sorted(path.name for path in directory.glob("*.part")):
         raise DatasetError(
@@ -201,7 +201,7 @@ def _row_without_episode(table: ThrowsTable, task: Task[Any], trial: Trial, earl
 
 
 def reason_lost(earlier: Row | None) -> str | None:
-    """Why an earlier row says that its trial was lost; None if it says no such thing."""
+    """Find the reason why a trial was lost according to an earlier row; None if the row does not say that it was."""
     if earlier is None or earlier["outcome"] != LOST:
         return None
     return str(earlier["reason"] or NO_EPISODE)
@@ -237,5 +237,5 @@ class _Recordings:
         if not problems:
             trial = self._plan.trial(stored.episode.header.trial)
             if trial.refused is not None or shard != shard_of(self._plan, trial.number):
-                yield "its episode does not belong into this file"
+                yield "its episode does not belong in this file"
             self.rows[trial.number] = self._check.row(stored, shard)

@@ -79,12 +79,12 @@ def repair(directory: Path, output: Path, *, remake: Remake) -> Repaired:
 
     Args:
         directory: Directory of the damaged dataset; it stays as it is.
-        output: Directory of the new one; must not exist, or be empty.
+        output: Directory of the new one; must be new or empty.
         remake: Draws the plan if neither the one in the directory nor the table of throws can be read.
 
     Raises:
         ConfigError: If `output` holds something already.
-        DatasetError: If there is no way to configuration or plan, or files cannot be read or written.
+        DatasetError: If configuration or plan cannot be read or made again, or files cannot be read or written.
     """
     refuse_other_directory(directory)
     config = _configuration(directory)
@@ -195,7 +195,7 @@ class _Sorting:
     Attributes:
         plan: The trials.
         writer: Writes the new dataset.
-        digests: Digests of the right episodes, by trial, as far as the table of throws tells them.
+        digests: Digests of the right episodes, by trial, as far as the table of throws has them.
         remarks: Receives a sentence for everything that is wrong.
         taken: File and digest of the episode of each trial that was written.
         differing: Episodes that were written and have another digest than the right one.
@@ -258,14 +258,14 @@ class _Sorting:
                 else:
                     self._write(episode.file, _find_again(directory / episode.file, episode))
                     self.differing.append(episode)
-                    self.remarks.append(f"{remark}; kept, as nothing else speaks against it")
+                    self.remarks.append(f"{remark}; kept, as it passes all other checks")
 
     def _write(self, name: str, episode: Episode) -> None:
         self.writer.append(episode, self._check.judge(episode))
         self.taken[episode.header.trial] = (name, episode.digest)
 
     def give_up(self, earlier: Mapping[int, Row]) -> tuple[LostTrial, ...]:
-        """Write down the trials that have no episode; returns those that were not lost before."""
+        """Write that the other trials have no episode; return those that were not lost before."""
         lost = []
         for trial in self.plan.trials:
             if trial.refused is not None or trial.number in self.taken:

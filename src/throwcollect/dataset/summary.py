@@ -1,4 +1,4 @@
-"""The summary of a dataset, apart from what computes it, as commands that only read records of runs must start fast."""
+"""The summary of a dataset, without what computes it, so that commands that only read records of runs start fast."""
 
 from __future__ import annotations
 

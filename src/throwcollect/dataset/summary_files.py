@@ -73,7 +73,7 @@ def write_description(
 
 
 def _digests(throws: pa.Table, on_piece: Callable[[], object]) -> Iterator[str]:
-    """Digests of the episodes, in order, some at a time: as Python texts, those of a million would fill 100 MB."""
+    """Read the digests of the episodes, in order, some at a time: as Python texts, a million would fill 100 MB."""
     for first in range(0, len(throws), _ROWS_AT_ONCE):
         yield from throws["digest"].slice(first, _ROWS_AT_ONCE).drop_null().to_pylist()
         on_piece()

@@ -168,7 +168,7 @@ class Joints(_Series):
     _prefix = "joints"
 
     def __getitem__(self, name: str) -> Joint:
-        """One joint, whose arrays are columns of those of all.
+        """Return one joint; its arrays are columns of the arrays of all joints.
 
         Raises:
             ConfigError: If the robot has none of this name; it is also a `KeyError`.
@@ -313,7 +313,7 @@ class Throw:
 
     @property
     def target(self) -> dict[str, float]:
-        """Where it should end, by column of the table such as ``target_x_m``; empty if nobody said so."""
+        """Where it should end, by column of the table such as ``target_x_m``; empty if it has no target."""
         return {name: value for name, value in self.row.items() if is_target(name) and value is not None}
 
     @property

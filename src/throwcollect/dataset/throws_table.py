@@ -35,7 +35,7 @@ Row = dict[str, Any]
 _KINDS = {"number": pa.float64(), "count": pa.int64(), "text": pa.string()}
 """Types of the columns that tasks declare."""
 _ROWS_A_PIECE = 500
-"""So many rows are made at a time: enough that making them costs no more than making all at once."""
+"""Number of rows that are made at a time: enough that this takes no longer than making all at once."""
 
 
 @dataclass(frozen=True)
@@ -135,7 +135,7 @@ class ThrowsTable:
 
     @classmethod
     def of(cls, plan: Plan) -> ThrowsTable:
-        """The table of a plan's trials."""
+        """Make the table of a plan's trials."""
         return cls(plan.keys, plan.config, plan.trials.target_names)
 
     def row(self, trial: Trial, result: Result, place: EpisodePlace | None) -> Row:
@@ -186,7 +186,7 @@ def read_throws_table(path: Path, plan: Plan) -> pa.Table:
 
 
 class RowsByTrial(Mapping[int, Row]):
-    """The rows of a table of throws, by trial; those of no trial are left out.
+    """The rows of a table of throws, by trial; rows without a trial are left out.
 
     Only a piece of the table at a time is made into rows, which take ten times its memory: those of a million throws
     would take 3 GB.
@@ -228,14 +228,14 @@ def read_throws(directory: Path, plan: Plan) -> pa.Table:
 
 
 def _explain_unusable(table: pa.Table, plan: Plan) -> str | None:
-    """Say what in a table, which may come from anybody, cannot be worked with; None if all can be, right or not."""
+    """Say what makes a table unusable, as it may come from anybody; None if it is usable, even with wrong numbers."""
     known = {
         "outcome": {REFUSED, *(each.value for each in task_of(plan.config).outcomes)},
         "shard": {None, *list_shards(plan)},
     }
     for name, values in known.items():
-        if strange := count_values(table[name]).keys() - values:
-            return f"{name} is {min(map(repr, strange))} in some row, which no row of this plan can have"
+        if unknown := count_values(table[name]).keys() - values:
+            return f"{name} is {min(map(repr, unknown))} in some row, which no row of this plan can have"
     places = ("shard", "chunk_offset", "samples", "digest")
     shard, *rest = (read_validity(table[name].combine_chunks()) for name in places)
     if not all(np.array_equal(each, shard) for each in rest):

@@ -104,7 +104,7 @@ def read_trajectories(
 ) -> Trajectories:
     """Read the trajectories of trials, whose episodes lie at these places; None for a trial that has none.
 
-    All else is as `Dataset.trajectories` takes it.
+    The other arguments are those of `Dataset.trajectories`.
 
     Raises:
         ConfigError: If there is no such column.

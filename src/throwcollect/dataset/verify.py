@@ -45,14 +45,14 @@ from throwcollect.sweep.plan import Plan
 from throwcollect.wording import format_count
 
 _MANY_EPISODES = 1000
-"""From here on, checking files side by side is worth the start of processes."""
+"""From this number of episodes on, starting processes that check files side by side saves time."""
 _TELL_EVERY_S = 2.0
 _UNFINISHED = (".part", ".new")
 _short = reprlib.Repr()
 _short.maxstring = _short.maxother = 120
 _short.maxlevel = _short.maxdict = _short.maxlist = 3
 _shorten = _short.repr
-"""A value of a file in words; somebody may have made it as large and as deep as possible."""
+"""Writes a value of a file in words, and cuts it, as somebody may have made it as large and deep as possible."""
 
 
 def verify(
@@ -72,9 +72,9 @@ def verify(
 
     Args:
         directory: Its directory.
-        check_of: Makes the check that says which trials the plan refuses; None leaves refusals as they are.
-        processes: How many processes may check the recordings of a large dataset; more than one import the program that
-            calls this, as those of `multiprocessing` do.
+        check_of: Makes the check that says which trials the plan refuses; None leaves refusals unchecked.
+        processes: How many processes may check the recordings of a large dataset. If more than one, they may import the
+            program that calls this, as those of `multiprocessing` do.
         say: Receives the progress of the check of a large dataset.
 
     Returns:
@@ -109,7 +109,7 @@ def verify(
 
 
 def find_unchecked(config: Config) -> tuple[str, ...]:
-    """What `verify` leaves out, as packages of the extra ``collect`` are not installed; empty if it is nothing."""
+    """List what `verify` leaves out, as packages of the extra ``collect`` are not installed; empty if nothing."""
     left_out: tuple[str, ...] = () if can_draw(config) else ("whether the configuration draws these trials",)
     if not robot_is_available(config):
         left_out += ("whether the robot can do them", "how its joints moved", "what came of the throws")

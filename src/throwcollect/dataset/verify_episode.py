@@ -49,9 +49,9 @@ class EpisodeCheck:
     """Checks the episodes of one dataset.
 
     Args:
-        plan: Its trials; None if they are not known, and then neither rows nor physics are looked at.
+        plan: Its trials; None if they are not known, and then neither rows nor physics are checked.
         rows: Rows of the table of throws, by trial; where there is none, the episode is not compared with it.
-        doubtful: Trials that the plan has wrong; neither rows nor physics of theirs are looked at.
+        doubtful: Trials that are wrong in the plan; neither their rows nor their physics are checked.
         robot: Whether the robot's model is available, which the motion of the joints, the names of bodies that the ball
             touches, and the result of the trial need.
     """
@@ -195,7 +195,7 @@ def _find_message_problems(episode: Episode, channels: Channels) -> Iterator[str
 
 
 def _find_record_problems(stored: StoredEpisode) -> Iterator[str]:
-    """Find differences between the records around chunks and those that their contents call for."""
+    """Find differences between the records around chunks and those that the writer makes for these chunks."""
     run = stored.intact_run
     for chunk, expected in zip(stored.chunks, run.chunk_indexes, strict=True):
         first = expected.chunk_start_offset + expected.chunk_length

@@ -29,7 +29,7 @@ class Tables:
         config: The configuration; None if it cannot be read or is not the plan's.
         plan: The trials; None if they cannot be read or are not the configuration's.
         rows: Rows of the table of throws, by trial; None if it cannot be read.
-        doubtful: Trials whose values or seed in the plan do not have their digest.
+        doubtful: Trials whose values or seed in the plan do not fit their digest.
         findings: What is wrong.
     """
 
@@ -140,7 +140,7 @@ def _plan_findings(plan: Plan, rows: Mapping[int, Row], doubtful: Collection[int
             continue
         place = f"trial {trial.number}"
         for key, value in trial.values.items():
-            # Of a doubtful trial, the plan itself is known to be wrong.
+            # The plan itself is known to be wrong about a doubtful trial.
             if row[key] != value and trial.number not in doubtful:
                 yield Finding(THROWS, place, f"has {key} = {row[key]!r}, the plan {value!r}")
         for name in plan.trials.target_names:

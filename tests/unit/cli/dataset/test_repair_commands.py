@@ -155,6 +155,6 @@ def test_repair_that_keeps_another_episode_than_the_tables_ends_with_5(
     output = tmp_path / "output"
     assert run("dataset", "repair", source, output) == 5
     told = capsys.readouterr()
-    assert told.out.count("as in throws.parquet; kept, as nothing else speaks against it") == 3
+    assert told.out.count("as in throws.parquet; kept, as it passes all other checks") == 3
     assert f"{output}: 3 episodes kept that differ from throws.parquet, such as that of trial 0" in told.err
     assert f"try: throwcollect dataset replay {output} --trial 0" in told.err
