@@ -160,7 +160,7 @@ def stop(run: RunOption = None) -> None:
     with count_interruptions() as interruptions:
         found = control.stop(found, keep_on=lambda: not interruptions())
     if found.status == "running":
-        raise Interrupted(f"left; run {found.id} goes on stopping")
+        raise Interrupted(f"left; run {found.id} is still stopping")
     error = describe_death(found) if found.status == "died" else found.record.error
     if error is not None and not isinstance(error, Interrupted):
         raise error

@@ -64,7 +64,7 @@ def open_streams() -> None:
         try:
             os.fstat(number)
         except OSError:
-            # open() takes the lowest free descriptor, which is this one. Child processes shall inherit it, too.
+            # open() takes the lowest free descriptor, which is this one. Child processes must inherit it, too.
             os.set_inheritable(os.open(os.devnull, os.O_RDWR), True)
     if sys.stdin is None:
         sys.stdin = open(0, closefd=False)  # noqa: SIM115 - it stays open

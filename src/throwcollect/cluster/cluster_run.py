@@ -238,7 +238,7 @@ def follow(run: ClusterRun, *, keep_on: Callable[[], bool] = lambda: True) -> It
     """Look at a run every few seconds, until it has ended or `keep_on` returns False.
 
     Yields:
-        The state of the run; the last one is that of the ended run, unless `keep_on` has returned False.
+        The state of the run; the last one is the state after its end, unless `keep_on` has returned False.
 
     Raises:
         ConfigError: If there is no Slurm here.

@@ -71,6 +71,6 @@ def key_of_field(section: type[Section], name: str) -> Key:
 
 @cache
 def overlay(above: Key, section: type[Section], name: str) -> Key:
-    """Combine the annotation of a section with that of a field of it, which wins where it is not None."""
+    """Combine the annotation of a section with the annotation of one of its fields, which wins where it is not None."""
     own = {name: value for name, value in vars(key_of_field(section, name)).items() if value is not None}
     return replace(above, **own)

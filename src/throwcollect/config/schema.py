@@ -89,8 +89,8 @@ class RobotConfig(Section):
     base_height_m: Annotated[float, Field(ge=0.5, le=2.0)] = 1.01927
     """Height of the fixed base link above the ground."""
     posture: dict[Joint, Angle] = {}
-    """Joint angles that replace those of the robot's posture at rest, which for Talos is half-sitting, for joints that
-    the task does not move."""
+    """Joint angles that replace angles of the robot's posture at rest (for Talos: half-sitting), for joints that the
+    task does not move."""
     locked: Literal["auto", "none"] | list[Joint] = "auto"
     """Joints simulated as rigid: `auto` locks what the task does not move, `none` simulates all, or a list."""
     position_gain_per_s: Annotated[float, Field(gt=0, le=1000), Key(swept=True)] = 100.0
@@ -115,7 +115,7 @@ class BallConfig(Section):
     radius_m: Annotated[float, Field(ge=0.005, le=0.1)] = 0.025
     """Radius."""
     friction: Annotated[float, Field(ge=0, le=2)] = 0.5
-    """Coulomb friction of the ball [-]; it is multiplied with that of the body it touches."""
+    """Coulomb friction of the ball [-]; it is multiplied with the friction of the body that it touches."""
     restitution: Annotated[float, Field(ge=0, le=1)] = 0.0
     """Coefficient of restitution between the ball and whatever it touches [-]."""
     drag_coefficient: Annotated[float, Field(ge=0, le=2)] = 0.0
@@ -255,7 +255,7 @@ class Config(Section):
         for section, joints in named.items():
             unknown = [joint for joint in joints if joint not in robot.joints]
             if unknown and section in ("task.start", "task.end") and section[5:] not in self.task.model_fields_set:
-                # The user has written none of these joints: they are those of the default.
+                # The user has written none of these joints: they come from the default.
                 init = f"throwcollect init --robot {self.robot.name}"
                 yield section, f"missing, and the default has joints that {robot.title} lacks; `{init}` writes one"
                 continue

@@ -24,7 +24,7 @@ def with_values(config: Config, values: Mapping[str, float]) -> Config:
 
     Args:
         config: The configuration, which stays as it is.
-        values: New values by dotted key, which `config` must have; items of lists go by their index from 0.
+        values: New values by dotted key, which `config` must have; an item of a list is named by its index, from 0.
 
     Raises:
         ConfigError: If a key does not exist, or the result would not be valid.
@@ -73,7 +73,7 @@ def differences(one: Config, other: Config) -> dict[str, tuple[Any, Any]]:
 
 
 def sweepable_keys(config: Config, effect: Effect | None = None) -> list[str]:
-    """List the dotted keys that a sweep of this configuration may vary, or those of them that have one effect."""
+    """List the dotted keys that a sweep of this configuration may vary; with `effect`, only those with this effect."""
     return [
         leaf.name
         for leaf in leaves(config)

@@ -36,7 +36,7 @@ class _Scanner(Scanner):
             parts = super().scan_flow_scalar_non_spaces(double, start_mark)
             "".join(parts).encode()
         except (ValueError, OverflowError):
-            self._refuse("an escaped character is none of Unicode")
+            self._refuse("an escaped character does not exist in Unicode")
         return parts
 
     def _refuse(self, reason: str) -> None:

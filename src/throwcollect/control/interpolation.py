@@ -19,7 +19,7 @@ from throwcollect.control.waypoints import CUBIC, LINE, QUINTIC, Waypoints
 class Curve:
     """Positions, velocities and accelerations over time; after the last knot its values are held.
 
-    Coefficients are those of ascending powers of the share of the segment that has passed, one array
+    Coefficients belong to ascending powers of the share of the segment that has passed, one array
     ``(n_knots, n_joints)`` for each power.
 
     Attributes:

@@ -34,7 +34,7 @@ class Constraints:
     Attributes:
         goal_time: How long after the trajectory's end the goal may still be reached [s]; 0 waits for ever.
         stopped_velocity_tolerance: Largest velocity error at the end [rad/s]. It has no effect: a controller that
-            commands positions alone has no velocity error. Clients can set it all the same.
+            commands positions alone has no velocity error. Clients can still set it.
         decelerate_on_cancel: Whether joints brake when they are stopped, instead of being held where they are. Then
             velocities are measured, and every joint has a deceleration.
         joints: Tolerances of each joint; a joint that is absent is not checked.

@@ -29,7 +29,7 @@ class Grid:
         self.end_index = first_index_at(curve.end_ns - origin_ns, step_ns)
         self._block_start = 0
         self._block = np.empty((0, 0))
-        # A clock that stands still never gets to the end, so its last position is that of the origin.
+        # A clock that stands still never gets to the end, so its last position is the position at the origin.
         self._last = self._compute(self.end_index if step_ns else 0, 1)[0]
 
     def time_ns(self, index: int) -> int:

@@ -47,7 +47,7 @@ class TrialCollection:
     Attributes:
         writer: The dataset that is filled.
         warn: Called with a warning when a trial goes to another simulation; the coordinator's node sets it to its log.
-        on_change: Called when the trials of simulations may have changed: the plan has grown, or no further trial shall
+        on_change: Called when the trials of simulations may have changed: the plan has grown, or no further trial may
             begin.
     """
 
@@ -190,7 +190,8 @@ class TrialCollection:
     def take_in(self, simulation: str, delivery: Delivery, token: str = "") -> bool:
         """Take in an episode, which `write_one` writes later; refuse one that is not what was asked for.
 
-        The simulation that has handed it over must hold its trial. `token` is that of the lease; empty without a lease.
+        The simulation that has handed it over must hold its trial. `token` is the token of the lease; empty if there
+        was none.
 
         Returns:
             Whether it was taken in.
@@ -352,7 +353,7 @@ class TrialCollection:
         if wrong is None:
             return False
         count = format_count(wrong.episodes, "episode")
-        say(f"plans trials from {wrong.first} on anew, as trials that were lost have results now: {count} removed")
+        say(f"plans trials from {wrong.first} on again, as trials that were lost have results now; {count} removed")
         self.writer.cut(wrong.first)
         return True
 

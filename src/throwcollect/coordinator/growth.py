@@ -42,7 +42,7 @@ class Growth:
     that it depends on. If all were known, other versions of libraries make the difference, and the round stays.
 
     Args:
-        plan: The plan as it is by now.
+        plan: The plan so far.
         lost: Trials that were lost in an earlier collection.
 
     Raises:

@@ -190,7 +190,7 @@ def check_room(directory: Path, trials: int) -> None:
     Raises:
         ConfigError: If it is too large.
     """
-    # The directory need not exist yet, so its disk is that of the nearest one above it that does.
+    # The directory need not exist yet, so ask about the disk of the nearest directory above it that does.
     parent = next(path for path in (directory, *directory.absolute().parents) if path.is_dir())
     least, free = trials * _LEAST_BYTES, shutil.disk_usage(parent).free
     if free < least:

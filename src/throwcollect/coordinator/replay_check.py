@@ -40,7 +40,7 @@ class ReplayCheck:
         self._early: _Process | None = None
 
     def begin(self, trials: Sequence[int]) -> None:
-        """Start to simulate those of the plan's trials that will be chosen if all of them get an episode.
+        """Start to simulate the trials that will be chosen if all of these, the trials of the plan, get an episode.
 
         Raises:
             OSError: If no process can be started.

@@ -295,7 +295,7 @@ def _extend(directory: Path, old: Plan | None, new: Plan) -> Plan:
             expected=f"{len(old.trials)}, as {directory} was begun with",
             hint="sobol and uniform go on where they ended; or merge datasets: throwcollect dataset merge",
         )
-    # A plan that grows is drawn anew up to its first rounds only. What results have added is kept.
+    # Of a plan that grows, only the first rounds are drawn again. What results have added is kept.
     if count < len(old.trials):
         trials = new.trials[:]
         trials.extend(old.trials[count:])

@@ -101,7 +101,7 @@ class SimulationClient:
         """
         if not self.unanswered or time.monotonic() < self._sent_at + self._patience_s:
             return None
-        # A simulation that was frozen for a while shall not find a pile of requests.
+        # A simulation that was frozen for a while must not find a pile of requests.
         self._patience_s *= 2
         self._leases = {trial: self._make_lease(self.namespace, trial) for trial in self._leases}
         self._send()

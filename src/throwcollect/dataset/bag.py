@@ -78,7 +78,7 @@ def bag_information(
             }
             for channel in channels
         ],
-        # This means rosbag2's own compression, of messages or files, and not that of the chunks in MCAP files.
+        # This means rosbag2's own compression, of messages or files, and not the compression of chunks in MCAP files.
         "compression_format": "",
         "compression_mode": "",
         "relative_file_paths": [file.path for file in files],

@@ -104,8 +104,8 @@ class StoredEpisode:
         """Make the episode of some chunks and of the Metadata record `facts` behind them, whose contents are `stated`.
 
         Raises:
-            DatasetError: If the metadata are not those of an episode with so many chunks; the contents of the chunks
-                are not looked at.
+            DatasetError: If the metadata are not those of an episode with this number of chunks; the contents of the
+                chunks are not looked at.
         """
         hashes = [stated.get("records_sha256", ""), *stated.get(SENSORS_SHA256, "").split()]
         episode = make_episode(stated.get("header", ""), hashes, [Chunk.parse(each.record.data) for each in chunks])

@@ -102,7 +102,7 @@ class Dataset(Sequence[Throw]):
         A column is an array with one value a throw; a number that is missing is NaN, a text None.
 
         Raises:
-            IndexError: If there are not so many throws.
+            IndexError: If there is no throw at this position.
             ConfigError: If there is no such column; it is also a `KeyError`.
             TypeError: If it is none of these.
         """

@@ -1,4 +1,4 @@
-"""Writes the files of a dataset anew that follow from the others: table of throws, manifest, metadata and data card."""
+"""Writes again those files of a dataset that follow from others: table of throws, manifest, metadata and data card."""
 
 from __future__ import annotations
 
@@ -108,7 +108,7 @@ def _read_plan(directory: Path, config: Config, repair: str) -> Plan:
 
     Raises:
         DatasetError: If it is missing or damaged; its hint is to repair the dataset, which makes the plan again.
-        ForeignPlanError: If it is that of another configuration.
+        ForeignPlanError: If it is the plan of another configuration.
     """
     try:
         return Plan.read(directory / PLAN, config)

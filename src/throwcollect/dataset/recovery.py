@@ -169,7 +169,7 @@ def find_episodes(path: Path, plan: Plan, channels: Channels | None = None) -> d
     Args:
         path: The file; if it is missing, it has none.
         plan: The trials; episodes of others, and of refused ones, are left out.
-        channels: What is recorded; None if nobody has to append to the file, and then channels are not compared.
+        channels: What is recorded; None if the file is only read, and then channels are not compared.
 
     Raises:
         DatasetError: If the file cannot be read.

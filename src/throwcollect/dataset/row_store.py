@@ -1,4 +1,4 @@
-"""Keeps rows of the table of throws on disk until it is written, as those of a million trials fill half a gigabyte."""
+"""Keeps rows of the table of throws on disk until it is written, as a million rows fill half a gigabyte of memory."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class _NamelessFile:
         self._map: mmap.mmap | None = None
 
     def append(self, parts: Iterable[pa.Buffer]) -> _Place:
-        """Append bytes, those of each part right behind those of the one before.
+        """Append the bytes of some parts, each right behind the one before.
 
         Raises:
             DatasetError: If they cannot be written.

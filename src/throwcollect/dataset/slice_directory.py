@@ -1,6 +1,6 @@
 """Directories of the slices of a dataset while many tasks collect it, and how the files of a slice appear all at once.
 
-A slice is collected as a dataset of its own, in a directory that nobody else uses: that of an **attempt**. When it is
+A slice is collected as a dataset of its own, in a directory that nobody else uses, called an **attempt**. When it is
 finished, its recordings, its table and its manifest go to the directory of the slice by one rename, which succeeds for
 one attempt alone. So nothing has to be locked, and an attempt that seemed dead, or was started twice, does no harm, as
 it would put the same bytes there::
@@ -29,7 +29,7 @@ from throwcollect.files import unreadable, unwritable
 from throwcollect.sweep.slice import Slice
 
 SLICES = "slices"
-"""Name of the directory of slices in that of a dataset."""
+"""Name of the directory of slices, inside the directory of a dataset."""
 
 _UNFINISHED = f"{SHARD_SUFFIX}.part"
 _STOPPED = "stopped"

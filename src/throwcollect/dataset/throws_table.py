@@ -188,8 +188,8 @@ def read_throws_table(path: Path, plan: Plan) -> pa.Table:
 class RowsByTrial(Mapping[int, Row]):
     """The rows of a table of throws, by trial; rows without a trial are left out.
 
-    Only a piece of the table at a time is made into rows, which take ten times its memory: those of a million throws
-    would take 3 GB.
+    Only a piece of the table at a time is made into rows, which take ten times its memory: a million rows would take
+    3 GB.
     """
 
     def __init__(self, table: pa.Table) -> None:

@@ -61,7 +61,7 @@ class Trajectories:
 
         Raises:
             KeyError: If the column was not read.
-            IndexError: If there are not so many throws.
+            IndexError: If there is no throw at this position.
         """
         if isinstance(which, str):
             return self.columns[which]

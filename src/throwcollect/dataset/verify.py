@@ -101,7 +101,7 @@ def verify(
     findings += [finding for check in checks.values() for finding in check.findings]
     if bag is not None:
         findings += _find_bag_problems(bag, checks)
-        # Targets are part of the digest, and only the plan has those of a list.
+        # Targets are part of the digest, and the targets of a list are only in the plan.
         if tables.plan is not None or not (directory / TRIALS).exists():
             findings += _find_digest_problems(bag, tables, checks)
     findings += _find_stray_files(directory, checks)
@@ -199,10 +199,10 @@ def _trials_by_file(directory: Path, tables: Tables) -> dict[str, list[int]] | N
         return None
     names, expected = _list_shards(directory), dict[str, list[int]]()
     refused = tables.plan.trials.refused
-    # The table may have rows of trials that the plan has not, and lack others.
+    # The table may have rows of trials that the plan does not have, and lack others.
     for trial in sorted({*range(len(tables.plan.trials)), *tables.rows}):
         name, row = shard_of(tables.plan, trial), tables.rows.get(trial)
-        # If the row of a trial is missing, its episode is most likely in its file all the same.
+        # If the row of a trial is missing, its episode is most likely in its file nevertheless.
         if (trial not in refused and name in names) if row is None else row["shard"] == name:
             expected.setdefault(name, []).append(trial)
     return expected

@@ -170,7 +170,7 @@ def _find_row_problems(expected: Mapping[str, Any], row: Mapping[str, Any]) -> I
             f"{name} = {row[name]!r}, the episode gives {expected[name]!r}" for name in wrong[:_MOST_NAMED]
         )
         more = f"; {len(wrong) - _MOST_NAMED} more columns differ" if len(wrong) > _MOST_NAMED else ""
-        hint = "; to have it judged anew: throwcollect dataset rebuild" if "outcome" in wrong else ""
+        hint = "; to judge it again: throwcollect dataset rebuild" if "outcome" in wrong else ""
         yield f"throws.parquet has {told}{more}{hint}"
 
 

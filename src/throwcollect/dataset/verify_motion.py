@@ -102,7 +102,7 @@ def find_ball_problems(trial: RecordedTrial) -> Iterator[str]:
     """Find what the ball cannot have done, given its contacts.
 
     From one sample to the next, the motion of a ball that nothing touches follows from the physics, bit for bit but for
-    rounding; that of a ball that something presses on does not.
+    rounding; the motion of a ball that something presses on does not.
 
     Yields:
         What is wrong, a sentence each.

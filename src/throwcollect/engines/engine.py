@@ -42,7 +42,7 @@ class BodyState:
     """A body at one instant.
 
     Attributes:
-        position: Its origin in world [m]; that of the ball is its centre.
+        position: Its origin in world [m]; the origin of the ball is its centre.
         orientation_xyzw: Unit quaternion, body to world.
         linear_velocity: In world [m/s].
         angular_velocity: In world [rad/s].
@@ -161,7 +161,7 @@ class Observer:
 
         Args:
             step: Number of the first step in which they do.
-            bodies: Their names: that of the tool, `GROUND`, a link of the robot, or ``body/link`` of an added body.
+            bodies: Their names: the tool, `GROUND`, a link of the robot, or ``body/link`` of an added body.
         """
 
     def on_sample(self, step: int, sample: Sample) -> bool:

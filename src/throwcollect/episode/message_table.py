@@ -78,7 +78,7 @@ class RowLayout:
         columns: Place of each channel's record in a row, by the channel's number.
 
     Raises:
-        DatasetError: If the contents cannot be so many rows, or the first one is not one message per channel.
+        DatasetError: If the contents cannot be this number of rows, or the first row is not one message per channel.
     """
 
     def __init__(self, contents: bytes | bytearray | memoryview, samples: int) -> None:

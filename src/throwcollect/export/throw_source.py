@@ -149,7 +149,7 @@ def _list_entries(dataset: Dataset, rate_hz: int) -> dict[str, tuple[ExportableT
         if row["shard"] is not None:
             count = count_resampled(row["samples"], recorded_hz=dataset.config.record.rate_hz, rate_hz=rate_hz)
             entry = ExportableThrow(row["trial"], count, row["outcome"] == dataset.config.task.success)
-            # The name becomes that of a file of the export, so it must lead nowhere else.
+            # The name becomes the name of a file of the export, so it must not lead to another directory.
             shards.setdefault(Path(row["shard"]).stem, []).append(entry)
     return {shard: tuple(entries) for shard, entries in shards.items()}
 

@@ -67,7 +67,7 @@ def print_summary(found: Info, directory: Path | None, *, as_json: bool) -> None
 
 
 def describe(found: Info) -> str:
-    """Put the summary of a dataset into words, one fact a line; that of a run also says if anybody could join it."""
+    """Put the summary of a dataset into words, one fact a line; a run's summary also says if anybody could join it."""
     from throwcollect.runs.run_record import Summary
 
     outcomes = ", ".join(f"{count} {outcome}" for outcome, count in found.outcomes.items())

@@ -108,7 +108,7 @@ class BallisticEngine(Engine):
         for number, (position, velocity, touching) in enumerate(self._path(steps), start=1):
             self._joints, self._velocities = steps.targets[number], steps.velocities[number - 1]
             self._position, self._velocity, self._touching = position, velocity, touching
-            # Observers hear of changes only, also from engines with contacts.
+            # Every engine tells observers only of changes.
             if touching != self._told:
                 self._told = touching
                 observer.on_touch(number, touching)

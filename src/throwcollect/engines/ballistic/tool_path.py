@@ -22,7 +22,7 @@ class _Joint:
     """One joint between base and tool.
 
     Attributes:
-        turn: Orientation of its frame in that of the link before, shape ``(3, 3)``.
+        turn: Orientation of its frame in the frame of the link before, shape ``(3, 3)``.
         place: Origin of its frame there [m], shape ``(3, 1)``.
         axis: Unit vector that it turns about, in its frame.
         column: Column of the commands that it follows; None if it is fixed.

@@ -70,7 +70,7 @@ def load_scenery(client: int, scene: Scene) -> Scenery:
     names = {(ground, BASE): GROUND, (robot, BASE): root}
     for number in links(client, robot)[1:]:
         info = pybullet.getJointInfo(robot, number, physicsClientId=client)
-        # Field 1 is the name of the joint, field 12 that of the link which it moves.
+        # Field 1 is the name of the joint, field 12 the name of the link that it moves.
         joints[info[1].decode()] = number
         names[robot, number] = info[12].decode()
     tool = next(link for (_, link), name in names.items() if name == scene.tool.link)

@@ -22,7 +22,7 @@ class _Added:
 
     Attributes:
         model: Its model.
-        links: Names of its links; that of the root comes first.
+        links: Names of its links; the root link comes first.
         state: The state that it was last put into.
     """
 

@@ -90,7 +90,7 @@ def test_rebuild_says_what_is_judged_otherwise(run: Run, source: Path, capsys: p
 
     misjudge(2)
     assert run("dataset", "verify", source) == 4
-    assert "trial 1: throws.parquet has outcome = 'dropped', the episode gives 'landed'; to have it judged anew: " in (
+    assert "trial 1: throws.parquet has outcome = 'dropped', the episode gives 'landed'; to judge it again: " in (
         capsys.readouterr().out
     )
     assert run("dataset", "rebuild", source) == 0
