@@ -110,7 +110,7 @@ def make_row(run: ClusterRun, look: SlicesLook) -> tuple[str, ...]:
         "slurm",
         str(look.running * run.simulations_per_task),
         f"{ProgressOfSlices(run).at(look).ended}/{run.trials}",
-        _status(look, run),
+        _describe_status(look, run),
         str(run.directory),
     )
 
@@ -133,7 +133,7 @@ def _number_of(run: ClusterRun) -> str:
     return run.submission.jobs[-1].array or run.submission.jobs[-1].join
 
 
-def _status(look: SlicesLook, run: ClusterRun) -> str:
+def _describe_status(look: SlicesLook, run: ClusterRun) -> str:
     if run.submission.live:
         return f"one run on {format_count(run.submission.tasks, 'node')}, {'running' if look.running else 'waiting'}"
     tasks = format_count(run.submission.tasks, "task")

@@ -90,7 +90,7 @@ def fit(
     folds = trained.folds_error.items()
     errors = ", ".join(f"degree {degree}: {tell_length(error, model.targets)}" for degree, error in folds)
     typer.echo(f"error for throws that it was not fitted to, in simulation, median: {errors}")
-    typer.echo(f"model: {output}\naim with it: {command('aim', output, '--at', _example(model))}")
+    typer.echo(f"model: {output}\naim with it: {command('aim', output, '--at', _write_example(model))}")
 
 
 def aim(
@@ -123,14 +123,16 @@ def aim(
         given += read_targets(targets, names, load_config(directory / CONFIG).task)
     if not given:
         raise ConfigError(
-            "no target", expected="--at, or --targets FILE", hint=command("aim", directory, "--at", _example(model))
+            "no target",
+            expected="--at, or --targets FILE",
+            hint=command("aim", directory, "--at", _write_example(model)),
         )
     aims = model.aim(given, choose=choose)
     if output is not None:
         task = load_config(directory / CONFIG).task
         write_aims(output, aims, names, task)
     if json:
-        print_json([_aim_as_json(aim) for aim in aims])
+        print_json([_make_aim_document(aim) for aim in aims])
     elif output is not None:
         typer.echo(f"{output}: {format_count(len(aims), task.noun)}")
     else:
@@ -274,7 +276,7 @@ def _split(names: str | None) -> tuple[str, ...]:
     return tuple(name.strip() for name in names.split(",")) if names else ()
 
 
-def _example(model: Model) -> str:
+def _write_example(model: Model) -> str:
     middle = model.learned.outputs[len(model.learned.outputs) // 2]
     given = [axis.nominal for axis in model.learned.axes if axis.key in model.given]
     return ",".join(f"{value:.2f}" for value in (*middle.tolist(), *given))
@@ -334,7 +336,7 @@ def _tell_out_of_reach(model: Model, aims: Sequence[Aim]) -> None:
         tell(f"and {len(far) - _MOST_TOLD} more; {len(far)} of {len(aims)} targets are out of reach")
 
 
-def _aim_as_json(aim: Aim) -> dict[str, object]:
+def _make_aim_document(aim: Aim) -> dict[str, object]:
     return {
         "target": aim.target.tolist(),
         "parameters": aim.parameters,
@@ -349,18 +351,18 @@ def _describe_score(score: Score) -> list[str]:
         f"throws at {format_count(score.targets, 'target')} for each of {format_count(score.seeds, 'seed')}, medians "
         "of the seeds, in simulation: median, 9 of 10 below, largest; not landed"
     ]
-    lines += [f"  learned from {each.trained_on:5} throws:  {_error_cells(each.errors)}" for each in score.trained]
+    lines += [f"  learned from {each.trained_on:5} throws:  {_format_errors(each.errors)}" for each in score.trained]
     if score.distilled is not None:
-        lines.append(f"  model.onnx of these:        {_error_cells(score.distilled)}")
+        lines.append(f"  model.onnx of these:        {_format_errors(score.distilled)}")
     if score.adapted:
         lines.append("in the other world, by the number of throws there:")
         lines += [
-            f"  {each.real_throws:3} ({each.method.value}):  {_error_cells(each.errors)}" for each in score.adapted
+            f"  {each.real_throws:3} ({each.method.value}):  {_format_errors(each.errors)}" for each in score.adapted
         ]
     return lines
 
 
-def _error_cells(errors: Errors) -> str:
+def _format_errors(errors: Errors) -> str:
     from throwcollect.learning.score import tell_misses
 
     return "  ".join([*(f"{cell:>8}" for cell in tell_misses(errors)), str(errors.missed)])

@@ -57,10 +57,10 @@ def ps(
         # Times are written as in events.
         print_json(documents, default=lambda time: time.isoformat(timespec="milliseconds"))
         return
-    rows = [(_make_row(run), _node_lines(run, held.get(run.id))) for run in shown]
+    rows = [(_make_row(run), _list_node_lines(run, held.get(run.id))) for run in shown]
     rows += [(_make_unrecorded_row(*each), _list_held_nodes(*each)) for each in unrecorded]
     rows += [(row, []) for row in cluster_runs.list_queued(cluster_runs.make_row)]
-    for line in _table(rows):
+    for line in _make_table(rows):
         typer.echo(line)
 
 
@@ -224,17 +224,17 @@ def _make_row(run: Run) -> tuple[str, ...]:
     throws = f"{record.progress.ended}/{record.progress.total}" if record.progress is not None else "-"
     dataset = run.place.dataset if record.kind == "collection" else "-"
     simulations = "-" if record.kind == "container" else str(record.simulations)
-    return run.id, record.runtime, simulations, throws, _status(run, record), dataset
+    return run.id, record.runtime, simulations, throws, _describe_status(run, record), dataset
 
 
-def _status(run: Run, record: RunRecord) -> str:
+def _describe_status(run: Run, record: RunRecord) -> str:
     if record.ended is not None:
-        return f"{run.status} {_age(record.ended)} ago, exit code {record.exit_code}"
+        return f"{run.status} {_format_age(record.ended)} ago, exit code {record.exit_code}"
     if run.lives and record.planning is not None:
         plan = record.planning
-        return f"planning for {_age(record.started)}, {plan.checked} of {plan.trials} trials checked"
+        return f"planning for {_format_age(record.started)}, {plan.checked} of {plan.trials} trials checked"
     if run.lives:
-        return f"running for {_age(record.started)}"
+        return f"running for {_format_age(record.started)}"
     from throwcollect.runs.run_selection import has_complete_dataset
 
     return f"{run.status}, but the dataset is complete" if has_complete_dataset(run) else run.status
@@ -245,14 +245,14 @@ def _make_unrecorded_row(runtime: str, held: HeldRun) -> tuple[str, ...]:
     return held.run_id, runtime, str(simulations), "-", "unrecorded", held.source
 
 
-def _node_lines(run: Run, held: tuple[str, HeldRun] | None) -> list[tuple[str, ...]]:
+def _list_node_lines(run: Run, held: tuple[str, HeldRun] | None) -> list[tuple[str, ...]]:
     if run.status == "running":
-        return [_node_line(node, _handle(run.record.runtime)) for node in run.record.nodes]
+        return [_make_node_line(node, _handle(run.record.runtime)) for node in run.record.nodes]
     # If the launcher has ended, its record of the nodes may be out of date.
     return _list_held_nodes(*held) if held is not None else []
 
 
-def _node_line(node: NodeState, handle: str) -> tuple[str, ...]:
+def _make_node_line(node: NodeState, handle: str) -> tuple[str, ...]:
     again = format_count(node.restarts, "restart") if node.restarts else ""
     return (
         node.name,
@@ -277,7 +277,7 @@ def _handle(name: str) -> str:
         return Runtime.handle
 
 
-def _table(rows: Sequence[tuple[tuple[str, ...], list[tuple[str, ...]]]]) -> Iterable[str]:
+def _make_table(rows: Sequence[tuple[tuple[str, ...], list[tuple[str, ...]]]]) -> Iterable[str]:
     """Format runs as one table, with the nodes of each run below it, indented."""
     runs = _align([_HEADINGS, *(run for run, _ in rows)])
     nodes = iter(_align([line for _, lines in rows for line in lines]))
@@ -293,7 +293,7 @@ def _align(rows: Sequence[Sequence[str]]) -> list[str]:
     return ["  ".join(map(str.ljust, row, widths)).rstrip() for row in rows]
 
 
-def _age(since: datetime) -> str:
+def _format_age(since: datetime) -> str:
     """Write the time since an instant, in its largest unit."""
     seconds = max(0, int((datetime.now(timezone.utc) - since).total_seconds()))
     return next((f"{seconds // size} {unit}" for unit, size in _UNITS if seconds >= size), "0 s")

@@ -106,20 +106,20 @@ def ensure_written(*, reader_may_leave: bool = False, hint: str | None = None) -
         ReaderGone: If the reader has ended, and the command should end with it.
     """
     sys.stdout.flush()
-    stream = _standard_output()
+    stream = _find_standard_output()
     if stream is None or stream.failure is None or stream.kind == "log":
         return
     if not (reader_may_leave and stream.reader_is_gone):
         raise OutputError(f"the output cannot be written: {stream.failure.strerror}", hint=hint)
 
 
-def _standard_output() -> _Stream | None:
+def _find_standard_output() -> _Stream | None:
     raw = getattr(getattr(sys.stdout, "buffer", None), "raw", None)
     return raw if isinstance(raw, _Stream) else None
 
 
 def _set_kind(kind: Literal["lines", "log"]) -> None:
-    if (stream := _standard_output()) is not None:
+    if (stream := _find_standard_output()) is not None:
         stream.kind = kind
 
 

@@ -106,7 +106,7 @@ class ClusterRun:
         ended: dict[int | None, ArrayTask] = {}
         for job in self.submission.jobs:
             ended |= slurm.find_ended(job.array) if job.array else {}
-        reasons = [self._reason(each, ended.get(each.index)) for each in missing[:_MOST_NAMED]]
+        reasons = [self._explain_slice(each, ended.get(each.index)) for each in missing[:_MOST_NAMED]]
         more = f" and {len(missing) - _MOST_NAMED} more" if len(missing) > _MOST_NAMED else ""
         message = f"{format_count(len(missing), 'slice')} of {self.submission.tasks} not collected: "
         if all(self._is_cancelled(each, ended.get(each.index)) for each in missing):
@@ -140,7 +140,7 @@ class ClusterRun:
         # Slurm forgets tasks that were cancelled before they began.
         return self.log(slice.index) is None if task is None else task.state == "CANCELLED"
 
-    def _reason(self, slice: Slice, task: ArrayTask | None) -> str:
+    def _explain_slice(self, slice: Slice, task: ArrayTask | None) -> str:
         if task is None:
             return f"{slice.index}"
         if task.saw_no_directory:

@@ -48,7 +48,7 @@ _REFUSED = {
 }
 
 
-def _size(text: str) -> str:
+def _check_size(text: str) -> str:
     match = re.fullmatch(r"([1-9][0-9]{0,17})([bkmg]?)", text)
     if match is None or int(match[1]) * _SIZE_UNITS[match[2]] < _LEAST_MEMORY:
         raise ValueError(f"should be a size of 6m or more, such as 512m or 2g, got '{text}'")
@@ -61,7 +61,7 @@ def _is_own_path(text: str) -> bool:
     return any(PurePosixPath(own) in (path, *path.parents) for own in _OWN_DIRECTORIES)
 
 
-def _mount(text: str) -> str:
+def _check_mount(text: str) -> str:
     source, _, rest = text.partition(":")
     target, _, mode = rest.partition(":")
     # With `..` in it, the path that is checked would not be the one that is mounted.
@@ -76,13 +76,13 @@ def _mount(text: str) -> str:
     return text
 
 
-def _network(text: str) -> str:
+def _check_network(text: str) -> str:
     if text in ("host", "none") or text.startswith("container:"):
         raise ValueError(f"{text} is refused; name a network of the engine, which is joined besides the run's own")
     return text
 
 
-def _variable(text: str) -> str:
+def _check_variable(text: str) -> str:
     if text in _OWN_VARIABLES:
         raise ValueError(_LAUNCHER)
     if not re.fullmatch(r"[A-Za-z_][A-Za-z0-9_]*", text):
@@ -90,26 +90,26 @@ def _variable(text: str) -> str:
     return text
 
 
-def _port(text: str) -> str:
+def _check_port(text: str) -> str:
     match = re.fullmatch(r"([1-9][0-9]{0,4})(/tcp|/udp)?", text)
     if match is None or int(match[1]) > 65535:
         raise ValueError("should be a port of the container from 1 to 65535, with /udp if it is not TCP")
     return text
 
 
-def _label(text: str) -> str:
+def _check_label(text: str) -> str:
     if text.startswith(_LABELS):
         raise ValueError(f"is refused, as labels that begin with {_LABELS} are the launcher's")
     return text
 
 
-def _tmpfs(text: str) -> str:
+def _check_tmpfs(text: str) -> str:
     if not text.startswith("/") or ".." in text.split("/") or normal_path(text) == "/" or _is_own_path(text):
         raise ValueError("should be an absolute path in the container, outside of /data and /key")
     return text
 
 
-def _device(text: str) -> str:
+def _check_device(text: str) -> str:
     host, _, rest = text.partition(":")
     inside, _, permissions = rest.partition(":")
     if not inside.startswith("/dev/") or ".." in inside.split("/") or permissions not in ("r", "w", "rw"):
@@ -119,24 +119,24 @@ def _device(text: str) -> str:
     return text
 
 
-Size = Annotated[str, AfterValidator(_size), in_words("a size such as 512m or 2g")]
+Size = Annotated[str, AfterValidator(_check_size), in_words("a size such as 512m or 2g")]
 Cores = Annotated[
     str,
     NUMBER_AS_TEXT,
     match(r"\d+(-\d+)?(,\d+(-\d+)?)*", "numbers and ranges of cores, such as 0-3,6"),
     in_words("cores such as 0-3,6"),
 ]
-Mount = Annotated[str, AfterValidator(_mount), in_words("HOST:CONTAINER[:ro]")]
-Network = Annotated[str, AfterValidator(_network), in_words("names of networks")]
+Mount = Annotated[str, AfterValidator(_check_mount), in_words("HOST:CONTAINER[:ro]")]
+Network = Annotated[str, AfterValidator(_check_network), in_words("names of networks")]
 Volume = Annotated[
     str,
     match(r"[a-zA-Z0-9][a-zA-Z0-9_.-]+", "a volume's name: letters, digits, _, . and -"),
     in_words("a volume's name"),
 ]
-Variable = Annotated[str, AfterValidator(_variable)]
-ContainerPort = Annotated[str, AfterValidator(_port)]
+Variable = Annotated[str, AfterValidator(_check_variable)]
+ContainerPort = Annotated[str, AfterValidator(_check_port)]
 HostPort = Annotated[int, Field(ge=1, le=65535)]
-Device = Annotated[str, AfterValidator(_device), in_words("HOST:CONTAINER:PERMISSIONS")]
+Device = Annotated[str, AfterValidator(_check_device), in_words("HOST:CONTAINER:PERMISSIONS")]
 
 _OPTIONAL_KEYS = ConfigDict(extra="forbid", use_attribute_docstrings=True)
 
@@ -174,13 +174,13 @@ class ContainerOptions(TypedDict, total=False):
     """Options of the resolver."""
     extra_hosts: dict[str, str]
     """Further host names and their addresses."""
-    labels: dict[Annotated[str, AfterValidator(_label)], str]
+    labels: dict[Annotated[str, AfterValidator(_check_label)], str]
     """Further labels."""
     group_add: list[str | int]
     """Further groups of the process."""
     shm_size: Size
     """Size of /dev/shm."""
-    tmpfs: dict[Annotated[str, AfterValidator(_tmpfs)], str]
+    tmpfs: dict[Annotated[str, AfterValidator(_check_tmpfs)], str]
     """Further directories in memory and their mount options; options for /tmp are added to those that it has anyway."""
     ulimits: dict[str, int]
     """Resource limits by their names, such as `nofile`."""

@@ -52,7 +52,7 @@ class Document:
         self._in_file = True
         self._lines: dict[Location, int | None] = {}
         try:
-            node = compose(_text_of(path))
+            node = compose(_read_text(path))
         except YAMLError as error:
             raise ConfigError([Problem(f"not valid YAML: {reason(error)}", path=path, line=line(error))]) from error
         if node is None:
@@ -60,7 +60,7 @@ class Document:
         if not isinstance(node, MappingNode):
             problem = Problem("the file should hold keys and values", path=path, line=node.start_mark.line + 1)
             raise ConfigError([problem], expected="keys such as task and sweep")
-        values = self._plain(node, ())
+        values = self._make_plain(node, ())
         if not isinstance(values, dict):
             raise ConfigError(self.problems)
         self.values = values
@@ -80,10 +80,10 @@ class Document:
             return problem
         location: Location = ()
         holder: Any = self.values
-        for part in _parts(problem.key):
-            index = _index(holder, part)
+        for part in _split_key(problem.key):
+            index = _read_index(holder, part)
             location = (*location, index)
-            holder = holder[index] if _holds(holder, index) else None
+            holder = holder[index] if _has_item(holder, index) else None
         return self.problem(location, problem.message)
 
     def override(
@@ -106,35 +106,35 @@ class Document:
         except YAMLError as error:
             self.problems.append(Problem(f"not valid YAML: {reason(error)}; got {quote(text)}", key))
             return
-        *above, last = _parts(key)
+        *above, last = _split_key(key)
         if len(above) >= MOST_LEVELS:
             self.problems.append(Problem("the key is nested too deeply", key))
             return
         holder: Any = self.values
         location: Location = ()
         for part in above:
-            index = _index(holder, part)
+            index = _read_index(holder, part)
             location = (*location, index)
             # A mapping that the file leaves out gets its default, so that the override changes only one key of it.
             if isinstance(holder, dict) and holder.get(part) is None:
                 holder[part] = dict(find_default(location))
                 self._lines[location] = None
-            holder = holder[index] if _holds(holder, index) else None
-        index = _index(holder, last)
-        if not isinstance(holder, dict) and not _holds(holder, index):
+            holder = holder[index] if _has_item(holder, index) else None
+        index = _read_index(holder, last)
+        if not isinstance(holder, dict) and not _has_item(holder, index):
             self.problems.append(Problem(f"nothing of this name can be set; got {quote(text)}", key))
             return
         location = (*location, index)
         # The override replaces these values, so they do not stand in lines of the file any more.
         self._lines = {known: line for known, line in self._lines.items() if known[: len(location)] != location}
         self._lines[location] = None
-        holder[index] = self._plain(node, location)
+        holder[index] = self._make_plain(node, location)
 
     def is_overridden(self, location: Location) -> bool:
         """Whether an override has given the value at a location."""
         return self._lines.get(location, 0) is None
 
-    def _plain(self, node: Node | None, location: Location, inside: tuple[Node, ...] = ()) -> Any:
+    def _make_plain(self, node: Node | None, location: Location, inside: tuple[Node, ...] = ()) -> Any:
         if node is None:
             return None
         self._count += 1
@@ -148,19 +148,19 @@ class Document:
             return self._leave_out(node, location, "values are nested too deeply")
         inside = (*inside, node)
         if isinstance(node, MappingNode) and node.tag == _TAG + "map":
-            return self._mapping(node, location, inside)
+            return self._make_mapping(node, location, inside)
         if isinstance(node, SequenceNode) and node.tag == _TAG + "seq":
             items = []
             for index, item in enumerate(node.value):
-                self._lines[(*location, index)] = self._line(item)
-                items.append(self._plain(item, (*location, index), inside))
+                self._lines[(*location, index)] = self._find_line(item)
+                items.append(self._make_plain(item, (*location, index), inside))
             return items
         try:
-            return _scalar(node)
+            return _read_scalar(node)
         except ValueError as error:
             return self._leave_out(node, location, str(error))
 
-    def _mapping(self, node: MappingNode, location: Location, inside: tuple[Node, ...]) -> dict[str, Any]:
+    def _make_mapping(self, node: MappingNode, location: Location, inside: tuple[Node, ...]) -> dict[str, Any]:
         values: dict[str, Any] = {}
         for key_node, value_node in node.value:
             name = key_node.value
@@ -170,8 +170,8 @@ class Document:
                 first = f", first in line {self._lines[(*location, name)]}" if self._in_file else ""
                 self._note(key_node, (*location, name), f"the key is here twice{first}")
             else:
-                self._lines[(*location, name)] = self._line(key_node)
-                values[name] = self._plain(value_node, (*location, name), inside)
+                self._lines[(*location, name)] = self._find_line(key_node)
+                values[name] = self._make_plain(value_node, (*location, name), inside)
         return values
 
     def _leave_out(self, node: Node, location: Location, sentence: str) -> None:
@@ -180,13 +180,13 @@ class Document:
 
     def _note(self, node: Node, location: Location, sentence: str) -> None:
         path = self._path if self._in_file else None
-        self.problems.append(Problem(sentence, join_key(location), path, self._line(node)))
+        self.problems.append(Problem(sentence, join_key(location), path, self._find_line(node)))
 
-    def _line(self, node: Node) -> int | None:
+    def _find_line(self, node: Node) -> int | None:
         return node.start_mark.line + 1 if self._in_file else None
 
 
-def _text_of(path: Path) -> str:
+def _read_text(path: Path) -> str:
     try:
         if not stat.S_ISREG(kind := path.stat().st_mode):
             # To read a pipe or a device may block for ever.
@@ -214,18 +214,18 @@ def _text_of(path: Path) -> str:
 
 
 @cache
-def _constructor() -> SafeConstructor:
+def _make_constructor() -> SafeConstructor:
     constructor: SafeConstructor = YAML(typ="safe", pure=True).constructor
     return constructor
 
 
-def _scalar(node: Node) -> Any:
+def _read_scalar(node: Node) -> Any:
     """Read a YAML 1.2 scalar; dates and other extensions stay text.
 
     Raises:
         ValueError: If the text does not fit its tag.
     """
-    constructor = _constructor()
+    constructor = _make_constructor()
     readers: dict[str, Callable[[ScalarNode], Any]] = {
         "null": lambda _: None,
         "bool": constructor.construct_yaml_bool,
@@ -246,7 +246,7 @@ def _scalar(node: Node) -> Any:
     return value
 
 
-def _parts(key: str) -> tuple[str, ...]:
+def _split_key(key: str) -> tuple[str, ...]:
     """Split a dotted key, but not the key of a swept parameter in it, which has dots itself."""
     parts = tuple(key.split("."))
     if parts[:2] != _SWEPT or len(parts) < 3:
@@ -258,11 +258,11 @@ def _parts(key: str) -> tuple[str, ...]:
     return (*_SWEPT, ".".join(swept), *field)
 
 
-def _index(holder: Any, part: str) -> str | int:
+def _read_index(holder: Any, part: str) -> str | int:
     return index_or_key(part) if isinstance(holder, list) else part
 
 
-def _holds(holder: Any, index: str | int) -> bool:
+def _has_item(holder: Any, index: str | int) -> bool:
     if isinstance(holder, list):
         return isinstance(index, int) and index < len(holder)
     return isinstance(holder, dict) and index in holder

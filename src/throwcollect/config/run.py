@@ -19,14 +19,14 @@ else:
     RuntimeName = Literal[("auto", *names_of("runtimes"))]
 
 
-def _listen_address(text: str) -> str:
+def _check_listen_address(text: str) -> str:
     found = re.fullmatch(r"tcp/(\[[0-9a-fA-F:.]+\]|[A-Za-z0-9.-]+):([1-9][0-9]{0,4})", text)
     if found is None or int(found[2]) > 65535:
         raise ValueError(f"should be tcp/ADDRESS:PORT, such as tcp/0.0.0.0:7447, got '{text}'")
     return text
 
 
-ListenAddress = Annotated[str, AfterValidator(_listen_address), in_words("tcp/ADDRESS:PORT")]
+ListenAddress = Annotated[str, AfterValidator(_check_listen_address), in_words("tcp/ADDRESS:PORT")]
 
 
 class RunConfig(Section):

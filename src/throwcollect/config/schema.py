@@ -39,14 +39,14 @@ __all__ = [
 ]
 
 
-def _sections_of(family: str) -> Any:
+def _make_section_type(family: str) -> Any:
     """Make the type of a key that holds the section of any member of a family; its key `name` says which."""
     sections = {name: load_member(family, name) for name in names_of(family)}
     default = next(iter(sections))
     return any_of(sections, lambda value: value.get("name", default) if isinstance(value, dict) else None)
 
 
-def _untils() -> Any:
+def _make_until_type() -> Any:
     """Make the type of the key `until`, which holds the section `until` of a task; its only key says which."""
     sections: dict[str, type[UntilConfig]] = {}
     for name in names_of("tasks"):
@@ -70,9 +70,9 @@ else:
     # The members are known only when the program runs, so type checkers see their common base instead.
     RobotName = Literal[names_of("robots")]
     EngineName = Literal[names_of("engines")]
-    AnyTool = _sections_of("tools")
-    AnyTask = _sections_of("tasks")
-    AnyUntil = _untils()
+    AnyTool = _make_section_type("tools")
+    AnyTask = _make_section_type("tasks")
+    AnyUntil = _make_until_type()
 
 SLOWEST, FASTEST = 0.001, 1000
 """Bounds of real-time factors: with slower ones, one step of the physics sleeps for minutes or overflows the clock."""

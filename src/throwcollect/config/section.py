@@ -71,11 +71,11 @@ def any_of(sections: Mapping[str, type[Section]], choose: Callable[[Any], Any]) 
     def find_tag(value: Any) -> str | None:
         # Defaults, and sections that are validated again as a part of another, are objects already.
         if isinstance(value, Section):
-            return _tag_of(type(value))
+            return _make_tag(type(value))
         name = choose(value)
-        return _tag_of(sections[name]) if isinstance(name, str) and name in sections else None
+        return _make_tag(sections[name]) if isinstance(name, str) and name in sections else None
 
-    return Annotated[reduce(or_, [Annotated[kind, Tag(_tag_of(kind))] for kind in kinds]), Discriminator(find_tag)]
+    return Annotated[reduce(or_, [Annotated[kind, Tag(_make_tag(kind))] for kind in kinds]), Discriminator(find_tag)]
 
 
 def list_sections(kind: Any) -> Iterator[type[Section]]:
@@ -92,7 +92,7 @@ def list_sections(kind: Any) -> Iterator[type[Section]]:
             yield from list_sections(each)
 
 
-def _tag_of(section: type[Section]) -> str:
+def _make_tag(section: type[Section]) -> str:
     """Name a class by its module, too, as classes of two packages may have one name."""
     return f"{section.__module__}.{section.__name__}"
 

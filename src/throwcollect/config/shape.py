@@ -68,7 +68,7 @@ class ValueShape:
         return ValueShape({})
 
     def __str__(self) -> str:
-        return " or ".join(dict.fromkeys(_in_words(shape) for shape in self.alternatives))
+        return " or ".join(dict.fromkeys(_describe(shape) for shape in self.alternatives))
 
 
 def root() -> ValueShape:
@@ -110,7 +110,7 @@ def _list_words(node: dict[str, Any]) -> list[str]:
     return [node["const"]] if "const" in node else list(node.get("enum", []))
 
 
-def _in_words(shape: ValueShape) -> str:
+def _describe(shape: ValueShape) -> str:
     node = shape.node
     if own := node.get("words"):
         return str(own)
@@ -122,7 +122,7 @@ def _in_words(shape: ValueShape) -> str:
         return " or ".join(listed) if len(listed) < 3 else f"one of {', '.join(listed)}"
     kind = node.get("type", "anything")
     if kind == "array":
-        return f"a list of {_plural(str(shape.child(0)))}"
+        return f"a list of {_make_plural(str(shape.child(0)))}"
     if kind == "object":
         if required := node.get("required"):
             return "{" + ", ".join(f"{key}: …" for key in required) + "}"
@@ -134,11 +134,11 @@ def _in_words(shape: ValueShape) -> str:
         return "null"
     if "pattern" in node:
         return "lower-case letters, digits, - and _, first a letter or digit"
-    bounds = _bounds(node) or (shape.unit and "in")
+    bounds = _describe_bounds(node) or (shape.unit and "in")
     return " ".join(filter(None, [_NOUNS.get(kind, kind), bounds, shape.unit]))
 
 
-def _bounds(node: dict[str, Any]) -> str:
+def _describe_bounds(node: dict[str, Any]) -> str:
     low, above = node.get("minimum"), node.get("exclusiveMinimum")
     high, below = node.get("maximum"), node.get("exclusiveMaximum")
     if high is None and below is not None and node["type"] == "integer":
@@ -154,7 +154,7 @@ def _bounds(node: dict[str, Any]) -> str:
     return " and ".join(filter(None, parts))
 
 
-def _plural(words: str) -> str:
+def _make_plural(words: str) -> str:
     for one, many in (("a joint's name", "joint names"), ("a number", "numbers"), ("one of ", "")):
         if words.startswith(one):
             return many + words.removeprefix(one)

@@ -140,7 +140,7 @@ class JointTrajectoryController:
         Returns:
             None if the goal is accepted; otherwise the reason of the refusal, which the log has too.
         """
-        if reason := self._refusal(goal.trajectory, now_ns):
+        if reason := self._find_refusal(goal.trajectory, now_ns):
             return reason
         self._finish(Decision.invalid("Current goal preempted by new incoming action."))
         self.goal_id = goal_id
@@ -150,7 +150,7 @@ class JointTrajectoryController:
 
     def replace(self, trajectory: Trajectory, now_ns: int) -> TrajectoryRefusal | None:
         """Follow a trajectory from the topic instead of the present one, or refuse it as `submit` refuses a goal."""
-        if reason := self._refusal(trajectory, now_ns):
+        if reason := self._find_refusal(trajectory, now_ns):
             return reason
         if self._topic_aborts_goal:
             self._finish(Decision.invalid("Current goal preempted by a trajectory on the topic."))
@@ -327,7 +327,7 @@ class JointTrajectoryController:
     def _judge_with(self, tolerances: Tolerances) -> Judge:
         return Judge(tolerances, self._parameters.timeout_ns, self._parameters.joints)
 
-    def _refusal(self, trajectory: Trajectory, now_ns: int) -> TrajectoryRefusal | None:
+    def _find_refusal(self, trajectory: Trajectory, now_ns: int) -> TrajectoryRefusal | None:
         if reason := refusal(trajectory, self._parameters, now_ns):
             return self.refuse(reason)
         ahead_ns = (trajectory.stamp_ns or now_ns) - now_ns

@@ -86,10 +86,10 @@ def interpolate(waypoints: Waypoints, start: JointState, start_ns: int) -> Curve
         start_ns: When, since the trajectory's start [ns].
     """
     if start_ns < waypoints.times_ns[0]:
-        waypoints = _lead_in(waypoints, start, start_ns)
+        waypoints = _prepend_start(waypoints, start, start_ns)
     durations_ns = np.append(np.diff(waypoints.times_ns), 1)
     if len(durations_ns) > 1:
-        return _splines(waypoints, durations_ns)
+        return _make_splines(waypoints, durations_ns)
     p, v, a = waypoints.positions, waypoints.velocities, waypoints.accelerations
     return Curve(waypoints.times_ns, durations_ns, p[np.newaxis], v[np.newaxis], a[np.newaxis])
 
@@ -122,7 +122,7 @@ def quintic(
     )
 
 
-def _lead_in(waypoints: Waypoints, start: JointState, start_ns: int) -> Waypoints:
+def _prepend_start(waypoints: Waypoints, start: JointState, start_ns: int) -> Waypoints:
     still = np.zeros_like(start.positions)
     return Waypoints(
         np.concatenate(([start_ns], waypoints.times_ns)),
@@ -133,7 +133,7 @@ def _lead_in(waypoints: Waypoints, start: JointState, start_ns: int) -> Waypoint
     )
 
 
-def _splines(waypoints: Waypoints, durations_ns: NDArray[np.int64]) -> Curve:
+def _make_splines(waypoints: Waypoints, durations_ns: NDArray[np.int64]) -> Curve:
     content = np.minimum(waypoints.content[:-1], waypoints.content[1:])
     seconds = (durations_ns / 1e9)[:, np.newaxis]
     # The highest degree of any segment decides the size of the tables. Lower ones leave their higher coefficients at 0.
@@ -152,15 +152,15 @@ def _splines(waypoints: Waypoints, durations_ns: NDArray[np.int64]) -> Curve:
     if len(quintics):
         d, v, w, a, b = step[quintics], v0[quintics], v1[quintics], a0[quintics], a1[quintics]
         position[1:6, quintics] = quintic(d, v, w, a, b)
-    velocity = _derivative(position, seconds)
-    acceleration = _derivative(velocity, seconds)
+    velocity = _differentiate(position, seconds)
+    acceleration = _differentiate(velocity, seconds)
     # After the end the position is constant, but velocity and acceleration are held at those of the last point, as
     # upstream does.
     velocity[0, -1], acceleration[0, -1] = waypoints.velocities[-1], waypoints.accelerations[-1]
     return Curve(waypoints.times_ns, durations_ns, position, velocity, acceleration)
 
 
-def _derivative(coefficients: NDArray[np.float64], seconds: NDArray[np.float64]) -> NDArray[np.float64]:
+def _differentiate(coefficients: NDArray[np.float64], seconds: NDArray[np.float64]) -> NDArray[np.float64]:
     if len(coefficients) == 1:
         return np.zeros_like(coefficients)
     # The polynomials are in the share of the segment and their derivatives in seconds, so each one is divided once

@@ -66,8 +66,8 @@ def arrange(
     placed = [index for index, point in enumerate(points) if len(point.positions)]
     if placed:
         positions[np.ix_(placed, columns)] = [points[index].positions for index in placed]
-    velocities, moving = _table([point.velocities for point in points], positions.shape, columns)
-    accelerations, accelerating = _table([point.accelerations for point in points], positions.shape, columns)
+    velocities, moving = _make_table([point.velocities for point in points], positions.shape, columns)
+    accelerations, accelerating = _make_table([point.accelerations for point in points], positions.shape, columns)
     content = np.zeros(len(points), np.int64)
     content[moving] = CUBIC
     # Accelerations without velocities do not count, as upstream's quintic needs both.
@@ -76,7 +76,7 @@ def arrange(
     return waypoints if len(placed) == len(points) else _integrate(waypoints, points, columns, start, start_ns)
 
 
-def _table(
+def _make_table(
     fields: Sequence[Values], shape: tuple[int, ...], columns: list[int]
 ) -> tuple[NDArray[np.float64], list[int]]:
     table = np.zeros(shape)

@@ -143,11 +143,11 @@ def feasibility_check(config: Config) -> Check:
     """
     feasibility = Feasibility(config)
     if config.sweep.feasibility == "nominal":
-        return lambda trial: feasibility.check(_with_nominal_robot(trial), trajectory_of(trial))
+        return lambda trial: feasibility.check(_replace_by_nominal_robot(trial), trajectory_of(trial))
     return lambda trial: feasibility.check(trial, trajectory_of(trial))
 
 
-def _with_nominal_robot(config: Config) -> Config:
+def _replace_by_nominal_robot(config: Config) -> Config:
     """Replace all numbers of robot, tool and ball that one has to measure by their defaults."""
     robot, defaults = config.robot, RobotConfig()
     kept = {"name": robot.name, "posture": robot.posture, "locked": robot.locked, "base_height_m": robot.base_height_m}

@@ -118,7 +118,7 @@ class _Process:
 
     def wait(self, meanwhile: Callable[[], None]) -> None:
         """Wait until it has simulated all of them, or ends."""
-        while self._process.poll() is None and _contents(self._stdout).count("\n") < len(self.trials):
+        while self._process.poll() is None and _read_contents(self._stdout).count("\n") < len(self.trials):
             meanwhile()
 
     def end(self) -> None:
@@ -128,8 +128,8 @@ class _Process:
         self.exit_code = self._process.wait()
         if not self._stdout.closed:
             with self._stdout, self._stderr:
-                lines = _contents(self._stdout).splitlines(keepends=True)
-                self.errors = _contents(self._stderr).strip()
+                lines = _read_contents(self._stdout).splitlines(keepends=True)
+                self.errors = _read_contents(self._stderr).strip()
             # The kill may have cut off the last line.
             whole = (json.loads(line) for line in lines if line[-1] == "\n")
             self.digests = {printed["trial"]: printed["digest"] for printed in whole}
@@ -154,6 +154,6 @@ def _simulate(directory: Path, trials: Sequence[int], meanwhile: Callable[[], No
     return process.digests
 
 
-def _contents(file: IO[bytes]) -> str:
+def _read_contents(file: IO[bytes]) -> str:
     # The process shares the file's position and writes there, so read without moving it.
     return os.pread(file.fileno(), os.fstat(file.fileno()).st_size, 0).decode(errors="replace")

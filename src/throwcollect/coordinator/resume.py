@@ -251,7 +251,7 @@ def refuse_changes(directory: Path, stored: Config, config: Config) -> None:
     problems = [
         Problem(f"{directory} was begun with {quote(before)}, got {quote(after)}", key=key)
         for key, (before, after) in changed.items()
-        if key not in may_grow or not _grows(before, after, config)
+        if key not in may_grow or not _is_growth(before, after, config)
     ]
     if problems:
         same = "the same configuration, but for `run`, `containers`, `cluster` and more `trials`"
@@ -260,7 +260,7 @@ def refuse_changes(directory: Path, stored: Config, config: Config) -> None:
         raise ConfigError(problems, expected=same, hint=hint)
 
 
-def _grows(before: int | None, after: int | None, config: Config) -> bool:
+def _is_growth(before: int | None, after: int | None, config: Config) -> bool:
     """Whether a number of trials may replace an earlier one; None stands for no limit."""
     if not config.grows:
         # `_extend` compares the trials of a plan that does not grow.

@@ -156,7 +156,7 @@ def read_named_manifest(directory: Path) -> tuple[str, tuple[FileEntry, ...]]:
     text = read_text(path, most_bytes=_MOST_BYTES)
     try:
         document = json.loads(text)
-        name, entries = str(document["name"]), tuple(map(_entry, document["resources"]))
+        name, entries = str(document["name"]), tuple(map(_read_entry, document["resources"]))
     except (ValueError, KeyError, TypeError, RecursionError) as error:
         raise DatasetError("is not the manifest of a dataset", path=path) from error
     # No digest covers the manifest itself, so a changed byte of it shows only by this comparison.
@@ -228,7 +228,7 @@ def find_changed_files(directory: Path, entries: Iterable[FileEntry], *, in_full
             )
 
 
-def _entry(resource: Any) -> FileEntry:
+def _read_entry(resource: Any) -> FileEntry:
     path, size, digest = resource["path"], resource["bytes"], str(resource["hash"]).removeprefix(_HASH)
     if not isinstance(path, str) or not _NAME.fullmatch(path):
         raise ValueError(path)

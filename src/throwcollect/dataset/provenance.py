@@ -89,7 +89,7 @@ class Provenance:
             host=os.environ.get(HOST_VARIABLE, socket.gethostname()) or None,
             platform=platform.platform(),
             python=platform.python_version(),
-            libraries={"throwcollect": __version__, **_versions()},
+            libraries={"throwcollect": __version__, **_find_versions()},
             simulations=simulations,
             wall_s=wall_s,
             was_open=was_open,
@@ -150,7 +150,7 @@ def _read_revision() -> str | None:
 
 
 @cache
-def _versions() -> Mapping[str, str]:
+def _find_versions() -> Mapping[str, str]:
     versions = {}
     for name in _LIBRARIES:
         # A machine that only coordinates has no engines.

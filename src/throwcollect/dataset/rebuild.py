@@ -148,7 +148,7 @@ def _rebuild(directory: Path) -> Rebuilt:
             raise DatasetError(f"{name} is missing", path=directory, hint=repair)
     table, task = ThrowsTable.of(plan), task_of(config)
     rows = [
-        recordings.rows.get(trial.number) or _row_without_episode(table, task, trial, earlier.get(trial.number))
+        recordings.rows.get(trial.number) or _make_row_without_episode(table, task, trial, earlier.get(trial.number))
         for trial in plan.trials
     ]
     throws = table.table(rows)
@@ -193,7 +193,7 @@ def read_earlier_rows(directory: Path, plan: Plan) -> Mapping[int, Row]:
     return {}
 
 
-def _row_without_episode(table: ThrowsTable, task: Task[Any], trial: Trial, earlier: Row | None) -> Row:
+def _make_row_without_episode(table: ThrowsTable, task: Task[Any], trial: Trial, earlier: Row | None) -> Row:
     """Make the row of a trial that has no episode; one that was lost before keeps its reason."""
     if trial.refused is not None:
         return table.make_refused_row(trial)
@@ -225,13 +225,13 @@ class _Recordings:
 
     def read(self, path: Path) -> list[Finding]:
         """Read a file and return its findings; only a file without findings counts."""
-        checked = check_shard(path, self._plan.config, None, self._problems)
+        checked = check_shard(path, self._plan.config, None, self._find_problems)
         if not checked.findings and checked.summary is not None:
             self.summaries.append(checked.summary)
             self.channels = checked.channels
         return checked.findings
 
-    def _problems(self, stored: StoredEpisode, shard: str, channels: Channels | None) -> Iterator[str]:
+    def _find_problems(self, stored: StoredEpisode, shard: str, channels: Channels | None) -> Iterator[str]:
         problems = list(self._check.find_problems(stored, shard, channels))
         yield from problems
         if not problems:

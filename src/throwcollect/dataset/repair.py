@@ -87,9 +87,9 @@ def repair(directory: Path, output: Path, *, remake: Remake) -> Repaired:
         DatasetError: If configuration or plan cannot be read or made again, or files cannot be read or written.
     """
     refuse_other_directory(directory)
-    config = _configuration(directory)
+    config = _read_configuration(directory)
     remarks: list[str] = []
-    plan = _plan(directory, config, remake, remarks)
+    plan = _read_or_remake_plan(directory, config, remake, remarks)
     earlier = read_earlier_rows(directory, plan)
     with new_directory(output) as beside:
         writer = DatasetWriter.create(beside, plan, listed=_find_list(directory, plan, remarks))
@@ -107,7 +107,7 @@ def repair(directory: Path, output: Path, *, remake: Remake) -> Repaired:
     return Repaired(len(plan.trials), len(sorting.taken), lost, tuple(sorting.differing), tuple(remarks))
 
 
-def _configuration(directory: Path) -> Config:
+def _read_configuration(directory: Path) -> Config:
     try:
         return load(config_path(directory))
     except (ConfigError, DatasetError) as error:
@@ -119,7 +119,7 @@ def _configuration(directory: Path) -> Config:
         ) from error
 
 
-def _plan(directory: Path, config: Config, remake: Remake, remarks: list[str]) -> Plan:
+def _read_or_remake_plan(directory: Path, config: Config, remake: Remake, remarks: list[str]) -> Plan:
     path = directory / PLAN
     try:
         plan = Plan.read(path, config)
@@ -134,7 +134,7 @@ def _plan(directory: Path, config: Config, remake: Remake, remarks: list[str]) -
     except DatasetError as error:
         reason = error.details
     try:
-        plan, source = _plan_of_table(directory / THROWS, config), THROWS
+        plan, source = _make_plan_of_table(directory / THROWS, config), THROWS
     except DatasetError as error:
         if config.grows:
             raise DatasetError(
@@ -150,7 +150,7 @@ def _plan(directory: Path, config: Config, remake: Remake, remarks: list[str]) -
     return plan
 
 
-def _plan_of_table(path: Path, config: Config) -> Plan:
+def _make_plan_of_table(path: Path, config: Config) -> Plan:
     """Make the plan of the trials that a table of throws has.
 
     Raises:

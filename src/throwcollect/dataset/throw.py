@@ -103,7 +103,7 @@ class _Series:
     def __repr__(self) -> str:
         return f"{type(self).__name__}({len(self)} samples, {self.time_s[-1]:.3f} s)"
 
-    def _column(self, name: str) -> Column:
+    def _read_column(self, name: str) -> Column:
         return self._recording.column(f"{self._prefix}.{name}")
 
     @cached_property
@@ -125,22 +125,22 @@ class Ball(_Series):
     @cached_property
     def position(self) -> NDArray[np.float64]:
         """Centre [m], shape ``(n_samples, 3)``."""
-        return self._column("position")
+        return self._read_column("position")
 
     @cached_property
     def velocity(self) -> NDArray[np.float64]:
         """Of the centre [m/s], shape ``(n_samples, 3)``."""
-        return self._column("velocity")
+        return self._read_column("velocity")
 
     @cached_property
     def orientation_xyzw(self) -> NDArray[np.float64]:
         """Unit quaternion, ball to world, shape ``(n_samples, 4)``."""
-        return self._column("orientation_xyzw")
+        return self._read_column("orientation_xyzw")
 
     @cached_property
     def angular_velocity(self) -> NDArray[np.float64]:
         """[rad/s], shape ``(n_samples, 3)``."""
-        return self._column("angular_velocity")
+        return self._read_column("angular_velocity")
 
 
 @dataclass(frozen=True)
@@ -189,17 +189,17 @@ class Joints(_Series):
     @cached_property
     def position(self) -> NDArray[np.float64]:
         """[rad], shape ``(n_samples, n_joints)``."""
-        return self._column("position")
+        return self._read_column("position")
 
     @cached_property
     def velocity(self) -> NDArray[np.float64]:
         """[rad/s], shape ``(n_samples, n_joints)``."""
-        return self._column("velocity")
+        return self._read_column("velocity")
 
     @cached_property
     def effort(self) -> NDArray[np.float64]:
         """Torques of the motors [Nm], shape ``(n_samples, n_joints)``; 0 for locked joints."""
-        return self._column("effort")
+        return self._read_column("effort")
 
 
 class Events:

@@ -136,10 +136,10 @@ def empty_columns(columns: Iterable[str], samples: int, joints: int) -> dict[str
     `joints` is the number of joints that the columns of joints have.
     """
     shapes = {TIMES: (samples,), **column_shapes(samples, joints)}
-    return {name: _empty(shapes[name], np.int64 if name == STAMPS else np.float64) for name in columns}
+    return {name: _make_empty(shapes[name], np.int64 if name == STAMPS else np.float64) for name in columns}
 
 
-def _empty(shape: tuple[int, ...], dtype: type[np.generic]) -> Column:
+def _make_empty(shape: tuple[int, ...], dtype: type[np.generic]) -> Column:
     size = math.prod(shape) * np.dtype(dtype).itemsize
     if size < _LARGE_BYTES:
         return np.empty(shape, dtype)

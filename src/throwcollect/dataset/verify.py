@@ -96,7 +96,7 @@ def verify(
     with _checking_shards(directory, tables, processes, say) as reports:
         findings += find_manifest_problems(directory, tables.config.name if tables.config else None)
         findings += tables.findings
-        findings += _plan_findings(directory, tables, check_of)
+        findings += _find_plan_problems(directory, tables, check_of)
         checks = dict(reports)
     findings += [finding for check in checks.values() for finding in check.findings]
     if bag is not None:
@@ -138,7 +138,7 @@ def find_damage(directory: Path, plan: Plan | None, *, in_full: bool) -> list[Fi
     return list(find_changed_files(directory, entries, in_full=in_full))
 
 
-def _plan_findings(directory: Path, tables: Tables, check_of: CheckOf | None) -> Iterator[Finding]:
+def _find_plan_problems(directory: Path, tables: Tables, check_of: CheckOf | None) -> Iterator[Finding]:
     if tables.plan is None:
         return
     yield from find_drawing_problems(directory, tables.plan, tables.rows)
@@ -151,14 +151,14 @@ def _checking_shards(
     directory: Path, tables: Tables, processes: int, say: Callable[[str], object]
 ) -> Iterator[Iterator[tuple[str, ShardReport]]]:
     """Start to check the files that rows name, or all that are there if there are no rows."""
-    expected = _trials_by_file(directory, tables)
+    expected = _list_trials_by_file(directory, tables)
     names = sorted(_list_shards(directory) if expected is None else expected)
     many = expected is not None and sum(map(len, expected.values())) >= _MANY_EPISODES
     if many:
         say(f"checks {format_count(len(names), 'recording')}")
     with working_side_by_side(
         names,
-        _file_check,
+        _make_file_check,
         (directory, tables, expected),
         processes=processes if many else 1,
         doing="checks recordings",
@@ -179,7 +179,7 @@ def _tell(
             say(f"{number} of {format_count(count, 'recording')} checked")
 
 
-def _file_check(
+def _make_file_check(
     directory: Path, tables: Tables, expected: Mapping[str, list[int]] | None
 ) -> Callable[[str], ShardReport]:
     """Make the function that checks a file of a dataset, by its name."""
@@ -193,7 +193,7 @@ def _file_check(
     return check_file
 
 
-def _trials_by_file(directory: Path, tables: Tables) -> dict[str, list[int]] | None:
+def _list_trials_by_file(directory: Path, tables: Tables) -> dict[str, list[int]] | None:
     """List the trials whose episodes each file should hold, in order; None if that is not known."""
     if tables.plan is None or tables.rows is None:
         return None

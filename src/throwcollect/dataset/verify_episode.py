@@ -164,7 +164,7 @@ def _place_of(stored: StoredEpisode, shard: str) -> EpisodePlace:
 
 def _find_row_problems(expected: Mapping[str, Any], row: Mapping[str, Any]) -> Iterator[str]:
     # A dataset of an earlier version has fewer columns.
-    wrong = [name for name, value in expected.items() if name in row and not _same(value, row[name])]
+    wrong = [name for name, value in expected.items() if name in row and not _are_same(value, row[name])]
     if wrong:
         told = ", ".join(
             f"{name} = {row[name]!r}, the episode gives {expected[name]!r}" for name in wrong[:_MOST_NAMED]
@@ -241,7 +241,7 @@ def _find_stamp_problems(episode: Episode, samples: Samples, config: Config) -> 
         yield f"stamps are not spaced by 1/{config.record.rate_hz} s: {steps.min()} to {steps.max()} ns"
 
 
-def _same(value: object, other: object) -> bool:
+def _are_same(value: object, other: object) -> bool:
     # The same build computes equal numbers, so `isclose` is rarely needed.
     return value == other or (
         isinstance(value, float)

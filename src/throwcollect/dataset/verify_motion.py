@@ -56,7 +56,7 @@ def find_joint_problems(trial: RecordedTrial) -> Iterator[str]:
     if peaks.max() > 1 + 1e-6:
         joint = robot.joints[int(peaks.argmax())]
         yield f"the torque of {joint} is {peaks.max():.4f} of the most that its motor has"
-    tolerance = _following_tolerance(config)
+    tolerance = _compute_following_tolerance(config)
     apart = np.abs(samples.position[0] - list(start_posture(config).values()))
     if apart.max() > tolerance:
         joint = robot.joints[int(apart.argmax())]
@@ -91,7 +91,7 @@ def _compute_motor_positions(trial: RecordedTrial) -> NDArray[np.float64]:
     return np.concatenate([start, reached[stride - 1 :: stride]])
 
 
-def _following_tolerance(config: Config) -> float:
+def _compute_following_tolerance(config: Config) -> float:
     """Compute how far a motor may be from its command without being saturated [rad]: weak gains follow less well."""
     robot = config.robot
     weak = max(1.0, 100 / robot.position_gain_per_s) * max(1.0, 1 / robot.velocity_gain) ** 2

@@ -58,9 +58,11 @@ def find_drawing_problems(directory: Path, plan: Plan, rows: Mapping[int, Row] |
         trial, again = planned[int(index)], drawn[int(index)]
         for key, value in again.values.items():
             if not find_same(np.array(trial.values[key]), np.array(value)):
-                yield _of_trial(again.number, f"has {key} = {trial.values[key]!r}, the configuration draws {value!r}")
+                yield _make_finding(
+                    again.number, f"has {key} = {trial.values[key]!r}, the configuration draws {value!r}"
+                )
         if trial.seed != again.seed:
-            yield _of_trial(again.number, f"has seed {trial.seed}, the configuration gives {again.seed}")
+            yield _make_finding(again.number, f"has seed {trial.seed}, the configuration gives {again.seed}")
 
 
 def find_refusal_problems(plan: Plan, doubtful: Collection[int], check_of: CheckOf) -> Iterator[Finding]:
@@ -77,8 +79,8 @@ def find_refusal_problems(plan: Plan, doubtful: Collection[int], check_of: Check
     for number in sorted({*refused, *(others[index] for index in chosen)} - set(doubtful)):
         trial = plan.trial(number)
         again = refusal(plan.config_of(trial), check)
-        if _kind(again) != _kind(trial.refused):
-            yield _of_trial(number, f"is refused as {trial.refused!r}, the check says {again!r}")
+        if _strip_numbers(again) != _strip_numbers(trial.refused):
+            yield _make_finding(number, f"is refused as {trial.refused!r}, the check says {again!r}")
 
 
 class _Drawing(NamedTuple):
@@ -149,10 +151,10 @@ def _require_keys(points: Points, plan: Plan) -> Points:
     return points
 
 
-def _kind(reason: str | None) -> str | None:
+def _strip_numbers(reason: str | None) -> str | None:
     """Replace the numbers of a reason, whose last digits may differ on another machine."""
     return None if reason is None else blank_numbers(reason)
 
 
-def _of_trial(number: int, problem: str) -> Finding:
+def _make_finding(number: int, problem: str) -> Finding:
     return Finding(PLAN, f"trial {number}", problem)

@@ -310,11 +310,11 @@ class _ShardCheck:
             raise DatasetError(f"a {footer.kind} where the footer should be", place=f"byte {footer.offset}")
         fields = footer.parse(records.Footer)
         # The CRC does not cover its own four bytes.
-        if fields.summary_crc != _crc(contents, fields.summary_start, footer.end - 4):
+        if fields.summary_crc != _compute_crc(contents, fields.summary_start, footer.end - 4):
             self._report(f"byte {footer.offset}", "summary: its CRC differs from its contents")
 
 
-def _crc(contents: McapContents, start: int, end: int) -> int:
+def _compute_crc(contents: McapContents, start: int, end: int) -> int:
     crc = 0
     for block in range(start, end, _CRC_BLOCK):
         crc = crc32(contents.slice(block, min(block + _CRC_BLOCK, end)), crc)

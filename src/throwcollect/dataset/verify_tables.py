@@ -79,7 +79,7 @@ def check_tables(directory: Path) -> Tables:
         else:
             tables.findings += _find_row_problems(tables.plan, throws["trial"].to_pylist())
             tables.rows = RowsByTrial(throws)
-            tables.findings += _plan_findings(tables.plan, tables.rows, tables.doubtful)
+            tables.findings += _find_plan_problems(tables.plan, tables.rows, tables.doubtful)
     return tables
 
 
@@ -134,7 +134,7 @@ def _find_row_problems(plan: Plan, trials: list[int | None]) -> Iterator[Finding
         yield Finding(THROWS, "", "the rows are not in order of trials")
 
 
-def _plan_findings(plan: Plan, rows: Mapping[int, Row], doubtful: Collection[int]) -> Iterator[Finding]:
+def _find_plan_problems(plan: Plan, rows: Mapping[int, Row], doubtful: Collection[int]) -> Iterator[Finding]:
     for trial in plan.trials:
         if (row := rows.get(trial.number)) is None:
             continue

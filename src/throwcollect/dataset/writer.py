@@ -154,7 +154,7 @@ class DatasetWriter:
             count += len(episodes)
             if left.finished is not None:
                 self._close_shard(number, left.finished)
-            elif episodes or not self._shard(number).missing:
+            elif episodes or not self._get_shard(number).missing:
                 self._finish_shard_if_complete(number)
             else:
                 del self._shards[number], self._rows[number]
@@ -227,12 +227,12 @@ class DatasetWriter:
             DatasetError: If the episode is damaged, is of no trial that is waited for, or cannot be written.
         """
         trial = episode.header.trial
-        number = self._waiting_shard(trial)
-        shard = self._shard(number)
+        number = self._find_waiting_shard(trial)
+        shard = self._get_shard(number)
         shard.append(episode)
         # The offset is not known before the shard is written in order of trials; `_close_shard` puts it in.
         place = EpisodePlace(shard.path.name, -1, episode.header.samples, episode.digest)
-        row = self._rows[number][trial] = self._row(trial, result, place)
+        row = self._rows[number][trial] = self._make_row(trial, result, place)
         ends = {name: row[name] for name in self._config.task.targets if row.get(name) is not None}
         self.note("commit", trial=trial, outcome=result.outcome.value, digest=episode.digest, **ends)
         self._finish_shard_if_complete(number)
@@ -243,9 +243,9 @@ class DatasetWriter:
         Raises:
             DatasetError: If the trial is not waited for, or the shard that it completes cannot be written.
         """
-        number = self._waiting_shard(trial)
+        number = self._find_waiting_shard(trial)
         self._shards[number].missing.remove(trial)
-        self._rows[number][trial] = self._row(trial, task_of(self._config).lose(reason), None)
+        self._rows[number][trial] = self._make_row(trial, task_of(self._config).lose(reason), None)
         self.note("lost", trial=trial, reason=reason)
         self._finish_shard_if_complete(number)
 
@@ -289,7 +289,7 @@ class DatasetWriter:
             DatasetError: If trials are missing, or a file cannot be written.
         """
         if self._unfinished:
-            missing = sorted(trial for number in self._unfinished for trial in self._shard(number).missing)
+            missing = sorted(trial for number in self._unfinished for trial in self._get_shard(number).missing)
             example = f", such as {missing[0]}" if missing else ""
             raise DatasetError(f"lacks {format_count(len(missing), 'trial')}{example}", path=self._directory)
         throws = self._finished_rows.table
@@ -350,14 +350,14 @@ class DatasetWriter:
 
     def _take_left(self, number: int, left: LeftOfShard) -> list[RecoveredEpisode]:
         """Take in what is left of an unfinished shard; returns its episodes in order of trials."""
-        shard = self._shard(number)
+        shard = self._get_shard(number)
         episodes = recover_shard(shard, left)
         for each in episodes:
             place = replace(each.place, shard=shard.path.name)
-            self._rows[number][each.trial] = self._row(each.trial, each.result, place)
+            self._rows[number][each.trial] = self._make_row(each.trial, each.result, place)
         return episodes
 
-    def _shard(self, number: int) -> OpenShard:
+    def _get_shard(self, number: int) -> OpenShard:
         """Return an unfinished shard, which takes memory only once it has been asked for."""
         if number not in self._shards:
             shard = OpenShard(self._layout.path(number), self._channels)
@@ -365,17 +365,17 @@ class DatasetWriter:
             self._shards[number], self._rows[number] = shard, {}
         return self._shards[number]
 
-    def _row(self, trial: int, result: Result, place: EpisodePlace | None) -> Row:
+    def _make_row(self, trial: int, result: Result, place: EpisodePlace | None) -> Row:
         return self._table.row(self.plan.trial(trial), result, place)
 
-    def _waiting_shard(self, trial: int) -> int:
+    def _find_waiting_shard(self, trial: int) -> int:
         shard = self._layout.number_of(trial)
-        if shard not in self._unfinished or trial not in self._shard(shard).missing:
+        if shard not in self._unfinished or trial not in self._get_shard(shard).missing:
             raise DatasetError(f"no episode of trial {trial} is waited for", path=self._directory)
         return shard
 
     def _finish_shard_if_complete(self, number: int) -> None:
-        shard = self._shard(number)
+        shard = self._get_shard(number)
         if not shard.missing and self._layout.is_settled(number):
             self._close_shard(number, shard.finish())
 

@@ -104,7 +104,7 @@ def split(
     parts = {}
     with new_directory(Path(output)) as beside:
         for name, places in members.items():
-            derived = derive([source(dataset, places)], beside / name, name=_part_name(dataset.config.name, name))
+            derived = derive([source(dataset, places)], beside / name, name=_name_part(dataset.config.name, name))
             held = list(places.values())
             parts[name] = SplitPart(derived, len({cell for cell in held if cell is not None}), held.count(None))
     return Split(parts, everything.without_episode)
@@ -219,7 +219,7 @@ def _read_pair(text: str, argument: str, what: str) -> tuple[str, Fraction]:
     return name.strip(), value
 
 
-def _part_name(name: str, part: str) -> str:
+def _name_part(name: str, part: str) -> str:
     """Put the names of a dataset and of a part together; the first is cut, or left out, where there is no room."""
     room = _LONGEST_NAME - len(part) - 1
     return f"{name[:room]}-{part}" if room > 0 else part

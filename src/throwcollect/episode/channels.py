@@ -113,7 +113,7 @@ class Channels:
     def __init__(self, config: Config, urdf: str) -> None:
         self.robot = urdf
         self._frames: FrameTree = read_frames(urdf, base_height=config.robot.base_height_m)
-        topics = _topics(config, self._frames)
+        topics = _make_topics(config, self._frames)
         self.sensors = tuple(SENSORS)
         self.recorded: dict[Channel, Topic] = {
             Channel(number, topic.name, topic.type_name, _TRANSFORMS if number == _TF_ID else _SAMPLED): topic
@@ -152,7 +152,7 @@ class Channels:
         }
 
 
-def _topics(config: Config, frames: FrameTree) -> dict[int, Topic]:
+def _make_topics(config: Config, frames: FrameTree) -> dict[int, Topic]:
     chosen, robot = config.record.topics, robot_of(config)
     topics = {JOINT_STATES_ID: joint_states(robot.joints), BALL_ODOMETRY_ID: ball_odometry()}
     if "clock" in chosen:

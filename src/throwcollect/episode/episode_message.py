@@ -146,7 +146,7 @@ def header_from_json(text: bytes | str) -> EpisodeHeader:
 
 
 @cache
-def _layout() -> MessageLayout:
+def _make_layout() -> MessageLayout:
     dimension = get_message("std_msgs/msg/MultiArrayDimension")
     layout = get_message("std_msgs/msg/MultiArrayLayout")(dim=[dimension(label=part) for part in _PARTS])
     message = get_message("std_msgs/msg/UInt8MultiArray")(layout=layout)
@@ -185,13 +185,13 @@ def pack(handed: Delivery | TrialRefusal, signer: Signer) -> bytes:
             b"".join(chunk.chunk.record() for chunk in episode.chunks),
         ]
     signature = signer.sign(*parts).encode()
-    return b"".join((_prefix([*map(len, parts), len(signature)]), *parts, signature))
+    return b"".join((_encode_prefix([*map(len, parts), len(signature)]), *parts, signature))
 
 
-def _prefix(sizes: list[int]) -> bytes:
+def _encode_prefix(sizes: list[int]) -> bytes:
     """Encode everything before the data: the layout, and at the end the size of the data."""
-    prefix = bytearray(_layout().template)
-    np.frombuffer(prefix, _layout().dtype)[0] = tuple(size for size in sizes for _ in ("size", "stride"))
+    prefix = bytearray(_make_layout().template)
+    np.frombuffer(prefix, _make_layout().dtype)[0] = tuple(size for size in sizes for _ in ("size", "stride"))
     # A stranger's message may have sizes whose sum does not fit; such a message is refused later, by its length.
     _COUNT.pack_into(prefix, len(prefix) - _COUNT.size, sum(sizes) % 2**32)
     return bytes(prefix)
@@ -203,13 +203,13 @@ def unpack(message: bytes, signer: Signer) -> Delivery | TrialRefusal:
     Raises:
         DatasetError: If it is another message, or is signed with another key.
     """
-    layout = _layout()
+    layout = _make_layout()
     length = len(layout.template)
     if len(message) < length:
         raise DatasetError(f"episode: a message of {len(message)} bytes", expected=f"at least {length}")
     sizes = list(np.frombuffer(message, layout.dtype, count=1)[0].item()[::2])
     # Names of the parts, strides and the size of the data follow from the sizes, so one comparison checks them all.
-    if message[:length] != _prefix(sizes):
+    if message[:length] != _encode_prefix(sizes):
         raise DatasetError(f"episode: not a UInt8MultiArray of the parts {', '.join(_PARTS)}")
     # Some RMWs hand over messages with padding behind them.
     if len(message) < length + sum(sizes):

@@ -99,7 +99,7 @@ class RowLayout:
         Raises:
             DatasetError: If there is no readable joint state.
         """
-        return read_joint_names(bytes(self._first_message(JOINT_STATES_ID, "/joint_states")))
+        return read_joint_names(bytes(self._find_first_message(JOINT_STATES_ID, "/joint_states")))
 
     def check_topic(self, channel: int, topic: Topic) -> None:
         """Check that the message of a channel has the layout of a topic.
@@ -107,12 +107,12 @@ class RowLayout:
         Raises:
             DatasetError: If there is no such channel, or its message has another layout.
         """
-        if not topic.layout.describes_message(self._first_message(channel, topic.name)):
+        if not topic.layout.describes_message(self._find_first_message(channel, topic.name)):
             raise DatasetError(
                 f"chunk: the messages of {topic.name} have another layout than {topic.type_name} written here"
             )
 
-    def _first_message(self, channel: int, topic: str) -> bytes | bytearray:
+    def _find_first_message(self, channel: int, topic: str) -> bytes | bytearray:
         if channel not in self.columns:
             raise DatasetError(f"chunk: no messages of {topic}")
         column = self.columns[channel]

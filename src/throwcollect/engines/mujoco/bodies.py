@@ -149,7 +149,7 @@ class MujocoBodies(Bodies):
         model, data = self._world()
         # MuJoCo computes the poses of shapes at the beginning of a step, so those of now are not known yet.
         mujoco.mj_kinematics(model, data)
-        return boxes(model, data, self._numbers(name))
+        return boxes(model, data, self._list_body_numbers(name))
 
     def bounds(self, name: str) -> list[Box]:
         """Find the boxes around the links of a body, along the axes of its root link."""
@@ -157,9 +157,9 @@ class MujocoBodies(Bodies):
         mujoco.mj_kinematics(model, data)
         root = model.body(f"{name}/0").id
         frame = data.xpos[root], rotation(data.xquat[root])
-        return boxes(model, data, self._numbers(name), frame)
+        return boxes(model, data, self._list_body_numbers(name), frame)
 
-    def _numbers(self, name: str) -> list[int]:
+    def _list_body_numbers(self, name: str) -> list[int]:
         """List MuJoCo's body number of each link of a body."""
         model, _ = self._world()
         return [model.body(f"{name}/{number}").id for number in range(len(self._bodies[name].links))]

@@ -229,11 +229,11 @@ class MujocoEngine(Engine):
 
     def ball_boxes(self) -> list[Box]:
         """Find the box around the ball, along the axes of the world."""
-        return self._boxes([self._model.body(BALL).id])
+        return self._find_boxes([self._model.body(BALL).id])
 
     def robot_boxes(self) -> list[Box]:
         """Find the boxes around the links of the robot, along the axes of the world."""
-        return self._boxes(range(1, self._model.body(BALL).id))
+        return self._find_boxes(range(1, self._model.body(BALL).id))
 
     def _compute_contact_forces(self) -> None:
         """Compute the contact forces on the robot that motors need in the first step, as if they had held it before."""
@@ -245,7 +245,7 @@ class MujocoEngine(Engine):
         mujoco.mj_fwdAcceleration(model, data)
         mujoco.mj_fwdConstraint(model, data)
 
-    def _boxes(self, bodies: Sequence[int]) -> list[Box]:
+    def _find_boxes(self, bodies: Sequence[int]) -> list[Box]:
         mujoco.mj_kinematics(self._model, self._data)
         return boxes(self._model, self._data, bodies)
 

@@ -231,14 +231,14 @@ def boxes(model: mujoco.MjModel, data: mujoco.MjData, bodies: Iterable[int], fra
     for body in bodies:
         first, count = int(model.body_geomadr[body]), int(model.body_geomnum[body])
         if count:
-            corners = [_reach(model, data, geom, frame) for geom in range(first, first + count)]
+            corners = [_find_extent(model, data, geom, frame) for geom in range(first, first + count)]
             lowest = np.min([low for low, _ in corners], axis=0)
             highest = np.max([high for _, high in corners], axis=0)
             enclosing.append((tuple(lowest.tolist()), tuple(highest.tolist())))
     return enclosing
 
 
-def _reach(
+def _find_extent(
     model: mujoco.MjModel, data: mujoco.MjData, geom: int, frame: Frame
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Find the lowest and highest corner of the box around a shape's own box."""
