@@ -131,7 +131,7 @@ class ClusterRun:
         return {index: path for index, path in found.items() if path is not None}
 
     def log(self, index: int) -> Path | None:
-        """The latest log of a task of an array; None if it has written none."""
+        """Find the latest log of a task of an array; None if it has written none."""
         logs = self.directory / CLUSTER / "logs"
         found = [path for job in self.submission.jobs if (path := logs / f"{job.array}_{index}.log").exists()]
         return found[-1] if found else None

@@ -27,7 +27,7 @@ DEVICES = "graphics processors alone: /dev/dri, /dev/nvidia*, /dev/kfd, /dev/dxg
 
 
 def normal_path(text: str) -> str:
-    """An absolute path without repeated and trailing slashes."""
+    """Write an absolute path without repeated and trailing slashes."""
     # `PurePosixPath` itself keeps two slashes at the beginning, which POSIX lets mean something else.
     return str(PurePosixPath(re.sub("/+", "/", text)))
 

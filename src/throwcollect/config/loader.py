@@ -147,7 +147,7 @@ def _check(values: dict[str, Any]) -> tuple[Config | None, list[KeyProblem], int
 
 
 def _find_robot(values: dict[str, Any]) -> str | None:
-    """The name of the robot whose joints the values may name; None if there is no such robot."""
+    """Find the name of the robot whose joints the values may name; None if there is no such robot."""
     section = values.get("robot")
     name = section.get("name") if isinstance(section, dict) else None
     return Config().robot.name if name is None else name if name in names_of("robots") else None

@@ -44,7 +44,7 @@ class Section(BaseModel):
 
     @classmethod
     def __get_pydantic_json_schema__(cls, core_schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
-        """The section's JSON Schema, in which the docstrings of its keys describe them.
+        """Make the section's JSON Schema, in which the docstrings of its keys describe them.
 
         Pydantic's own ``use_attribute_docstrings`` would read the docstrings in every process, although few need a
         schema. That takes a third of the time of importing the configuration.

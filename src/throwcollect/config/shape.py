@@ -72,12 +72,12 @@ class ValueShape:
 
 
 def root() -> ValueShape:
-    """The shape of a whole configuration."""
+    """Make the shape of a whole configuration."""
     return ValueShape(json_schema())
 
 
 def unit_of_key(key: str) -> str:
-    """Unit of the numbers of a dotted key: that of its field, or else the one that the key ends with.
+    """Find the unit of the numbers of a dotted key: the unit of its field, or else the one that the key ends with.
 
     Args:
         key: Dotted key, in which an index is a part of its own; a name that is no key is allowed.
@@ -91,7 +91,7 @@ def index_or_key(part: str) -> int | str:
 
 
 def shape_of(parts: Sequence[str | int]) -> ValueShape:
-    """The shape of the value of a key of a configuration."""
+    """Find the shape of the value of a key of a configuration."""
     shape = root()
     for part in parts:
         shape = shape.child(part)

@@ -67,6 +67,6 @@ def reason(error: YAMLError) -> str:
 
 
 def line(error: YAMLError) -> int | None:
-    """The line of the error, counted from 1; None if it is unknown."""
+    """Find the line of the error, counted from 1; None if it is unknown."""
     mark = (error.problem_mark or error.context_mark) if isinstance(error, MarkedYAMLError) else None
     return mark.line + 1 if mark else None

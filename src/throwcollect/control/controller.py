@@ -199,7 +199,7 @@ class JointTrajectoryController:
         return self.command
 
     def next_decision(self) -> int:
-        """Number of updates that can pass without the controller seeing the measured state.
+        """Count the updates that can pass without the controller seeing the measured state.
 
         Returns:
             Most updates that `take` may make now; the one after them must be made with `update`. `sys.maxsize` if
@@ -246,12 +246,12 @@ class JointTrajectoryController:
         self._measured = measured
 
     def pop_results(self) -> tuple[GoalResult, ...]:
-        """Results of the goals that have ended since the last call, oldest first."""
+        """Return the results of the goals that have ended since the last call, oldest first."""
         results, self._results = tuple(self._results), []
         return results
 
     def state(self, time_ns: int | None = None) -> ControllerState:
-        """State of the last update, which is the content of feedback while a goal is being executed.
+        """Report the state of the last update, which is the content of feedback while a goal is being executed.
 
         Args:
             time_ns: Time of what was observed last, if that was after the update [ns].
@@ -272,7 +272,7 @@ class JointTrajectoryController:
         )
 
     def query(self, time_ns: int) -> TrajectoryState:
-        """The trajectory that is being followed, at an absolute time [ns]."""
+        """Evaluate the trajectory that is being followed at an absolute time [ns]."""
         motion = self._motion
         if time_ns < motion.first_ns:
             return TrajectoryState(False, self._measured.positions, self._measured.velocities)

@@ -26,7 +26,7 @@ class Decision:
 
     @classmethod
     def invalid(cls, text: str) -> Decision:
-        """A goal is dropped, for a reason outside of the trajectory."""
+        """Make the decision to drop a goal, for a reason outside of the trajectory."""
         return cls(GoalStatus.ABORTED, ErrorCode.INVALID_GOAL, text)
 
 
@@ -77,7 +77,7 @@ class Judge:
         return None
 
     def updates_to_skip(self, motion: Motion, *, goal: bool) -> int | None:
-        """Number of updates that can pass without anything to decide; None if there will never be anything.
+        """Count the updates that can pass without anything to decide; None if there will never be anything.
 
         `goal` tells whether a goal waits for the end of the motion.
         """

@@ -43,14 +43,14 @@ class Curve:
         return int(self.knots_ns[-1])
 
     def positions(self, times_ns: NDArray[np.int64]) -> NDArray[np.float64]:
-        """Positions [rad], shape ``(n, n_joints)``, at times since the trajectory's start [ns], shape ``(n,)``.
+        """Compute positions [rad], shape ``(n, n_joints)``, at times since the trajectory's start [ns], shape ``(n,)``.
 
         No time may be before the first knot.
         """
         return self._evaluate(self.position, times_ns)
 
     def state(self, time_ns: int) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-        """Position, velocity and acceleration at one time.
+        """Compute position, velocity and acceleration at one time.
 
         Args:
             time_ns: Time since the trajectory's start, not before the first knot [ns].

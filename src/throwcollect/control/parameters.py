@@ -46,7 +46,7 @@ class Constraints:
     joints: Mapping[str, JointConstraints] = field(default_factory=dict)
 
     def of(self, joint: str) -> JointConstraints:
-        """Tolerances of a joint."""
+        """Return the tolerances of a joint."""
         return self.joints.get(joint, JointConstraints())
 
 

@@ -40,7 +40,7 @@ class Waypoints:
         velocities: NDArray[np.float64] | None = None,
         accelerations: NDArray[np.float64] | None = None,
     ) -> Waypoints:
-        """One point at the trajectory's start, to be held; velocities and accelerations of None are 0."""
+        """Make one point at the trajectory's start, to be held; velocities and accelerations of None are 0."""
         still = np.zeros(len(positions))
         rows = [still if row is None else row for row in (positions, velocities, accelerations)]
         p, v, a = (row[np.newaxis] for row in rows)

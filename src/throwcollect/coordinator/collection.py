@@ -124,7 +124,8 @@ class TrialCollection:
 
     @property
     def finished(self) -> bool:
-        """Whether all trials have ended and are written; while draining, whether those that ran ended or had time."""
+        """Whether all trials have ended and are written; when draining, whether running ones ended or are out of
+        time."""
         if self._backlog:
             return False
         if self.complete:
@@ -214,7 +215,7 @@ class TrialCollection:
         return True
 
     def refuse(self, simulation: str, trial: int, reason: str) -> None:
-        """Take back a trial that a simulation could not do, or did otherwise, and count it as refused by it."""
+        """Take back a trial that a simulation could not do, or did otherwise, and count that as its refusal."""
         self._give_back(simulation, trial, reason, self._leases.fail(simulation, trial, reason, refused=True))
 
     def take_back(self, simulation: str, reason: str, *, refused: bool = False) -> None:
@@ -281,7 +282,7 @@ class TrialCollection:
             self._replay.begin(list(self.writer.plan.trials.numbers_to_run))
 
     def progress(self, hung: Iterable[str] = ()) -> Progress:
-        """How far the collection has come; `hung` has the names of the simulations that took too long for a trial."""
+        """Report how far the collection has come; `hung` names the simulations that took too long for a trial."""
         ended = self._leases.ended
         self._rate.note(ended)
         # The number of trials of a plan that ends when enough have succeeded is not known.
@@ -325,7 +326,7 @@ class TrialCollection:
             raise lost
 
     def name_of(self, simulation: str) -> str:
-        """Name of a simulation's node, also after the simulation has left."""
+        """Find the name of a simulation's node, even after the simulation has left."""
         # Unless it was told otherwise, a simulation lives in a namespace that has the name of its node.
         return self._names.get(simulation, simulation.strip("/"))
 

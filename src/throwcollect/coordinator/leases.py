@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable
 
 _MOST_IN_A_ROW = 3
-"""A simulation that refuses so many trials, without doing one in between, is doubted."""
+"""A simulation that refuses this many trials, without doing one in between, is doubted."""
 
 
 class Leases:
@@ -84,7 +84,7 @@ class Leases:
             self._fresh[trial] = True
 
     def find_held(self, simulation: str) -> tuple[int, ...]:
-        """The trials that a simulation holds, in their order."""
+        """List the trials that a simulation holds, in their order."""
         return tuple(self._held.get(simulation, ()))
 
     def lease(self, simulation: str, *, others: Collection[str] = ()) -> int | None:

@@ -42,7 +42,7 @@ class Lookahead:
         self._durations.pop(simulation, None)
 
     def count_for(self, simulation: str, *, waiting: int, simulations: int) -> int:
-        """Number of trials that a simulation should have.
+        """Compute how many trials a simulation should have.
 
         `waiting` is the number of trials that wait or that this simulation holds; `simulations` is the number of
         simulations in the run.

@@ -66,7 +66,7 @@ def _draw_points(config: Config, directory: Path, onlooker: Onlooker) -> Points:
 
 
 def count_before(config: Config) -> int:
-    """Number of trials that is known before they are drawn; 0 if none is known."""
+    """Count the trials before they are drawn; 0 if their number is not known yet."""
     return 0 if config.grows else config.trials or 0
 
 
@@ -136,7 +136,7 @@ def _make_checked_trials(config: Config) -> Callable[[tuple[int, Points]], Trial
 def feasibility_check(config: Config) -> Check:
     """Make a function that says why the robot cannot do a trial, in 1 to 5 ms each.
 
-    With `sweep.feasibility: nominal`, the function checks the robot that its owner believes to have.
+    With `sweep.feasibility: nominal`, the function checks the robot as its owner believes it to be.
 
     Raises:
         ConfigError: If the robot's files cannot be read.
@@ -158,7 +158,7 @@ def _replace_by_nominal_robot(config: Config) -> Config:
 
 
 def more_trials(plan: Plan) -> str:
-    """Words that follow the number of a plan's trials: whether more will follow, and how many."""
+    """Write the words that follow the number of a plan's trials: whether more will follow, and how many."""
     if not plan.config.grows or len(plan.trials) >= (limit := Rounds(plan.config).limit):
         return ""
     goal = plan.config.until

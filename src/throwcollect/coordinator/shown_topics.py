@@ -14,5 +14,5 @@ SHOWN_QOS = ros.QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
 
 
 def make_shown_topic(simulation: str) -> str:
-    """Name the topic on which the newest message of a simulation with an episode is repeated, by its node's name."""
+    """Name the topic of a simulation's newest episode, by its node's name; messages are as the simulation sent them."""
     return f"/coordinator/shown/{simulation}"

@@ -65,7 +65,7 @@ class Journal:
             raise
 
     def measure_collected_s(self) -> float:
-        """Real time for which this process and earlier ones have collected [s], to the millisecond."""
+        """Add up the real time for which this process and earlier ones have collected [s], to the millisecond."""
         # The clock may have been set back meanwhile.
         return round(self._earlier_s + max(time.time() - self._opened, 0.0), 3)
 
@@ -186,7 +186,7 @@ def was_open(directory: Path) -> bool:
 
 
 def measure_collected_s(directory: Path) -> float | None:
-    """Real time for which processes have collected into a dataset [s]; None if no journal says so.
+    """Add up the real time for which processes have collected into a dataset [s]; None if no journal says so.
 
     The process that finishes a dataset writes this time down. Processes that came after it count from their first to
     their last event, and so do all if none has finished the dataset.

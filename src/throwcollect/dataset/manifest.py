@@ -64,7 +64,7 @@ def entry_of_file(path: Path) -> FileEntry:
 
 
 def size_of_file(path: Path) -> int:
-    """Size of a file on disk [bytes].
+    """Find the size of a file on disk [bytes].
 
     Raises:
         DatasetError: If it cannot be opened, or is no regular file.
@@ -95,7 +95,7 @@ class RunningHash:
             self._hand_over()
 
     def hexdigest(self) -> str:
-        """The hash of everything, in hexadecimal."""
+        """Return the hash of everything, in hexadecimal."""
         if self._running is not None:
             self._running.result()
         self._add(self._held)

@@ -196,7 +196,7 @@ class McapFile:
         return summary
 
     def _encode_summary_section(self, summary: FileSummary) -> bytes:
-        """Everything between the end of the data and the closing magic (MCAP specification, Summary Section)."""
+        """Encode everything between the end of the data and the closing magic (MCAP specification, Summary Section)."""
         schemas, channels = self._declarations
         statistics = records.Statistics(
             attachment_count=0,

@@ -121,7 +121,7 @@ class StoredEpisode:
         return episode_run(self.episode)
 
     def run(self) -> RecordGroup:
-        """Its records as they lie in the file, whether or not they fit each other."""
+        """Make the run of its records as they lie in the file, whether or not they fit each other."""
         chunks = zip(self.episode.chunks, self.chunks, strict=True)
         runs = [(each.chunk, {channel: index.data for channel, index in at.indexes.items()}) for each, at in chunks]
         return RecordGroup.of(runs, self.facts.data)
@@ -148,7 +148,7 @@ class McapContents:
         return len(self._data)
 
     def slice(self, start: int, end: int) -> bytes:
-        """Bytes of the file from `start` to `end`, not included."""
+        """Return the bytes of the file from `start` to `end`, not included."""
         return self._data[start:end]
 
     def record(self, offset: int) -> McapRecord:

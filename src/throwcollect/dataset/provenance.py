@@ -99,7 +99,7 @@ class Provenance:
         )
 
     def facts(self) -> dict[str, str]:
-        """Its facts in words, by name; unknown ones are left out."""
+        """List its facts in words, by name; unknown ones are left out."""
         facts = {
             "finished": self.finished.isoformat(timespec="seconds"),
             "host": self.host,

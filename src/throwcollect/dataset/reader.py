@@ -97,7 +97,7 @@ class Dataset(Sequence[Throw]):
     @overload
     def __getitem__(self, which: str) -> NDArray[Any]: ...
     def __getitem__(self, which: int | slice | str) -> Throw | Dataset | NDArray[Any]:
-        """A throw by its position, the throws of a slice, or a column of `throws` by its name.
+        """Return a throw by its position, the throws of a slice, or a column of `throws` by its name.
 
         A column is an array with one value a throw; a number that is missing is NaN, a text None.
 
@@ -176,7 +176,7 @@ class Dataset(Sequence[Throw]):
         return NamedArray.of(self.throws, _LANDING, limits)
 
     def to_pandas(self) -> DataFrame:
-        """The table of throws as a DataFrame, one row a throw, with the number of the trial as its index.
+        """Convert the table of throws to a DataFrame, one row a throw, with the number of the trial as its index.
 
         Raises:
             MissingExtraError: If pandas is not installed.

@@ -37,7 +37,7 @@ _NAME = re.compile(r"(\d+)-of-(\d+)", re.ASCII)
 
 
 def slice_directory(directory: Path, slice: Slice) -> Path:
-    """Directory of a finished slice of a dataset."""
+    """Make the path of the directory of a finished slice of a dataset."""
     return directory / SLICES / f"{slice.index}-of-{slice.count}"
 
 

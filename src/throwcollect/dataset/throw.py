@@ -82,7 +82,7 @@ class _Recording:
         return self._recorded.read_rows()
 
     def column(self, name: str) -> Column:
-        """A column in an array of its own."""
+        """Read a column into an array of its own."""
         joints = self._recorded.joints
         columns = empty_columns([name], self._recorded.samples, len(joints))
         fill(columns, [self._recorded], [self._rows], joints)
@@ -278,7 +278,7 @@ class Throw:
             raise refuse_attribute(self, name, THROW)
 
     def __getitem__(self, column: str) -> Any:
-        """Its value in a column of the table of throws, such as ``throw["landing_x_m"]``; None if there is none.
+        """Return its value in a column of the table of throws, such as ``throw["landing_x_m"]``; None if there is none.
 
         Raises:
             ConfigError: If there is no such column; it is also a `KeyError`.
@@ -382,7 +382,7 @@ class Throw:
         return Joints(self._recording)
 
     def to_pandas(self) -> DataFrame:
-        """The motion of ball and joints as a DataFrame: one row a sample, by the time since the start of the trial.
+        """Make a DataFrame of the motion of ball and joints: one row a sample, by time since the start of the trial.
 
         Columns are named as those of `throwcollect dataset export --to parquet`, such as ``ball_x_m`` and
         ``arm_right_4_joint_position_rad``.

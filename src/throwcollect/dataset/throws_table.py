@@ -62,7 +62,7 @@ def _describe_swept(key: str) -> pa.Field:
 
 
 def name_alias(key: str) -> str:
-    """Name of a swept key without dots and with its unit at the end, for SQL and formulas."""
+    """Make the name of a swept key without dots and with its unit at the end, for SQL and formulas."""
     name = key.replace(".", "_")
     # The unit is written as names of keys have it: m/s² is mps2.
     unit = unit_of_key(key).replace("/", "p").replace("²", "2").replace("³", "3").replace(" ", "")

@@ -57,7 +57,7 @@ class Trajectories:
     @overload
     def __getitem__(self, which: int) -> dict[str, Column]: ...
     def __getitem__(self, which: str | int) -> Column | dict[str, Column]:
-        """A column of all throws by its name, or all columns of one throw by its position.
+        """Return a column of all throws by its name, or all columns of one throw by its position.
 
         Raises:
             KeyError: If the column was not read.
