@@ -176,7 +176,7 @@ class SlicesLook:
 
     @property
     def lives(self) -> bool:
-        """Whether a job of it runs, or waits to run."""
+        """Whether a job of the dataset runs, or waits to run."""
         # With this reason a job waits for ever, as the job that it depends on can no longer end as it should.
         joins = self.joining is not None and self.joining.lives and self.joining.reason != "DependencyNeverSatisfied"
         return any(task.lives for task in self.tasks) or joins

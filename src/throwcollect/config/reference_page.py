@@ -94,7 +94,7 @@ def _find_discriminator(shape: ValueShape) -> str:
 
 
 def _find_twins(shape: ValueShape, child: ValueShape) -> list[str]:
-    """List the sections in `shape` that have the same model as `child`, one of them."""
+    """List the sections in `shape` that have the same model as `child`, including `child` itself."""
     title = _find_title(child)
     return [name for name, each in shape.keys.items() if title is not None and _find_title(each) == title]
 

@@ -124,8 +124,7 @@ class TrialCollection:
 
     @property
     def finished(self) -> bool:
-        """Whether all trials have ended and are written; when draining, whether running ones ended or are out of
-        time."""
+        """Whether all trials have ended and are written; while draining, whether running ones did, or time is up."""
         if self._backlog:
             return False
         if self.complete:
@@ -303,7 +302,7 @@ class TrialCollection:
     def finish(self, *, meanwhile: Callable[[], None], say: Callable[[str], object]) -> None:
         """Simulate some trials again in a fresh process, and write what describes the dataset as a whole.
 
-        `meanwhile` is called again and again while that process works, and `say` with what came of it.
+        `meanwhile` is called again and again while that process works, and `say` with the result.
 
         Raises:
             Interrupted: If the collection was drained before its last trial.

@@ -25,7 +25,7 @@ class WrongTrials(NamedTuple):
     """Planned trials that are given up, because the results that are known now lead to others.
 
     Attributes:
-        first: The first of them; all later ones are given up, too.
+        first: The first of these trials; all later ones are given up, too.
         episodes: How many of them have episodes, which are removed.
     """
 

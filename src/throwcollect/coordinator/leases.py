@@ -164,7 +164,7 @@ class Leases:
         del held[1:]
 
     def forget(self, simulation: str) -> None:
-        """Forget the refusals of a simulation that is gone; the next one of its name is another one."""
+        """Forget the refusals of a simulation that is gone; a later one of the same name is a different one."""
         self._refusals.pop(simulation, None)
         self._wrong_refusals.pop(simulation, None)
 

@@ -117,7 +117,7 @@ class _Process:
         )
 
     def wait(self, meanwhile: Callable[[], None]) -> None:
-        """Wait until it has simulated all of them, or ends."""
+        """Wait until the process has simulated all trials, or has ended."""
         while self._process.poll() is None and _read_contents(self._stdout).count("\n") < len(self.trials):
             meanwhile()
 

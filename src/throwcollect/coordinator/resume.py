@@ -72,7 +72,7 @@ def resume(
             through.
 
     Raises:
-        ConfigError: If the configuration is another one, has fewer trials or other ones, or too many for the disk.
+        ConfigError: If the configuration differs, or has fewer trials, other trials, or too many for the disk.
         DatasetError: If another process changes the dataset, files cannot be written, or something is damaged that
             cannot be made again.
     """

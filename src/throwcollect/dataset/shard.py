@@ -1,6 +1,6 @@
 """One shard while it is filled: episodes in order of arrival, and at the end the same in order of trials.
 
-While a shard is filled it is called ``<name>_00000.mcap.part``: a complete MCAP file but for its summary and footer, in
+While a shard is filled it is called ``<name>_00000.mcap.part``: an MCAP file that lacks only its summary and footer, in
 which every episode is one run of records. When its last trial is in, the runs are copied in order of trials into the
 file ``<name>_00000.mcap``, and the other vanishes.
 """

@@ -101,7 +101,7 @@ def _compute_following_tolerance(config: Config) -> float:
 def find_ball_problems(trial: RecordedTrial) -> Iterator[str]:
     """Find what the ball cannot have done, given its contacts.
 
-    From one sample to the next, the motion of a ball that nothing touches follows from the physics, bit for bit but for
+    From one sample to the next, the motion of a ball that nothing touches follows from the physics, except for
     rounding; the motion of a ball that something presses on does not.
 
     Yields:

@@ -73,7 +73,7 @@ def find_refusal_problems(plan: Plan, doubtful: Collection[int], check_of: Check
     """
     refused = plan.trials.refused
     others = [number for number in plan.trials.numbers if number not in refused]
-    # Each verification checks the same ones again, so that two of them agree.
+    # Every verification checks the same trials again, so that two verifications agree.
     chosen = np.random.default_rng(plan.config.seed).permutation(len(others))[:CHECKED_AGAIN]
     check = check_of(plan.config)
     for number in sorted({*refused, *(others[index] for index in chosen)} - set(doubtful)):

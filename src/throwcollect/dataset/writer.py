@@ -327,7 +327,7 @@ class DatasetWriter:
                 self._finish_shard_if_complete(number)
 
     def _forget_shard(self, number: int) -> list[Row]:
-        """Forget a shard, but for its files; returns the rows of the trials that have ended."""
+        """Forget a shard, but keep its files; return the rows of the trials that have ended."""
         self._recordings.pop(number, None)
         if number not in self._unfinished:
             return self._finished_rows.take(number)

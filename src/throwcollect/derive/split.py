@@ -1,8 +1,8 @@
 """Splits a dataset into parts so that throws to the same place go to the same part.
 
 Space is cut into cells, such as squares of the ground. The hash of a cell and a seed decides to which part the cell
-goes, so it does not depend on other trials. A trial that is in no cell, because it did not land, goes to the part that
-a hash over everything that determines the trial, except its number, decides on.
+goes, so it does not depend on other trials. For a trial that is in no cell, because it did not land, a hash over
+everything that determines the trial, except its number, decides on the part.
 """
 
 from __future__ import annotations
@@ -88,7 +88,8 @@ def split(
     Args:
         directory: The dataset.
         output: Directory that gets one directory for each part; it must be new or empty.
-        fractions: Names of the parts and their shares of the cells: ``train=0.8,test=0.2``, or a mapping of them.
+        fractions: Names of the parts and their shares of the cells: ``train=0.8,test=0.2``, or a mapping from names to
+            shares.
         cells: Axes of the space that is cut into cells. Each is an expression on columns of the table of throws (see
             `dataset.expression`) and the width of the cells along this axis, such as ``landing_x_m=0.05``.
         seed: Seed of the choice, 0 or more.

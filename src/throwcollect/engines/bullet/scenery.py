@@ -137,7 +137,7 @@ def boxes(client: int, body: int) -> list[Box]:
 
 
 def set_physics(client: int, scenery: Scenery, ball: int, physics: Physics) -> None:
-    """Set time step, solver, gravity, masses and surfaces: all of them, so that none of an earlier trial remains."""
+    """Set time step, solver, gravity, masses and surfaces: all of them, so that nothing of an earlier trial stays."""
     pybullet.setPhysicsEngineParameter(
         fixedTimeStep=1 / physics.hz,
         numSolverIterations=physics.solver_iterations,

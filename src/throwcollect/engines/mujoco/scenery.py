@@ -178,7 +178,7 @@ def resize_ball(model: mujoco.MjModel, radius: float) -> None:
 
 
 def set_physics(model: mujoco.MjModel, physics: Physics) -> None:
-    """Set time step, solver, gravity, masses and surfaces: all of them, so that none of an earlier trial remains."""
+    """Set time step, solver, gravity, masses and surfaces: all of them, so that nothing of an earlier trial stays."""
     model.opt.timestep = 1 / physics.hz
     model.opt.iterations = physics.solver_iterations
     model.opt.gravity[:] = (0.0, 0.0, -physics.gravity_mps2)
