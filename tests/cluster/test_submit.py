@@ -282,7 +282,7 @@ def test_the_file_of_the_site_gives_defaults_for_cluster_keys(
 def test_submit_without_slurm_is_an_error(short: tuple[Path, dict[str, str]], slurm: Slurm, tmp_path: Path) -> None:
     data = tmp_path / "data"
     said = call(slurm, "submit", short[0], "--output", data, "--tasks", str(TASKS), expect=2, PATH="/nowhere")
-    assert "this is no machine that submits to Slurm" in said
+    assert "this machine cannot submit to Slurm" in said
     assert not data.exists()
 
 

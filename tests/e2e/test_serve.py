@@ -355,7 +355,7 @@ def test_an_unusable_address_or_certificate_gives_one_message(place: Place, tmp_
     assert said.stderr.startswith(f"throwcollect: --host 127.0.0.1 --port {port}: nobody can be served there: Address")
     said = call_here("serve", "--host", "0.0.0.0", "--port", "0")  # noqa: S104 - it is refused
     assert said.returncode == 2
-    assert "--host 0.0.0.0: whoever is on that network could read the token" in said.stderr
+    assert "--host 0.0.0.0: anybody on that network could read the token" in said.stderr
     (tmp_path / "no.pem").write_text("no certificate\n")
     for file, reason in (("none.pem", "no such file"), ("no.pem", "cannot be used: ")):
         cert = ("--tls-cert", tmp_path / "no.pem")

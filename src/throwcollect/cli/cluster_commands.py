@@ -22,7 +22,7 @@ def submit(
             "--output",
             "-o",
             metavar="DIR",
-            help="Directory of the dataset, which all nodes see: new, or with a plan alone.",
+            help="Directory of the dataset, which all nodes see: new, or with nothing but a plan.",
         ),
     ],
     tasks: Annotated[int, typer.Option("--tasks", metavar="N", min=1, help="Number of tasks; each collects a slice.")],
@@ -30,7 +30,7 @@ def submit(
     trials: TrialsOption = None,
     mode: Annotated[
         Literal["array", "live"],
-        typer.Option("--mode", help="Slices by tasks of their own, or one run on as many nodes, for plans that grow."),
+        typer.Option("--mode", help="array: a task for each slice; live: one run on N nodes, for plans that grow."),
     ] = "array",
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Print the batch script, and do nothing else.")] = False,
     wait: Annotated[bool, typer.Option("--wait", help="Follow it until the dataset is finished.")] = False,

@@ -73,7 +73,7 @@ def print_events(run: ClusterRun, *, as_json: bool) -> None:
         states = {task.index: f"{task.state.lower()}{f' on {task.node}' if task.node else ''}" for task in look.tasks}
         for index in sorted(states.keys() | before.keys(), key=lambda each: each or 0):
             now = states.get(index, "ended")
-            # Slurm forgets tasks some minutes after their end, which is no event if their end was told.
+            # Slurm forgets a task some minutes after its end, which is no event if the end was printed.
             if before.get(index) != now and (index in states or before.get(index) != "ended"):
                 who = "all tasks" if index is None else f"task {index}"
                 tell(f"{who}: {now}", event="task", task=index, state=now)
@@ -92,7 +92,7 @@ def end(run: ClusterRun) -> None:
 
 
 def list_queued(describe: Callable[[ClusterRun, SlicesLook], _Described]) -> Iterator[_Described]:
-    """Describe each run in the queue by `make_row` or `make_document`; of one that cannot be read, tell the error."""
+    """Describe each run in the queue by `make_row` or `make_document`; print the error of one that cannot be read."""
     for directory in find_queued():
         try:
             run = ClusterRun.open(directory)
@@ -104,19 +104,19 @@ def list_queued(describe: Callable[[ClusterRun, SlicesLook], _Described]) -> Ite
 
 
 def make_row(run: ClusterRun, look: SlicesLook) -> tuple[str, ...]:
-    """The row of a run, for the table that `ps` prints."""
+    """Make the row of a run in the table that `ps` prints."""
     return (
         _number_of(run),
         "slurm",
         str(look.running * run.simulations_per_task),
         f"{ProgressOfSlices(run).at(look).ended}/{run.trials}",
-        _status(look, run),
+        _describe_status(look, run),
         str(run.directory),
     )
 
 
 def make_document(run: ClusterRun, look: SlicesLook) -> dict[str, Any]:
-    """A run for the JSON document that `ps` prints."""
+    """Make the entry of a run in the JSON document that `ps` prints."""
     return {
         "run": _number_of(run),
         "runtime": "slurm",
@@ -129,11 +129,11 @@ def make_document(run: ClusterRun, look: SlicesLook) -> dict[str, Any]:
 
 
 def _number_of(run: ClusterRun) -> str:
-    """Number of the run's last array; of its joining job if nothing else was left to submit."""
+    """Find the number of the run's last array, or of its joining job if there was nothing else left to submit."""
     return run.submission.jobs[-1].array or run.submission.jobs[-1].join
 
 
-def _status(look: SlicesLook, run: ClusterRun) -> str:
+def _describe_status(look: SlicesLook, run: ClusterRun) -> str:
     if run.submission.live:
         return f"one run on {format_count(run.submission.tasks, 'node')}, {'running' if look.running else 'waiting'}"
     tasks = format_count(run.submission.tasks, "task")

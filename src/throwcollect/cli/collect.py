@@ -39,7 +39,7 @@ TokenOption = Annotated[
     typer.Option(
         "--token-file",
         metavar="FILE",
-        help="With --listen: write the token there, for its owner alone, and do not print it.",
+        help="With --listen: write the token to FILE, which only you can read, and do not print it.",
         readable=False,
     ),
 ]
@@ -65,7 +65,7 @@ def up(
     ] = None,
     resume: Annotated[
         Path | None,
-        typer.Option("--resume", metavar="DIR", help="Go on with the dataset in DIR; without CONFIG, with its own."),
+        typer.Option("--resume", metavar="DIR", help="Go on with the dataset in DIR; CONFIG is its own by default."),
     ] = None,
     slice: Annotated[
         str | None,
@@ -121,7 +121,7 @@ def resume(
     detach: DetachOption = False,
     json: JsonOption = False,
 ) -> None:
-    """Go on with a dataset whose collection was ended by anything, or with more trials."""
+    """Go on with a dataset, whatever has ended its collection, or add more trials to it."""
     from throwcollect.cluster.submission import is_submitted
 
     changes = overrides(settings, trials=trials, run__simulations=simulations, run__runtime=runtime)
@@ -159,7 +159,7 @@ def launch(run: str, lock: LockOption) -> None:
 
 
 def begin(run: str, lock: LockOption) -> None:
-    """Prepare and launch a run that another process has begun, and whose order it writes to standard input."""
+    """Prepare and launch a run that another process has begun; that process writes the order to standard input."""
     from throwcollect.runs.background import carry_out
 
     only_log()
@@ -196,7 +196,7 @@ def join_run(
     """Add simulations of this machine to a run of another one, until it is over; Ctrl-C takes them away."""
     from throwcollect.runs.joining import join_run as join
 
-    # The counting begins afterwards, because what only counts does not end the wait for a line.
+    # Interruptions are counted only afterwards, because a signal that is only counted would not end the wait for input.
     word = sys.stdin.readline() if token == "-" else token  # noqa: S105 - it is no password
     with display(quiet=False) as shown, count_interruptions() as interruptions:
         join(word, simulations or count_cores(), onlooker=shown, interruptions=interruptions)
@@ -231,14 +231,14 @@ def _collect(
             held.enter_context(run)
             _announce(run, token_file, view=view)
             if not detach:
-                # Not before: where the thread of a bar runs, nodes are not forked off this process, and start later.
+                # The bar comes only now: while its thread runs, nodes are not forked off this process, and start later.
                 with shown, count_interruptions() as interruptions:
                     keep_objects()
                     summary = run.collect(interruptions=interruptions)
         if run is not None and detach:
             _start(run, json=json)
             return
-    # Only now, because these imports take long, and nodes would start later if they came first.
+    # Imported only now, because these imports take long, and would delay the start of the nodes.
     from throwcollect.cli.dataset.info import print_collected, print_summary
 
     if run is not None:
@@ -254,7 +254,7 @@ def _announce(run: PreparedRun, token_file: Path | None, *, view: bool) -> None:
     if token_file is not None:
         write_secret(token_file, f"{run.token}\n".encode())
     elif run.config.run.listen is not None:
-        # The token is a secret, and what a display is told may be written to a log.
+        # The token is a secret, so it is not told to a display, which may write to a log.
         tell(f"other machines join by: {command('join-run', run.token, '-n', 4)}")
     if view:
         from throwcollect.cli.serve import write_tunnel

@@ -22,9 +22,9 @@ from throwcollect.interruption import stop_signals
 from throwcollect.wording import is_text, printable
 
 _WRONG_PATHS = (errno.ENAMETOOLONG, errno.ELOOP, errno.EACCES, errno.ENOTDIR)
-"""Errors of the system that a path of the user may cause, and that are no errors of ours."""
+"""System errors that a path from the user may cause, and that are no errors of this program."""
 _OPTIONS = {"rate_hz": "--rate"}
-"""Options whose names are others than those of the arguments that they are given to."""
+"""Options by the arguments that they set, where the two have different names."""
 
 
 def execute(command: Callable[..., Any]) -> NoReturn:
@@ -82,14 +82,14 @@ def _name_options(error: ConfigError) -> ConfigError:
 
 
 def _name_run(context: typer.Context) -> str:
-    """Say how a command without arguments is told its run, as other programs take such a name without an option."""
+    """Write how to name the run of a command that takes no arguments, as users may have given it without an option."""
     has_run = any(each.name == "run" for each in context.command.params)
     has_arguments = any(each.param_type_name == "argument" for each in context.command.params)
     return f"{context.command_path} --run RUN, or " if has_run and not has_arguments else ""
 
 
 def _describe(error: Exception) -> tuple[str, int]:
-    """Message and exit code of an error."""
+    """Find the message and the exit code of an error."""
     if isinstance(error, ConfigError):
         error = _name_options(error)
     if isinstance(error, ThrowcollectError):

@@ -47,7 +47,7 @@ def build(
 
 def sif(
     output: Annotated[
-        Path, typer.Option("--output", "-o", metavar="FILE", help="The file; replaced when the new one is whole.")
+        Path, typer.Option("--output", "-o", metavar="FILE", help="File to write; an older one is replaced at the end.")
     ] = Path("throwcollect.sif"),
     image: Annotated[
         str | None, typer.Option("--image", metavar="NAME", help="Convert this image of the Docker engine.")
@@ -63,7 +63,7 @@ def sif(
     from throwcollect.runtimes.apptainer.sif import make_sif
 
     if image is not None and archive is not None:
-        raise ConfigError("--image and --archive: should be one of them")
+        raise ConfigError("--image and --archive: should not be given together")
     if image is not None or archive is not None:
         source = "--archive" if image is None else "--image"
         for name, value in {"--base": base, "--wheelhouse": wheelhouse}.items():

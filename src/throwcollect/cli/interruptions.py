@@ -12,7 +12,7 @@ from throwcollect.interruption import stop_signals
 
 @contextmanager
 def count_interruptions() -> Iterator[Callable[[], int]]:
-    """Count the signals that ask to stop, which would otherwise raise, so that the block can end its nodes in order.
+    """Count the signals that ask to stop, which would otherwise raise, so that the block can end its nodes properly.
 
     Only the main thread may use it.
 

@@ -23,14 +23,15 @@ if TYPE_CHECKING:
     from throwcollect.learning.score import Errors, Score
 
 _MOST_TOLD = 20
-"""Number of targets out of reach that are told; the others are counted."""
+"""Largest number of targets out of reach that are printed; further ones are only counted."""
 
 ModelArgument = Annotated[Path, typer.Argument(metavar="MODEL", help="Directory of the model.", readable=False)]
 ModelOption = Annotated[
     Path, typer.Option("--output", "-o", metavar="MODEL", help="Directory to write; must be new or empty.")
 ]
 ScatterOption = Annotated[
-    float, typer.Option("--scatter", help="Standard deviation of what is measured of a throw, in the targets' unit.")
+    float,
+    typer.Option("--scatter", help="Standard deviation of where throws with the same parameters end, in their unit."),
 ]
 
 
@@ -49,9 +50,9 @@ def fit(
         str | None,
         typer.Option("--given", metavar="KEY,...", help="What is given with a target; by default, as the task says."),
     ] = None,
-    kind: Annotated[str, typer.Option("--kind", help="local, or polynomial: without the nearest throws.")] = "local",
+    kind: Annotated[str, typer.Option("--kind", help="local, by the nearest throws, too; or polynomial.")] = "local",
     where: Annotated[
-        str | None, typer.Option("--where", metavar="CONDITION", help="Learn from throws of this kind alone.")
+        str | None, typer.Option("--where", metavar="CONDITION", help="Learn only from throws that fulfil it.")
     ] = None,
     onnx: Annotated[
         bool, typer.Option("--onnx", help="Write model.onnx, too: target to parameters, for a robot's controller.")
@@ -89,7 +90,7 @@ def fit(
     folds = trained.folds_error.items()
     errors = ", ".join(f"degree {degree}: {tell_length(error, model.targets)}" for degree, error in folds)
     typer.echo(f"error for throws that it was not fitted to, in simulation, median: {errors}")
-    typer.echo(f"model: {output}\naim with it: {command('aim', output, '--at', _example(model))}")
+    typer.echo(f"model: {output}\naim with it: {command('aim', output, '--at', _write_example(model))}")
 
 
 def aim(
@@ -105,7 +106,7 @@ def aim(
         Path | None, typer.Option("--output", "-o", metavar="FILE", help="CSV file to write, for the sampler `list`.")
     ] = None,
     choose: Annotated[
-        str, typer.Option("--choose", help="Of several ways: nearest, least-effort or least-sensitive.")
+        str, typer.Option("--choose", help="Which of several throws: nearest, least-effort or least-sensitive.")
     ] = "nearest",
     json: JsonOption = False,
 ) -> None:
@@ -122,14 +123,16 @@ def aim(
         given += read_targets(targets, names, load_config(directory / CONFIG).task)
     if not given:
         raise ConfigError(
-            "no target", expected="--at, or --targets FILE", hint=command("aim", directory, "--at", _example(model))
+            "no target",
+            expected="--at, or --targets FILE",
+            hint=command("aim", directory, "--at", _write_example(model)),
         )
     aims = model.aim(given, choose=choose)
     if output is not None:
         task = load_config(directory / CONFIG).task
         write_aims(output, aims, names, task)
     if json:
-        print_json([_aim_as_json(aim) for aim in aims])
+        print_json([_make_aim_document(aim) for aim in aims])
     elif output is not None:
         typer.echo(f"{output}: {format_count(len(aims), task.noun)}")
     else:
@@ -183,9 +186,9 @@ def throw(
 
 def score(
     directory: ModelArgument,
-    targets: Annotated[int, typer.Option("--targets", metavar="N", help="Number of targets of each seed.")] = 40,
-    seed: Annotated[int, typer.Option("--seed", help="The first seed of their choice.")] = 0,
-    seeds: Annotated[int, typer.Option("--seeds", metavar="N", help="Number of seeds, whose medians are taken.")] = 3,
+    targets: Annotated[int, typer.Option("--targets", metavar="N", help="Number of targets for each seed.")] = 40,
+    seed: Annotated[int, typer.Option("--seed", help="First seed; targets are chosen by it.")] = 0,
+    seeds: Annotated[int, typer.Option("--seeds", metavar="N", help="Number of seeds; their medians count.")] = 3,
     world: Annotated[
         Path | None,
         typer.Option(
@@ -196,7 +199,7 @@ def score(
     scatter: ScatterOption = 0.0,
     json: JsonOption = False,
 ) -> None:
-    """Throw at targets in simulation, and put into the model how it hits."""
+    """Throw at targets in simulation, and note in the model how well it hits."""
     from contextlib import ExitStack
 
     from throwcollect.learning.model import load_model
@@ -273,7 +276,7 @@ def _split(names: str | None) -> tuple[str, ...]:
     return tuple(name.strip() for name in names.split(",")) if names else ()
 
 
-def _example(model: Model) -> str:
+def _write_example(model: Model) -> str:
     middle = model.learned.outputs[len(model.learned.outputs) // 2]
     given = [axis.nominal for axis in model.learned.axes if axis.key in model.given]
     return ",".join(f"{value:.2f}" for value in (*middle.tolist(), *given))
@@ -323,7 +326,7 @@ def _read_dataset(directory: Path, keys: Sequence[str], model: Model) -> list[Ro
 
 
 def _tell_out_of_reach(model: Model, aims: Sequence[Aim]) -> None:
-    """Tell which targets are out of reach, and why; of very many, the others are counted."""
+    """Print which targets are out of reach, and why; only count those beyond the first `_MOST_TOLD`."""
     from throwcollect.learning.reach import explain_reach
 
     far = [(number, aim) for number, aim in enumerate(aims, start=1) if not aim.reachable]
@@ -333,7 +336,7 @@ def _tell_out_of_reach(model: Model, aims: Sequence[Aim]) -> None:
         tell(f"and {len(far) - _MOST_TOLD} more; {len(far)} of {len(aims)} targets are out of reach")
 
 
-def _aim_as_json(aim: Aim) -> dict[str, object]:
+def _make_aim_document(aim: Aim) -> dict[str, object]:
     return {
         "target": aim.target.tolist(),
         "parameters": aim.parameters,
@@ -348,18 +351,18 @@ def _describe_score(score: Score) -> list[str]:
         f"throws at {format_count(score.targets, 'target')} for each of {format_count(score.seeds, 'seed')}, medians "
         "of the seeds, in simulation: median, 9 of 10 below, largest; not landed"
     ]
-    lines += [f"  learned from {each.trained_on:5} throws:  {_error_cells(each.errors)}" for each in score.trained]
+    lines += [f"  learned from {each.trained_on:5} throws:  {_format_errors(each.errors)}" for each in score.trained]
     if score.distilled is not None:
-        lines.append(f"  model.onnx of these:        {_error_cells(score.distilled)}")
+        lines.append(f"  model.onnx of these:        {_format_errors(score.distilled)}")
     if score.adapted:
         lines.append("in the other world, by the number of throws there:")
         lines += [
-            f"  {each.real_throws:3} ({each.method.value}):  {_error_cells(each.errors)}" for each in score.adapted
+            f"  {each.real_throws:3} ({each.method.value}):  {_format_errors(each.errors)}" for each in score.adapted
         ]
     return lines
 
 
-def _error_cells(errors: Errors) -> str:
+def _format_errors(errors: Errors) -> str:
     from throwcollect.learning.score import tell_misses
 
     return "  ".join([*(f"{cell:>8}" for cell in tell_misses(errors)), str(errors.missed)])

@@ -22,7 +22,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-dataset_app = typer.Typer(help="Look into datasets, and make others of them.", no_args_is_help=True)
+dataset_app = typer.Typer(help="Look into datasets, and make others from them.", no_args_is_help=True)
 image_app = typer.Typer(help="Make the image that containers are made from.", no_args_is_help=True)
 app.add_typer(dataset_app, name="dataset")
 app.add_typer(image_app, name="image")

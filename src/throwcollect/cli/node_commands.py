@@ -24,7 +24,7 @@ def router(
         typer.Option(
             "--key",
             metavar="DIR",
-            help="Key that tls/... lets nobody in without; made if DIR has none. By default, that of THROWCOLLECT_KEY.",
+            help="Key that clients of tls/... need; made if DIR has none. By default, that of THROWCOLLECT_KEY.",
             readable=False,
         ),
     ] = None,
@@ -95,8 +95,8 @@ def simulate(directory: DatasetArgument, trials: list[int]) -> None:
 
     plan = Plan.read(directory / PLAN, load(directory / CONFIG))
     known = range(plan.trials.first, plan.trials.first + len(plan.trials))
-    if strange := [trial for trial in trials if trial not in known]:
-        raise NotFoundError(f"{directory / PLAN}: no trial {strange[0]}", expected=f"{known[0]} to {known[-1]}")
+    if unknown := [trial for trial in trials if trial not in known]:
+        raise NotFoundError(f"{directory / PLAN}: no trial {unknown[0]}", expected=f"{known[0]} to {known[-1]}")
     replayer = Replayer(plan.config)
     for trial in trials:
         print(json.dumps({"trial": trial, "digest": replayer.run(plan.trial(trial)).digest}), flush=True)

@@ -54,13 +54,13 @@ def ps(
         for runtime, found in unrecorded:
             documents.append({"run": found.run_id, "runtime": runtime, "status": "unrecorded", **asdict(found)})
         documents += cluster_runs.list_queued(cluster_runs.make_document)
-        # Times have the form of those of events.
+        # Times are written as in events.
         print_json(documents, default=lambda time: time.isoformat(timespec="milliseconds"))
         return
-    rows = [(_make_row(run), _node_lines(run, held.get(run.id))) for run in shown]
+    rows = [(_make_row(run), _list_node_lines(run, held.get(run.id))) for run in shown]
     rows += [(_make_unrecorded_row(*each), _list_held_nodes(*each)) for each in unrecorded]
     rows += [(row, []) for row in cluster_runs.list_queued(cluster_runs.make_row)]
-    for line in _table(rows):
+    for line in _make_table(rows):
         typer.echo(line)
 
 
@@ -160,7 +160,7 @@ def stop(run: RunOption = None) -> None:
     with count_interruptions() as interruptions:
         found = control.stop(found, keep_on=lambda: not interruptions())
     if found.status == "running":
-        raise Interrupted(f"not waited for; run {found.id} is stopping all the same")
+        raise Interrupted(f"left; run {found.id} is still stopping")
     error = describe_death(found) if found.status == "died" else found.record.error
     if error is not None and not isinstance(error, Interrupted):
         raise error
@@ -192,7 +192,7 @@ def down(
 
 
 def _find_submitted(run: str | None) -> ClusterRun | None:
-    """The submitted dataset that a command means; None if it means a run of this machine."""
+    """Find the submitted dataset that a command means; None if it means a run of this machine."""
     from throwcollect.runs.records import Records
 
     # A run of this machine comes first, and then the scheduler need not be asked, which would take time.
@@ -204,7 +204,7 @@ def _find_submitted(run: str | None) -> ClusterRun | None:
 
 
 def _find_run(named: str | None) -> Run:
-    """The run of this machine that a command is to look at."""
+    """Find the run of this machine that a command is to look at."""
     from throwcollect.runs.records import Records
     from throwcollect.runs.run_selection import find_run_to_watch
 
@@ -224,17 +224,17 @@ def _make_row(run: Run) -> tuple[str, ...]:
     throws = f"{record.progress.ended}/{record.progress.total}" if record.progress is not None else "-"
     dataset = run.place.dataset if record.kind == "collection" else "-"
     simulations = "-" if record.kind == "container" else str(record.simulations)
-    return run.id, record.runtime, simulations, throws, _status(run, record), dataset
+    return run.id, record.runtime, simulations, throws, _describe_status(run, record), dataset
 
 
-def _status(run: Run, record: RunRecord) -> str:
+def _describe_status(run: Run, record: RunRecord) -> str:
     if record.ended is not None:
-        return f"{run.status} {_age(record.ended)} ago, exit code {record.exit_code}"
+        return f"{run.status} {_format_age(record.ended)} ago, exit code {record.exit_code}"
     if run.lives and record.planning is not None:
         plan = record.planning
-        return f"planning for {_age(record.started)}, {plan.checked} of {plan.trials} trials checked"
+        return f"planning for {_format_age(record.started)}, {plan.checked} of {plan.trials} trials checked"
     if run.lives:
-        return f"running for {_age(record.started)}"
+        return f"running for {_format_age(record.started)}"
     from throwcollect.runs.run_selection import has_complete_dataset
 
     return f"{run.status}, but the dataset is complete" if has_complete_dataset(run) else run.status
@@ -245,14 +245,14 @@ def _make_unrecorded_row(runtime: str, held: HeldRun) -> tuple[str, ...]:
     return held.run_id, runtime, str(simulations), "-", "unrecorded", held.source
 
 
-def _node_lines(run: Run, held: tuple[str, HeldRun] | None) -> list[tuple[str, ...]]:
+def _list_node_lines(run: Run, held: tuple[str, HeldRun] | None) -> list[tuple[str, ...]]:
     if run.status == "running":
-        return [_node_line(node, _handle(run.record.runtime)) for node in run.record.nodes]
+        return [_make_node_line(node, _handle(run.record.runtime)) for node in run.record.nodes]
     # If the launcher has ended, its record of the nodes may be out of date.
     return _list_held_nodes(*held) if held is not None else []
 
 
-def _node_line(node: NodeState, handle: str) -> tuple[str, ...]:
+def _make_node_line(node: NodeState, handle: str) -> tuple[str, ...]:
     again = format_count(node.restarts, "restart") if node.restarts else ""
     return (
         node.name,
@@ -267,7 +267,7 @@ def _list_held_nodes(runtime: str, held: HeldRun) -> list[tuple[str, ...]]:
 
 
 def _handle(name: str) -> str:
-    """The noun for the handle of a node, such as "pid"; that of processes if the runtime is unknown on this machine."""
+    """Find the noun for the handle of a node; "pid" if this machine does not know the runtime."""
     from throwcollect.runtimes.registry import get_runtime
     from throwcollect.runtimes.runtime import Runtime
 
@@ -277,8 +277,8 @@ def _handle(name: str) -> str:
         return Runtime.handle
 
 
-def _table(rows: Sequence[tuple[tuple[str, ...], list[tuple[str, ...]]]]) -> Iterable[str]:
-    """Runs as one table, and below each run its nodes, indented."""
+def _make_table(rows: Sequence[tuple[tuple[str, ...], list[tuple[str, ...]]]]) -> Iterable[str]:
+    """Format runs as one table, with the nodes of each run below it, indented."""
     runs = _align([_HEADINGS, *(run for run, _ in rows)])
     nodes = iter(_align([line for _, lines in rows for line in lines]))
     yield runs[0]
@@ -293,7 +293,7 @@ def _align(rows: Sequence[Sequence[str]]) -> list[str]:
     return ["  ".join(map(str.ljust, row, widths)).rstrip() for row in rows]
 
 
-def _age(since: datetime) -> str:
-    """The time since an instant, in its largest unit."""
+def _format_age(since: datetime) -> str:
+    """Write the time since an instant, in its largest unit."""
     seconds = max(0, int((datetime.now(timezone.utc) - since).total_seconds()))
     return next((f"{seconds // size} {unit}" for unit, size in _UNITS if seconds >= size), "0 s")

@@ -34,13 +34,13 @@ def serve(
     host: Annotated[str, typer.Option("--host", metavar="ADDRESS", help="Address to listen at.")] = "127.0.0.1",
     port: Annotated[
         int | None,
-        typer.Option("--port", min=0, max=65535, help="Port; by default 8080, or any that is free if that is not."),
+        typer.Option("--port", min=0, max=65535, help="Port; by default 8080, or a free one if that is taken."),
     ] = None,
     datasets: Annotated[
-        Path, typer.Option("--datasets", metavar="DIR", help="Where instances make their datasets.")
+        Path, typer.Option("--datasets", metavar="DIR", help="Directory in which instances write datasets.")
     ] = Path("datasets"),
     models: Annotated[
-        Path, typer.Option("--models", metavar="DIR", help="Where models are, each in a directory of its own.")
+        Path, typer.Option("--models", metavar="DIR", help="Directory of models, each in a directory of its own.")
     ] = Path("models"),
     certificate: Annotated[
         Path | None, typer.Option("--tls-cert", metavar="FILE", help="Certificate in PEM: speak HTTPS.")
@@ -69,7 +69,7 @@ def serve(
         raise ConfigError("--tls-cert and --tls-key: should be given together")
     if host not in _LOOPBACK and certificate is None and not in_the_clear:
         raise ConfigError(
-            f"--host {host}: whoever is on that network could read the token as it goes by",
+            f"--host {host}: anybody on that network could read the token while it is sent",
             hint="--tls-cert and --tls-key, or --in-the-clear if the network is trusted; ssh -L needs neither",
         )
     tls = None if certificate is None or key is None else Tls(certificate, key)
@@ -117,4 +117,4 @@ def write_tunnel(address: Address) -> str:
 
     port = address.url.rpartition(":")[2]
     tunnel = f"ssh -L {port}:127.0.0.1:{port} {socket.gethostname()}"
-    return f"from another machine: {tunnel}   and then the same address, which opens once"
+    return f"from another machine: {tunnel}   and then open the same address, which works only once"

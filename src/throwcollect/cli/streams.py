@@ -1,6 +1,6 @@
 """Standard streams that survive being closed, before a command starts or while it runs.
 
-Output that cannot be written is dropped, so that the command still does its work and ends in order. Lost standard
+Output that cannot be written is dropped, so that the command still does its work and ends properly. Lost standard
 output is reported by the exit code where it matters; lost standard error never is.
 """
 
@@ -45,7 +45,7 @@ class _Stream(io.FileIO):
                 self.failure = error
                 if self.kind == "lines" and self.reader_is_gone:
                     raise ReaderGone from error
-        # The buffer has to believe that all was written; it would keep the rest, and try again at the end.
+        # Tell the buffer that all was written; it would otherwise keep the rest, and try again at the end.
         return memoryview(data).nbytes
 
     @property
@@ -55,7 +55,7 @@ class _Stream(io.FileIO):
 
 
 def open_streams() -> None:
-    """Make all three standard streams exist, and output outlive its readers.
+    """Make sure that all three standard streams exist, and that a command goes on when a reader of its output ends.
 
     A stream that was closed, as by ``>&-``, becomes ``/dev/null``. Otherwise the next file that is opened would get its
     descriptor, and the output would be written into that file.
@@ -64,7 +64,7 @@ def open_streams() -> None:
         try:
             os.fstat(number)
         except OSError:
-            # open() takes the lowest free descriptor, which is this one. Child processes shall inherit it, too.
+            # open() takes the lowest free descriptor, which is this one. Child processes must inherit it, too.
             os.set_inheritable(os.open(os.devnull, os.O_RDWR), True)
     if sys.stdin is None:
         sys.stdin = open(0, closefd=False)  # noqa: SIM115 - it stays open
@@ -80,12 +80,12 @@ def end_with_reader() -> None:
 def has_reader() -> bool:
     """Find out whether anybody may still read standard output, without writing to it.
 
-    A command that waits for something to print asks this meanwhile; otherwise it would learn only with its next line
-    that its reader has ended.
+    A command that waits for something to print asks this meanwhile; otherwise, it would notice only when it prints the
+    next line that its reader has ended.
     """
     poll = select.poll()
     poll.register(1, 0)
-    # A pipe without a reader is reported as POLLERR, for which nobody has to ask (poll(2)).
+    # A pipe without a reader is reported as POLLERR, whatever events were asked for (poll(2)).
     return not any(happened & select.POLLERR for _, happened in poll.poll(0))
 
 
@@ -106,20 +106,20 @@ def ensure_written(*, reader_may_leave: bool = False, hint: str | None = None) -
         ReaderGone: If the reader has ended, and the command should end with it.
     """
     sys.stdout.flush()
-    stream = _standard_output()
+    stream = _find_standard_output()
     if stream is None or stream.failure is None or stream.kind == "log":
         return
     if not (reader_may_leave and stream.reader_is_gone):
         raise OutputError(f"the output cannot be written: {stream.failure.strerror}", hint=hint)
 
 
-def _standard_output() -> _Stream | None:
+def _find_standard_output() -> _Stream | None:
     raw = getattr(getattr(sys.stdout, "buffer", None), "raw", None)
     return raw if isinstance(raw, _Stream) else None
 
 
 def _set_kind(kind: Literal["lines", "log"]) -> None:
-    if (stream := _standard_output()) is not None:
+    if (stream := _find_standard_output()) is not None:
         stream.kind = kind
 
 

@@ -30,7 +30,7 @@ _MOST_NAMED = 5
 
 @dataclass(frozen=True)
 class ClusterRun:
-    """A dataset that was submitted, with the record of that."""
+    """A dataset that was submitted to a scheduler, with the record of its submission."""
 
     directory: Path
     submission: Submission
@@ -72,7 +72,7 @@ class ClusterRun:
             WorkerError: If it does not answer.
             DatasetError: If the directory cannot be read.
         """
-        # The queue comes first: a task that has left the queue has put its slice into place before.
+        # Ask the queue before the files are read: a task puts its slice into place before it leaves the queue.
         queue = slurm.find_tasks()
         tasks: dict[int | None, ArrayTask] = {}
         joining: ArrayTask | None = None
@@ -84,7 +84,7 @@ class ClusterRun:
         return SlicesLook(finished, tuple(tasks.values()), joining, complete)
 
     def stop(self) -> None:
-        """End all jobs: tasks stop in order, and keep the episodes that they have.
+        """End all jobs: tasks shut down properly, and keep the episodes that they have.
 
         Raises:
             ConfigError: If there is no Slurm here.
@@ -106,7 +106,7 @@ class ClusterRun:
         ended: dict[int | None, ArrayTask] = {}
         for job in self.submission.jobs:
             ended |= slurm.find_ended(job.array) if job.array else {}
-        reasons = [self._reason(each, ended.get(each.index)) for each in missing[:_MOST_NAMED]]
+        reasons = [self._explain_slice(each, ended.get(each.index)) for each in missing[:_MOST_NAMED]]
         more = f" and {len(missing) - _MOST_NAMED} more" if len(missing) > _MOST_NAMED else ""
         message = f"{format_count(len(missing), 'slice')} of {self.submission.tasks} not collected: "
         if all(self._is_cancelled(each, ended.get(each.index)) for each in missing):
@@ -123,7 +123,7 @@ class ClusterRun:
 
     @property
     def logs(self) -> dict[str, Path]:
-        """The latest log of each task, by its index; of one run on several nodes, its one log."""
+        """The latest log of each task, by its index; for one run on several nodes, its only log."""
         if self.submission.live:
             path = self.directory / CLUSTER / "logs" / f"{self.submission.jobs[-1].array}_live.log"
             return {"0": path} if path.exists() else {}
@@ -131,7 +131,7 @@ class ClusterRun:
         return {index: path for index, path in found.items() if path is not None}
 
     def log(self, index: int) -> Path | None:
-        """The latest log of a task of an array; None if it has written none."""
+        """Find the latest log of a task of an array; None if it has written none."""
         logs = self.directory / CLUSTER / "logs"
         found = [path for job in self.submission.jobs if (path := logs / f"{job.array}_{index}.log").exists()]
         return found[-1] if found else None
@@ -140,7 +140,7 @@ class ClusterRun:
         # Slurm forgets tasks that were cancelled before they began.
         return self.log(slice.index) is None if task is None else task.state == "CANCELLED"
 
-    def _reason(self, slice: Slice, task: ArrayTask | None) -> str:
+    def _explain_slice(self, slice: Slice, task: ArrayTask | None) -> str:
         if task is None:
             return f"{slice.index}"
         if task.saw_no_directory:
@@ -176,8 +176,8 @@ class SlicesLook:
 
     @property
     def lives(self) -> bool:
-        """Whether a job of it runs, or waits to run."""
-        # With this reason a job waits for ever, as the one that it depends on can no longer end as it should.
+        """Whether a job of the dataset runs, or waits to run."""
+        # With this reason a job waits for ever, as the job that it depends on can no longer end as it should.
         joins = self.joining is not None and self.joining.lives and self.joining.reason != "DependencyNeverSatisfied"
         return any(task.lives for task in self.tasks) or joins
 
@@ -185,7 +185,7 @@ class SlicesLook:
 class ProgressOfSlices:
     """Counts the trials of finished slices, and reads each slice only once.
 
-    The speed is that since the first look, as nobody wrote down how fast trials ended before.
+    The speed is measured from the first look on, as no file says how fast trials ended before.
     """
 
     def __init__(self, run: ClusterRun) -> None:
@@ -238,7 +238,7 @@ def follow(run: ClusterRun, *, keep_on: Callable[[], bool] = lambda: True) -> It
     """Look at a run every few seconds, until it has ended or `keep_on` returns False.
 
     Yields:
-        The state of the run; the last is that of a run that has ended, unless `keep_on` refused.
+        The state of the run; the last one is the state after its end, unless `keep_on` has returned False.
 
     Raises:
         ConfigError: If there is no Slurm here.
@@ -254,7 +254,7 @@ def follow(run: ClusterRun, *, keep_on: Callable[[], bool] = lambda: True) -> It
 
 
 def find_cluster_run(named: str | None) -> ClusterRun | None:
-    """Find the submitted dataset that a command names by its directory; None if the name is another one.
+    """Find the submitted dataset that a command names by its directory; None if it names something else.
 
     Without a name, the command means the only dataset in the queue that lies below the current directory.
     """

@@ -19,7 +19,7 @@ from throwcollect.dataset.directory import PLAN
 from throwcollect.errors import Interrupted
 
 _ENDING_S = 30
-"""Time that a task needs besides `run.grace_s` to end in order: to end nodes and close files."""
+"""Time that a task needs, besides `run.grace_s`, to shut down: to end nodes and close files."""
 _JOIN_MEMORY = "4G"
 _EXPANDED = re.compile(r"\$SLURM_|cluster\.scratch=|tcp/0\.0\.0\.0:\$PORT$")
 """Words in which the shell of the task replaces variables; all other words are quoted."""
@@ -47,7 +47,7 @@ class BatchScripts:
         directives = {
             "job-name": f"throwcollect-{self.config.name}",
             "array": indexes + (f"%{cluster.at_once}" if cluster.at_once else ""),
-            "output": self._output("%A_%a.log"),
+            "output": self._name_output("%A_%a.log"),
             "cpus-per-task": cluster.cores,
             "mem": cluster.memory,
             "time": cluster.time,
@@ -63,10 +63,10 @@ class BatchScripts:
             directives,
             (self._requeue_flag,),
             "# As a step, so that signals reach it.",
-            self._step(words, cores=cluster.cores),
+            self._write_step(words, cores=cluster.cores),
             "code=$?",
             # SLURM_JOB_ID of the last task is the id of the whole array, all of which would be queued again.
-            *_requeue(cluster.requeue, "${SLURM_ARRAY_JOB_ID}_$SLURM_ARRAY_TASK_ID"),
+            *_write_requeue(cluster.requeue, "${SLURM_ARRAY_JOB_ID}_$SLURM_ARRAY_TASK_ID"),
             "exit $code",
         )
 
@@ -75,7 +75,7 @@ class BatchScripts:
         cluster = self.config.cluster
         directives = {
             "job-name": f"throwcollect-{self.config.name}",
-            "output": self._output("%j_live.log"),
+            "output": self._name_output("%j_live.log"),
             "nodes": nodes,
             "ntasks": nodes,
             "ntasks-per-node": 1,
@@ -95,8 +95,8 @@ class BatchScripts:
             f"Collects a dataset of throwcollect in one run on {nodes} nodes.",
             directives,
             ("--no-kill", self._requeue_flag),
-            # By its number, each job has a port of its own, as several jobs may share a node. From 32768 on, ports are
-            # those that Linux gives to connections that leave.
+            # The number of the job gives each job a port of its own, as several jobs may share a node. Ports from 32768
+            # on are left out, as Linux gives them to outgoing connections.
             "export PORT=$((20000 + SLURM_JOB_ID % 12768))",
             # A token of an earlier start of this job would lead the other tasks to a router that is gone.
             f"rm -f {token} {token}.over",
@@ -105,7 +105,7 @@ class BatchScripts:
             'if [ "$SLURM_PROCID" = 0 ]; then',
             "    # Slurm signals this shell, too, which has to outlive the run.",
             "    trap : TERM INT HUP",
-            f"    {_escape_quotes(self._words(begin))}",
+            f"    {_escape_quotes(self._write_command(begin))}",
             "    code=$?",
             "    # A run that ends before it has a token has no need of the others.",
             f"    touch {_escape_quotes(token)}.over",
@@ -115,11 +115,11 @@ class BatchScripts:
             f"    [ ! -e {_escape_quotes(token)}.over ] || exit 0",
             "    sleep 0.5",
             "done",
-            f"exec {_escape_quotes(self._words(join))} < {_escape_quotes(token)}",
+            f"exec {_escape_quotes(self._write_command(join))} < {_escape_quotes(token)}",
             "'",
             "code=$?",
             f"rm -f {token} {token}.over",
-            *_requeue(cluster.requeue, "$SLURM_JOB_ID"),
+            *_write_requeue(cluster.requeue, "$SLURM_JOB_ID"),
             "exit $code",
         )
 
@@ -128,18 +128,23 @@ class BatchScripts:
         cluster = self.config.cluster
         directives = {
             "job-name": f"throwcollect-{self.config.name}-join",
-            "output": self._output("%j_join.log"),
+            "output": self._name_output("%j_join.log"),
             "cpus-per-task": 1,
             "mem": cluster.memory and _JOIN_MEMORY,
             "time": cluster.time,
         }
-        step = self._step(["join", str(self.directory)], cores=1)
+        step = self._write_step(["join", str(self.directory)], cores=1)
         return self._write("Joins the slices of a dataset of throwcollect.", directives, ("--requeue",), step)
 
     def _write(self, purpose: str, directives: dict[str, object], flags: Sequence[str], *commands: str) -> str:
         """Write a script: the options for Slurm, what all scripts begin with, and then its own commands."""
-        head = ["#!/bin/bash", f"# {purpose}", *self._directives(directives), *(f"#SBATCH {flag}" for flag in flags)]
-        return "\n".join([*head, *self._start(), "", *commands, ""])
+        head = [
+            "#!/bin/bash",
+            f"# {purpose}",
+            *self._list_directives(directives),
+            *(f"#SBATCH {flag}" for flag in flags),
+        ]
+        return "\n".join([*head, *self._list_opening_lines(), "", *commands, ""])
 
     @property
     def _requeue_flag(self) -> str:
@@ -150,11 +155,11 @@ class BatchScripts:
         # Without the letter B, Slurm signals the step alone: the script lives on, and can have the task queued again.
         return f"TERM@{math.ceil(self.config.run.grace_s) + _ENDING_S}"
 
-    def _output(self, name: str) -> str:
+    def _name_output(self, name: str) -> str:
         # Slurm replaces patterns such as %j in names of logs, and takes %% for a percent sign.
         return f"{str(self.logs).replace('%', '%%')}/{name}"
 
-    def _directives(self, own: dict[str, object]) -> Iterator[str]:
+    def _list_directives(self, own: dict[str, object]) -> Iterator[str]:
         cluster = self.config.cluster
         shared = {
             "partition": cluster.partition,
@@ -171,7 +176,7 @@ class BatchScripts:
                 text = str(value)
                 yield f"#SBATCH --{name}={text if _is_plain(text) else _quote(text)}"
 
-    def _start(self) -> Iterator[str]:
+    def _list_opening_lines(self) -> Iterator[str]:
         yield from self.config.cluster.lines
         yield from (f"module load {shlex.quote(module)}" for module in self.config.cluster.modules)
         plan = shlex.quote(str(self.directory / PLAN))
@@ -181,30 +186,32 @@ class BatchScripts:
         yield "    exit 2"
         yield "fi"
 
-    def _step(self, words: Sequence[str], *, cores: int) -> str:
-        return f"srun --ntasks=1 --cpus-per-task={cores} {self._words(words)}"
+    def _write_step(self, words: Sequence[str], *, cores: int) -> str:
+        return f"srun --ntasks=1 --cpus-per-task={cores} {self._write_command(words)}"
 
-    def _words(self, words: Sequence[str]) -> str:
+    def _write_command(self, words: Sequence[str]) -> str:
         """Write a command of throwcollect for the shell, in the image if there is one."""
         if self.image is None:
-            return " ".join(map(_in_shell, (*self.program, *words)))
+            return " ".join(map(_quote_for_shell, (*self.program, *words)))
         binds = [shlex.quote(f"--bind={bind}") for bind in (self.directory, *self.config.cluster.binds)]
         if self.config.cluster.scratch:
-            # It may have variables anywhere.
+            # Its path may have variables anywhere.
             binds.append(f'"--bind={self.config.cluster.scratch}"')
         image = shlex.quote(str(self.image))
-        return " ".join(["apptainer --quiet exec --cleanenv", *binds, image, "throwcollect", *map(_in_shell, words)])
+        return " ".join(
+            ["apptainer --quiet exec --cleanenv", *binds, image, "throwcollect", *map(_quote_for_shell, words)]
+        )
 
 
-def _requeue(times: int, job: str) -> Iterator[str]:
+def _write_requeue(times: int, job: str) -> Iterator[str]:
     if times:
-        yield f"# {Interrupted.exit_code}: it was stopped in order, and goes on where it is started again."
+        yield f"# {Interrupted.exit_code}: it was stopped, and goes on where it left off when it is started again."
         yield f'if [ $code = {Interrupted.exit_code} ] && [ "${{SLURM_RESTART_COUNT:-0}}" -lt {times} ]; then'
         yield f'    scontrol requeue "{job}"'
         yield "fi"
 
 
-def _in_shell(word: str) -> str:
+def _quote_for_shell(word: str) -> str:
     """Quote a word for the shell, which replaces variables in names of tasks and of the scratch directory alone."""
     if "$" in word and _EXPANDED.match(word):
         return f'"{word}"'

@@ -14,7 +14,7 @@ from throwcollect.errors import ConfigError
 
 
 def site_path() -> Path:
-    """Path of the file, which need not exist."""
+    """Name the path of the file, which need not exist."""
     home = os.environ.get("XDG_CONFIG_HOME") or Path.home() / ".config"
     return Path(home) / "throwcollect" / "cluster.yaml"
 

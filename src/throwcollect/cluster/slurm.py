@@ -12,7 +12,7 @@ from throwcollect.cluster.site import site_path
 from throwcollect.errors import ConfigError, WorkerError
 
 MARK = "throwcollect:"
-"""Begin of the comment of our jobs; the directory of the dataset follows."""
+"""Beginning of the comment of our jobs; the directory of the dataset follows."""
 
 _PATIENCE_S = 60.0
 """Longest wait for a command of Slurm."""
@@ -109,13 +109,13 @@ def find_tasks() -> dict[str, list[ArrayTask]]:
         ConfigError: If there is no Slurm here.
         WorkerError: If it does not answer.
     """
-    # squeue fails if it is asked for a job that Slurm has forgotten, and not if it is asked for all jobs of this user.
-    # Number of the array, index in it, state, node, and reason.
+    # squeue would fail for a job that Slurm has forgotten, but never fails for all jobs of this user. Ask for number of
+    # the array, index in it, state, node, and reason.
     format_ = "%F|%K|%T|%N|%r"
     found: dict[str, list[ArrayTask]] = {}
     for line in _run("squeue", "--noheader", "--array", "--me", "--states=all", f"--format={format_}").splitlines():
         job, index, state, node, reason = line.strip().split("|")
-        found.setdefault(job, []).append(ArrayTask(_index(index), state, node, reason))
+        found.setdefault(job, []).append(ArrayTask(_read_index(index), state, node, reason))
     return found
 
 
@@ -132,7 +132,7 @@ def find_ended(job: str) -> dict[int | None, ArrayTask]:
         text = ""
     for line in text.splitlines():
         facts = dict(word.split("=", 1) for word in line.split() if "=" in word)
-        for index in _indexes(facts.get("ArrayTaskId", "")):
+        for index in _read_indexes(facts.get("ArrayTaskId", "")):
             task = ArrayTask(index, facts["JobState"], facts.get("NodeList", ""), facts["ExitCode"])
             if not task.lives:
                 ended[index] = task
@@ -150,7 +150,7 @@ def _find_accounted(job: str) -> dict[int | None, ArrayTask]:
     for line in text.splitlines():
         name, state, node, code = line.split("|")
         # A task is called ARRAY_INDEX, and a cancelled one has the state `CANCELLED by UID`.
-        task = ArrayTask(_index(name.partition("_")[2]), state.partition(" ")[0], node, code)
+        task = ArrayTask(_read_index(name.partition("_")[2]), state.partition(" ")[0], node, code)
         if not task.lives:
             found[task.index] = task
     return found
@@ -192,7 +192,7 @@ def find_largest_array() -> int | None:
     return None
 
 
-def _indexes(text: str) -> list[int | None]:
+def _read_indexes(text: str) -> list[int | None]:
     """Read the indexes of array tasks, such as ``4``, ``4-7%2`` or ``1,4-7``; ``[None]`` for a job that is no array."""
     found: list[int | None] = []
     for part in text.partition("%")[0].split(","):
@@ -202,7 +202,7 @@ def _indexes(text: str) -> list[int | None]:
     return found or [None]
 
 
-def _index(text: str) -> int | None:
+def _read_index(text: str) -> int | None:
     return int(text) if text.isdigit() else None
 
 
@@ -211,7 +211,7 @@ def _run(program: str, *arguments: str, patience_s: float = _PATIENCE_S) -> str:
 
     Raises:
         ConfigError: If there is no such command.
-        WorkerError: If it fails or does not answer; the message has its own words.
+        WorkerError: If it fails or does not answer; the message quotes what it printed.
     """
     try:
         done = subprocess.run(
@@ -226,7 +226,7 @@ def _run(program: str, *arguments: str, patience_s: float = _PATIENCE_S) -> str:
         )
     except FileNotFoundError as error:
         raise ConfigError(
-            f"{program} is not there: this is no machine that submits to Slurm",
+            f"{program} is missing: this machine cannot submit to Slurm",
             hint="run this on a login node, or see docs/cluster.md for other schedulers",
         ) from error
     except subprocess.TimeoutExpired as error:

@@ -1,4 +1,4 @@
-"""The record of what was submitted for a dataset; it lies in its directory, so any machine that sees that can go on."""
+"""The record of what was submitted for a dataset; any machine that sees the dataset's directory can go on with it."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from throwcollect.files import read_text, write_file
 from throwcollect.sweep.slice import Slice
 
 CLUSTER = "cluster"
-"""Name of the directory of scripts and logs, in that of a dataset."""
+"""Name of the directory of scripts and logs, inside the directory of a dataset."""
 
 _FILE = "submission.json"
 _MOST_BYTES = 10_000_000
@@ -21,7 +21,7 @@ _MOST_BYTES = 10_000_000
 
 @dataclass(frozen=True)
 class Job:
-    """An array that was submitted, and the job that joins the slices behind it.
+    """An array that was submitted, and the job that joins the slices after it.
 
     Attributes:
         array: Number of the array; empty if the slices were only to be joined.

@@ -44,7 +44,7 @@ _COLLECT, _JOIN, _LOGS = "collect.sh", "join.sh", "logs"
 
 @dataclass(frozen=True)
 class Submitted:
-    """The result of a submission to the absolute path of a dataset; a dry run has no job, but the script of a task."""
+    """What was submitted for a dataset, whose path is absolute; a dry run has only the script of a task, and no job."""
 
     directory: Path
     script: str
@@ -78,8 +78,8 @@ def submit(
         onlooker: Is told what is planned and submitted.
 
     Raises:
-        ConfigError: If the configuration cannot be collected so, something is missing that tasks need, or Slurm would
-            refuse them; nothing is left behind then.
+        ConfigError: If the configuration cannot be collected this way, something is missing that tasks need, or Slurm
+            would refuse them; nothing is left behind then.
         WorkerError: If Slurm refuses the jobs.
         DatasetError: If the directory cannot be written.
     """
@@ -118,7 +118,7 @@ def submit(
 
 
 def submit_missing(directory: Path, *, overrides: Sequence[str] = (), onlooker: Onlooker) -> Submitted | None:
-    """Submit the slices of a dataset that are neither finished nor on their way; of one run, what is left of it.
+    """Submit the slices of a dataset that are neither finished nor in the queue; if it is one run, submit it again.
 
     Overrides may change only keys that do not change the dataset.
 
@@ -170,7 +170,7 @@ def _submit(scripts: BatchScripts, submission: Submission, slices: tuple[int, ..
         if slices:
             array = slurm.submit(_write(directory, _COLLECT, text))
             with ExitStack() as undo:
-                # No record would name the array, and its tasks would lack their files, which are removed on failure.
+                # If submitting the other job fails, no record names the array, and the files of its tasks are removed.
                 undo.callback(slurm.cancel, [array])
                 # The joining job starts after all tasks, however they end, and reports what is missing then.
                 joining = slurm.submit(join, f"--dependency=afterany:{array}", "--kill-on-invalid-dep=yes")

@@ -44,7 +44,7 @@ class ClusterConfig(Section):
     """How a collection is run as an array of tasks of a scheduler; nothing in this section changes the dataset."""
 
     partition: Word | None = None
-    """Partition that the tasks are queued in; null leaves this and the next ones to the scheduler."""
+    """Partition that the tasks are queued in; null leaves the choice to the scheduler, here and in the next keys."""
     account: Word | None = None
     """Account that is charged."""
     qos: Word | None = None
@@ -52,23 +52,23 @@ class ClusterConfig(Section):
     constraint: Word | None = None
     """Features that a node must have."""
     time: Time | None = None
-    """Time limit of a task; a task that comes near it stops in order, and is queued again (`requeue`)."""
+    """Time limit of a task; shortly before it, the task shuts down properly, and is queued again (`requeue`)."""
     memory: Memory | None = None
     """Memory of a task."""
     cores: Annotated[int, Field(ge=1, le=256)] = 1
-    """Cores of a task; it runs as many simulations."""
+    """Cores of a task, which runs one simulation on each."""
     at_once: PositiveInt | None = None
     """Largest number of tasks that run at the same time."""
     modules: list[Word] = []
     """Environment modules that a task loads."""
     lines: list[Line] = []
-    """Lines of the site's own at the start of the batch script: `#SBATCH` options and commands."""
+    """Further lines that the site needs at the start of the batch script: `#SBATCH` options and commands."""
     image: str | None = None
-    """Image of Apptainer that tasks run in (`throwcollect image sif`); null takes the Python environment that submits,
-    which all nodes have to see."""
+    """Image of Apptainer that tasks run in (`throwcollect image sif`); null takes the Python environment from which
+    the collection is submitted, which all nodes have to see."""
     binds: list[Bind] = []
-    """Further directories that are seen in the image; that of the dataset always is."""
+    """Further directories that tasks see inside the image; they always see the directory of the dataset."""
     scratch: Scratch | None = None
     """Directory on a disk of the node, such as `$TMPDIR`, in which a task collects before it hands its slice over."""
     requeue: Annotated[int, Field(ge=0, le=1000)] = 10
-    """How often a task that was stopped in order is queued again."""
+    """How often a task that was stopped, and has shut down properly, is queued again."""

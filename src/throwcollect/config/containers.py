@@ -16,7 +16,7 @@ from throwcollect.config.kinds import NUMBER_AS_TEXT, in_words, match
 from throwcollect.config.section import Section
 
 _LEAST_MEMORY = 6 * 1024**2
-"""The least that Docker engines accept."""
+"""Smallest limit of memory that Docker engines accept [bytes]."""
 
 _SIZE_UNITS = {"": 1, "b": 1, "k": 1024, "m": 1024**2, "g": 1024**3}
 _OWN_VARIABLES = (
@@ -48,7 +48,7 @@ _REFUSED = {
 }
 
 
-def _size(text: str) -> str:
+def _check_size(text: str) -> str:
     match = re.fullmatch(r"([1-9][0-9]{0,17})([bkmg]?)", text)
     if match is None or int(match[1]) * _SIZE_UNITS[match[2]] < _LEAST_MEMORY:
         raise ValueError(f"should be a size of 6m or more, such as 512m or 2g, got '{text}'")
@@ -61,7 +61,7 @@ def _is_own_path(text: str) -> bool:
     return any(PurePosixPath(own) in (path, *path.parents) for own in _OWN_DIRECTORIES)
 
 
-def _mount(text: str) -> str:
+def _check_mount(text: str) -> str:
     source, _, rest = text.partition(":")
     target, _, mode = rest.partition(":")
     # With `..` in it, the path that is checked would not be the one that is mounted.
@@ -76,13 +76,13 @@ def _mount(text: str) -> str:
     return text
 
 
-def _network(text: str) -> str:
+def _check_network(text: str) -> str:
     if text in ("host", "none") or text.startswith("container:"):
-        raise ValueError(f"{text} is refused; a network of the engine is joined besides the run's own")
+        raise ValueError(f"{text} is refused; name a network of the engine, which is joined besides the run's own")
     return text
 
 
-def _variable(text: str) -> str:
+def _check_variable(text: str) -> str:
     if text in _OWN_VARIABLES:
         raise ValueError(_LAUNCHER)
     if not re.fullmatch(r"[A-Za-z_][A-Za-z0-9_]*", text):
@@ -90,26 +90,26 @@ def _variable(text: str) -> str:
     return text
 
 
-def _port(text: str) -> str:
+def _check_port(text: str) -> str:
     match = re.fullmatch(r"([1-9][0-9]{0,4})(/tcp|/udp)?", text)
     if match is None or int(match[1]) > 65535:
         raise ValueError("should be a port of the container from 1 to 65535, with /udp if it is not TCP")
     return text
 
 
-def _label(text: str) -> str:
+def _check_label(text: str) -> str:
     if text.startswith(_LABELS):
         raise ValueError(f"is refused, as labels that begin with {_LABELS} are the launcher's")
     return text
 
 
-def _tmpfs(text: str) -> str:
+def _check_tmpfs(text: str) -> str:
     if not text.startswith("/") or ".." in text.split("/") or normal_path(text) == "/" or _is_own_path(text):
         raise ValueError("should be an absolute path in the container, outside of /data and /key")
     return text
 
 
-def _device(text: str) -> str:
+def _check_device(text: str) -> str:
     host, _, rest = text.partition(":")
     inside, _, permissions = rest.partition(":")
     if not inside.startswith("/dev/") or ".." in inside.split("/") or permissions not in ("r", "w", "rw"):
@@ -119,24 +119,24 @@ def _device(text: str) -> str:
     return text
 
 
-Size = Annotated[str, AfterValidator(_size), in_words("a size such as 512m or 2g")]
+Size = Annotated[str, AfterValidator(_check_size), in_words("a size such as 512m or 2g")]
 Cores = Annotated[
     str,
     NUMBER_AS_TEXT,
     match(r"\d+(-\d+)?(,\d+(-\d+)?)*", "numbers and ranges of cores, such as 0-3,6"),
     in_words("cores such as 0-3,6"),
 ]
-Mount = Annotated[str, AfterValidator(_mount), in_words("HOST:CONTAINER[:ro]")]
-Network = Annotated[str, AfterValidator(_network), in_words("names of networks")]
+Mount = Annotated[str, AfterValidator(_check_mount), in_words("HOST:CONTAINER[:ro]")]
+Network = Annotated[str, AfterValidator(_check_network), in_words("names of networks")]
 Volume = Annotated[
     str,
     match(r"[a-zA-Z0-9][a-zA-Z0-9_.-]+", "a volume's name: letters, digits, _, . and -"),
     in_words("a volume's name"),
 ]
-Variable = Annotated[str, AfterValidator(_variable)]
-ContainerPort = Annotated[str, AfterValidator(_port)]
+Variable = Annotated[str, AfterValidator(_check_variable)]
+ContainerPort = Annotated[str, AfterValidator(_check_port)]
 HostPort = Annotated[int, Field(ge=1, le=65535)]
-Device = Annotated[str, AfterValidator(_device), in_words("HOST:CONTAINER:PERMISSIONS")]
+Device = Annotated[str, AfterValidator(_check_device), in_words("HOST:CONTAINER:PERMISSIONS")]
 
 _OPTIONAL_KEYS = ConfigDict(extra="forbid", use_attribute_docstrings=True)
 
@@ -150,7 +150,7 @@ class DeviceRequest(TypedDict, total=False):
     count: int
     """Number of devices; -1 for all."""
     device_ids: list[str]
-    """Devices by name, in the place of a number."""
+    """Names of devices, instead of a number."""
     capabilities: list[list[str]]
     """Alternatives of what the devices must be able to do, such as `[[gpu]]`."""
     options: dict[str, str]
@@ -158,7 +158,7 @@ class DeviceRequest(TypedDict, total=False):
 
 
 class ContainerOptions(TypedDict, total=False):
-    """Further keywords of `docker.containers.create` of the Docker SDK for Python; absent ones are the engine's."""
+    """Further keywords of `docker.containers.create` of the Docker SDK for Python; by default they are the engine's."""
 
     # Unknown keywords are errors. For those that Docker knows and we refuse, the message gives the reason.
     __pydantic_config__ = ConfigDict(**_OPTIONAL_KEYS, json_schema_extra={"refused": _REFUSED})  # type: ignore[misc]
@@ -174,30 +174,30 @@ class ContainerOptions(TypedDict, total=False):
     """Options of the resolver."""
     extra_hosts: dict[str, str]
     """Further host names and their addresses."""
-    labels: dict[Annotated[str, AfterValidator(_label)], str]
+    labels: dict[Annotated[str, AfterValidator(_check_label)], str]
     """Further labels."""
     group_add: list[str | int]
     """Further groups of the process."""
     shm_size: Size
     """Size of /dev/shm."""
-    tmpfs: dict[Annotated[str, AfterValidator(_tmpfs)], str]
-    """Further directories in memory and their mount options; those of /tmp join the ones it has."""
+    tmpfs: dict[Annotated[str, AfterValidator(_check_tmpfs)], str]
+    """Further directories in memory and their mount options; options for /tmp are added to those that it has anyway."""
     ulimits: dict[str, int]
     """Resource limits by their names, such as `nofile`."""
     sysctls: dict[str, str | int]
     """Kernel parameters of the container's namespaces."""
     pids_limit: PositiveInt
-    """Upper bound of threads and processes, in the place of 512."""
+    """Upper bound of threads and processes, instead of 512."""
     mem_reservation: Size
-    """Memory down to which it is shrunk when the host has little."""
+    """Memory to which the container is limited when the host runs short of it."""
     oom_score_adj: Annotated[int, Field(ge=-1000, le=1000)]
-    """How readily the kernel ends it when the host runs out of memory."""
+    """How readily the kernel ends the container when the host runs out of memory."""
     cpu_shares: PositiveInt
-    """Weight of its computing time; 1024 if absent."""
+    """Share of computing time, relative to that of other containers; 1024 if absent."""
     cpuset_mems: Cores
-    """NUMA nodes whose memory it uses."""
+    """NUMA nodes whose memory the container uses."""
     blkio_weight: Annotated[int, Field(ge=10, le=1000)]
-    """Weight of its disk access."""
+    """Share of disk access, relative to that of other containers."""
     devices: list[Device]
     """Graphics processors of the host as HOST:CONTAINER:PERMISSIONS, such as `/dev/dri:/dev/dri:rw`."""
     device_requests: list[DeviceRequest]
@@ -212,15 +212,16 @@ class NodeContainerConfig(Section):
     cpus: Annotated[float, Field(ge=0.01, le=10_000)] | None = None
     """Upper bound of processor time, in cores."""
     memory: Size | None = None
-    """Upper bound of memory; nothing is swapped out beyond it."""
+    """Upper bound of memory; the container gets no swap beyond it."""
     cpuset: Cores | None = None
-    """Cores it runs on; null: any, or one each where simulations fill all cores."""
+    """Cores that the container runs on; null: any core, but one core for each simulation if simulations fill all
+    cores."""
     environment: dict[Variable, str | int | float] = {}
     """Further environment variables."""
     mounts: list[Mount] = []
-    """Directories and files with data of the host that are there in the container, too; not below /data or /key."""
+    """Directories and files with data of the host that the container sees, too; none inside /data or /key."""
     networks: list[Network] = []
-    """Networks of the engine that it joins besides the run's own."""
+    """Networks of the engine that the container joins besides the run's own."""
     ports: dict[ContainerPort, HostPort] = {}
     """Ports of the container (`80`, `53/udp`) and those of 127.0.0.1 at which they are published."""
     options: ContainerOptions = {}
@@ -238,8 +239,8 @@ class ContainerSpec:
 
     Attributes:
         image: Its image.
-        command: The command that it runs; None for that of the image.
-        section: Everything else that it gets.
+        command: The command that it runs; None for the command of the image.
+        section: All its other properties.
     """
 
     image: str

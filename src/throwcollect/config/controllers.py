@@ -1,4 +1,4 @@
-"""Keys for the joint trajectory controllers, by which they may differ from ros2_controllers."""
+"""Keys by which the joint trajectory controllers may be made to differ from those of ros2_controllers."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from throwcollect.config.section import Section
 
 
 class ControllersConfig(Section):
-    """The joint trajectory controllers; the defaults are what clients of PAL's robot and of ros2_controllers know."""
+    """The joint trajectory controllers; by default they do what clients of PAL's robot and ros2_controllers expect."""
 
     names: Annotated[Literal["ros2", "ros1"], Key(Effect.APPEARANCE)] = "ros2"
     """Names of the controllers in the ROS graph: `arm_left_controller` as on Talos with ROS 2, or `left_arm_controller`
-    as with ROS 1. Datasets have the former."""
+    as with ROS 1. Datasets always have the names of ROS 2."""
     hold: Literal["measured", "command", "decelerate"] = "measured"
     """What joints do when a goal is cancelled or aborted: they are held at the `measured` positions (ros2_controllers);
-    at the last `command`, so that joints which lag under load do not sag; or they `decelerate` to rest, which takes
-    measured velocities, and feedback has them then (constraints.decelerate_on_cancel of ros2_controllers)."""
+    at the last `command`, so that joints which lag under load do not sag; or they `decelerate` to rest. This needs
+    measured velocities, so feedback has them, too (constraints.decelerate_on_cancel of ros2_controllers)."""
     max_deceleration_radps2: Annotated[float, Field(gt=0, le=1000)] = 10.0
     """How hard each joint brakes with `hold: decelerate`."""
     topic_aborts_goal: bool = False

@@ -1,4 +1,4 @@
-"""The configuration that commands take if none is named; apart from others, because its import is cheap."""
+"""The configuration that commands read if none is named; in a module of its own, so that importing it is cheap."""
 
 from pathlib import Path
 

@@ -40,7 +40,7 @@ class Document:
     Attributes:
         values: Plain dictionaries, lists, text, numbers, truth values and None.
         problems: Problems of the YAML and of overrides, which are known before the values are validated.
-        left_out: Locations of values that are None because a problem tells what is wrong with them.
+        left_out: Locations of values that are None because they were wrong; a problem says what was wrong with each.
     """
 
     def __init__(self, path: Path) -> None:
@@ -52,7 +52,7 @@ class Document:
         self._in_file = True
         self._lines: dict[Location, int | None] = {}
         try:
-            node = compose(_text_of(path))
+            node = compose(_read_text(path))
         except YAMLError as error:
             raise ConfigError([Problem(f"not valid YAML: {reason(error)}", path=path, line=line(error))]) from error
         if node is None:
@@ -60,7 +60,7 @@ class Document:
         if not isinstance(node, MappingNode):
             problem = Problem("the file should hold keys and values", path=path, line=node.start_mark.line + 1)
             raise ConfigError([problem], expected="keys such as task and sweep")
-        values = self._plain(node, ())
+        values = self._make_plain(node, ())
         if not isinstance(values, dict):
             raise ConfigError(self.problems)
         self.values = values
@@ -75,15 +75,15 @@ class Document:
         return Problem(sentence, join_key(location), self._path)
 
     def place(self, problem: Problem) -> Problem:
-        """Add the line of its key to a problem that has a key and no file."""
+        """Return a problem with the file and the line of its key, if it has a key but no file yet."""
         if problem.path or not problem.key:
             return problem
         location: Location = ()
         holder: Any = self.values
-        for part in _parts(problem.key):
-            index = _index(holder, part)
+        for part in _split_key(problem.key):
+            index = _read_index(holder, part)
             location = (*location, index)
-            holder = holder[index] if _holds(holder, index) else None
+            holder = holder[index] if _has_item(holder, index) else None
         return self.problem(location, problem.message)
 
     def override(
@@ -106,35 +106,35 @@ class Document:
         except YAMLError as error:
             self.problems.append(Problem(f"not valid YAML: {reason(error)}; got {quote(text)}", key))
             return
-        *above, last = _parts(key)
+        *above, last = _split_key(key)
         if len(above) >= MOST_LEVELS:
             self.problems.append(Problem("the key is nested too deeply", key))
             return
         holder: Any = self.values
         location: Location = ()
         for part in above:
-            index = _index(holder, part)
+            index = _read_index(holder, part)
             location = (*location, index)
             # A mapping that the file leaves out gets its default, so that the override changes only one key of it.
             if isinstance(holder, dict) and holder.get(part) is None:
                 holder[part] = dict(find_default(location))
                 self._lines[location] = None
-            holder = holder[index] if _holds(holder, index) else None
-        index = _index(holder, last)
-        if not isinstance(holder, dict) and not _holds(holder, index):
+            holder = holder[index] if _has_item(holder, index) else None
+        index = _read_index(holder, last)
+        if not isinstance(holder, dict) and not _has_item(holder, index):
             self.problems.append(Problem(f"nothing of this name can be set; got {quote(text)}", key))
             return
         location = (*location, index)
-        # The lines of values that the override replaces do not hold any more.
+        # The override replaces these values, so they do not stand in lines of the file any more.
         self._lines = {known: line for known, line in self._lines.items() if known[: len(location)] != location}
         self._lines[location] = None
-        holder[index] = self._plain(node, location)
+        holder[index] = self._make_plain(node, location)
 
     def is_overridden(self, location: Location) -> bool:
         """Whether an override has given the value at a location."""
         return self._lines.get(location, 0) is None
 
-    def _plain(self, node: Node | None, location: Location, inside: tuple[Node, ...] = ()) -> Any:
+    def _make_plain(self, node: Node | None, location: Location, inside: tuple[Node, ...] = ()) -> Any:
         if node is None:
             return None
         self._count += 1
@@ -148,19 +148,19 @@ class Document:
             return self._leave_out(node, location, "values are nested too deeply")
         inside = (*inside, node)
         if isinstance(node, MappingNode) and node.tag == _TAG + "map":
-            return self._mapping(node, location, inside)
+            return self._make_mapping(node, location, inside)
         if isinstance(node, SequenceNode) and node.tag == _TAG + "seq":
             items = []
             for index, item in enumerate(node.value):
-                self._lines[(*location, index)] = self._line(item)
-                items.append(self._plain(item, (*location, index), inside))
+                self._lines[(*location, index)] = self._find_line(item)
+                items.append(self._make_plain(item, (*location, index), inside))
             return items
         try:
-            return _scalar(node)
+            return _read_scalar(node)
         except ValueError as error:
             return self._leave_out(node, location, str(error))
 
-    def _mapping(self, node: MappingNode, location: Location, inside: tuple[Node, ...]) -> dict[str, Any]:
+    def _make_mapping(self, node: MappingNode, location: Location, inside: tuple[Node, ...]) -> dict[str, Any]:
         values: dict[str, Any] = {}
         for key_node, value_node in node.value:
             name = key_node.value
@@ -170,8 +170,8 @@ class Document:
                 first = f", first in line {self._lines[(*location, name)]}" if self._in_file else ""
                 self._note(key_node, (*location, name), f"the key is here twice{first}")
             else:
-                self._lines[(*location, name)] = self._line(key_node)
-                values[name] = self._plain(value_node, (*location, name), inside)
+                self._lines[(*location, name)] = self._find_line(key_node)
+                values[name] = self._make_plain(value_node, (*location, name), inside)
         return values
 
     def _leave_out(self, node: Node, location: Location, sentence: str) -> None:
@@ -180,13 +180,13 @@ class Document:
 
     def _note(self, node: Node, location: Location, sentence: str) -> None:
         path = self._path if self._in_file else None
-        self.problems.append(Problem(sentence, join_key(location), path, self._line(node)))
+        self.problems.append(Problem(sentence, join_key(location), path, self._find_line(node)))
 
-    def _line(self, node: Node) -> int | None:
+    def _find_line(self, node: Node) -> int | None:
         return node.start_mark.line + 1 if self._in_file else None
 
 
-def _text_of(path: Path) -> str:
+def _read_text(path: Path) -> str:
     try:
         if not stat.S_ISREG(kind := path.stat().st_mode):
             # To read a pipe or a device may block for ever.
@@ -209,23 +209,23 @@ def _text_of(path: Path) -> str:
         sentence = f"should be UTF-8 text, got the byte 0x{error.object[error.start]:02x}"
         raise ConfigError([Problem(sentence, path=path, line=line)]) from error
     except ValueError as error:
-        # A zero byte, for one, is refused by Python, which does not ask the system then.
+        # Python itself refuses some names before it asks the system, such as one with a zero byte.
         raise ConfigError([Problem("no file can have this name", path=path)]) from error
 
 
 @cache
-def _constructor() -> SafeConstructor:
+def _make_constructor() -> SafeConstructor:
     constructor: SafeConstructor = YAML(typ="safe", pure=True).constructor
     return constructor
 
 
-def _scalar(node: Node) -> Any:
+def _read_scalar(node: Node) -> Any:
     """Read a YAML 1.2 scalar; dates and other extensions stay text.
 
     Raises:
         ValueError: If the text does not fit its tag.
     """
-    constructor = _constructor()
+    constructor = _make_constructor()
     readers: dict[str, Callable[[ScalarNode], Any]] = {
         "null": lambda _: None,
         "bool": constructor.construct_yaml_bool,
@@ -239,30 +239,30 @@ def _scalar(node: Node) -> Any:
     try:
         value = readers[tag](node)
     except (LookupError, ValueError) as error:
-        # Of a text that does not fit, ruamel looks for letters and words that are not there.
+        # ruamel looks for certain letters and words in the text, and raises these where it does not find them.
         raise ValueError(f"{quote(node.value)} is not of the kind {tag}") from error
     if isinstance(value, int) and value.bit_length() > _MOST_BITS:
         raise ValueError("the number is too large")
     return value
 
 
-def _parts(key: str) -> tuple[str, ...]:
+def _split_key(key: str) -> tuple[str, ...]:
     """Split a dotted key, but not the key of a swept parameter in it, which has dots itself."""
     parts = tuple(key.split("."))
     if parts[:2] != _SWEPT or len(parts) < 3:
         return parts
     rest = parts[2:]
-    # What stands first is the swept key, or its beginning, also if it is called as a field is.
+    # The first part always belongs to the swept key, even if it has the name of a field, such as `min`.
     within = 1 if rest[-1] in _SWEPT_FIELDS and rest[1:] else 2 if rest[1:-1][-1:] == ("values",) else 0
     swept, field = rest[: len(rest) - within], rest[len(rest) - within :]
     return (*_SWEPT, ".".join(swept), *field)
 
 
-def _index(holder: Any, part: str) -> str | int:
+def _read_index(holder: Any, part: str) -> str | int:
     return index_or_key(part) if isinstance(holder, list) else part
 
 
-def _holds(holder: Any, index: str | int) -> bool:
+def _has_item(holder: Any, index: str | int) -> bool:
     if isinstance(holder, list):
         return isinstance(index, int) and index < len(holder)
     return isinstance(holder, dict) and index in holder

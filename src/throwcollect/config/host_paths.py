@@ -12,7 +12,7 @@ _SYSTEM = (
     *("/run", "/sbin", "/sys", "/usr", "/var/backups", "/var/cache", "/var/lib", "/var/lock", "/var/log", "/var/mail"),
     *("/var/run", "/var/spool"),
 )
-"""Directories of the system; neither what is in them nor what holds them is data."""
+"""Directories of the system. Neither what is in them nor a directory that contains one of them may be mounted."""
 
 _SHARED = ("/home", "/tmp", "/var/tmp")  # noqa: S108
 """Directories that all users and programs share; directories in them may be data."""
@@ -27,7 +27,7 @@ DEVICES = "graphics processors alone: /dev/dri, /dev/nvidia*, /dev/kfd, /dev/dxg
 
 
 def normal_path(text: str) -> str:
-    """An absolute path without repeated and trailing slashes."""
+    """Write an absolute path without repeated and trailing slashes."""
     # `PurePosixPath` itself keeps two slashes at the beginning, which POSIX lets mean something else.
     return str(PurePosixPath(re.sub("/+", "/", text)))
 

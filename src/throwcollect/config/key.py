@@ -1,6 +1,7 @@
 """The annotation of configuration keys: their effect, and who or what may set them or vary them.
 
-It stands on the field, and nowhere else. A section annotates all keys below it, and a key may differ from that::
+It is written on the field, and nowhere else. The annotation of a section holds for all keys below it that have none of
+their own::
 
     class BallConfig(Section):
         mass_kg: Annotated[float, Field(gt=0)] = 0.045
@@ -39,7 +40,7 @@ class Effect(Enum):
 
 @dataclass(frozen=True)
 class Key:
-    """Annotation of a field of a section; an attribute that is None is as for the section that has the field.
+    """Annotation of a field of a section; an attribute that is None has its value from the section's annotation.
 
     Attributes:
         effect: What the value has an effect on.
@@ -47,7 +48,7 @@ class Key:
         later: Whether the key was added after datasets had been published. Digests leave it out where it has its
             default, so that older digests hold.
         operator: Whether only the operator of a server sets the value, as it names files or resources of its machine.
-        grows: Whether a dataset may be gone on with where more trials follow from the value.
+        grows: Whether the value may change when the collection of a dataset goes on, to add more trials.
     """
 
     effect: Effect | None = None
@@ -70,6 +71,6 @@ def key_of_field(section: type[Section], name: str) -> Key:
 
 @cache
 def overlay(above: Key, section: type[Section], name: str) -> Key:
-    """Combine the annotation of a section with that of a field of it, which wins where it is not None."""
+    """Combine the annotation of a section with the annotation of one of its fields, which wins where it is not None."""
     own = {name: value for name, value in vars(key_of_field(section, name)).items() if value is not None}
     return replace(above, **own)

@@ -25,7 +25,7 @@ class ContradictionError(ValueError):
 
 
 class UnknownJointError(ValueError):
-    """A joint that the robot does not have; `problems` proposes another one of its joints."""
+    """A name that is no joint of the robot; the message that `problems` makes of it proposes a similar joint."""
 
     def __init__(self, name: str, robot: str, joints: tuple[str, ...]) -> None:
         self.name, self.robot, self.joints = name, robot, joints
@@ -39,7 +39,7 @@ def all_joints() -> tuple[str, ...]:
 
 
 def _require_joint(name: str, info: ValidationInfo) -> str:
-    # The context is the name of the robot. Only the loader knows it before it validates; otherwise, `Config` checks.
+    # The context is the name of the robot, which only the loader passes. Without it, `Config` checks the joints later.
     if info.context is not None:
         robot = load_member("robots", info.context)
         if name not in robot.joints:
@@ -48,7 +48,7 @@ def _require_joint(name: str, info: ValidationInfo) -> str:
 
 
 class _JointSchema:
-    """Lists the joints in the JSON Schema, and not earlier, because that imports all robots."""
+    """Lists the joints only when a JSON Schema is made, because listing them imports all robots."""
 
     @staticmethod
     def __get_pydantic_json_schema__(core: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
@@ -61,7 +61,7 @@ Name = Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9_-]*$", max_length=64)]
 
 
 def _make_text(value: object) -> object:
-    # Not by `isinstance`, as `true` is an `int` in Python.
+    # `isinstance` would also take `true`, which is an `int` in Python.
     return str(value) if type(value) is int else value
 
 
@@ -86,5 +86,5 @@ def match(pattern: str, expected: str) -> AfterValidator:
 
 
 def in_words(words: str) -> WithJsonSchema:
-    """Describe a text in the reference and in messages by some words, and not as any text."""
+    """Describe a kind of text in the reference and in messages by some words, instead of the word "text"."""
     return WithJsonSchema({"type": "string", "words": words})

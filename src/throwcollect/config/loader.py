@@ -63,7 +63,7 @@ def load_locating_errors(path: Path, overrides: Sequence[str] = ()) -> Iterator[
         document.override(override, find_default=partial(_find_default, document.values))
     config, found, more = _check(document.values)
     if config is not None and document.is_overridden(_SIMULATIONS):
-        found += _simulations_findings(config)
+        found += _find_simulations_problem(config)
     found = [each for each in found if each.location not in document.left_out]
     problems = [document.problem(each.location, each.sentence) for each in found]
     unknown = sum(each.unknown for each in found)
@@ -82,7 +82,7 @@ def dump_yaml(config: Config) -> str:
 
     The text is part of every dataset, so it must not depend on the version of a library that writes YAML.
     """
-    return "".join(f"{line}\n" for line in _lines(config.model_dump(), ""))
+    return "".join(f"{line}\n" for line in _write_lines(config.model_dump(), ""))
 
 
 def value_as_yaml(value: Any) -> str:
@@ -94,11 +94,11 @@ def value_as_yaml(value: Any) -> str:
     if isinstance(value, str) and _PLAIN_WORD.fullmatch(value) and value.lower() not in _NOT_PLAIN:
         return value
     if isinstance(value, str):
-        return '"' + "".join(_character(character) for character in value) + '"'
+        return '"' + "".join(_escape_character(character) for character in value) + '"'
     return json.dumps(value)
 
 
-def _character(character: str) -> str:
+def _escape_character(character: str) -> str:
     plain = character.isprintable() and character not in '"\\'
     return character if plain else f"\\U{ord(character):08x}"
 
@@ -120,9 +120,9 @@ def _check(values: dict[str, Any]) -> tuple[Config | None, list[KeyProblem], int
     Returns:
         The configuration, or None; the findings; and the number of further problems, which are only counted.
     """
-    # What is wrong is removed below, and the caller needs the values of the user.
+    # Wrong values are removed from this copy below; the caller still needs the values as the user wrote them.
     values = deepcopy(values)
-    robot = _robot_of(values)
+    robot = _find_robot(values)
     found: list[KeyProblem] = []
     replaced: set[Location] = set()
     config = None
@@ -130,15 +130,15 @@ def _check(values: dict[str, Any]) -> tuple[Config | None, list[KeyProblem], int
     while config is None and len(found) < MOST_EXAMINED:
         try:
             config = Config.model_validate(values, strict=True, context=robot)
-            fresh = list(_sweep_findings(config))
+            fresh = list(_find_sweep_problems(config))
         except ValidationError as error:
             fresh = findings(error, values)
             more += max(0, error.error_count() - MOST_EXAMINED)
-        found += [finding for finding in fresh if not any(_about(finding, location) for location in replaced)]
-        # Two parts are a key in a section; three are a swept key, so that the others stay.
+        found += [finding for finding in fresh if not any(_is_about(finding, location) for location in replaced)]
+        # Remove only the key of the section (two parts) or the swept key (three parts), so that the others stay.
         places = {finding.location[: 3 if finding.location[:2] == _PARAMETERS else 2] for finding in fresh}
         removed = {place for place in places if _remove(values, place)}
-        # Of a key that was written under a wrong name, the value is a default from now on, or is missing.
+        # A misspelt key now has its default under the right name, or is missing there.
         replaced |= places | {(*finding.location[:-1], finding.meant) for finding in fresh if finding.meant}
         # Without a known robot, each joint would be reported.
         if not removed or robot is None:
@@ -146,14 +146,14 @@ def _check(values: dict[str, Any]) -> tuple[Config | None, list[KeyProblem], int
     return config, sorted(found, key=lambda finding: not finding.unknown), more
 
 
-def _robot_of(values: dict[str, Any]) -> str | None:
-    """The name of the robot whose joints the values may name; None if there is no such robot."""
+def _find_robot(values: dict[str, Any]) -> str | None:
+    """Find the name of the robot whose joints the values may name; None if there is no such robot."""
     section = values.get("robot")
     name = section.get("name") if isinstance(section, dict) else None
     return Config().robot.name if name is None else name if name in names_of("robots") else None
 
 
-def _about(finding: KeyProblem, location: Location) -> bool:
+def _is_about(finding: KeyProblem, location: Location) -> bool:
     """Whether a finding may be about the default that was put at a location, and not about a value of the user."""
     if finding.location[: len(location)] == location:
         return True
@@ -163,7 +163,7 @@ def _about(finding: KeyProblem, location: Location) -> bool:
 
 
 def _remove(values: dict[str, Any], location: Location) -> bool:
-    """Remove the value at a location, or else the section that lacks it; return whether there was one."""
+    """Remove the value at a location, or the section if it lacks that value; return whether anything was removed."""
     holder: Any = values
     for part in location[:-1]:
         holder = holder.get(part) if isinstance(holder, dict) else None
@@ -173,11 +173,11 @@ def _remove(values: dict[str, Any], location: Location) -> bool:
     return values.pop(str(location[0]), None) is not None
 
 
-def _sweep_findings(config: Config) -> Iterator[KeyProblem]:
+def _find_sweep_problems(config: Config) -> Iterator[KeyProblem]:
     sampler = config.sweep.sampler
     if config.sweep.parameters and sampler != "grid" and config.trials is None and config.until is None:
-        until = f"until how many have {config.task.success}"
-        sentence = f"missing; the sampler {sampler} should know how many trials to draw, or {until}"
+        wanted = f"or (until) how many should have {config.task.success}"
+        sentence = f"missing; the sampler {sampler} should know how many trials to draw, {wanted}"
         yield KeyProblem(("trials",), sentence)
     for key, parameter in config.sweep.parameters.items():
         location: Location = (*_PARAMETERS, key)
@@ -195,10 +195,10 @@ def _sweep_findings(config: Config) -> Iterator[KeyProblem]:
                 yield KeyProblem((*location, *part), error.problems[0].message)
 
 
-def _simulations_findings(config: Config) -> Iterator[KeyProblem]:
-    """Find a number of simulations that is asked for, and that a runtime cannot have.
+def _find_simulations_problem(config: Config) -> Iterator[KeyProblem]:
+    """Report a number of simulations that was given by an override, and that the runtime cannot have.
 
-    The number in a file holds for whichever runtime the file is used with, and every dataset's file has one.
+    A number in a file is not reported, as the file may be used with any runtime, and the file of every dataset has one.
     """
     run = config.run
     # A wrong value was replaced by the default, which nobody has asked for.
@@ -206,10 +206,10 @@ def _simulations_findings(config: Config) -> Iterator[KeyProblem]:
         yield KeyProblem(_SIMULATIONS, f"should be 1 with the runtime inprocess, got {run.simulations}")
 
 
-def _lines(values: dict[str, Any], indent: str) -> Iterator[str]:
+def _write_lines(values: dict[str, Any], indent: str) -> Iterator[str]:
     for key, value in values.items():
         if isinstance(value, dict) and value:
             yield f"{indent}{value_as_yaml(key)}:"
-            yield from _lines(value, indent + "  ")
+            yield from _write_lines(value, indent + "  ")
         else:
             yield f"{indent}{value_as_yaml(key)}: {value_as_yaml(value)}"

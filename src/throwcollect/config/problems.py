@@ -38,7 +38,8 @@ class KeyProblem:
         location: The key, which need not exist.
         sentence: Says what is wrong, which value was given and which would be right.
         unknown: Whether the key itself is wrong, and not its value.
-        meant: Name of the key that stands for an unknown one: the most like it, or the only one there; empty if none.
+        meant: Name of the key that the user probably meant by an unknown one: the most similar, or the only one that
+            the section has; empty if there is none.
     """
 
     location: Location
@@ -91,7 +92,7 @@ def findings(
     expected = shape or shape_of(above)
     found: dict[Location, KeyProblem] = {}
     for details in error.errors(include_url=False)[:MOST_EXAMINED]:
-        for finding in _findings(details, values, above, expected):
+        for finding in _describe_error(details, values, above, expected):
             # A union reports an error for each alternative, and the first sentence names all of them.
             found.setdefault(finding.location, finding)
     for location in [place[:length] for place in found for length in range(len(place))]:
@@ -104,7 +105,7 @@ def findings(
     return [*unknown, *rest]
 
 
-def _findings(details: ErrorDetails, values: Any, above: Location, expected: ValueShape) -> Iterator[KeyProblem]:
+def _describe_error(details: ErrorDetails, values: Any, above: Location, expected: ValueShape) -> Iterator[KeyProblem]:
     location, shape, section = _locate(details, values, above, expected)
     kind, value = details["type"], details["input"]
     cause = details.get("ctx", {}).get("error")
@@ -112,7 +113,7 @@ def _findings(details: ErrorDetails, values: Any, above: Location, expected: Val
     if kind == "extra_forbidden":
         name, known = str(location[-1]), list(section.keys)
         refused = section.refused.get(name)
-        # Where a section has a single key, that is meant whatever is written.
+        # If a section has a single key, the user means that key, whatever they wrote.
         only = known[0] if len(known) == 1 else ""
         meant = "" if refused else _find_nearest(name, known) or only
         if name.isdecimal() and value is None:
@@ -134,18 +135,18 @@ def _findings(details: ErrorDetails, values: Any, above: Location, expected: Val
         tag = "family" if "family" in value else "name"
         choices = [word for each in shape.alternatives for word in each.child(tag).choices]
         words = " or ".join(f"'{each}'" for each in choices)
-        yield KeyProblem((*location, tag), _should_be(words, value[tag], choices))
+        yield KeyProblem((*location, tag), _write_expectation(words, value[tag], choices))
     else:
-        strange = "; no package that is installed brings it" if location in _MEMBERS else ""
+        no_match = "; no package that is installed brings it" if location in _MEMBERS else ""
         if location == _ENGINE and value == "auto":
-            strange = "; none is chosen by itself, as the same file would give other throws on another machine"
-        sentence = _should_be(str(shape), value, shape.choices, strange=strange)
-        yield KeyProblem(location, sentence + _radians(kind, shape, value))
+            no_match = "; none is chosen automatically, as the same file would give other throws on another machine"
+        sentence = _write_expectation(str(shape), value, shape.choices, no_match=no_match)
+        yield KeyProblem(location, sentence + _explain_radians(kind, shape, value))
 
 
-def _should_be(words: str, value: Any, choices: list[str], *, strange: str = "") -> str:
-    """Say what would be right, and which choice the user meant; if none is like the value, append `strange`."""
-    return f"should be {words}, got {quote(value)}{_did_you_mean(_find_nearest(value, choices)) or strange}"
+def _write_expectation(words: str, value: Any, choices: list[str], *, no_match: str = "") -> str:
+    """Say what would be right, and which choice the user meant; if none is like the value, append `no_match`."""
+    return f"should be {words}, got {quote(value)}{_did_you_mean(_find_nearest(value, choices)) or no_match}"
 
 
 def _find_nearest(value: Any, choices: Sequence[str]) -> str:
@@ -158,7 +159,7 @@ def _did_you_mean(choice: str) -> str:
     return f"; did you mean '{choice}'?" if choice else ""
 
 
-def _radians(kind: str, shape: ValueShape, value: Any) -> str:
+def _explain_radians(kind: str, shape: ValueShape, value: Any) -> str:
     if kind not in _RANGE_ERRORS or shape.unit != "rad":
         return ""
     return f"; angles are in radians: {value:g} degrees are {math.radians(value):.4f}"

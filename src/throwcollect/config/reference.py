@@ -14,11 +14,11 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         prog="python -m throwcollect.config.reference", description="Reference of all keys"
     )
-    parser.add_argument("--output", type=Path, metavar="FILE", help="write this file, and only once the page is whole")
+    parser.add_argument("--output", type=Path, metavar="FILE", help="write the page to this file once it is complete")
     output: Path | None = parser.parse_args().output
     # The page must not depend on what is installed beside throwcollect.
     members.leave_out_others()
-    # Not before, because the kinds of keys are made from the members when they are imported.
+    # Imported only now, because the import makes the kinds of keys from the members that are not left out.
     from throwcollect.config.reference_page import page
 
     if output is None:

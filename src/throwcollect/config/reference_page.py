@@ -23,8 +23,8 @@ Units are part of the names; angles are in radians. A key that does not exist, a
 there twice are errors, and all of them are reported at once.
 
 `--set KEY=VALUE` replaces one key, such as `--set task.duration_s=1.1` or `--set 'record.topics=[joint_states,
-ball/odometry, clock]'`. The value is read as YAML; later ones win. Items of a list that the
-file has go by their index from 0; any other list is given as a whole.
+ball/odometry, clock]'`. The value is read as YAML; later ones win. An item of a list in
+the file is named by its index, from 0; a list that the file leaves out is given as a whole.
 """
 
 _SAMPLERS = """\
@@ -39,7 +39,7 @@ _SAMPLERS = """\
 | `list` | the rows of `sweep.file`; `trials` takes the first ones | same first points |
 
 The file of the sampler `list` is CSV (UTF-8, commas, a header line) or Parquet; its columns are named with dotted keys.
-A set of `values` is drawn from in equal shares. Everything is drawn from `seed`.
+Each of a set of `values` is drawn equally often. All draws follow from `seed`.
 
 With `sweep.target` or `until`, trials are added to the plan while it is collected: [targets.md](targets.md).
 """
@@ -57,73 +57,73 @@ _ANY = {"containers.": "<node>", "sweep.target.": "<target>"}
 
 def page() -> str:
     """Write the reference of all keys, as Markdown."""
-    return "\n".join([_INTRODUCTION, *_sections(root(), "")])
+    return "\n".join([_INTRODUCTION, *_write_sections(root(), "")])
 
 
-def _sections(shape: ValueShape, prefix: str) -> Iterator[str]:
-    yield _table(shape, prefix)
+def _write_sections(shape: ValueShape, prefix: str) -> Iterator[str]:
+    yield _write_table(shape, prefix)
     for name, child in shape.keys.items():
         key = prefix + name
         alternatives = child.alternatives
         if key == "sweep.parameters":
             for parameter in child.child("").alternatives:
-                yield f"### `sweep.parameters.<key>`: {_sentence(parameter)}\n"
-                yield _table(parameter, "")
+                yield f"### `sweep.parameters.<key>`: {_write_sentence(parameter)}\n"
+                yield _write_table(parameter, "")
             yield f"{_SAMPLERS}\n### Targets in a list\n\n{_list_targets()}"
             yield f"### Keys that may be swept\n\n{_list_sweepable()}\n"
         elif len(alternatives) > 1 and all(each.keys for each in alternatives):
             for each in alternatives:
-                yield f"### `{key}` with `{_discriminator(each)}`\n\n{each.node['description']}\n"
-                yield from _sections(each, f"{key}.")
-        elif len(twins := _twins(shape, child)) > 1:
+                yield f"### `{key}` with `{_find_discriminator(each)}`\n\n{each.node['description']}\n"
+                yield from _write_sections(each, f"{key}.")
+        elif len(twins := _find_twins(shape, child)) > 1:
             if name == twins[0]:
-                yield f"## {', '.join(f'`{prefix}{twin}`' for twin in twins)}\n\n{_own_sentence(child)}\n"
-                yield from _sections(child, f"{prefix}{_ANY[prefix]}.")
+                yield f"## {', '.join(f'`{prefix}{twin}`' for twin in twins)}\n\n{_find_own_sentence(child)}\n"
+                yield from _write_sections(child, f"{prefix}{_ANY[prefix]}.")
         elif child.keys:
             yield f"## `{key}`\n\n{child.node['description']}\n"
-            yield from _sections(child, f"{key}.")
+            yield from _write_sections(child, f"{key}.")
         elif child.child(0).keys:
             yield f"### Items of `{key}`\n\n{child.child(0).node['description']}\n"
-            yield _table(child.child(0), "")
+            yield _write_table(child.child(0), "")
 
 
-def _discriminator(shape: ValueShape) -> str:
-    """What tells a section from its alternatives: a key with the only word that it takes, or else its first key."""
+def _find_discriminator(shape: ValueShape) -> str:
+    """Find what distinguishes a section from its alternatives: a key that takes one word, or else its first key."""
     words = (f"{name}: {child.node['const']}" for name, child in shape.keys.items() if "const" in child.node)
     return next(words, next(iter(shape.keys)))
 
 
-def _twins(shape: ValueShape, child: ValueShape) -> list[str]:
-    """Names of the sections that are of the same model as one of them."""
-    title = _title(child)
-    return [name for name, each in shape.keys.items() if title is not None and _title(each) == title]
+def _find_twins(shape: ValueShape, child: ValueShape) -> list[str]:
+    """List the sections in `shape` that have the same model as `child`, including `child` itself."""
+    title = _find_title(child)
+    return [name for name, each in shape.keys.items() if title is not None and _find_title(each) == title]
 
 
-def _title(shape: ValueShape) -> str | None:
-    """Name of the model of a section, also of one that may be null; None if the shape is no section."""
+def _find_title(shape: ValueShape) -> str | None:
+    """Find the name of the model of a section, even if the section may be null; None if the shape is no section."""
     return next((each.node.get("title") for each in shape.alternatives if each.keys), None)
 
 
-def _own_sentence(shape: ValueShape) -> str:
-    """The docstring of a section, and not of the key that holds it."""
-    return str(json_schema()["$defs"][_title(shape)]["description"])
+def _find_own_sentence(shape: ValueShape) -> str:
+    """Find the docstring of a section itself, not of the key that holds it."""
+    return str(json_schema()["$defs"][_find_title(shape)]["description"])
 
 
-def _table(shape: ValueShape, prefix: str) -> str:
+def _write_table(shape: ValueShape, prefix: str) -> str:
     rows = ["| key | holds | default | meaning |", "|---|---|---|---|"]
     for name, child in shape.keys.items():
         if child.keys and "default" in child.node and len(child.alternatives) == 1:
             continue
-        cells = [f"`{prefix}{name}`", str(child), _default(child, name, shape), _sentence(child)]
+        cells = [f"`{prefix}{name}`", str(child), _write_default(child, name, shape), _write_sentence(child)]
         rows.append("| " + " | ".join(cells) + " |")
     return "\n".join(rows) + "\n"
 
 
-def _sentence(shape: ValueShape) -> str:
+def _write_sentence(shape: ValueShape) -> str:
     return re.sub(r"\s+", " ", shape.node["description"])
 
 
-def _default(child: ValueShape, name: str, holder: ValueShape) -> str:
+def _write_default(child: ValueShape, name: str, holder: ValueShape) -> str:
     if any(name in each.node.get("required", []) for each in holder.alternatives):
         return "required"
     if "default" not in child.node:
@@ -145,10 +145,10 @@ def _list_sweepable() -> str:
     learned: Section = config.task.model_copy(update={"trajectory": primitive})
     keys = [*sweepable_keys(config), *sweepable_keys(config.model_copy(update={"task": learned}))]
     joints = "|".join(all_joints())
-    general = dict.fromkeys(re.sub(rf"({joints})(\.\d+)?", _general, key) for key in keys)
+    general = dict.fromkeys(re.sub(rf"({joints})(\.\d+)?", _generalise, key) for key in keys)
     where = "A joint must be in `task.end`, and a weight in `task.trajectory.weights`."
     return ", ".join(f"`{key}`" for key in general) + f".\n{where}"
 
 
-def _general(match: re.Match[str]) -> str:
+def _generalise(match: re.Match[str]) -> str:
     return "<joint>.<index>" if match[2] else "<joint>"

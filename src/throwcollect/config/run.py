@@ -19,21 +19,21 @@ else:
     RuntimeName = Literal[("auto", *names_of("runtimes"))]
 
 
-def _listen_address(text: str) -> str:
+def _check_listen_address(text: str) -> str:
     found = re.fullmatch(r"tcp/(\[[0-9a-fA-F:.]+\]|[A-Za-z0-9.-]+):([1-9][0-9]{0,4})", text)
     if found is None or int(found[2]) > 65535:
         raise ValueError(f"should be tcp/ADDRESS:PORT, such as tcp/0.0.0.0:7447, got '{text}'")
     return text
 
 
-ListenAddress = Annotated[str, AfterValidator(_listen_address), in_words("tcp/ADDRESS:PORT")]
+ListenAddress = Annotated[str, AfterValidator(_check_listen_address), in_words("tcp/ADDRESS:PORT")]
 
 
 class RunConfig(Section):
     """How a collection is run; nothing in this section changes the dataset."""
 
     simulations: Annotated[int, Field(ge=0, le=256)] = 2
-    """Number of simulations, unless `-n` says otherwise; 0 only with `listen`, for those of other machines."""
+    """Number of simulations, unless `-n` says otherwise; 0 only with `listen`, if other machines run all of them."""
     runtime: RuntimeName = "auto"
     """Where the nodes run: in processes (`local`) or in containers; `auto` takes containers if an engine answers.
 
@@ -41,10 +41,10 @@ class RunConfig(Section):
     router_port: Annotated[int, Field(ge=0, le=65535)] = 0
     """TCP port of the router on the loopback interface; 7447 is the one ROS nodes look for.
 
-    0 takes a free one, and publishes none of a container."""
+    0 takes any free port; a router in a container then publishes no port."""
     listen: ListenAddress | None = None
-    """Where simulations of other machines can join (`throwcollect join-run`), such as `tcp/0.0.0.0:7447`; nobody can
-    without the token of the run. Null: this machine alone."""
+    """Address at which simulations of other machines can join (`throwcollect join-run`), such as `tcp/0.0.0.0:7447`;
+    they need the token of the run. Null: this machine alone."""
     open: bool = False
     """Anybody who reaches the router may join, read and disturb the run; episodes are still signed."""
     ros: Literal["auto", "rclpy", "embedded"] = "auto"
@@ -55,18 +55,19 @@ class RunConfig(Section):
     domain_id: Annotated[int, Field(ge=0, le=232)] = 0
     """ROS domain."""
     trial_timeout_s: PositiveFloat = 60.0
-    """Real time that a simulation may take for one trial before it counts as lost, besides what `sim.max_trial_s` takes
-    in real time, or in slow motion (`sim.real_time_factor`)."""
+    """Real time after which a simulation that is still at the same trial counts as lost. It comes on top of the real
+    time that `sim.max_trial_s` takes at real-time speed, or in slow motion (`sim.real_time_factor`)."""
     start_timeout_s: PositiveFloat = 60.0
     """Real time within which the first simulation must be ready once it runs."""
     grace_s: Annotated[float, Field(ge=0, le=3600)] = 8.0
-    """Real time that running trials get to end in after Ctrl-C or SIGTERM; what is dropped then is run when resumed."""
+    """Real time that running trials have left after Ctrl-C or SIGTERM; `throwcollect resume` runs those that did not
+    end."""
     retries: Annotated[int, Field(ge=0, le=100)] = 3
-    """How often a trial is given to another simulation before it is recorded as failed."""
+    """How often a trial is given to another simulation before it is recorded as `lost`."""
     replay: Annotated[int, Field(ge=0)] = 3
     """How many trials, chosen by the seed, a fresh process simulates again at the end, to be compared bit for bit."""
     restarts: Annotated[int, Field(ge=0, le=1000)] = 10
-    """How often one simulation is restarted before it is given up."""
+    """How often one simulation is restarted before the run goes on without it."""
 
     def _find_contradictions(self) -> Iterator[tuple[str, str]]:
         if self.listen is None and self.simulations == 0:

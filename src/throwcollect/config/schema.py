@@ -39,19 +39,19 @@ __all__ = [
 ]
 
 
-def _sections_of(family: str) -> Any:
+def _make_section_type(family: str) -> Any:
     """Make the type of a key that holds the section of any member of a family; its key `name` says which."""
     sections = {name: load_member(family, name) for name in names_of(family)}
     default = next(iter(sections))
     return any_of(sections, lambda value: value.get("name", default) if isinstance(value, dict) else None)
 
 
-def _untils() -> Any:
+def _make_until_type() -> Any:
     """Make the type of the key `until`, which holds the section `until` of a task; its only key says which."""
     sections: dict[str, type[UntilConfig]] = {}
     for name in names_of("tasks"):
         until = load_member("tasks", name).until
-        # Tasks may have the same success; its section is that of the first of them, so our own stay as they are.
+        # Tasks may have the same success. The first task's section is taken, so that packages cannot replace our own.
         sections.setdefault(until.outcome(), until)
     # The first section reports unknown keys.
     default = next(iter(sections))
@@ -70,9 +70,9 @@ else:
     # The members are known only when the program runs, so type checkers see their common base instead.
     RobotName = Literal[names_of("robots")]
     EngineName = Literal[names_of("engines")]
-    AnyTool = _sections_of("tools")
-    AnyTask = _sections_of("tasks")
-    AnyUntil = _untils()
+    AnyTool = _make_section_type("tools")
+    AnyTask = _make_section_type("tasks")
+    AnyUntil = _make_until_type()
 
 SLOWEST, FASTEST = 0.001, 1000
 """Bounds of real-time factors: with slower ones, one step of the physics sleeps for minutes or overflows the clock."""
@@ -89,8 +89,8 @@ class RobotConfig(Section):
     base_height_m: Annotated[float, Field(ge=0.5, le=2.0)] = 1.01927
     """Height of the fixed base link above the ground."""
     posture: dict[Joint, Angle] = {}
-    """Joint angles that replace those of the robot's posture at rest, which for Talos is half-sitting, for joints that
-    the task does not move."""
+    """Joint angles that replace angles of the robot's posture at rest (for Talos: half-sitting), for joints that the
+    task does not move."""
     locked: Literal["auto", "none"] | list[Joint] = "auto"
     """Joints simulated as rigid: `auto` locks what the task does not move, `none` simulates all, or a list."""
     position_gain_per_s: Annotated[float, Field(gt=0, le=1000), Key(swept=True)] = 100.0
@@ -100,8 +100,7 @@ class RobotConfig(Section):
     effort_scale: Annotated[float, Field(gt=0, le=10), Key(swept=True)] = 1.0
     """Factor on the effort limits of all joints [-]."""
     joint_offsets: Annotated[dict[Joint, Angle], Key(swept=True, later=True)] = {}
-    """Errors of the joints' zeros: such a joint stands by this angle farther than its command and its measurement
-    say."""
+    """Errors of the joints' zeros: the true angle of such a joint minus the angle that is commanded and measured."""
     speed_scale: Annotated[float, Field(gt=0.5, lt=2), Key(swept=True, later=True)] = 1.0
     """Speed of the clock by which controllers follow trajectories [-]: below 1, motions take longer than planned."""
     motor_lag_s: Annotated[float, Field(ge=0, le=0.2), Key(swept=True, later=True)] = 0.0
@@ -116,7 +115,7 @@ class BallConfig(Section):
     radius_m: Annotated[float, Field(ge=0.005, le=0.1)] = 0.025
     """Radius."""
     friction: Annotated[float, Field(ge=0, le=2)] = 0.5
-    """Coulomb friction of the ball [-]; it is multiplied with that of the body it touches."""
+    """Coulomb friction of the ball [-]; it is multiplied with the friction of the body that it touches."""
     restitution: Annotated[float, Field(ge=0, le=1)] = 0.0
     """Coefficient of restitution between the ball and whatever it touches [-]."""
     drag_coefficient: Annotated[float, Field(ge=0, le=2)] = 0.0
@@ -147,19 +146,19 @@ class SimConfig(Section):
     physics_hz: Annotated[int, Field(ge=100, le=10000)] = 500
     """Physics steps per simulated second; also the controllers' update rate."""
     solver_iterations: Annotated[int, Field(ge=1, le=1000)] = 50
-    """Iterations of the contact solver per step; MuJoCo takes fewer where fewer do."""
+    """Iterations of the contact solver per step; MuJoCo takes fewer where fewer are enough."""
     settle_s: Annotated[float, Field(ge=0, le=2), Key(swept=True)] = 0.05
     """Simulated time for which the ball settles in the spoon before a trial."""
     command_delay_s: Annotated[float, Field(ge=0, le=0.2), Key(swept=True)] = 0.0
     """Time between a controller's command and the motor acting on it."""
     real_time_factor: Annotated[Annotated[float, Field(ge=SLOWEST, le=FASTEST)] | None, Key(Effect.APPEARANCE)] = None
-    """Upper bound of simulated over real time, for onlookers; none: as fast as it can."""
+    """Upper bound of simulated over real time, for people who watch; null: as fast as possible."""
     max_trial_s: Annotated[float, Field(gt=0, le=60)] = 6.0
     """Simulated time after which a trial is ended as `timeout`."""
 
     @property
     def slowest_factor(self) -> float:
-        """The slowest real-time factor of leased trials: real time, which onlookers may ask for, or as configured."""
+        """The slowest real-time factor of leased trials: 1, which watchers may ask for, or a slower configured one."""
         return min(self.real_time_factor or 1.0, 1.0)
 
 
@@ -174,7 +173,7 @@ class RecordConfig(Section):
     ]
     """Recorded topics; the first two are always needed, as throws are judged from them."""
     zstd_level: Annotated[int, Field(ge=-7, le=19), Key(Effect.ENCODING)] = -1
-    """Compression level of the MCAP chunks; with -1 they are as small as with 1, and sooner written and read."""
+    """Compression level of the MCAP chunks; with -1 they are as small as with 1, and faster to write and read."""
     trials_per_shard: Annotated[PositiveInt, Key(Effect.FILES)] = 1000
     """Trials in one MCAP file."""
 
@@ -191,8 +190,8 @@ class Config(Section):
     seed: Annotated[int, Field(ge=0, lt=2**32), Key(Effect.PLAN)] = 0
     """Root of all randomness."""
     trials: Annotated[Annotated[int, Field(ge=1, le=MOST_TRIALS)] | None, Key(Effect.PLAN, grows=True)] = None
-    """Number of trials, with `until` the largest one; none means all points for `grid` and `list`, ten for each throw
-    that should land with `until`."""
+    """Number of trials; with `until`, their largest number. Null takes all points of `grid` and `list`, and with
+    `until` ten trials for each throw that should land."""
     until: Annotated[AnyUntil | None, Key(Effect.PLAN, later=True, grows=True)] = None
     """Collects until enough throws have landed, or `trials` are used up."""
     robot: Annotated[RobotConfig, Key(Effect.PHYSICS)] = RobotConfig()
@@ -221,8 +220,8 @@ class Config(Section):
     """Runs on a cluster."""
 
     def _find_contradictions(self) -> Iterator[tuple[str, str]]:
-        yield from self._find_strange_joints()
-        # Samples are taken at physics steps, with as many steps between each two.
+        yield from self._find_unknown_joints()
+        # Samples are taken at physics steps, with the same number of steps between each two.
         if self.sim.physics_hz % self.record.rate_hz:
             yield "record.rate_hz", f"should divide sim.physics_hz, {self.sim.physics_hz}, got {self.record.rate_hz}"
         if isinstance(self.robot.locked, list) and (moving := [j for j in self.robot.locked if j in self.task.end]):
@@ -245,7 +244,7 @@ class Config(Section):
         if self.run.root_namespace and self.run.simulations > 1:
             yield "run.root_namespace", f"{several} (-n) cannot share a namespace"
 
-    def _find_strange_joints(self) -> Iterator[tuple[str, str]]:
+    def _find_unknown_joints(self) -> Iterator[tuple[str, str]]:
         robot = load_member("robots", self.robot.name)
         named = {
             "robot.posture": self.robot.posture,
@@ -254,13 +253,13 @@ class Config(Section):
             "task.end": self.task.end,
         }
         for section, joints in named.items():
-            strange = [joint for joint in joints if joint not in robot.joints]
-            if strange and section in ("task.start", "task.end") and section[5:] not in self.task.model_fields_set:
-                # The user has written none of these joints: they are those of the default.
+            unknown = [joint for joint in joints if joint not in robot.joints]
+            if unknown and section in ("task.start", "task.end") and section[5:] not in self.task.model_fields_set:
+                # The user has written none of these joints: they come from the default.
                 init = f"throwcollect init --robot {self.robot.name}"
                 yield section, f"missing, and the default has joints that {robot.title} lacks; `{init}` writes one"
                 continue
-            for joint in strange:
+            for joint in unknown:
                 yield f"{section}.{joint}", f"{robot.title} has no joint {joint!r}"
 
     @property
@@ -269,13 +268,13 @@ class Config(Section):
         return self.until is not None or self.sweep.target is not None
 
     def without_run(self) -> Config:
-        """This configuration with all that does not change the dataset at its default."""
+        """Make a copy of this configuration in which all keys that do not change the dataset have their defaults."""
         return self.model_copy(
             update={"run": RunConfig(), "containers": ContainersConfig(), "cluster": ClusterConfig()}
         )
 
     def run_as(self, other: Config) -> Config:
-        """This configuration, with all that does not change the dataset as another one has it."""
+        """Make a copy of this configuration that takes all keys that do not change the dataset from another one."""
         return self.model_copy(update={name: getattr(other, name) for name in ("run", "containers", "cluster")})
 
     def trial_start_ns(self, number: int) -> int:

@@ -25,7 +25,7 @@ class Section(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
     def __deepcopy__(self, memo: dict[int, Any] | None = None) -> Self:
-        """The section itself, as its values never change; Pydantic copies those of keys that are left out."""
+        """Return the section itself, as its values never change; Pydantic copies defaults of keys that are left out."""
         return self
 
     def _find_contradictions(self) -> Iterator[tuple[str, str]]:
@@ -44,7 +44,7 @@ class Section(BaseModel):
 
     @classmethod
     def __get_pydantic_json_schema__(cls, core_schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
-        """The section's JSON Schema, in which the docstrings of its keys describe them.
+        """Make the section's JSON Schema, in which the docstrings of its keys describe them.
 
         Pydantic's own ``use_attribute_docstrings`` would read the docstrings in every process, although few need a
         schema. That takes a third of the time of importing the configuration.
@@ -64,22 +64,22 @@ def any_of(sections: Mapping[str, type[Section]], choose: Callable[[Any], Any]) 
         choose: Finds that name in the value; anything else is an error.
     """
     kinds = list(dict.fromkeys(sections.values()))
-    # Pydantic takes a discriminator for unions alone.
+    # Pydantic accepts a discriminator only for a union.
     if len(kinds) == 1:
         return kinds[0]
 
     def find_tag(value: Any) -> str | None:
         # Defaults, and sections that are validated again as a part of another, are objects already.
         if isinstance(value, Section):
-            return _tag_of(type(value))
+            return _make_tag(type(value))
         name = choose(value)
-        return _tag_of(sections[name]) if isinstance(name, str) and name in sections else None
+        return _make_tag(sections[name]) if isinstance(name, str) and name in sections else None
 
-    return Annotated[reduce(or_, [Annotated[kind, Tag(_tag_of(kind))] for kind in kinds]), Discriminator(find_tag)]
+    return Annotated[reduce(or_, [Annotated[kind, Tag(_make_tag(kind))] for kind in kinds]), Discriminator(find_tag)]
 
 
 def list_sections(kind: Any) -> Iterator[type[Section]]:
-    """List the sections that a value of some type may be; those that are items of it are left out.
+    """List the sections that a value of some type may be; sections that are items of a list or a mapping are left out.
 
     Args:
         kind: The type, such as that of a field; with `any_of`, it has several.
@@ -92,7 +92,7 @@ def list_sections(kind: Any) -> Iterator[type[Section]]:
             yield from list_sections(each)
 
 
-def _tag_of(section: type[Section]) -> str:
+def _make_tag(section: type[Section]) -> str:
     """Name a class by its module, too, as classes of two packages may have one name."""
     return f"{section.__module__}.{section.__name__}"
 

@@ -11,7 +11,7 @@ from throwcollect.config.schema import Config
 from throwcollect.units import unit_of_name
 
 _MOST_DIGITS = 9
-"""No list of a configuration is so long; of thousands of digits, Python makes no number."""
+"""Most digits of an index: no list of a configuration is longer, and Python refuses numbers of thousands of digits."""
 
 _NOUNS = {"number": "a number", "integer": "a whole number", "string": "text", "boolean": "true or false"}
 
@@ -54,11 +54,11 @@ class ValueShape:
 
     @property
     def choices(self) -> list[str]:
-        """The words that are allowed, if not any text is."""
+        """The words that are allowed; empty if any text is."""
         return [word for shape in self.alternatives for word in _list_words(shape.node)]
 
     def child(self, part: str | int) -> ValueShape:
-        """The shape of the value under a key or an index; that of any value if there should be none."""
+        """Find the shape of the value under a key or an index; it allows anything if there should be no value."""
         for shape in self.alternatives:
             rest = shape.node.get("items" if isinstance(part, int) else "additionalProperties")
             if node := shape.node.get("properties", {}).get(part) or rest:
@@ -68,16 +68,16 @@ class ValueShape:
         return ValueShape({})
 
     def __str__(self) -> str:
-        return " or ".join(dict.fromkeys(_in_words(shape) for shape in self.alternatives))
+        return " or ".join(dict.fromkeys(_describe(shape) for shape in self.alternatives))
 
 
 def root() -> ValueShape:
-    """The shape of a whole configuration."""
+    """Make the shape of a whole configuration."""
     return ValueShape(json_schema())
 
 
 def unit_of_key(key: str) -> str:
-    """Unit of the numbers of a dotted key: that of its field, or else the one that the key ends with.
+    """Find the unit of the numbers of a dotted key: the unit of its field, or else the one that the key ends with.
 
     Args:
         key: Dotted key, in which an index is a part of its own; a name that is no key is allowed.
@@ -91,7 +91,7 @@ def index_or_key(part: str) -> int | str:
 
 
 def shape_of(parts: Sequence[str | int]) -> ValueShape:
-    """The shape of the value of a key of a configuration."""
+    """Find the shape of the value of a key of a configuration."""
     shape = root()
     for part in parts:
         shape = shape.child(part)
@@ -110,7 +110,7 @@ def _list_words(node: dict[str, Any]) -> list[str]:
     return [node["const"]] if "const" in node else list(node.get("enum", []))
 
 
-def _in_words(shape: ValueShape) -> str:
+def _describe(shape: ValueShape) -> str:
     node = shape.node
     if own := node.get("words"):
         return str(own)
@@ -122,7 +122,7 @@ def _in_words(shape: ValueShape) -> str:
         return " or ".join(listed) if len(listed) < 3 else f"one of {', '.join(listed)}"
     kind = node.get("type", "anything")
     if kind == "array":
-        return f"a list of {_plural(str(shape.child(0)))}"
+        return f"a list of {_make_plural(str(shape.child(0)))}"
     if kind == "object":
         if required := node.get("required"):
             return "{" + ", ".join(f"{key}: …" for key in required) + "}"
@@ -134,11 +134,11 @@ def _in_words(shape: ValueShape) -> str:
         return "null"
     if "pattern" in node:
         return "lower-case letters, digits, - and _, first a letter or digit"
-    bounds = _bounds(node) or (shape.unit and "in")
+    bounds = _describe_bounds(node) or (shape.unit and "in")
     return " ".join(filter(None, [_NOUNS.get(kind, kind), bounds, shape.unit]))
 
 
-def _bounds(node: dict[str, Any]) -> str:
+def _describe_bounds(node: dict[str, Any]) -> str:
     low, above = node.get("minimum"), node.get("exclusiveMinimum")
     high, below = node.get("maximum"), node.get("exclusiveMaximum")
     if high is None and below is not None and node["type"] == "integer":
@@ -154,7 +154,7 @@ def _bounds(node: dict[str, Any]) -> str:
     return " and ".join(filter(None, parts))
 
 
-def _plural(words: str) -> str:
+def _make_plural(words: str) -> str:
     for one, many in (("a joint's name", "joint names"), ("a number", "numbers"), ("one of ", "")):
         if words.startswith(one):
             return many + words.removeprefix(one)

@@ -77,7 +77,7 @@ class Bins(Section):
 
 
 class TargetConfig(Section):
-    """Landing targets over which throws that land are spread evenly: as many in each cell of the bins, if they can."""
+    """Landing targets over which throws are spread evenly: if possible, equally many land in each cell of the bins."""
 
     distance_m: Bins | None = None
     """Horizontal distance of the landing ball from the origin of the robot's base."""
@@ -114,14 +114,14 @@ class SweepConfig(Section):
     parameters: dict[str, Parameter] = {}
     """Dotted configuration keys (`task.duration_s`, `ball.mass_kg`, ...) and what they range over."""
     file: Annotated[str | None, Key(operator=True)] = None
-    """CSV or Parquet file with one row a trial and dotted keys as columns, perhaps targets, too; for the sampler
-    `list`.
+    """CSV or Parquet file for the sampler `list`, with one row for each trial; its columns are dotted keys, and
+    possibly targets.
 
     A relative path starts at the directory of the configuration file."""
     feasibility: Annotated[Literal["actual", "nominal"], Key(later=True)] = "actual"
     """Robot that the plan is checked for: the `actual` one that throws, or the `nominal` one, for which all keys of
-    `tool` and `ball`, and those of `robot` but `posture`, `locked` and `base_height_m`, have their defaults: a user who
-    plans motions for a robot knows only this one."""
+    `tool`, `ball` and `robot` have their defaults, except `posture`, `locked` and `base_height_m`. Somebody who plans
+    motions for a real robot knows only the nominal one."""
     target: Annotated[TargetConfig | None, Key(later=True)] = None
     """Spreads throws over landing targets: trials are added to the plan where throws are few."""
 

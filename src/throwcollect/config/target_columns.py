@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 TARGET_PREFIX = "target_"
-"""Prefix of the columns of targets, and of no others: keys have dots, and results have other names."""
+"""Prefix of the columns of targets. No other columns have it: keys have dots, and results have other names."""
 
 LARGEST_TARGET = 1e6
 """Largest number of a target [m, rad, ...]: no robot reaches that far, and powers of it do not overflow."""
@@ -18,7 +18,7 @@ class TargetColumn:
     Attributes:
         name: Its name, which begins with `TARGET_PREFIX` and ends with its unit.
         of: The column of the task's results, or the key given with a target, that should have the value.
-        miss: Column of the table of throws with the distance to which it contributes.
+        miss: Column of the table of throws with the miss to which this column contributes.
         word: Its name in sentences.
         description: Its meaning, with the unit.
         required: Whether a target has to have it.

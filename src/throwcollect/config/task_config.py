@@ -25,7 +25,7 @@ class TaskConfig(Section):
         until: The section `until` of a configuration of this task; its key is the outcome of a trial that succeeded.
         throws: Whether the ball is thrown: then the tool has to move, and `sweep.target` can ask for landings, as
             results are `ThrowResult`.
-        targets: Columns of its results that say where a trial ended, which is what others aim at; none if there is
+        targets: Columns of its results that say where a trial ended, and that can be aimed at; none if there is
             nothing to aim at.
         given: Keys whose values belong to a target, in the order in which they follow it: aiming does not choose them.
         target_columns: Columns of targets that lists of its trials may have, in the order of the table of throws; none

@@ -17,7 +17,7 @@ class UntilConfig(Section):
 
     @classmethod
     def outcome(cls) -> str:
-        """The outcome that is counted."""
+        """Name the outcome that is counted."""
         return next(iter(cls.model_fields))
 
     @property

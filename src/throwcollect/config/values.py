@@ -20,11 +20,11 @@ AnySection = TypeVar("AnySection", bound=Section)
 
 
 def with_values(config: Config, values: Mapping[str, float]) -> Config:
-    """Make a configuration with some of its values replaced, such as that of one trial.
+    """Make a configuration with some of its values replaced, such as the configuration of one trial.
 
     Args:
         config: The configuration, which stays as it is.
-        values: New values by dotted key, which `config` must have; items of lists go by their index from 0.
+        values: New values by dotted key, which `config` must have; an item of a list is named by its index, from 0.
 
     Raises:
         ConfigError: If a key does not exist, or the result would not be valid.
@@ -58,7 +58,7 @@ class Leaf:
 
 def leaves(config: Config) -> Iterator[Leaf]:
     """List the leaves of a configuration, in the order in which their keys are declared."""
-    return _leaves(config, (), Key(), Config())
+    return _list_leaves(config, (), Key(), Config())
 
 
 def values_by_key(config: Config) -> dict[str, Any]:
@@ -73,7 +73,7 @@ def differences(one: Config, other: Config) -> dict[str, tuple[Any, Any]]:
 
 
 def sweepable_keys(config: Config, effect: Effect | None = None) -> list[str]:
-    """List the dotted keys that a sweep of this configuration may vary, or those of them that have one effect."""
+    """List the dotted keys that a sweep of this configuration may vary; with `effect`, only those with this effect."""
     return [
         leaf.name
         for leaf in leaves(config)
@@ -84,7 +84,7 @@ def sweepable_keys(config: Config, effect: Effect | None = None) -> list[str]:
 @cache
 def list_operator_keys() -> tuple[str, ...]:
     """List the dotted keys that only the operator of a server sets, without those that lie below another of them."""
-    return tuple(_operator_keys(Config))
+    return tuple(_find_operator_keys(Config))
 
 
 def reason_not_sweepable(config: Config, key: str) -> str | None:
@@ -110,28 +110,30 @@ def _find_obstacle(config: Config, leaf: Leaf) -> str | None:
     return None
 
 
-def _operator_keys(section: type[Section]) -> Iterator[str]:
+def _find_operator_keys(section: type[Section]) -> Iterator[str]:
     for name, field in section.model_fields.items():
         if key_of_field(section, name).operator:
             yield name
             continue
         # Sections of members may have the same key.
-        inner = dict.fromkeys(key for each in list_sections(field.annotation) for key in _operator_keys(each))
+        inner = dict.fromkeys(key for each in list_sections(field.annotation) for key in _find_operator_keys(each))
         yield from (f"{name}.{key}" for key in inner)
 
 
-def _leaves(value: Any, location: Location, key: Key, default: Any) -> Iterator[Leaf]:
+def _list_leaves(value: Any, location: Location, key: Key, default: Any) -> Iterator[Leaf]:
     if isinstance(value, Section):
         for name, inner in value.__dict__.items():
             own = overlay(key, type(value), name)
             # The default may be another task or another family, which need not have this key.
-            yield from _leaves(inner, (*location, name), own, getattr(default, name, None))
+            yield from _list_leaves(inner, (*location, name), own, getattr(default, name, None))
     elif isinstance(value, dict) and value:
         for name, inner in value.items():
-            yield from _leaves(inner, (*location, name), key, default.get(name) if isinstance(default, dict) else None)
+            yield from _list_leaves(
+                inner, (*location, name), key, default.get(name) if isinstance(default, dict) else None
+            )
     elif isinstance(value, list) and value:
         for index, inner in enumerate(value):
-            yield from _leaves(inner, (*location, index), key, None)
+            yield from _list_leaves(inner, (*location, index), key, None)
     else:
         yield Leaf(join_key(location), value, key, is_default=value == default)
 
@@ -140,7 +142,7 @@ def _change(section: AnySection, changes: Mapping[str, Any], location: Location)
     values = dict(section.__dict__)
     for part, change in changes.items():
         if part not in values:
-            raise _unknown((*location, part), list(values))
+            raise _make_unknown_key_error((*location, part), list(values))
         values[part] = _replace(values[part], change, (*location, part))
     try:
         # Strictly, so that a text in quotes is not taken for a number. Pydantic does not validate sections again.
@@ -160,10 +162,10 @@ def _replace(value: Any, change: Any, location: Location) -> Any:
     for part, inner in change.items():
         index = index_or_key(part) if isinstance(value, list) else part
         if index not in copy:
-            raise _unknown((*location, part), list(map(str, copy)))
+            raise _make_unknown_key_error((*location, part), list(map(str, copy)))
         copy[index] = _replace(copy[index], inner, (*location, index))
     return list(copy.values()) if isinstance(value, list) else copy
 
 
-def _unknown(location: Location, known: list[str]) -> ConfigError:
+def _make_unknown_key_error(location: Location, known: list[str]) -> ConfigError:
     return ConfigError([Problem(unknown_key(str(location[-1]), known), join_key(location))])

@@ -30,12 +30,13 @@ class _Scanner(Scanner):
         return super().fetch_more_tokens()
 
     def scan_flow_scalar_non_spaces(self, double: Any, start_mark: Any) -> Any:
-        # The digits after \U may be any, and those after \u half of a character, which no file can hold.
+        # The digits after \U may name no character, and those after \u half of a surrogate pair, which no file can
+        # hold.
         try:
             parts = super().scan_flow_scalar_non_spaces(double, start_mark)
             "".join(parts).encode()
         except (ValueError, OverflowError):
-            self._refuse("an escaped character is none of Unicode")
+            self._refuse("an escaped character does not exist in Unicode")
         return parts
 
     def _refuse(self, reason: str) -> None:
@@ -66,6 +67,6 @@ def reason(error: YAMLError) -> str:
 
 
 def line(error: YAMLError) -> int | None:
-    """The line of the error, counted from 1; None if it is unknown."""
+    """Find the line of the error, counted from 1; None if it is unknown."""
     mark = (error.problem_mark or error.context_mark) if isinstance(error, MarkedYAMLError) else None
     return mark.line + 1 if mark else None

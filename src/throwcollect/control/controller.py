@@ -28,18 +28,19 @@ from throwcollect.control.validation import refusal
 from throwcollect.control.waypoints import Waypoints, arrange
 
 REPEATED = "repeated"
-"""Attribute of log records that clients can cause as often as they like; it holds the subject of the record. A log may
-leave some of them out. All other records are one line for each goal, stop or decision."""
+"""Attribute of log records that clients can cause as often as they like; its value is the subject of the record. A log
+may drop some of these records. All other records are one line for each goal, stop or decision."""
 
 _FAR_AHEAD_NS = 3600 * 10**9
-"""A trajectory that starts so much later was most likely stamped by another clock."""
+"""A trajectory that starts later than this from now was most likely stamped by another clock."""
 
 _MOST_SPEED = 1000.0
-"""Upstream has no limit. Far above this one, the time that the clock advances in a period fits no number."""
+"""Largest speed of a trajectory's clock [-]. Upstream has no limit, but far above this one, the nanoseconds that the
+clock advances in a period do not fit into 64 bits."""
 
 
 class JointTrajectoryController:
-    """Follows joint trajectories by commanding positions, as ros2_controllers' (Jazzy, 4.42) does.
+    """Follows joint trajectories by commanding positions, as the controller of ros2_controllers (Jazzy, 4.42) does.
 
     The caller begins with `reset`. It then calls `update` once a control period, or, where nothing has to be decided,
     `take` for many periods at once: both leave the controller in the same state. Between updates it hands in goals. It
@@ -49,7 +50,7 @@ class JointTrajectoryController:
     Args:
         name: Name of the controller, for texts.
         parameters: Its parameters; later changes must keep the joints and the interfaces that are measured.
-        period_ns: Control period [ns], above 0; a command is what is due one period after its update.
+        period_ns: Control period [ns], above 0; an update commands the positions that are due one period later.
         holds_command: Whether joints that are stopped are held at the last command, so that joints which lag under load
             do not sag. Otherwise they are held where they are measured, as upstream does.
         topic_aborts_goal: Whether a trajectory from the topic aborts the goal that is being executed. Otherwise the
@@ -111,7 +112,7 @@ class JointTrajectoryController:
         return self._motion.past_end and self.next_decision() == sys.maxsize
 
     def scale_speed(self, factor: float) -> None:
-        """Let the trajectory's clock go at another speed [-]: slower below 1; 0 stops it. Log wrong ones."""
+        """Let the trajectory's clock go at another speed [-]: slower below 1, 0 stops it. Log wrong speeds."""
         if not 0 <= factor <= _MOST_SPEED:
             rule = "Scaling factor has to be greater or equal to 0.0 - Ignoring input!"
             problem = f"{rule} (got {factor:g}; expected 0 to {_MOST_SPEED:g})"
@@ -139,7 +140,7 @@ class JointTrajectoryController:
         Returns:
             None if the goal is accepted; otherwise the reason of the refusal, which the log has too.
         """
-        if reason := self._refusal(goal.trajectory, now_ns):
+        if reason := self._find_refusal(goal.trajectory, now_ns):
             return reason
         self._finish(Decision.invalid("Current goal preempted by new incoming action."))
         self.goal_id = goal_id
@@ -149,7 +150,7 @@ class JointTrajectoryController:
 
     def replace(self, trajectory: Trajectory, now_ns: int) -> TrajectoryRefusal | None:
         """Follow a trajectory from the topic instead of the present one, or refuse it as `submit` refuses a goal."""
-        if reason := self._refusal(trajectory, now_ns):
+        if reason := self._find_refusal(trajectory, now_ns):
             return reason
         if self._topic_aborts_goal:
             self._finish(Decision.invalid("Current goal preempted by a trajectory on the topic."))
@@ -198,10 +199,10 @@ class JointTrajectoryController:
         return self.command
 
     def next_decision(self) -> int:
-        """Number of updates that can pass without the controller seeing the measured state.
+        """Count the updates that can pass without the controller seeing the measured state.
 
         Returns:
-            Most updates that `take` gives now; the one after them must be made with `update`. `sys.maxsize` if
+            Most updates that `take` may make now; the one after them must be made with `update`. `sys.maxsize` if
             nothing is to be decided.
         """
         if self._holding:
@@ -238,19 +239,19 @@ class JointTrajectoryController:
         return commands
 
     def observe(self, measured: JointState) -> None:
-        """Tell what the last of the updates that were taken would have measured.
+        """Set the measured state at the time of the last update that `take` made.
 
-        Call it after `take` and before `cancel`, `state` or `query`, which use what was measured last.
+        Call it after `take` and before `cancel`, `state` or `query`, which use the state that was measured last.
         """
         self._measured = measured
 
     def pop_results(self) -> tuple[GoalResult, ...]:
-        """Results of the goals that have ended since the last call, oldest first."""
+        """Return the results of the goals that have ended since the last call, oldest first."""
         results, self._results = tuple(self._results), []
         return results
 
     def state(self, time_ns: int | None = None) -> ControllerState:
-        """State of the last update, which is the content of feedback while a goal is being executed.
+        """Report the state of the last update, which is the content of feedback while a goal is being executed.
 
         Args:
             time_ns: Time of what was observed last, if that was after the update [ns].
@@ -271,7 +272,7 @@ class JointTrajectoryController:
         )
 
     def query(self, time_ns: int) -> TrajectoryState:
-        """The trajectory that is being followed, at an absolute time [ns]."""
+        """Evaluate the trajectory that is being followed at an absolute time [ns]."""
         motion = self._motion
         if time_ns < motion.first_ns:
             return TrajectoryState(False, self._measured.positions, self._measured.velocities)
@@ -279,7 +280,7 @@ class JointTrajectoryController:
         return TrajectoryState(time_from_start_ns < motion.curve.end_ns, *motion.curve.state(time_from_start_ns))
 
     def _begin(self, incoming: Trajectory | Waypoints, state: JointState) -> None:
-        """Follow something else from the present update on, in which the joints are in the given state."""
+        """Follow a new trajectory or hold from the present update on, in which the joints are in the given state."""
         start_ns = self._time_ns
         if isinstance(incoming, Trajectory):
             start_ns = incoming.stamp_ns or start_ns
@@ -295,8 +296,8 @@ class JointTrajectoryController:
         if (decision := self._judge.decide(motion, self._measured, first=first)) is None:
             return None
         if decision.status is GoalStatus.ABORTED:
-            holds = "" if self.goal_id is not None else " (no goal is open; the trajectory of the topic ends)"
-            self.logger.warning("%s: %s%s", self.name, decision.text, holds)
+            remark = "" if self.goal_id is not None else " (no goal is open; the trajectory of the topic ends)"
+            self.logger.warning("%s: %s%s", self.name, decision.text, remark)
             self._stop()
         # An end that no goal waits for is judged again in each update until its goal time is over.
         elif self.goal_id is not None or self._judge.is_settled(motion):
@@ -326,7 +327,7 @@ class JointTrajectoryController:
     def _judge_with(self, tolerances: Tolerances) -> Judge:
         return Judge(tolerances, self._parameters.timeout_ns, self._parameters.joints)
 
-    def _refusal(self, trajectory: Trajectory, now_ns: int) -> TrajectoryRefusal | None:
+    def _find_refusal(self, trajectory: Trajectory, now_ns: int) -> TrajectoryRefusal | None:
         if reason := refusal(trajectory, self._parameters, now_ns):
             return self.refuse(reason)
         ahead_ns = (trajectory.stamp_ns or now_ns) - now_ns

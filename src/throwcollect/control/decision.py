@@ -26,7 +26,7 @@ class Decision:
 
     @classmethod
     def invalid(cls, text: str) -> Decision:
-        """A goal is dropped, for a reason outside of the trajectory."""
+        """Make the decision to drop a goal, for a reason outside of the trajectory."""
         return cls(GoalStatus.ABORTED, ErrorCode.INVALID_GOAL, text)
 
 
@@ -39,7 +39,7 @@ class Judge:
     """Judges the updates of one trajectory.
 
     Attributes:
-        tolerances: Those in force.
+        tolerances: The tolerances in force.
         timeout_ns: How long after the end the joints are stopped [ns]; 0 never.
         joints: Names of the joints.
     """
@@ -49,7 +49,7 @@ class Judge:
     joints: Sequence[str]
 
     def decide(self, motion: Motion, measured: JointState, *, first: bool) -> Decision | None:
-        """Judge one update; None while the trajectory goes on, or its end waits for the joints.
+        """Judge one update; None while the trajectory goes on, or has ended but the joints are not there yet.
 
         In the `first` update of a motion, the path is checked even if the end has come.
         """
@@ -77,7 +77,7 @@ class Judge:
         return None
 
     def updates_to_skip(self, motion: Motion, *, goal: bool) -> int | None:
-        """Number of updates that can pass without anything to decide; None if there will never be anything.
+        """Count the updates that can pass without anything to decide; None if there will never be anything.
 
         `goal` tells whether a goal waits for the end of the motion.
         """

@@ -14,8 +14,8 @@ from throwcollect.control.sampling import Grid, first_index_at
 class Motion:
     """A curve, sampled once a control period.
 
-    In every update the desired positions are those of the trajectory's clock, and the commanded ones those of one
-    period later. An instance stands at its first update when it is made.
+    In every update the desired positions are those at the time of the trajectory's clock, and the commanded ones those
+    one period later. A new instance stands at its first update.
 
     Args:
         curve: The curve that is followed.
@@ -40,7 +40,7 @@ class Motion:
 
     @property
     def past_end(self) -> bool:
-        """Whether the command of this update is that of the last point."""
+        """Whether the command of this update is the position of the last point."""
         return self.clock_ns + self._period_ns >= self.curve.end_ns
 
     @property
@@ -74,13 +74,13 @@ class Motion:
         return self._commands.positions(first, n_updates)
 
     def updates_until_end(self) -> int:
-        """Updates that follow before the one in which `past_end` becomes true; negative when it is true."""
+        """Count the updates before the one in which `past_end` becomes true; negative if it is true already."""
         if self.past_end:
             return -1
         return first_index_at(self.curve.end_ns - self._period_ns - self.clock_ns, self._step_ns) - 1
 
     def updates_until_late(self, tolerance_ns: int) -> int:
-        """Updates that follow before the one in which `since_end_ns` exceeds the tolerance; negative when it does."""
+        """Count the updates before the one in which `since_end_ns` exceeds the tolerance; negative if it does so."""
         left_ns = tolerance_ns - self.since_end_ns
         if left_ns < 0:
             return -1

@@ -19,7 +19,7 @@ from throwcollect.control.waypoints import CUBIC, LINE, QUINTIC, Waypoints
 class Curve:
     """Positions, velocities and accelerations over time; after the last knot its values are held.
 
-    Coefficients are those of ascending powers of the share of the segment that has passed, one array
+    Coefficients belong to ascending powers of the share of the segment that has passed, one array
     ``(n_knots, n_joints)`` for each power.
 
     Attributes:
@@ -43,14 +43,14 @@ class Curve:
         return int(self.knots_ns[-1])
 
     def positions(self, times_ns: NDArray[np.int64]) -> NDArray[np.float64]:
-        """Positions [rad], shape ``(n, n_joints)``, at times since the trajectory's start [ns], shape ``(n,)``.
+        """Compute positions [rad], shape ``(n, n_joints)``, at times since the trajectory's start [ns], shape ``(n,)``.
 
         No time may be before the first knot.
         """
         return self._evaluate(self.position, times_ns)
 
     def state(self, time_ns: int) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-        """Position, velocity and acceleration at one time.
+        """Compute position, velocity and acceleration at one time.
 
         Args:
             time_ns: Time since the trajectory's start, not before the first knot [ns].
@@ -78,7 +78,7 @@ class Curve:
 
 
 def interpolate(waypoints: Waypoints, start: JointState, start_ns: int) -> Curve:
-    """Curve from a start state through the points; if the first point's time has come, it begins there instead.
+    """Make a curve from a start state through the points; if the first point's time has come, it begins there instead.
 
     Args:
         waypoints: The points.
@@ -86,10 +86,10 @@ def interpolate(waypoints: Waypoints, start: JointState, start_ns: int) -> Curve
         start_ns: When, since the trajectory's start [ns].
     """
     if start_ns < waypoints.times_ns[0]:
-        waypoints = _lead_in(waypoints, start, start_ns)
+        waypoints = _prepend_start(waypoints, start, start_ns)
     durations_ns = np.append(np.diff(waypoints.times_ns), 1)
     if len(durations_ns) > 1:
-        return _splines(waypoints, durations_ns)
+        return _make_splines(waypoints, durations_ns)
     p, v, a = waypoints.positions, waypoints.velocities, waypoints.accelerations
     return Curve(waypoints.times_ns, durations_ns, p[np.newaxis], v[np.newaxis], a[np.newaxis])
 
@@ -101,7 +101,7 @@ def quintic(
     a0: NDArray[np.float64],
     a1: NDArray[np.float64],
 ) -> tuple[NDArray[np.float64], ...]:
-    """Polynomials of degree 5 in the share of a segment that has passed, from what they are at both ends.
+    """Find polynomials of degree 5 in the share of a segment that has passed, from their values at both ends.
 
     Args:
         step: End minus start [rad]; all arguments have the same shape.
@@ -122,7 +122,7 @@ def quintic(
     )
 
 
-def _lead_in(waypoints: Waypoints, start: JointState, start_ns: int) -> Waypoints:
+def _prepend_start(waypoints: Waypoints, start: JointState, start_ns: int) -> Waypoints:
     still = np.zeros_like(start.positions)
     return Waypoints(
         np.concatenate(([start_ns], waypoints.times_ns)),
@@ -133,7 +133,7 @@ def _lead_in(waypoints: Waypoints, start: JointState, start_ns: int) -> Waypoint
     )
 
 
-def _splines(waypoints: Waypoints, durations_ns: NDArray[np.int64]) -> Curve:
+def _make_splines(waypoints: Waypoints, durations_ns: NDArray[np.int64]) -> Curve:
     content = np.minimum(waypoints.content[:-1], waypoints.content[1:])
     seconds = (durations_ns / 1e9)[:, np.newaxis]
     # The highest degree of any segment decides the size of the tables. Lower ones leave their higher coefficients at 0.
@@ -152,15 +152,15 @@ def _splines(waypoints: Waypoints, durations_ns: NDArray[np.int64]) -> Curve:
     if len(quintics):
         d, v, w, a, b = step[quintics], v0[quintics], v1[quintics], a0[quintics], a1[quintics]
         position[1:6, quintics] = quintic(d, v, w, a, b)
-    velocity = _derivative(position, seconds)
-    acceleration = _derivative(velocity, seconds)
+    velocity = _differentiate(position, seconds)
+    acceleration = _differentiate(velocity, seconds)
     # After the end the position is constant, but velocity and acceleration are held at those of the last point, as
     # upstream does.
     velocity[0, -1], acceleration[0, -1] = waypoints.velocities[-1], waypoints.accelerations[-1]
     return Curve(waypoints.times_ns, durations_ns, position, velocity, acceleration)
 
 
-def _derivative(coefficients: NDArray[np.float64], seconds: NDArray[np.float64]) -> NDArray[np.float64]:
+def _differentiate(coefficients: NDArray[np.float64], seconds: NDArray[np.float64]) -> NDArray[np.float64]:
     if len(coefficients) == 1:
         return np.zeros_like(coefficients)
     # The polynomials are in the share of the segment and their derivatives in seconds, so each one is divided once

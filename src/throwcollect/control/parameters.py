@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from throwcollect.errors import ConfigError, Problem
 
 _LONGEST_S = 1e10
-"""Longest time that counts: no stamp of ROS is so late, and parameters may be as large as floats are."""
+"""Longest time that is used: a parameter may be any float, but no stamp of ROS is later than this."""
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ class Constraints:
     Attributes:
         goal_time: How long after the trajectory's end the goal may still be reached [s]; 0 waits for ever.
         stopped_velocity_tolerance: Largest velocity error at the end [rad/s]. It has no effect: a controller that
-            commands positions alone has no velocity error. Clients can set it all the same.
+            commands positions alone has no velocity error. Clients can still set it.
         decelerate_on_cancel: Whether joints brake when they are stopped, instead of being held where they are. Then
             velocities are measured, and every joint has a deceleration.
         joints: Tolerances of each joint; a joint that is absent is not checked.
@@ -46,7 +46,7 @@ class Constraints:
     joints: Mapping[str, JointConstraints] = field(default_factory=dict)
 
     def of(self, joint: str) -> JointConstraints:
-        """Tolerances of a joint."""
+        """Return the tolerances of a joint."""
         return self.joints.get(joint, JointConstraints())
 
 
@@ -99,5 +99,5 @@ class ControllerParameters:
 
 
 def to_nanoseconds(seconds: float) -> int:
-    """A time that a parameter says, in nanoseconds."""
+    """Convert the time in a parameter to nanoseconds; a time that is too long is cut."""
     return round(min(seconds, _LONGEST_S) * 1e9)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from throwcollect.control.interpolation import Curve
 
 _BLOCK = 4096
-"""Points that are computed at once: whole throws, yet bounded for trajectories that end in years."""
+"""Points that are computed at once: enough for whole throws, but limited, as a trajectory may end in years."""
 
 
 class Grid:
@@ -29,20 +29,20 @@ class Grid:
         self.end_index = first_index_at(curve.end_ns - origin_ns, step_ns)
         self._block_start = 0
         self._block = np.empty((0, 0))
-        # A clock that stands still never gets to the end, so its last position is that of the origin.
+        # A clock that stands still never gets to the end, so its last position is the position at the origin.
         self._last = self._compute(self.end_index if step_ns else 0, 1)[0]
 
     def time_ns(self, index: int) -> int:
-        """Time of a point, since the trajectory's start [ns]."""
+        """Compute the time of a point, since the trajectory's start [ns]."""
         return self._origin_ns + index * self._step_ns
 
     def position(self, index: int) -> NDArray[np.float64]:
-        """Position at one point [rad], shape ``(n_joints,)``, read-only."""
+        """Compute the position at one point [rad], shape ``(n_joints,)``, read-only."""
         position: NDArray[np.float64] = self.positions(index, 1)[0]
         return position
 
     def positions(self, first: int, count: int) -> NDArray[np.float64]:
-        """Positions at successive points [rad], shape ``(count, n_joints)``, read-only; `first` is an index."""
+        """Compute positions at successive points [rad], shape ``(count, n_joints)``, read-only; `first` is an index."""
         stop = first + count
         moving_stop = min(stop, self.end_index if self._step_ns else first)
         if first >= moving_stop:
@@ -65,7 +65,7 @@ class Grid:
 
 
 def first_index_at(distance_ns: int, step_ns: int) -> int:
-    """Index of the first point that is at least this far from the origin; `sys.maxsize` if there is none."""
+    """Find the index of the first point that is at least this far from the origin; `sys.maxsize` if there is none."""
     if distance_ns <= 0:
         return 0
     # This rounds up in whole numbers, because a float cannot tell single nanoseconds of a year.

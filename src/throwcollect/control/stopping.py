@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from throwcollect.control.waypoints import QUINTIC, Waypoints
 
 _LONGEST_S = 60.0
-"""Longest time for which a joint brakes: one that is faster than any robot's would take more points than fit."""
+"""Longest time for which a joint brakes: at a speed far above that of any robot, the points would fill all memory."""
 
 
 def brake(
@@ -19,7 +19,7 @@ def brake(
     deceleration: NDArray[np.float64],
     period_ns: int,
 ) -> Waypoints:
-    """Trajectory on which each joint brakes from its speed to rest, at a deceleration of its own, within a minute.
+    """Make a trajectory on which each joint brakes from its speed to rest, at its own deceleration, within a minute.
 
     Args:
         positions: Where the joints are [rad], shape ``(n_joints,)``.

@@ -1,7 +1,7 @@
 """Which tolerances are in force for a goal, and which joints break them.
 
-A tolerance of 0 is not in force, here as in the parameters. Those of velocities and accelerations never are, as in
-controllers of ros2_controllers that command positions alone; they are checked for being legal all the same.
+A tolerance of 0 is not in force, here as in the parameters. Tolerances of velocities and accelerations never are, as in
+controllers of ros2_controllers that command positions alone; a goal with an illegal one is still noticed.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ class Tolerances:
 
 
 def default_tolerances(constraints: Constraints, joints: Sequence[str]) -> Tolerances:
-    """Tolerances of trajectories that bring none of their own: the controller's parameters as arrays."""
+    """Make the tolerances of trajectories that bring none of their own: the controller's parameters as arrays."""
     limits = [constraints.of(joint) for joint in joints]
     return Tolerances(
         path=np.array([limit.trajectory for limit in limits]),
@@ -52,7 +52,7 @@ def default_tolerances(constraints: Constraints, joints: Sequence[str]) -> Toler
 def goal_tolerances(
     goal: TrajectoryGoal, defaults: Tolerances, joints: Sequence[str], *, logger: logging.Logger
 ) -> Tolerances:
-    """Tolerances of one goal: its own where it has any, the defaults elsewhere.
+    """Find the tolerances of one goal: its own where it has any, the defaults elsewhere.
 
     One illegal number or unknown joint makes the whole goal fall back to the defaults; the log says so.
     """
@@ -67,7 +67,7 @@ def goal_tolerances(
 
 
 def violations(error: NDArray[np.float64], limits: Limits, joints: Sequence[str]) -> str:
-    """One phrase for each joint whose position error [rad], shape ``(n_joints,)``, is above its limit, or nothing."""
+    """Write one phrase for each joint whose position error [rad], shape ``(n_joints,)``, is above its limit."""
     broken = np.flatnonzero((limits > 0) & (np.abs(error) > limits))
     return "; ".join(
         f"joint {joints[index]} has position {_describe(error[index], limits[index])}" for index in broken.tolist()

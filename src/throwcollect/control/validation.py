@@ -27,7 +27,7 @@ _FIELDS: tuple[tuple[str, Callable[[TrajectoryPoint], Values]], ...] = (
 
 
 def refusal(trajectory: Trajectory, parameters: ControllerParameters, now_ns: int) -> TrajectoryRefusal | None:
-    """The first rule that a trajectory breaks at the present time [ns]; None if it can be executed."""
+    """Find the first rule that a trajectory breaks at the present time [ns]; None if it can be executed."""
     answers = _judge(trajectory, parameters, now_ns)
     return next((TrajectoryRefusal(code, text) for code, text in answers if text is not None), None)
 

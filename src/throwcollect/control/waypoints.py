@@ -1,4 +1,4 @@
-"""Points of a trajectory in a controller's joint order, with all that they leave out filled in."""
+"""Points of a trajectory in a controller's joint order, with values for everything that the trajectory leaves out."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class Waypoints:
         velocities: NDArray[np.float64] | None = None,
         accelerations: NDArray[np.float64] | None = None,
     ) -> Waypoints:
-        """One point at the trajectory's start, to be held; velocities and accelerations of None are 0."""
+        """Make one point at the trajectory's start, to be held; velocities and accelerations of None are 0."""
         still = np.zeros(len(positions))
         rows = [still if row is None else row for row in (positions, velocities, accelerations)]
         p, v, a = (row[np.newaxis] for row in rows)
@@ -50,7 +50,7 @@ class Waypoints:
 def arrange(
     trajectory: Trajectory, joints: Sequence[str], command: NDArray[np.float64], start: JointState, start_ns: int
 ) -> Waypoints:
-    """Points of a valid trajectory for all joints of the controller, in the controller's order.
+    """Bring the points of a valid trajectory into the controller's order, with values for all of its joints.
 
     Args:
         trajectory: The trajectory that was asked for.
@@ -66,8 +66,8 @@ def arrange(
     placed = [index for index, point in enumerate(points) if len(point.positions)]
     if placed:
         positions[np.ix_(placed, columns)] = [points[index].positions for index in placed]
-    velocities, moving = _table([point.velocities for point in points], positions.shape, columns)
-    accelerations, accelerating = _table([point.accelerations for point in points], positions.shape, columns)
+    velocities, moving = _make_table([point.velocities for point in points], positions.shape, columns)
+    accelerations, accelerating = _make_table([point.accelerations for point in points], positions.shape, columns)
     content = np.zeros(len(points), np.int64)
     content[moving] = CUBIC
     # Accelerations without velocities do not count, as upstream's quintic needs both.
@@ -76,7 +76,7 @@ def arrange(
     return waypoints if len(placed) == len(points) else _integrate(waypoints, points, columns, start, start_ns)
 
 
-def _table(
+def _make_table(
     fields: Sequence[Values], shape: tuple[int, ...], columns: list[int]
 ) -> tuple[NDArray[np.float64], list[int]]:
     table = np.zeros(shape)
@@ -92,7 +92,7 @@ def _integrate(
     """Fill in positions, and velocities too where a point has accelerations alone, by the trapezoidal rule."""
     positions, velocities, content = waypoints.positions.copy(), waypoints.velocities.copy(), waypoints.content.copy()
     still = np.zeros(positions.shape[1])
-    # If the time of the first point is over, the joints are taken to be there, so nothing is integrated backwards.
+    # If the time of the first point has passed, the joints count as being there, so nothing is integrated backwards.
     time_ns = min(start_ns, int(waypoints.times_ns[0]))
     p = start.positions
     v, a = still if start.velocities is None else start.velocities, still

@@ -22,9 +22,9 @@ class Acceptance:
         self._settings = Settings(config)
 
     def find_difference(self, text: str, plan: Plan, trial: Trial, *, token: str) -> str | None:
-        """Why an episode is not the one that was asked for by the lease with this token; None if it is.
+        """Say why an episode is not the one that the lease with this token asked for; None if it is.
 
-        `text` has the conditions that the simulation names, in JSON.
+        `text` has the conditions that the simulation reports, in JSON.
         """
         try:
             conditions = conditions_from_json(text)

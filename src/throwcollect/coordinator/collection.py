@@ -1,8 +1,8 @@
 """The trials of a plan on their way into the dataset, for any kind of simulation.
 
-It decides which trial a simulation gets next, whether an episode is the one that was asked for, and what is written. It
-knows no network and no processes: the coordinator's node drives it with simulations that it finds in the ROS graph, a
-run in one process with a simulation of its own.
+`TrialCollection` decides which trial a simulation gets next, whether an episode is the one that was asked for, and what
+is written. It knows no network and no processes: the coordinator's node drives it with the simulations that it finds in
+the ROS graph, and a run in one process drives it with a simulation of its own.
 """
 
 from __future__ import annotations
@@ -32,14 +32,14 @@ from throwcollect.tasks.task import task_of
 from throwcollect.wording import command, format_count
 
 _SYNC_EVERY_S = 1.0
-"""Real time of collecting that a power cut may cost."""
+"""Real time after which data is forced to the disk: a power cut costs what was collected in this time at most."""
 _TELL_EVERY_S = 2.0
 _REPLAY_AHEAD_S = 3.0
-"""Real time before the last trial ends, as it seems, at which the process is begun that simulates some again."""
+"""How long before the expected end of the last trial the process starts that simulates some trials again."""
 
 
 class TrialCollection:
-    """The trials of one dataset; close it, or use it as a context manager.
+    """The trials of one dataset; a context manager.
 
     A simulation is known by an address that is unique in the run (its ROS namespace), and named in the journal and in
     reports by its node's name.
@@ -47,7 +47,7 @@ class TrialCollection:
     Attributes:
         writer: The dataset that is filled.
         warn: Called with a warning when a trial goes to another simulation; the coordinator's node sets it to its log.
-        on_change: Called when the trials of simulations may have changed: the plan has grown, or no further trial shall
+        on_change: Called when the trials of simulations may have changed: the plan has grown, or no further trial may
             begin.
     """
 
@@ -92,7 +92,7 @@ class TrialCollection:
 
         def tell(trial: int, result: Result) -> None:
             nonlocal count, told
-            # Episodes come file by file, so these are all of some files.
+            # Episodes come file by file, so this is the number in all files that were read so far.
             if count and time.monotonic() >= told + _TELL_EVERY_S:
                 told = time.monotonic()
                 say(f"has found {format_count(count, 'episode')} of an earlier collection so far")
@@ -124,12 +124,12 @@ class TrialCollection:
 
     @property
     def finished(self) -> bool:
-        """Whether every trial has ended and is written; while draining, whether running ones have ended or had time."""
+        """Whether all trials have ended and are written; while draining, whether running ones did, or time is up."""
         if self._backlog:
             return False
         if self.complete:
             return True
-        # `grow_plan` still has to close the plan. Otherwise a drain at this moment would have a complete collection
+        # `grow_plan` still has to close the plan. Otherwise, a drain at this moment would make a complete collection
         # count as interrupted.
         if self._growth is not None and self._growth.over:
             return False
@@ -141,17 +141,17 @@ class TrialCollection:
         return self._leases.finished and self._growth is None
 
     def drain(self) -> None:
-        """Have no more trials begun; those that run may end within `run.grace_s`."""
+        """Let no more trials begin; those that run have `run.grace_s` to end."""
         if not self._draining:
             self._draining = True
             self._drain_deadline = time.monotonic() + self._config.run.grace_s
-            # Of the trials that a simulation holds only the first one runs. The others go back, and it is told so.
+            # Only the first trial that a simulation holds runs. The others go back, which `on_change` tells it.
             for simulation in self._names:
                 self._leases.release(simulation)
             self.on_change()
 
     def recall(self, trial: int, result: Result) -> None:
-        """Count a trial as ended whose episode is in the dataset already; only before anything is leased."""
+        """Count a trial as ended, as the dataset has its episode; call this only before anything is leased."""
         if self._growth is None or not self._growth.keep(trial, result):
             self._recall(trial, result)
         while self._confirm_round():
@@ -163,14 +163,14 @@ class TrialCollection:
         self._took_part.add(name)
 
     def leave(self, simulation: str, reason: str) -> None:
-        """Take its trials back from a simulation that is gone, and forget it: the next of its name is another one."""
+        """Forget a simulation that is gone, and take its trials back; the next one at its address counts as new."""
         self.take_back(simulation, reason)
         self._leases.forget(simulation)
         self._lookahead.forget(simulation)
         del self._names[simulation]
 
     def lease(self, simulation: str) -> tuple[int, ...]:
-        """Give further trials to a simulation that has few; return all that it shall do, in their order."""
+        """Give further trials to a simulation that has few, and return all trials that it has to do, in order."""
         held = self._leases.find_held(simulation)
         count = self._lookahead.count_for(
             simulation, waiting=self._leases.waiting + len(held), simulations=len(self._names)
@@ -190,7 +190,8 @@ class TrialCollection:
     def take_in(self, simulation: str, delivery: Delivery, token: str = "") -> bool:
         """Take in an episode, which `write_one` writes later; refuse one that is not what was asked for.
 
-        The simulation that has handed it over holds its trial. The token is that of the lease; empty if there was none.
+        The simulation that has handed it over must hold its trial. `token` is the token of the lease; empty if there
+        was none.
 
         Returns:
             Whether it was taken in.
@@ -213,13 +214,13 @@ class TrialCollection:
         return True
 
     def refuse(self, simulation: str, trial: int, reason: str) -> None:
-        """Take back a trial that a simulation could not do, or did otherwise; it may refuse all others, too."""
+        """Take back a trial that a simulation could not do, or did otherwise, and count that as its refusal."""
         self._give_back(simulation, trial, reason, self._leases.fail(simulation, trial, reason, refused=True))
 
     def take_back(self, simulation: str, reason: str, *, refused: bool = False) -> None:
         """Take all trials back from a simulation, which failed with the first and had not begun the others.
 
-        The reason is kept as evidence. If the simulation refused them, it may refuse all others, too.
+        The reason is kept as evidence. With `refused`, the simulation refused the trials, and may refuse all others.
         """
         self._leases.release(simulation)
         for trial in self._leases.find_held(simulation):
@@ -274,13 +275,13 @@ class TrialCollection:
             self._synced_at = time.monotonic()
             self.writer.sync()
         remaining = self._leases.total - self._leases.ended
-        # The guess is made from all trials of the plan, so it is worth nothing while some may be added or left out.
+        # `begin` guesses from all trials of the plan, so wait until no trials can be added or left out any more.
         settled = self._growth is None and not self._draining
         if settled and not self._replay.begun and remaining <= _REPLAY_AHEAD_S * self._rate.per_s:
             self._replay.begin(list(self.writer.plan.trials.numbers_to_run))
 
     def progress(self, hung: Iterable[str] = ()) -> Progress:
-        """How far the collection has come; `hung` has the names of the simulations that took too long for a trial."""
+        """Report how far the collection has come; `hung` names the simulations that took too long for a trial."""
         ended = self._leases.ended
         self._rate.note(ended)
         # The number of trials of a plan that ends when enough have succeeded is not known.
@@ -301,7 +302,7 @@ class TrialCollection:
     def finish(self, *, meanwhile: Callable[[], None], say: Callable[[str], object]) -> None:
         """Simulate some trials again in a fresh process, and write what describes the dataset as a whole.
 
-        `meanwhile` is called again and again while that process works, and `say` with what came of it.
+        `meanwhile` is called again and again while that process works, and `say` with the result.
 
         Raises:
             Interrupted: If the collection was drained before its last trial.
@@ -324,7 +325,7 @@ class TrialCollection:
             raise lost
 
     def name_of(self, simulation: str) -> str:
-        """Name of a simulation's node, also after the simulation has left."""
+        """Find the name of a simulation's node, even after the simulation has left."""
         # Unless it was told otherwise, a simulation lives in a namespace that has the name of its node.
         return self._names.get(simulation, simulation.strip("/"))
 
@@ -336,7 +337,7 @@ class TrialCollection:
         self._rate = TrialRate(self._leases.ended)
 
     def _confirm_round(self) -> bool:
-        """Count the next round that an earlier collection has planned as planned; False while that is not certain."""
+        """Take over the next round that an earlier collection has planned; False if none is confirmed by results."""
         earlier = self._growth.confirm() if self._growth is not None else None
         if earlier is None:
             return False
@@ -347,12 +348,12 @@ class TrialCollection:
         return True
 
     def _cut_plan(self, say: Callable[[str], object]) -> bool:
-        """Remove the trials that an earlier collection has planned and results do not give; False if there are none."""
+        """Remove planned trials that the results do not lead to; return whether there were any."""
         wrong = self._growth.take_wrong() if self._growth is not None else None
         if wrong is None:
             return False
         count = format_count(wrong.episodes, "episode")
-        say(f"plans trials from {wrong.first} on anew, as lost ones have results now: {count} removed")
+        say(f"plans trials from {wrong.first} on again, as trials that were lost have results now; {count} removed")
         self.writer.cut(wrong.first)
         return True
 

@@ -23,13 +23,13 @@ from throwcollect.trial.lease import Lease
 _DISCOVERY_PERIOD_S = 0.05
 _REPORT_PERIOD_S = 0.2
 _UNREADABLE_PERIOD_S = 10.0
-"""Time between two warnings of episodes that cannot be read, because anybody may publish such, and often."""
+"""Time between two warnings of episodes that cannot be read, because anybody may publish them, and often."""
 _SHARED_PERIOD_S = 10.0
 """Time between two warnings of simulations that share a namespace."""
 _UNKNOWN = "_NODE_NAME_UNKNOWN_"
 """An RMW gives this name to a node when it has heard of its publisher, and not yet of the node."""
 _REACH_S = 6.0
-"""A simulation that cannot be asked for so long is out of reach: nodes usually connect within a second."""
+"""Time after which a simulation that cannot be asked counts as out of reach: nodes usually connect within a second."""
 
 
 class Coordinator(Node):
@@ -46,8 +46,8 @@ class Coordinator(Node):
         self._visible: set[str] = set()
         self._unreached: dict[str, float] = {}
         self._signer = Signer.of_environment()
-        # A real-time factor slows trials down on purpose, also one that onlookers set, of which nobody hears here; add
-        # that time before a simulation counts as lost.
+        # A real-time factor slows trials down on purpose, even one that onlookers set, which the coordinator does not
+        # learn of. Add the time that this takes before a simulation counts as lost.
         self._patience_s = config.run.trial_timeout_s + config.sim.max_trial_s / config.sim.slowest_factor
         self._showing = Showing(self)
         self._progress = self.create_publisher(String, PROGRESS_TOPIC, PROGRESS_QOS)
@@ -79,7 +79,7 @@ class Coordinator(Node):
         self._notice_unreached(now)
 
     def _notice_unreached(self, now: float) -> None:
-        """Note since when simulations are in the graph and cannot be asked, because they are connected in part only."""
+        """Note since when simulations have been in the graph without being ready: they are connected only in part."""
         reached = {namespace for namespace, simulation in self._simulations.items() if simulation.ready()}
         self._unreached = {
             namespace: self._unreached.get(namespace, now) for namespace in self._visible if namespace not in reached
@@ -99,7 +99,7 @@ class Coordinator(Node):
             if name != simulation.name:
                 self._lose(namespace, "left the ROS graph")
             elif publishers - simulation.publishers:
-                # The graph may keep a dead node for a while and show the one in its place before that ends.
+                # The graph may keep a dead node for a while, and show its successor beside it.
                 self._lose(namespace, "was started again")
         for namespace in offered.keys() - self._simulations.keys():
             self._simulations[namespace] = SimulationClient(
@@ -117,7 +117,7 @@ class Coordinator(Node):
         self._simulations.pop(namespace).destroy()
 
     def _find_offers(self) -> Iterator[tuple[str, str, frozenset[bytes]]]:
-        """Each simulation in the graph, which is a node that publishes episodes: namespace, name, its publishers."""
+        """Find the simulations in the graph, nodes that publish episodes: namespace, name and publishers of each."""
         for topic, types in self.get_topic_names_and_types():
             above, _, last = topic.rpartition("/")
             if last != EPISODE_TOPIC or "std_msgs/msg/UInt8MultiArray" not in types:
@@ -132,7 +132,7 @@ class Coordinator(Node):
             names = names & {above.removeprefix("/")} or names
             if len(names) > 1:
                 self.get_logger().warning(
-                    f"namespace {above or '/'}: gets no trials, as it is that of {len(names)} simulations: "
+                    f"namespace {above or '/'}: gets no trials, as {len(names)} simulations share it: "
                     f"{', '.join(sorted(names))}",
                     throttle_duration_sec=_SHARED_PERIOD_S,
                 )
@@ -148,7 +148,7 @@ class Coordinator(Node):
         simulation = self._simulations.get(namespace)
         if simulation is None or simulation.hung or not simulation.ready():
             return
-        # A deadline that is set is that of the trial that runs, which a longer list must not postpone.
+        # A deadline that is set belongs to the trial that runs; a longer list must not postpone it.
         if simulation.ask(self._collection.lease(namespace)) and simulation.deadline == math.inf:
             simulation.deadline = time.monotonic() + self._patience_s
 

@@ -19,7 +19,7 @@ from throwcollect.side_by_side import count_cores
 
 _IDLE_S = 0.05
 _TELL_EVERY_S = 10.0
-"""Real time between two lines of progress in the log; the topic has it more often."""
+"""Real time between two lines of progress in the log; it is published on its topic more often."""
 
 
 def run(directory: Path) -> None:
@@ -30,14 +30,15 @@ def run(directory: Path) -> None:
     Raises:
         DatasetError: If the directory holds no plan, or cannot be written, or a trial came out otherwise when it was
             simulated again.
-        WorkerError: If every simulation refuses every trial, trials cannot be simulated again, or ROS 2 is silent.
+        WorkerError: If every simulation refuses every trial, trials cannot be simulated again, or ROS 2 does not
+            answer.
         LossError: If the dataset is finished, and trials of it are lost.
         Interrupted: If a signal ended the collection before its last trial.
     """
     # The dataset is opened before the node exists, because opening a large one takes long and a node has to answer.
     with TrialCollection.open(directory, say=_say, processes=count_cores()) as collection:
         ros.init()
-        # The journal keeps that anybody could join this run, because the dataset has to say so later on.
+        # Note in the journal that anybody could join this run, because the finished dataset has to say so.
         if not ros.joins_protected():
             collection.writer.note("exposed")
         node = Coordinator(collection)
@@ -47,7 +48,7 @@ def run(directory: Path) -> None:
         asked = False
 
         def ask_to_drain(_number: int, _frame: FrameType | None) -> None:
-            # The loop drains, because this may come in the middle of anything, also of what draining does itself.
+            # Only the loop drains, because a signal may come in the middle of anything, even of draining.
             nonlocal asked
             asked = True
             ros.stop_waiting(executor)
@@ -59,14 +60,14 @@ def run(directory: Path) -> None:
         gc.freeze()
         heartbeat = Heartbeat()
 
-        def go_on() -> None:
-            """Answer while trials are simulated again."""
+        def keep_answering() -> None:
+            """Answer other nodes while trials are simulated again."""
             heartbeat.beat()
             executor.spin_once(timeout_sec=_IDLE_S)
 
         try:
             _collect(node, collection, executor, heartbeat, is_to_drain=lambda: asked)
-            collection.finish(meanwhile=go_on, say=_say)
+            collection.finish(meanwhile=keep_answering, say=_say)
         finally:
             node.destroy_node()
             ros.shutdown()
@@ -80,7 +81,7 @@ def _collect(
     *,
     is_to_drain: Callable[[], bool],
 ) -> None:
-    """Collect until all trials have ended, or those that run when it drains."""
+    """Collect until all trials have ended or, after a request to drain, those that run."""
     told = time.monotonic()
     while not collection.finished:
         heartbeat.beat()

@@ -22,10 +22,10 @@ class EarlierRound(NamedTuple):
 
 
 class WrongTrials(NamedTuple):
-    """Planned trials that are given up, because the results known now call for others.
+    """Planned trials that are given up, because the results that are known now lead to others.
 
     Attributes:
-        first: The first of them; all later ones are given up, too.
+        first: The first of these trials; all later ones are given up, too.
         episodes: How many of them have episodes, which are removed.
     """
 
@@ -36,13 +36,13 @@ class WrongTrials(NamedTuple):
 class Growth:
     """The trials that a plan will still get.
 
-    Of a plan that an earlier collection has left, only the first two rounds are sure to be those of its configuration:
-    results of trials that were lost there, and are run again, may call for others behind. So all later rounds are drawn
-    again from the results. One that comes out otherwise is given up if it was planned without a result that is known
-    now. If all results were known then, other versions of libraries draw otherwise, and it stays as it was planned.
+    If an earlier collection has left a plan, only its first two rounds follow from the configuration alone. All later
+    rounds follow from results, too, and trials that were lost may have other results when they are run again. So these
+    rounds are drawn again. A round that comes out otherwise is given up if it was planned before all results were known
+    that it depends on. If all were known, other versions of libraries make the difference, and the round stays.
 
     Args:
-        plan: The plan as it is by now.
+        plan: The plan so far.
         lost: Trials that were lost in an earlier collection.
 
     Raises:
@@ -108,7 +108,7 @@ class Growth:
 
         Returns:
             That round, whose trials are sure to belong to the plan from now on; None if there is none, if results are
-            missing on which it depends, or if they do not give it (see `take_wrong`).
+            missing on which it depends, or if the results lead to another one (see `take_wrong`).
         """
         if not self._doubtful or not self._rounds.due:
             return None
@@ -116,7 +116,7 @@ class Growth:
         there = self._earlier[first : first + ROUND_TRIALS]
         drawn = None if self._rounds.over else self._rounds.draw()
         is_same = drawn is not None and find_same(there.values, drawn.values[: len(there)]).all()
-        # The results of all rounds up to two before this one determine it.
+        # A round depends on the results of all earlier rounds but the one right before it.
         if not is_same and self._first_anew < first - ROUND_TRIALS:
             self._give_up(first)
             if drawn is not None:
@@ -130,7 +130,7 @@ class Growth:
         return EarlierRound(there, {number: self._results.pop(number) for number in known})
 
     def take_wrong(self) -> WrongTrials | None:
-        """The trials that were found not to belong to the plan, once; None if there are none."""
+        """Return the trials that were found not to belong to the plan, only once; None if there are none."""
         wrong, self._wrong = self._wrong, None
         return wrong
 
@@ -138,7 +138,7 @@ class Growth:
         """Do the next piece of work, of some milliseconds: draw a round, or check one of its trials.
 
         Returns:
-            The trials of a round when it is ready, none before that; None if there is nothing to do.
+            The trials of a round when it is ready, an empty tuple before that; None if there is nothing to do.
         """
         if self._coming is None:
             if self._doubtful or self._rounds.over or not self._rounds.due:
@@ -156,7 +156,7 @@ class Growth:
         return trials
 
     def _give_up(self, first: int) -> None:
-        """Forget what the earlier collection has planned from a trial on."""
+        """Forget the trials that the earlier collection has planned, from the trial `first` on."""
         self._wrong = WrongTrials(first, len(self._results))
         self._earlier = self._earlier[:first]
         self._results.clear()

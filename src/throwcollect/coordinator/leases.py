@@ -5,19 +5,19 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable
 
 _MOST_IN_A_ROW = 3
-"""After so many refused trials, and none that it could do, a simulation is doubted."""
+"""A simulation that refuses this many trials, without doing one in between, is doubted."""
 
 
 class Leases:
     """Hands out trials and takes them back; every trial is completed or given up exactly once.
 
     A trial is *waiting*, then *held* by a simulation, until it is completed or waits again. A simulation does the
-    trials that it holds in their order. Trials are handed out by number; one that comes back goes before all that are
-    new, so that the dataset's open shards stay few, but not to a simulation that has failed with it, as long as there
-    is another one.
+    trials that it holds in their order. Trials are handed out by number. A trial that comes back is handed out before
+    all new ones, so that few shards of the dataset are open at a time. It does not go to a simulation that has failed
+    with it, as long as there is another one.
 
-    Some trials are refused by every simulation, and some simulations refuse every trial. So one that refuses is doubted
-    at first: others get the trials. It is set aside for good when others could do what it refused.
+    Some trials are refused by every simulation, and some simulations refuse every trial. So a simulation that refuses
+    trials is doubted at first: others get the trials. It is set aside for good when others could do what it refused.
 
     Args:
         trials: Numbers of the trials to do.
@@ -63,13 +63,13 @@ class Leases:
         return self.ended == self.total
 
     def why_set_aside(self, simulation: str) -> str | None:
-        """Why a simulation gets no more trials, as it refused too many that others could do; None if it gets them."""
+        """Say why a simulation gets no more trials: it refused too many that others could do. None if it gets more."""
         if self._wrong_refusals.get(simulation, 0) < _MOST_IN_A_ROW:
             return None
         return self._refusals[simulation][-1][1]
 
     def explain_hopelessness(self, simulations: Collection[str]) -> str | None:
-        """Why none of these simulations will ever do a trial: none ever did, and all refuse. None if there is hope."""
+        """Say why none of these simulations will ever do a trial: none ever did, and all refuse. Else None."""
         if self._completed or not simulations or not all(map(self._is_doubted, simulations)):
             return None
         return self._refusals[min(simulations)][-1][1]
@@ -84,12 +84,12 @@ class Leases:
             self._fresh[trial] = True
 
     def find_held(self, simulation: str) -> tuple[int, ...]:
-        """The trials that a simulation holds, in their order."""
+        """List the trials that a simulation holds, in their order."""
         return tuple(self._held.get(simulation, ()))
 
     def lease(self, simulation: str, *, others: Collection[str] = ()) -> int | None:
-        """Give the next trial to a simulation, of whose rivals `others` has the names; None when none waits for it."""
-        # Where nobody is free of doubt, doubted simulations go on, because the trials may be to blame and not they.
+        """Give the next trial to a simulation; None if none waits for it. `others` are all simulations of the run."""
+        # If all simulations are doubted, they all go on, because the trials may be to blame.
         rivals = [other for other in others if other != simulation and not self._is_doubted(other)]
         if self.why_set_aside(simulation) is not None or (rivals and self._is_doubted(simulation)):
             return None
@@ -116,7 +116,7 @@ class Leases:
         self.ended += 1
 
     def complete(self, simulation: str, trial: int) -> None:
-        """A simulation has done a trial that it held.
+        """Note that a simulation has done a trial that it held.
 
         Raises:
             ValueError: If it does not hold the trial.
@@ -131,9 +131,9 @@ class Leases:
         self._completed += 1
 
     def fail(self, simulation: str, trial: int, reason: str, *, refused: bool = False) -> list[str] | None:
-        """A simulation was lost with a trial that it holds, or could not do it; the trial goes back, or is given up.
+        """Take a trial back from a simulation that was lost or could not do it; let it wait again, or give it up.
 
-        The reason is kept as evidence. A simulation that refused the trial may refuse all others, too.
+        The reason is kept as evidence. With `refused`, the simulation refused the trial, and may refuse all others.
 
         Returns:
             All reasons when its retries are used up, else None.
@@ -150,7 +150,7 @@ class Leases:
             self._returned.append(trial)
             return None
         self.ended += 1
-        # While no trial was ever done, refusals are kept whatever becomes of their trials: `hopeless` counts them.
+        # While no trial was ever done, refusals are kept whatever becomes of their trials: `_is_doubted` counts them.
         if self._completed:
             # No simulation could do the trial, so its refusals are not held against them.
             for name, refusals in self._refusals.items():
@@ -164,7 +164,7 @@ class Leases:
         del held[1:]
 
     def forget(self, simulation: str) -> None:
-        """A simulation is gone; the next one of its name is another one."""
+        """Forget the refusals of a simulation that is gone; a later one of the same name is a different one."""
         self._refusals.pop(simulation, None)
         self._wrong_refusals.pop(simulation, None)
 

@@ -6,9 +6,10 @@ import math
 import time
 
 _AHEAD_S = 0.5
-"""Real time that the trials of a simulation last: as much is lost with it, and others wait as long at the end."""
+"""Real time that the trials in the list of a simulation should last. As much work is lost when the simulation is lost,
+and the other simulations may wait as long for it at the end."""
 _MOST = 16
-"""A list of more trials saves no time that could be measured."""
+"""Most trials in a list: longer lists save no time that could be measured."""
 _WEIGHT = 0.3
 """Weight of the last trial in the mean duration of a trial."""
 
@@ -24,7 +25,7 @@ class Lookahead:
         self._durations: dict[str, float] = {}
 
     def begin(self, simulation: str) -> None:
-        """Note that a simulation that had nothing to do has got something."""
+        """Note that a simulation that had nothing to do has got a trial."""
         self._since[simulation] = time.monotonic()
 
     def end(self, simulation: str) -> None:
@@ -41,14 +42,15 @@ class Lookahead:
         self._durations.pop(simulation, None)
 
     def count_for(self, simulation: str, *, waiting: int, simulations: int) -> int:
-        """Number of trials that a simulation should have.
+        """Compute how many trials a simulation should have.
 
-        `waiting` is the number of trials that wait or that this simulation holds; `simulations` is that of the run.
+        `waiting` is the number of trials that wait or that this simulation holds; `simulations` is the number of
+        simulations in the run.
         """
         duration = self._durations.get(simulation)
         if duration is None:
             return 1
-        # Towards the end each gets less, so that all have work until then.
+        # Towards the end, each simulation gets fewer trials, so that all have work until the end.
         share = math.ceil(waiting / (2 * max(simulations, 1)))
         # Two episodes may arrive together, with no time between them, so a duration counts as 1 ms at least.
         return max(1, min(_MOST, share, math.ceil(_AHEAD_S / max(duration, 1e-3))))

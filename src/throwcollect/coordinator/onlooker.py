@@ -10,13 +10,13 @@ if TYPE_CHECKING:
 
 
 class Onlooker:
-    """Is told what goes on in a run that this process prepares or launches; this class ignores everything."""
+    """Receives reports on a run that this process prepares or launches; this class itself ignores all of them."""
 
     def update(self, progress: Progress) -> None:
         """Take in a progress report of the coordinator."""
 
     def update_plan(self, checked: int, trials: int) -> None:
-        """Take in how many of a plan's trials have been checked; an error that is raised here gives the plan up."""
+        """Take in how many of a plan's trials have been checked; an error that is raised here ends the planning."""
 
     def say(self, line: str) -> None:
         """Take in a line of information."""

@@ -26,12 +26,13 @@ from throwcollect.sweep.trials import Trials
 from throwcollect.tasks.task import trajectory_of
 
 _MANY_TRIALS = 500
-"""From here on, checking trials side by side is worth the start of processes."""
+"""From this number of trials on, starting processes that check them side by side saves time."""
 _TRIALS_A_PIECE = 100
 _MOST_PIECES = 10_000
-"""To hand over many more pieces takes a minute, in which no trial is checked and Ctrl-C has no effect."""
+"""Most pieces of a plan: handing over many more takes a minute, in which no trial is checked and Ctrl-C does
+nothing."""
 _ANNOUNCED_TRIALS = 20_000
-"""From here on the user is told at once what happens, because seconds pass until the first trials are checked."""
+"""From this number of trials on, the user is told at once what happens, as it takes seconds to check the first ones."""
 _TELL_FIRST_S = 2.0
 _TELL_EVERY_S = 10.0
 _DEEPEST_SOLE_M = 0.01
@@ -46,8 +47,8 @@ def draw_plan(config: Config, *, directory: Path, processes: int = 1, onlooker: 
     Args:
         config: The configuration.
         directory: Where a relative `sweep.file` is looked for: the directory of the configuration's file.
-        processes: How many processes may check the trials of a large plan; more than one import the program that calls
-            this, as those of `multiprocessing` do.
+        processes: How many processes may check the trials of a large plan. If more than one, they import the program
+            that calls this, as processes of `multiprocessing` do.
         onlooker: Is told how many trials of a large plan have been checked, and warned of a robot that is misplaced.
 
     Raises:
@@ -65,7 +66,7 @@ def _draw_points(config: Config, directory: Path, onlooker: Onlooker) -> Points:
 
 
 def count_before(config: Config) -> int:
-    """Number of trials as far as it is known before they are drawn."""
+    """Count the trials before they are drawn; 0 if their number is not known yet."""
     return 0 if config.grows else config.trials or 0
 
 
@@ -103,7 +104,7 @@ def _check_trials(config: Config, points: Points, *, processes: int, onlooker: O
 def find_sunken_robot(config: Config) -> str | None:
     """Say by how much a robot stands in the ground at the start, if its base is not where it is by default.
 
-    Such trials are not refused: the robot's base is fixed, and of its links the ground stops none.
+    Such trials are not refused: the robot's base is fixed, and the ground stops none of its links.
 
     Raises:
         ConfigError: If the robot's files cannot be read.
@@ -121,7 +122,7 @@ def find_sunken_robot(config: Config) -> str | None:
 
 
 def _make_checked_trials(config: Config) -> Callable[[tuple[int, Points]], Trials]:
-    """Make a function that makes the trials of some points, given the number of the first, and refuses as needed."""
+    """Make a function that makes the trials of points from a first number on, and refuses those that cannot be done."""
     check = feasibility_check(config)
 
     def make(piece: tuple[int, Points]) -> Trials:
@@ -135,19 +136,19 @@ def _make_checked_trials(config: Config) -> Callable[[tuple[int, Points]], Trial
 def feasibility_check(config: Config) -> Check:
     """Make a function that says why the robot cannot do a trial, in 1 to 5 ms each.
 
-    With `sweep.feasibility` nominal, it asks about the robot as its owner believes it to be: without what differs.
+    With `sweep.feasibility: nominal`, the function checks the robot as its owner believes it to be.
 
     Raises:
         ConfigError: If the robot's files cannot be read.
     """
     feasibility = Feasibility(config)
     if config.sweep.feasibility == "nominal":
-        return lambda trial: feasibility.check(_with_nominal_robot(trial), trajectory_of(trial))
+        return lambda trial: feasibility.check(_replace_by_nominal_robot(trial), trajectory_of(trial))
     return lambda trial: feasibility.check(trial, trajectory_of(trial))
 
 
-def _with_nominal_robot(config: Config) -> Config:
-    """The configuration with the defaults in place of all numbers of robot, tool and ball that one has to measure."""
+def _replace_by_nominal_robot(config: Config) -> Config:
+    """Replace all numbers of robot, tool and ball that one has to measure by their defaults."""
     robot, defaults = config.robot, RobotConfig()
     kept = {"name": robot.name, "posture": robot.posture, "locked": robot.locked, "base_height_m": robot.base_height_m}
     tool = type(config.tool).model_validate({"name": config.tool.name})
@@ -157,7 +158,7 @@ def _with_nominal_robot(config: Config) -> Config:
 
 
 def more_trials(plan: Plan) -> str:
-    """Words that follow the number of a plan's trials: whether more will follow, and how many."""
+    """Write the words that follow the number of a plan's trials: whether more will follow, and how many."""
     if not plan.config.grows or len(plan.trials) >= (limit := Rounds(plan.config).limit):
         return ""
     goal = plan.config.until
@@ -166,14 +167,14 @@ def more_trials(plan: Plan) -> str:
 
 
 def make_self_contained(config: Config) -> Config:
-    """The configuration as a dataset has it: a list of trials lies beside it."""
+    """Make the configuration as a dataset stores it: its list of trials lies beside it."""
     if config.sweep.file is None:
         return config
     return config.model_copy(update={"sweep": config.sweep.model_copy(update={"file": TRIALS})})
 
 
 def read_listed_points(config: Config, *, directory: Path) -> Points | None:
-    """All points of the list that a configuration names, whether its plan takes them or not; None if it names none.
+    """Read all points of the list that a configuration names, even those beyond its plan; None if it names none.
 
     A relative `sweep.file` is looked for in the directory.
 
@@ -189,7 +190,7 @@ def check_room(directory: Path, trials: int) -> None:
     Raises:
         ConfigError: If it is too large.
     """
-    # The directory need not exist yet, so its disk is that of the nearest one above it that does.
+    # The directory need not exist yet, so ask about the disk of the nearest directory above it that does.
     parent = next(path for path in (directory, *directory.absolute().parents) if path.is_dir())
     least, free = trials * _LEAST_BYTES, shutil.disk_usage(parent).free
     if free < least:

@@ -1,4 +1,4 @@
-"""The progress of a collection, as the coordinator publishes it (see `topics`)."""
+"""The progress of a collection, as the coordinator publishes it (see `shown_topics`)."""
 
 from __future__ import annotations
 
@@ -81,12 +81,12 @@ class Progress:
         return [f"{self.failed} failed", *lost, simulations, f"{self.throws_per_s:.1f} {self.noun}s/s"]
 
     def to_json(self) -> str:
-        """The progress as JSON, for `read`."""
+        """Write the progress as JSON, for `read`."""
         return json.dumps(asdict(self))
 
     @classmethod
     def read(cls, text: str) -> Progress | None:
-        """Progress from its JSON; None if the text is anything else, as anybody may publish on the topic."""
+        """Read progress from its JSON; None if the text is anything else, as anybody may publish on the topic."""
         try:
             return _PROGRESS.validate_json(text, strict=True)
         except ValidationError:

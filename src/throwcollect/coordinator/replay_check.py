@@ -19,10 +19,10 @@ from throwcollect.wording import format_count
 
 
 class ReplayCheck:
-    """Compares episodes with what a process that knows nothing but configuration and plan makes of their trials.
+    """Compares episodes with those that a fresh process makes, which knows nothing but configuration and plan.
 
-    Such a process takes a second before its first trial. So it can begin while the last trials are still with
-    simulations, by a guess at which will be chosen. What is compared in the end does not depend on that guess.
+    Such a process takes a second before its first trial. So it may start while simulations still run the last trials,
+    with a guess at which trials will be chosen. Which trials are compared in the end does not depend on that guess.
 
     Attributes:
         begun: Whether `begin` has been called.
@@ -40,7 +40,7 @@ class ReplayCheck:
         self._early: _Process | None = None
 
     def begin(self, trials: Sequence[int]) -> None:
-        """Begin with the trials that are chosen if all of these, which the plan has to run, get an episode.
+        """Start to simulate the trials that will be chosen if all of these, the trials of the plan, get an episode.
 
         Raises:
             OSError: If no process can be started.
@@ -58,11 +58,11 @@ class ReplayCheck:
             DatasetError: If an episode came out otherwise.
             WorkerError: If the process failed.
         """
-        # The choice goes by places in the list, so the order must not depend on which episode came first.
+        # The choice is made by place in the list, so the order must not depend on which episode came first.
         trials = choose_trials(sorted(digests), count=self._count, seed=self._seed)
         again: dict[int, str] = {}
         if self._early is not None:
-            # The process is not waited for if its guess was wrong: a trial that was lost may never end there, either.
+            # If the guess was wrong, do not wait for the process: a trial that was lost may never end there, either.
             if self._early.trials == trials:
                 self._early.wait(meanwhile)
             self._early.end()
@@ -73,12 +73,12 @@ class ReplayCheck:
         if wrong:
             counted = f"{len(wrong)} of {format_count(len(trials), 'trial')}"
             raise DatasetError(
-                f"{self._directory}: {counted} came out otherwise in a fresh process: "
+                f"{self._directory}: {counted} came out differently in a fresh process: "
                 f"trial {', '.join(map(str, wrong))}",
                 evidence="\n".join(
                     f"trial {trial}: {digests[trial]} in the dataset, {again.get(trial)}" for trial in wrong
                 ),
-                hint="this machine does not compute alike each time, or something has changed what was simulated",
+                hint="this machine does not compute the same each time, or something has changed what was simulated",
             )
         if not trials:
             return None
@@ -94,7 +94,7 @@ class _Process:
     """A process that simulates trials and prints their digests.
 
     Attributes:
-        digests: Those that it has printed, by trial; empty until `end`.
+        digests: The digests that it has printed, by trial; empty until `end`.
         errors: Text of its standard error; empty until `end`.
         exit_code: Its exit code; None until `end`.
     """
@@ -105,38 +105,38 @@ class _Process:
         self.errors = ""
         self.exit_code: int | None = None
         # Files instead of pipes, because nobody reads while it works, and a full pipe would stop it.
-        self._printed, self._said = TemporaryFile(), TemporaryFile()  # noqa: SIM115 - closed at its end
+        self._stdout, self._stderr = TemporaryFile(), TemporaryFile()  # noqa: SIM115 - closed at its end
         self._process = subprocess.Popen(
             [*make_command(), "simulate", str(directory), *map(str, trials)],
             stdin=subprocess.DEVNULL,
-            stdout=self._printed,
-            stderr=self._said,
-            # Ctrl-C is for this process alone, which ends that one.
+            stdout=self._stdout,
+            stderr=self._stderr,
+            # Ctrl-C reaches only the process of this object, which then ends the new one.
             start_new_session=True,
             preexec_fn=partial(die_with_parent, os.getpid()),  # noqa: PLW1509 - it calls nothing that takes a lock
         )
 
     def wait(self, meanwhile: Callable[[], None]) -> None:
-        """Wait until it has simulated all of them, or ends."""
-        while self._process.poll() is None and _contents(self._printed).count("\n") < len(self.trials):
+        """Wait until the process has simulated all trials, or has ended."""
+        while self._process.poll() is None and _read_contents(self._stdout).count("\n") < len(self.trials):
             meanwhile()
 
     def end(self) -> None:
         """Kill it; a second call does no harm."""
-        # It is not left to end by itself, which takes time: all that is wanted of it stands in the files.
+        # Ending by itself would take the process time, and everything that is needed from it is in the files.
         self._process.kill()
         self.exit_code = self._process.wait()
-        if not self._printed.closed:
-            with self._printed, self._said:
-                lines = _contents(self._printed).splitlines(keepends=True)
-                self.errors = _contents(self._said).strip()
+        if not self._stdout.closed:
+            with self._stdout, self._stderr:
+                lines = _read_contents(self._stdout).splitlines(keepends=True)
+                self.errors = _read_contents(self._stderr).strip()
             # The kill may have cut off the last line.
             whole = (json.loads(line) for line in lines if line[-1] == "\n")
             self.digests = {printed["trial"]: printed["digest"] for printed in whole}
 
 
 def _simulate(directory: Path, trials: Sequence[int], meanwhile: Callable[[], None]) -> Mapping[int, str]:
-    """Digests of trials, by number.
+    """Simulate trials in a fresh process, and return the digests of their episodes, by number.
 
     Raises:
         WorkerError: If the process failed.
@@ -154,6 +154,6 @@ def _simulate(directory: Path, trials: Sequence[int], meanwhile: Callable[[], No
     return process.digests
 
 
-def _contents(file: IO[bytes]) -> str:
+def _read_contents(file: IO[bytes]) -> str:
     # The process shares the file's position and writes there, so read without moving it.
     return os.pread(file.fileno(), os.fstat(file.fileno()).st_size, 0).decode(errors="replace")

@@ -1,4 +1,4 @@
-"""Prepares a dataset that a collection has left for the next one, by its configuration and its plan."""
+"""Prepares the configuration and the plan of a dataset that an earlier collection has left, for the next one."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ from throwcollect.tasks.result import LOST
 from throwcollect.wording import command
 
 _MUCH_BYTES = 50_000_000
-"""A core takes a second to look through so many bytes."""
+"""Size of recordings from which on the search is announced: a core takes a second to look through so many bytes."""
 
 
 def is_begun(directory: Path) -> bool:
@@ -72,7 +72,7 @@ def resume(
             through.
 
     Raises:
-        ConfigError: If the configuration is another one, has fewer trials or other ones, or too many for the disk.
+        ConfigError: If the configuration differs, or has fewer trials, other trials, or too many for the disk.
         DatasetError: If another process changes the dataset, files cannot be written, or something is damaged that
             cannot be made again.
     """
@@ -93,7 +93,7 @@ def resume(
         if old is not None and PLAN in damaged and (not config.grows or find_wrong_trials(old)):
             # The plan is drawn again. One that grew with the results cannot be, and stays if its trials are intact.
             old = None
-        plan, listed = _plan_again(config, directory, sweep_directory, old, damaged, processes, onlooker)
+        plan, listed = _make_plan(config, directory, sweep_directory, old, damaged, processes, onlooker)
         # The dataset may be finished only by its earlier configuration, or by files that are gone.
         changes = bool(damaged) or (stored is not None and stored.without_run() != plan.config.without_run())
         ended = not changes and has_all_trials(directory, plan)
@@ -121,7 +121,7 @@ def prepare_or_resume(path: Path, directory: Path) -> Plan:
         return freeze(config, directory, sweep_directory=path.parent)
 
 
-def _plan_again(
+def _make_plan(
     given: Config,
     directory: Path,
     sweep_directory: Path,
@@ -149,13 +149,14 @@ def _plan_again(
 
 
 def _write(plan: Plan, directory: Path, stored: Config | None, old: Plan | None, *, replan: bool, ended: bool) -> None:
-    """Write configuration and plan if they are other ones than those that are stored, or the plan is damaged."""
+    """Write configuration and plan if they differ from the stored ones, or the plan is damaged."""
     # A finished dataset stays as it is, without the keys that say how it is run.
     kept = plan.config.without_run() if ended else plan.config
     replanned = old is None or plan.trials != old.trials or kept.without_run() != old.config.without_run()
     if stored != kept:
         if replanned:
-            # No kill may leave a plan beside another configuration; a missing plan is made again.
+            # Were this process killed here, the plan must not lie beside another configuration. If it is missing, it
+            # is made again.
             remove(directory / PLAN)
         write_file(directory / CONFIG, dump_yaml(kept).encode())
     if replanned or replan:
@@ -172,7 +173,7 @@ def _announce_search(directory: Path, onlooker: Onlooker) -> None:
 
 
 def _find_damaged(directory: Path, plan: Plan | None, *, check: bool, onlooker: Onlooker) -> frozenset[str]:
-    """Names of the files of a finished dataset that are missing or damaged; none if it is not finished.
+    """Find the names of files of a finished dataset that are missing or damaged; none if it is not finished.
 
     Raises:
         DatasetError: If the list of sources of a derived dataset is among them, as it cannot be made again.
@@ -211,11 +212,11 @@ def is_complete(directory: Path) -> bool:
 
 
 def _read_stored_config(directory: Path) -> Config | None:
-    """The configuration that a dataset was begun with; None unless its file is complete."""
+    """Read the configuration that a dataset was begun with; None unless its file is complete."""
     try:
         path = config_path(directory)
         config = load(path)
-        # The whole text is compared: one that a power cut has shortened may be valid, with defaults for what is gone.
+        # Compare the whole text: one that a power cut has cut off may still be valid, with defaults for missing keys.
         # A finished dataset of an earlier version has fewer keys, and counts as complete if its manifest says so.
         complete = path.read_text(encoding="utf-8") == dump_yaml(config) or is_as_written(directory, CONFIG)
     except (ConfigError, DatasetError, OSError):
@@ -233,8 +234,8 @@ def _read_stored_plan(directory: Path, stored: Config | None, config: Config) ->
                 hint=f"restore {CONFIG}, or remove {PLAN} if it is the one that is wrong",
             ) from error
         if stored is None:
-            # If a power cut has cost the configuration, only the plan can tell whether the given one was its own.
-            hint = f"{command('up', 'CONFIG', '--resume', directory)}, as at first"
+            # The configuration is missing, too, so nothing tells whether the given one is that of the dataset.
+            hint = f"{command('up', 'CONFIG', '--resume', directory)}, with the CONFIG that the dataset was begun with"
             raise DatasetError(error.message, hint=hint) from error
         return None
 
@@ -250,7 +251,7 @@ def refuse_changes(directory: Path, stored: Config, config: Config) -> None:
     problems = [
         Problem(f"{directory} was begun with {quote(before)}, got {quote(after)}", key=key)
         for key, (before, after) in changed.items()
-        if key not in may_grow or not _grows(before, after, config)
+        if key not in may_grow or not _is_growth(before, after, config)
     ]
     if problems:
         same = "the same configuration, but for `run`, `containers`, `cluster` and more `trials`"
@@ -259,7 +260,7 @@ def refuse_changes(directory: Path, stored: Config, config: Config) -> None:
         raise ConfigError(problems, expected=same, hint=hint)
 
 
-def _grows(before: int | None, after: int | None, config: Config) -> bool:
+def _is_growth(before: int | None, after: int | None, config: Config) -> bool:
     """Whether a number of trials may replace an earlier one; None stands for no limit."""
     if not config.grows:
         # `_extend` compares the trials of a plan that does not grow.
@@ -268,7 +269,7 @@ def _grows(before: int | None, after: int | None, config: Config) -> bool:
 
 
 def _extend(directory: Path, old: Plan | None, new: Plan) -> Plan:
-    """The new plan, which has to begin with all trials of the old one.
+    """Check that the new plan begins with the trials of the old one, and keep those that results have added.
 
     Raises:
         ConfigError: If it is shorter, or its sampler draws other trials when there are more.
@@ -286,7 +287,7 @@ def _extend(directory: Path, old: Plan | None, new: Plan) -> Plan:
     if before.targets != after.targets:
         raise ConfigError(
             [Problem(f"the list has other targets than {directory} was begun with", key="sweep.file")],
-            expected="those for all trials that are in the plan",
+            expected="the same targets for all trials that are in the plan",
         )
     if not np.array_equal(before.digests, after.digests) or before.refused.keys() != after.refused.keys():
         raise ConfigError(
@@ -294,7 +295,7 @@ def _extend(directory: Path, old: Plan | None, new: Plan) -> Plan:
             expected=f"{len(old.trials)}, as {directory} was begun with",
             hint="sobol and uniform go on where they ended; or merge datasets: throwcollect dataset merge",
         )
-    # A plan that grows is drawn anew up to its first rounds only. What results have added is kept.
+    # Of a plan that grows, only the first rounds are drawn again. What results have added is kept.
     if count < len(old.trials):
         trials = new.trials[:]
         trials.extend(old.trials[count:])

@@ -1,6 +1,7 @@
 """Publishes the newest episodes for onlookers, once a second, and only while a topic has subscribers.
 
-Onlookers must not subscribe to the episodes themselves, because a simulation waits until all subscribers have got each.
+Onlookers must not subscribe to the episodes themselves, because a simulation waits until all subscribers have received
+each of them.
 """
 
 from __future__ import annotations

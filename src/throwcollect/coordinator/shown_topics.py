@@ -10,9 +10,9 @@ PROGRESS_TOPIC = "/coordinator/progress"
 PROGRESS_QOS = ros.QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 SHOWN_QOS = ros.QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
-"""A slow subscriber misses some and delays nobody."""
+"""A slow subscriber misses some episodes, and delays nobody."""
 
 
 def make_shown_topic(simulation: str) -> str:
-    """Topic of the newest episode of a simulation, given the name of its node: the std_msgs/UInt8MultiArray it sent."""
+    """Name the topic of a simulation's newest episode, by its node's name; messages are as the simulation sent them."""
     return f"/coordinator/shown/{simulation}"

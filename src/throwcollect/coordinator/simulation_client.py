@@ -13,21 +13,21 @@ from throwcollect.trial.lease import LEASES, Lease, leases_to_json
 from throwcollect.wording import format_count
 
 _ANSWER_S = 5.0
-"""A request without an answer in this real time got lost, as when the router is started again. Others are answered
-within milliseconds, or between two slices of a trial."""
+"""A request that is not answered in this real time was lost, as when the router is started again. Simulations answer
+within milliseconds, or between two pieces of a trial."""
 
 EPISODE_TOPIC = "episode"
 EPISODE_QOS = QoSProfile(history=HistoryPolicy.KEEP_ALL, reliability=ReliabilityPolicy.RELIABLE)
 
 
 class SimulationClient:
-    """Asks one simulation for trials, and hears what it hands over.
+    """Asks one simulation for trials, and receives what it hands over.
 
     Args:
         node: The coordinator.
         namespace: Namespace of the simulation, such as ``/sim_0`` or ``/``.
         name: Name of its node there.
-        publishers: Identifiers of its publishers of episodes: a simulation that is started again has other ones.
+        publishers: Identifiers of the publishers of its episodes: a simulation that is started again has other ones.
         make_lease: Makes a new lease of a trial for a simulation, which is given by its namespace.
         on_episode: Called with the serialised message of an episode, or of a refusal.
         on_refusal: Called with the reason when the simulation refuses to be asked.
@@ -50,9 +50,9 @@ class SimulationClient:
         self.deadline = float("inf")
         """Monotonic time [s] at which the trial that runs counts as lost; infinite while none does."""
         self.hung = False
-        """Whether a trial was lost that way and nothing has come from the simulation since."""
+        """Whether a trial was lost at its deadline, and nothing has come from the simulation since."""
         self.unanswered = False
-        """Whether the simulation has not answered yet what it was asked for last."""
+        """Whether the simulation has not answered the last request yet."""
         self._node = node
         self._make_lease = make_lease
         self._on_refusal = on_refusal
@@ -80,10 +80,10 @@ class SimulationClient:
         return self._parameters.service_is_ready()
 
     def ask(self, trials: Sequence[int]) -> bool:
-        """Ask for these trials, in their order, instead of those before; one that runs goes on if it is among them.
+        """Ask for these trials, in order, instead of the last ones; a trial that runs goes on if it is among them.
 
         Returns:
-            Whether that is another request than the last one.
+            Whether this differs from the last request.
         """
         if tuple(trials) == self.trials:
             return False
@@ -101,7 +101,7 @@ class SimulationClient:
         """
         if not self.unanswered or time.monotonic() < self._sent_at + self._patience_s:
             return None
-        # A simulation that was frozen for a while shall not find a pile of requests.
+        # A simulation that was frozen for a while must not find a pile of requests.
         self._patience_s *= 2
         self._leases = {trial: self._make_lease(self.namespace, trial) for trial in self._leases}
         self._send()

@@ -13,8 +13,8 @@ class TrialRate:
     """Trials that ended per second of real time, over the last ten seconds; the first `ended` trials do not count."""
 
     def __init__(self, ended: int = 0) -> None:
-        # Each time has the number of trials that had ended by then. One is there from the start, so that there are two
-        # ends to take a rate of.
+        # Pairs of a time and the number of trials that had ended by then. One pair is there from the start, so that a
+        # rate can be taken from the first call of `note` on.
         self._ends = deque([(time.monotonic(), ended)])
 
     @property

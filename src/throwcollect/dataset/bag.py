@@ -31,7 +31,7 @@ _MOST_BYTES = 10_000_000
 _ROS_DISTRO = "jazzy"
 """Release whose interface definitions the messages follow."""
 _MOST_NEARBY = 5
-"""A message names so many datasets that may be meant."""
+"""Most datasets that a message names as those that may be meant."""
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ class FileSummary:
 def bag_information(
     files: Sequence[FileSummary], channels: Sequence[Channel], custom_data: Mapping[str, str]
 ) -> dict[str, Any]:
-    """The fields of the metadata of a bag with these files, in order; rosbag2 does not read `custom_data`."""
+    """Make the fields of the metadata of a bag with these files, in order; rosbag2 does not read `custom_data`."""
     start = min((file.start_ns for file in files), default=0)
     end = max((file.end_ns for file in files), default=0)
     return {
@@ -78,7 +78,7 @@ def bag_information(
             }
             for channel in channels
         ],
-        # This means rosbag2's own compression, of messages or files, and not that of the chunks in MCAP files.
+        # This means rosbag2's own compression, of messages or files, and not the compression of chunks in MCAP files.
         "compression_format": "",
         "compression_mode": "",
         "relative_file_paths": [file.path for file in files],
@@ -142,8 +142,8 @@ def read_bag_metadata(directory: Path) -> Mapping[str, Any]:
     path = directory / METADATA
     if not path.exists():
         if (directory / PLAN).is_file():
-            on = find_next_command(directory)
-            raise DatasetError(f"the dataset {on.state}: it has no {METADATA}", path=directory, hint=on.command)
+            found = find_next_command(directory)
+            raise DatasetError(f"the dataset {found.state}: it has no {METADATA}", path=directory, hint=found.command)
         raise DatasetError("holds no dataset", path=directory, hint=_name_nearby(directory))
     bag = from_yaml(path).get("rosbag2_bagfile_information")
     if not isinstance(bag, dict):
@@ -152,7 +152,7 @@ def read_bag_metadata(directory: Path) -> Mapping[str, Any]:
 
 
 def refuse_other_directory(directory: Path) -> None:
-    """Refuse a directory that no file of a dataset is in, as the advice on damaged ones would lead nowhere there.
+    """Refuse a directory without any file of a dataset, as advice on damaged datasets would not help there.
 
     Raises:
         DatasetError: If there is no such directory, or it has no such file.
@@ -162,7 +162,7 @@ def refuse_other_directory(directory: Path) -> None:
 
 
 def _name_nearby(directory: Path) -> str | None:
-    """Name datasets that may be meant by a path that is none: the one that it lies in, or those that lie in it."""
+    """Name datasets that may be meant by a path that is no dataset: the one around it, or those inside it."""
     if directory.is_file():
         return str(directory.parent) if (directory.parent / METADATA).is_file() else None
     found = sorted(str(path.parent) for path in directory.glob(f"*/{METADATA}"))
@@ -176,12 +176,12 @@ def to_yaml(data: Mapping[str, Any]) -> str:
 
 @lru_cache(maxsize=8)
 def _write_yaml(text: str) -> str:
-    """Encode what JSON says; the last texts are remembered, because whoever checks a file writes its metadata again."""
+    """Write a JSON text as YAML; the last texts are remembered, because checking a file writes its metadata again."""
     yaml = YAML()
     # By default, long values would be broken at 80 characters.
     yaml.width = 4096
     stream = io.StringIO()
-    # A value that occurs twice, such as an infinite duration, is two values here; else it would become an alias, which
-    # `from_yaml` refuses.
+    # A value that occurs twice, such as an infinite duration, is two objects after `loads`. One object would be written
+    # as an alias, which `from_yaml` refuses.
     yaml.dump(json.loads(text), stream)
     return stream.getvalue()

@@ -28,7 +28,7 @@ def read_config(directory: Path) -> Config:
 
 
 def refuse_damaged_config(directory: Path, error: ConfigError) -> None:
-    """Refuse a dataset if its configuration is damaged, and this is why reading it has ended with an error.
+    """Refuse a dataset if damage of its configuration is the reason why reading it has ended with an error.
 
     Raises:
         DatasetError: If the file is missing, cannot be read, or is not as it was written.
@@ -37,7 +37,7 @@ def refuse_damaged_config(directory: Path, error: ConfigError) -> None:
     # Without a key, it is the file itself that is wrong.
     if not first.key or was_changed(directory, CONFIG):
         place = ": ".join(filter(None, [f"line {first.line}" if first.line else "", first.key]))
-        hint = _name_way_back(directory)
+        hint = _say_how_to_restore(directory)
         raise DatasetError(first.message, path=directory / CONFIG, place=place, hint=hint) from error
 
 
@@ -48,11 +48,11 @@ def refuse_lost_config(directory: Path) -> None:
         DatasetError: If it is one.
     """
     if has_files(directory) and not is_there(directory / CONFIG):
-        raise DatasetError("no such file", path=directory / CONFIG, hint=_name_way_back(directory))
+        raise DatasetError("no such file", path=directory / CONFIG, hint=_say_how_to_restore(directory))
 
 
-def _name_way_back(directory: Path) -> str:
-    """Name what brings the configuration of a dataset back; nothing else in the directory holds it."""
+def _say_how_to_restore(directory: Path) -> str:
+    """Say how to get the configuration of a dataset back; nothing else in the directory holds it."""
     if (directory / SOURCES).exists():
         return "derive the dataset again"
     if (directory / PLAN).exists():

@@ -33,7 +33,7 @@ def create(directory: Path, plan: Plan, *, listed: Points | None = None) -> None
         made = not directory.exists()
         directory.mkdir(parents=True, exist_ok=True)
     except (OSError, RecursionError) as error:
-        raise _unusable(directory, error) from error
+        raise _make_unusable_error(directory, error) from error
     with hold_lock(directory, needed=False):
         _fill(directory, plan, listed, made=made)
 
@@ -49,7 +49,7 @@ def refuse_taken(directory: Path) -> None:
     except FileNotFoundError:
         return
     except OSError as error:
-        raise _unusable(directory, error) from error
+        raise _make_unusable_error(directory, error) from error
     if taken:
         begun = PLAN in taken or CONFIG in taken
         raise ConfigError(
@@ -71,7 +71,7 @@ def _fill(directory: Path, plan: Plan, listed: Points | None, *, made: bool) -> 
         undo.pop_all()
 
 
-def _unusable(directory: Path, error: OSError | RecursionError) -> ConfigError:
+def _make_unusable_error(directory: Path, error: OSError | RecursionError) -> ConfigError:
     reason = error.strerror if isinstance(error, OSError) else "it has too many levels"
     return ConfigError(f"{directory}: cannot be used as directory of a dataset: {reason}")
 

@@ -1,4 +1,4 @@
-"""Says where damage is that is only found when an episode is looked at."""
+"""Says in which dataset and trial damage is that is found only when an episode is read."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from throwcollect.wording import command
 
 @contextmanager
 def locating_damage(dataset: Dataset, trial: int) -> Iterator[None]:
-    """Report damage of an episode, which knows neither its dataset nor its place, with both and a way to find more.
+    """Add the dataset, the trial and a command that finds more to an error that an episode raises without them.
 
     Raises:
         DatasetError: If the block raises one.

@@ -63,11 +63,12 @@ def data_card(config: Config, throws: pa.Table, provenance: Provenance) -> str:
         "- `config.yaml`: the configuration; collecting with it again yields the same data.",
         *([f"- `{TRIALS}`: the list of points that the configuration reads."] if config.sweep.file else []),
         "",
-        *_ranges(config, throws),
+        *_list_ranges(config, throws),
         *_list_targets(config, throws),
         "## Limits",
         "",
-        _limits(config.sim.engine) + f" {config.task.noun.capitalize()}s that failed are kept; `outcome` says how.",
+        _describe_limits(config.sim.engine)
+        + f" {config.task.noun.capitalize()}s that failed are kept; `outcome` says how.",
         "",
         "## Provenance",
         "",
@@ -84,7 +85,7 @@ _RIGID_BODIES = {"bullet": "Bullet", "mujoco": "MuJoCo"}
 """Engines with the same limits."""
 
 
-def _limits(engine: str) -> str:
+def _describe_limits(engine: str) -> str:
     """Say what a physics engine leaves out; nothing is known of engines of other packages."""
     if engine in _RIGID_BODIES:
         return (
@@ -99,7 +100,7 @@ def _limits(engine: str) -> str:
     return f"Simulated with the physics engine `{engine}`, without sensor noise."
 
 
-def _ranges(config: Config, throws: pa.Table) -> list[str]:
+def _list_ranges(config: Config, throws: pa.Table) -> list[str]:
     rows = []
     # Only swept keys have dots.
     for name in (name for name in throws.column_names if "." in name):

@@ -37,23 +37,23 @@ FORMAT = "1"
 
 
 def shard_name(collection: str, number: int) -> str:
-    """File name of the shard of a collection that has this number, counted from 0."""
+    """Make the file name of the shard of a collection that has this number, counted from 0."""
     return f"{collection}_{number:05d}{SHARD_SUFFIX}"
 
 
 def shard_of(plan: Plan, trial: int) -> str:
-    """Name of the file that holds the episode of a trial, if it has one."""
+    """Name the file that holds the episode of a trial, if it has one."""
     return shard_name(plan.config.name, trial // plan.config.record.trials_per_shard)
 
 
 def list_shards(plan: Plan) -> list[str]:
-    """Names of the files that a plan's trials may have, in order."""
+    """List the names of the files that a plan's trials may have, in order."""
     numbers, size = plan.trials.numbers, plan.config.record.trials_per_shard
     return [shard_of(plan, trial) for trial in range(numbers.start // size * size, numbers.stop, size)]
 
 
 def path_of_part(path: Path) -> Path:
-    """Path of a shard while it is filled; `path` is its final one."""
+    """Make the path of a shard while it is filled; `path` is its final one."""
     return path.with_name(f"{path.name}.part")
 
 
@@ -64,21 +64,21 @@ def has_files(directory: Path) -> bool:
 
 
 def is_attempt(directory: Path) -> bool:
-    """Whether a directory is that of an attempt at a slice, which no other process knows (see `slice_directory`)."""
+    """Whether a directory belongs to an attempt at a slice, which no other process knows (see `slice_directory`)."""
     return ATTEMPT in directory.name
 
 
 def find_known_directory(directory: Path) -> Path | None:
-    """The directory of a dataset as its user knows it, which may have another path in this process, as in a container.
+    """Find the directory of a dataset as its user knows it; a process in a container may see it at another path.
 
-    It is None if the user cannot reach it, as in a volume.
+    It is None if the user cannot reach the dataset, as in a volume.
     """
     known = os.environ.get(DIRECTORY_VARIABLE, str(directory))
     return Path(known) if known else None
 
 
 def config_path(directory: Path) -> Path:
-    """Path of the configuration in a dataset's directory.
+    """Make the path of the configuration in a dataset's directory.
 
     Raises:
         DatasetError: If something else than a file of the directory has its name.

@@ -1,8 +1,8 @@
 """Conditions and numbers computed from the columns of a table, written as Python writes them.
 
-Python parses the text, and Arrow evaluates it here, so nothing of it ever runs. Names with dots are names of
-columns, ``weights.arm_right_4_joint[0]`` is the column ``weights.arm_right_4_joint.0``. A null stays null in
-comparisons and arithmetic, and a null condition is not fulfilled.
+Python only parses the text, and this module evaluates it with Arrow, so it is never run as code. Names with dots are
+names of columns, and ``weights.arm_right_4_joint[0]`` is the column ``weights.arm_right_4_joint.0``. A null stays null
+in comparisons and arithmetic, and a null condition is not fulfilled.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from throwcollect.arguments import show_value
 from throwcollect.errors import ConfigError, Problem
 
 _SHOWN = 100
-"""Characters of an expression that a message shows."""
+"""Most characters of an expression that a message shows."""
 
 _EXAMPLE = "outcome == 'landed' and landing_x_m > 1.5"
 
@@ -82,7 +82,7 @@ class Expression:
     Args:
         text: The expression.
         place: What messages begin with: the argument that the expression was given as, such as ``where``.
-        is_argument: Whether that is an argument, for which commands have an option.
+        is_argument: Whether `place` is an argument, for which commands have an option.
 
     Raises:
         ConfigError: If it is no expression, or no text; all methods raise it for what cannot be evaluated.
@@ -101,37 +101,37 @@ class Expression:
         except SyntaxError as error:
             # Python gives no place, or 0, to an expression that ends too early.
             column = error.offset - 1 if error.offset else len(self._text)
-            raise self._error(column, f"cannot be understood: {error.msg}", example=True) from error
+            raise self._make_error(column, f"cannot be understood: {error.msg}", example=True) from error
         except (ValueError, RecursionError, MemoryError) as error:
-            raise self._error(0, "cannot be understood", example=True) from error
+            raise self._make_error(0, "cannot be understood", example=True) from error
 
     def rows(self, table: pa.Table) -> list[int]:
-        """Numbers of the rows that fulfil the expression as a condition."""
+        """List the numbers of the rows that fulfil the expression as a condition."""
         found = self._evaluate(table, "a condition")
         return [number for number, holds in enumerate(found.to_pylist()) if holds]
 
     def numbers(self, table: pa.Table) -> list[float | None]:
-        """The expression's number in each row; None where it is null."""
+        """Compute the expression's number in each row; None where it is null."""
         values: list[float | None] = self._evaluate(table, "a number").to_pylist()
         return values
 
     def _evaluate(self, table: pa.Table, kind: _Kind) -> Any:
         try:
-            value = _Evaluation(table, self._error_at).value(self._tree)
+            value = _Evaluation(table, self._make_error_at).value(self._tree)
         except RecursionError as error:
-            raise self._error(0, "is nested too deeply") from error
+            raise self._make_error(0, "is nested too deeply") from error
         if value.kind != kind:
-            raise self._error(0, f"should be {kind}, is {value.kind}")
+            raise self._make_error(0, f"should be {kind}, is {value.kind}")
         if isinstance(value.data, pa.Scalar):
             return pa.repeat(value.data, len(table))
         return value.data
 
-    def _error_at(self, node: ast.expr, problem: str) -> ConfigError:
+    def _make_error_at(self, node: ast.expr, problem: str) -> ConfigError:
         # Python counts bytes, people count characters.
         before = self._text.encode()[: node.col_offset].decode()
-        return self._error(len(before), problem)
+        return self._make_error(len(before), problem)
 
-    def _error(self, column: int, problem: str, *, example: bool = False) -> ConfigError:
+    def _make_error(self, column: int, problem: str, *, example: bool = False) -> ConfigError:
         start = max(0, column - _SHOWN // 2)
         shown = f"\n    {self._text[start : start + _SHOWN]}\n    {' ' * (column - start)}^"
         return ConfigError(
@@ -145,49 +145,53 @@ class _Evaluation:
 
     def __init__(self, table: pa.Table, error: Callable[[ast.expr, str], ConfigError]) -> None:
         self._table = table
-        self._error = error
+        self._make_error = error
 
     def value(self, node: ast.expr) -> _Value:
-        """The value of a part.
+        """Compute the value of a part.
 
         Raises:
-            ConfigError: If it is no part that an expression may have.
+            ConfigError: If an expression may not have such a part.
         """
         match node:
             case ast.Constant():
-                return self._constant(node)
+                return self._read_constant(node)
             case ast.Name() | ast.Attribute() | ast.Subscript():
-                return self._column(node)
+                return self._read_column(node)
             case ast.BoolOp():
                 # As in SQL, `null and False` is false, and `null or True` is true.
                 combine = pc.and_kleene if isinstance(node.op, ast.And) else pc.or_kleene
-                return _Value("a condition", reduce(combine, [self._of(part, "a condition") for part in node.values]))
+                return _Value(
+                    "a condition", reduce(combine, [self._evaluate_as(part, "a condition") for part in node.values])
+                )
             case ast.UnaryOp(op=ast.Not()):
-                return _Value("a condition", pc.invert(self._of(node.operand, "a condition")))
+                return _Value("a condition", pc.invert(self._evaluate_as(node.operand, "a condition")))
             case ast.UnaryOp(op=ast.USub()):
-                return _Value("a number", pc.negate(self._of(node.operand, "a number")))
+                return _Value("a number", pc.negate(self._evaluate_as(node.operand, "a number")))
             case ast.UnaryOp(op=ast.UAdd()):
-                return _Value("a number", self._of(node.operand, "a number"))
+                return _Value("a number", self._evaluate_as(node.operand, "a number"))
             case ast.BinOp() if operation := _ARITHMETIC.get(type(node.op)):
-                operands = self._of(node.left, "a number"), self._of(node.right, "a number")
+                operands = self._evaluate_as(node.left, "a number"), self._evaluate_as(node.right, "a number")
                 return _Value("a number", operation(*operands))
             case ast.Compare():
-                return self._comparison(node)
+                return self._evaluate_comparison(node)
             case ast.Call(func=ast.Name(id=name), args=arguments, keywords=[]) if name in _FUNCTIONS:
                 count, function = _FUNCTIONS[name]
                 if len(arguments) != count:
-                    raise self._error(node, f"{name} takes {count} number{'s' if count > 1 else ''}")
-                return _Value("a number", function(*(self._of(each, "a number") for each in arguments)))
+                    raise self._make_error(node, f"{name} takes {count} number{'s' if count > 1 else ''}")
+                return _Value("a number", function(*(self._evaluate_as(each, "a number") for each in arguments)))
         hint = "use `and`, `or`, `not`" if isinstance(node, ast.BinOp) else f"known functions: {', '.join(_FUNCTIONS)}"
-        raise self._error(node, f"only comparisons, `and`, `or`, `not`, arithmetic and columns are allowed; {hint}")
+        raise self._make_error(
+            node, f"only comparisons, `and`, `or`, `not`, arithmetic and columns are allowed; {hint}"
+        )
 
-    def _of(self, node: ast.expr, kind: _Kind) -> Any:
+    def _evaluate_as(self, node: ast.expr, kind: _Kind) -> Any:
         value = self.value(node)
         if value.kind != kind:
-            raise self._error(node, f"should be {kind}, is {value.kind}")
+            raise self._make_error(node, f"should be {kind}, is {value.kind}")
         return value.data
 
-    def _constant(self, node: ast.Constant) -> _Value:
+    def _read_constant(self, node: ast.Constant) -> _Value:
         match node.value:
             # This comes before numbers, as True is an `int` in Python.
             case bool():
@@ -197,20 +201,20 @@ class _Evaluation:
                     # Whole numbers, too: Arrow's division of integers drops the remainder, and fails at 0.
                     return _Value("a number", pa.scalar(float(node.value)))
                 except OverflowError as error:
-                    raise self._error(node, "too large a number") from error
+                    raise self._make_error(node, "too large a number") from error
             case str():
                 return _Value("text", pa.scalar(node.value))
             case None:
                 return _Value("None", pa.scalar(None))
-        raise self._error(node, "should be a number, a text in quotes, True, False or None")
+        raise self._make_error(node, "should be a number, a text in quotes, True, False or None")
 
-    def _column(self, node: ast.expr) -> _Value:
+    def _read_column(self, node: ast.expr) -> _Value:
         name = self._name(node)
         known = self._table.column_names
         if name not in known:
             near = get_close_matches(name, known, 1)
             other = f"did you mean {near[0]!r}?" if near else "a text needs quotes"
-            raise self._error(node, f"no column {name!r}; {other}")
+            raise self._make_error(node, f"no column {name!r}; {other}")
         column = self._table[name]
         if pa.types.is_string(column.type):
             return _Value("text", column)
@@ -225,15 +229,15 @@ class _Evaluation:
                 return f"{self._name(node.value)}.{node.attr}"
             case ast.Subscript(slice=ast.Constant(value=int(index))):
                 return f"{self._name(node.value)}.{index}"
-        raise self._error(node, "should be the name of a column")
+        raise self._make_error(node, "should be the name of a column")
 
-    def _comparison(self, node: ast.Compare) -> _Value:
+    def _evaluate_comparison(self, node: ast.Compare) -> _Value:
         parts = []
         operands = [node.left, *node.comparators]
         # `a < b < c` is `a < b and b < c`, as in Python.
         for left, operator, right in zip(operands, node.ops, operands[1:], strict=False):
             if isinstance(operator, ast.In | ast.NotIn):
-                found = self._membership(left, right)
+                found = self._evaluate_membership(left, right)
                 parts.append(pc.invert(found) if isinstance(operator, ast.NotIn) else found)
             else:
                 parts.append(self._compare(left, operator, right))
@@ -244,17 +248,17 @@ class _Evaluation:
         if b.kind == "None":
             if isinstance(operator, ast.Is | ast.IsNot | ast.Eq | ast.NotEq):
                 return pc.is_null(a.data) if isinstance(operator, ast.Is | ast.Eq) else pc.is_valid(a.data)
-            raise self._error(right, "None can be compared by `is` and `is not` only")
+            raise self._make_error(right, "None can be compared by `is` and `is not` only")
         if isinstance(operator, ast.Is | ast.IsNot):
-            raise self._error(right, "`is` is for None only; use == or !=")
+            raise self._make_error(right, "`is` is for None only; use == or !=")
         if a.kind != b.kind:
-            raise self._error(right, f"{b.kind} cannot be compared with {a.kind}")
+            raise self._make_error(right, f"{b.kind} cannot be compared with {a.kind}")
         if a.kind == "a condition" and not isinstance(operator, ast.Eq | ast.NotEq):
-            raise self._error(right, "conditions can be compared by == and != only")
+            raise self._make_error(right, "conditions can be compared by == and != only")
         return _COMPARISONS[type(operator)](a.data, b.data)
 
-    def _membership(self, left: ast.expr, right: ast.expr) -> Any:
+    def _evaluate_membership(self, left: ast.expr, right: ast.expr) -> Any:
         if not isinstance(right, ast.List | ast.Tuple | ast.Set) or not right.elts:
-            raise self._error(right, "should be a list, such as ['landed', 'recaught']")
+            raise self._make_error(right, "should be a list, such as ['landed', 'recaught']")
         equal = [self._compare(left, ast.Eq(), element) for element in right.elts]
         return reduce(pc.or_kleene, equal)

@@ -49,7 +49,7 @@ THROW: Mapping[str, str] = {
 
 
 def refuse_attribute(owner: object, name: str, guesses: Mapping[str, str]) -> AttributeError:
-    """Make the error for an attribute that `owner` has not, which names the one that is meant if it can be guessed."""
+    """Make the error for an attribute that `owner` lacks; it names the attribute that was probably meant, if any."""
     public = [each for each in dir(type(owner)) if not each.startswith("_")]
     meant = guesses.get(name) or next(iter(get_close_matches(name, public, 1)), None)
     hint = f"; try .{meant}" if meant and not name.startswith("_") else ""

@@ -19,7 +19,7 @@ from throwcollect.sweep.arrow_column import find_range
 from throwcollect.wording import command, join_names
 
 _MOST_NAMED = 5
-"""A message names so many missing files."""
+"""Most missing files that a message names."""
 
 
 def info(directory: Path) -> Info:
@@ -99,7 +99,7 @@ def digest(directory: Path) -> str:
         ConfigError: If its ``config.yaml`` is wrong.
     """
     dataset = Dataset.open(directory)
-    said = dict(zip(dataset.throws["trial"].to_pylist(), dataset.throws["digest"].to_pylist(), strict=True))
+    stated = dict(zip(dataset.throws["trial"].to_pylist(), dataset.throws["digest"].to_pylist(), strict=True))
     digests = []
     for episode in dataset.episodes():
         trial = episode.header.trial
@@ -107,9 +107,9 @@ def digest(directory: Path) -> str:
             episode.check_records()
         except DatasetError as error:
             raise error.locate(directory, f"trial {trial}") from error
-        if episode.digest != said[trial]:
+        if episode.digest != stated[trial]:
             raise DatasetError(
-                f"digest {episode.digest}", path=directory, place=f"trial {trial}", expected=f"{said[trial]}"
+                f"digest {episode.digest}", path=directory, place=f"trial {trial}", expected=f"{stated[trial]}"
             )
         digests.append(episode.digest)
     combined = combine_digests(digests, dataset.plan.trials.targets)

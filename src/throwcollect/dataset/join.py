@@ -1,6 +1,6 @@
 """Joins the slices of a dataset: moves their recordings beside each other, and writes the tables of the whole.
 
-Of a recording, only the statistics at its end are read. If joining is interrupted, it can be done again and gives the
+Only the statistics at the end of each recording are read. If joining is interrupted, it can be done again and gives the
 same dataset: ``metadata.yaml``, which marks a finished dataset, is written last, and the slices are removed after that.
 """
 
@@ -36,7 +36,7 @@ def join(directory: Path) -> None:
     """Make a finished dataset of its slices; one that is finished already stays as it is.
 
     Raises:
-        ConfigError: If the directory holds no slices, or some of another number of slices.
+        ConfigError: If the directory holds no slices, or slices I/N with different N.
         DatasetError: If a slice is missing, damaged or not of this plan, or the dataset cannot be written.
     """
     with hold_lock(directory, needed=False):
@@ -46,10 +46,10 @@ def join(directory: Path) -> None:
 
 
 def _count_slices(directory: Path, finished: Collection[Slice]) -> int:
-    """The number of slices that a dataset was cut into.
+    """Find the number of slices that a dataset was cut into.
 
     Raises:
-        ConfigError: If none is finished, or they are of different numbers of slices.
+        ConfigError: If none is finished, or there are slices I/N with different N.
     """
     counts = sorted({each.count for each in finished})
     if not counts:
@@ -58,8 +58,8 @@ def _count_slices(directory: Path, finished: Collection[Slice]) -> int:
     if len(counts) > 1:
         raise ConfigError(
             f"{directory / SLICES}: holds slices of {' and of '.join(map(str, counts))}",
-            expected="slices of one number",
-            hint="remove the directories of those that are not meant",
+            expected="slices I/N with the same N",
+            hint="remove the directories of the others",
         )
     return counts[0]
 
@@ -119,7 +119,7 @@ def _move(source: Path, target: Path, entry: FileEntry) -> FileSummary:
     try:
         with open(open_regular(target), "rb") as file:
             size = os.fstat(file.fileno()).st_size
-            # To hash it again would mean to read all recordings of the dataset in one process.
+            # Only the size is checked: hashing would mean to read all recordings of the dataset in one process.
             if size != entry.bytes:
                 raise DatasetError(f"has {size} bytes", path=target, expected=f"{entry.bytes}, as its slice says")
             summary = make_reader(file).get_summary()
@@ -128,7 +128,7 @@ def _move(source: Path, target: Path, entry: FileEntry) -> FileSummary:
     except (McapError, ValueError) as error:
         raise DatasetError(f"is damaged: {error}", path=target) from error
     if summary is None or summary.statistics is None:
-        raise DatasetError("is damaged: it says nothing of what is in it", path=target)
+        raise DatasetError("is damaged: it has no statistics of its contents", path=target)
     found = summary.statistics
     counts: Mapping[int, int] = dict(sorted(found.channel_message_counts.items()))
     return FileSummary(entry.path, found.message_start_time, found.message_end_time, counts)

@@ -1,8 +1,9 @@
 """The journal of a dataset, ``logs/journal.jsonl``: what happened while it was collected, in that order.
 
 Each line is a JSON object with `event`, `time` (Unix [s]) and the facts of that event. Lines are only ever appended,
-also after an interruption. The journal is for people and for the data card. A dataset depends on it in one case alone:
-rounds of a plan that results do not give are removed only if trials before them were lost (see `coordinator.growth`).
+also after an interruption. The journal is for people and for the data card. A dataset depends on it in one case only:
+rounds of a plan that do not follow from the results are removed only if trials before them were lost (see
+`coordinator.growth`).
 """
 
 from __future__ import annotations
@@ -25,14 +26,14 @@ Event = Literal["opened", "exposed", "recovered", "planned", "lease", "commit", 
 """
 - ``opened``: a process began to collect into the directory: `pid`.
 - ``exposed``: any process that reaches the router may join, because of `run.open` or because nothing protects it.
-- ``recovered``: what earlier ones had left was taken in: `episodes`.
+- ``recovered``: the episodes that earlier processes had left were taken in: `episodes`.
 - ``planned``: trials were added to the plan: `trials` in all.
 - ``lease``: a trial was given to a simulation: `trial`, `simulation`.
-- ``commit``: its episode was written: `trial`, `outcome`, `digest`, and where it ended: columns that the task aims at.
-- ``fail``: a simulation did not bring it back: `trial`, `simulation`, `reason`.
-- ``lost``: no simulation did: `trial`, `reason`.
+- ``commit``: the episode of a trial was written: `trial`, `outcome`, `digest`, and the columns that the task aims at.
+- ``fail``: a simulation did not hand over the episode of a trial: `trial`, `simulation`, `reason`.
+- ``lost``: no simulation did, and the trial was given up: `trial`, `reason`.
 - ``shard``: a file was finished: `name`.
-- ``finished``: the dataset was: `wall_s`, the real time that it took in all [s], as the data card has it.
+- ``finished``: the dataset was finished: `wall_s`, the real time that it took in all [s], as the data card has it.
 """
 
 
@@ -64,7 +65,7 @@ class Journal:
             raise
 
     def measure_collected_s(self) -> float:
-        """Real time for which this process and earlier ones have collected [s], to the millisecond."""
+        """Add up the real time for which this process and earlier ones have collected [s], to the millisecond."""
         # The clock may have been set back meanwhile.
         return round(self._earlier_s + max(time.time() - self._opened, 0.0), 3)
 
@@ -89,7 +90,7 @@ class Journal:
 
 @dataclass(frozen=True)
 class JournalLine:
-    """One line of a journal; `wall_s` (real time that collecting took in all) and `outcome` are None if it has none."""
+    """One line of a journal; `wall_s` (real time that collecting took in all) and `outcome` are None in most lines."""
 
     event: Event
     time_s: float
@@ -117,7 +118,7 @@ def _read_lines(path: Path, mark: bytes = b"") -> Iterator[dict[str, Any]]:
 
 
 def _read_number(value: object) -> float | None:
-    """A number that can be computed with; None for anything else, as a journal may come from anybody."""
+    """Return the value if it is a finite number, else None, as a journal may come from anybody."""
     with suppress(OverflowError):
         if isinstance(value, int | float) and isfinite(value):
             return value
@@ -127,16 +128,16 @@ def _read_number(value: object) -> float | None:
 def read_commits(
     path: Path, columns: Sequence[str], *, first: int, most_bytes: int
 ) -> tuple[list[list[Any]], int, bool]:
-    """Read a part of a journal for the trials whose episodes were written; a trial whose episode got lost occurs again.
+    """Read the trials whose episodes were written from a part of a journal; one that was collected again occurs again.
 
     Args:
         path: The file; if it is missing, it has no trials.
-        columns: Values to read of each: `trial`, `outcome`, and numbers. Trials without one of them are left out.
-        first: Where the part begins [bytes]: 0, or where an earlier one has ended.
-        most_bytes: How long the part is at most, which is more than a line.
+        columns: Values to read of each trial: `trial`, `outcome`, and numbers. Trials without one of them are left out.
+        first: Where the part begins [bytes]: 0, or where an earlier part has ended.
+        most_bytes: Largest size of the part, which is more than that of a line.
 
     Returns:
-        The values of `columns` of each, where the part ended, and whether there is more.
+        The values of `columns` of each trial, where the part ended, and whether there is more.
 
     Raises:
         DatasetError: If it cannot be read.
@@ -163,8 +164,8 @@ def read_commits(
 
 
 def _parse(line: bytes) -> dict[str, Any]:
-    """The fields of a line; none if it was cut off or damaged."""
-    # Brackets in brackets without end are a RecursionError.
+    """Read the fields of a line; none if it was cut off or damaged."""
+    # Brackets that are nested too deeply raise a RecursionError.
     with suppress(ValueError, RecursionError):
         entry = json.loads(line)
         if isinstance(entry, dict):
@@ -173,7 +174,7 @@ def _parse(line: bytes) -> dict[str, Any]:
 
 
 def find_lost(directory: Path) -> frozenset[int]:
-    """Find the trials that no simulation brought back in one of the collections into a dataset."""
+    """Find the trials that were given up as lost in one of the collections into a dataset."""
     entries = _read_lines(directory / JOURNAL, b'"lost"')
     numbers = [entry.get("trial") for entry in entries if entry.get("event") == "lost"]
     return frozenset(number for number in numbers if isinstance(number, int))
@@ -185,7 +186,7 @@ def was_open(directory: Path) -> bool:
 
 
 def measure_collected_s(directory: Path) -> float | None:
-    """Real time for which processes have collected into a dataset [s]; None if no journal says so.
+    """Add up the real time for which processes have collected into a dataset [s]; None if no journal says so.
 
     The process that finishes a dataset writes this time down. Processes that came after it count from their first to
     their last event, and so do all if none has finished the dataset.

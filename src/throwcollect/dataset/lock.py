@@ -69,8 +69,8 @@ def lock(descriptor: int, directory: Path, *, alone: bool = True, needed: bool =
     Raises:
         DatasetError: If another process holds it, or it cannot be locked.
     """
-    # A process of a run waits only for those that look: if it waited for a preparation, it would go on with another
-    # plan than it was started for.
+    # A process of a run waits only as long as `is_locked` takes: if it waited for a preparation to end, it would go on
+    # with another plan than it was started for.
     deadline = time.monotonic() + (PATIENCE_S if alone else _GLANCE_S)
     while True:
         try:
@@ -96,7 +96,7 @@ def lock(descriptor: int, directory: Path, *, alone: bool = True, needed: bool =
 
 
 def is_locked(directory: Path) -> bool:
-    """Whether a process collects into a dataset or changes it; no, if nothing tells, as on a file system without locks.
+    """Whether a process collects into a dataset or changes it; False if the file system has no locks.
 
     This function takes the lock for a moment to find out.
     """
@@ -105,7 +105,7 @@ def is_locked(directory: Path) -> bool:
     except OSError:
         return False
     try:
-        # The processes of a run hold the lock together, so only who asks for it alone meets them.
+        # The processes of a run share the lock, so only a request for it alone fails while they hold it.
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
         return True

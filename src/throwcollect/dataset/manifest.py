@@ -64,7 +64,7 @@ def entry_of_file(path: Path) -> FileEntry:
 
 
 def size_of_file(path: Path) -> int:
-    """Size of a file on disk [bytes].
+    """Find the size of a file on disk [bytes].
 
     Raises:
         DatasetError: If it cannot be opened, or is no regular file.
@@ -95,7 +95,7 @@ class RunningHash:
             self._hand_over()
 
     def hexdigest(self) -> str:
-        """The hash of everything, in hexadecimal."""
+        """Return the hash of everything, in hexadecimal."""
         if self._running is not None:
             self._running.result()
         self._add(self._held)
@@ -107,7 +107,7 @@ class RunningHash:
     def _hand_over(self) -> None:
         if self._pool is None:
             self._pool = ThreadPoolExecutor(1)
-        # Blocks are hashed in order, and while one is, at most one other is held in memory.
+        # Blocks are hashed in order; while one is hashed, at most one other is held in memory.
         if self._running is not None:
             self._running.result()
         self._running = self._pool.submit(self._add, self._held)
@@ -119,7 +119,7 @@ class RunningHash:
 
 
 def list_promised_names(directory: Path) -> list[str]:
-    """Names of the files in a directory that a manifest has to cover, in order.
+    """List the names of the files in a directory that a manifest has to cover, in order.
 
     The data card and the logs are not among them, as they tell how, where and when the dataset was collected.
     """
@@ -127,7 +127,7 @@ def list_promised_names(directory: Path) -> list[str]:
 
 
 def manifest_text(name: str, entries: Iterable[FileEntry]) -> str:
-    """Text of the manifest of a collection of this name; the entries may come in any order."""
+    """Write the text of the manifest of a collection of this name; the entries may come in any order."""
     resources = [
         {"name": entry.path, "path": entry.path, "bytes": entry.bytes, "hash": _HASH + entry.sha256}
         for entry in sorted(entries, key=lambda entry: entry.path)
@@ -156,7 +156,7 @@ def read_named_manifest(directory: Path) -> tuple[str, tuple[FileEntry, ...]]:
     text = read_text(path, most_bytes=_MOST_BYTES)
     try:
         document = json.loads(text)
-        name, entries = str(document["name"]), tuple(map(_entry, document["resources"]))
+        name, entries = str(document["name"]), tuple(map(_read_entry, document["resources"]))
     except (ValueError, KeyError, TypeError, RecursionError) as error:
         raise DatasetError("is not the manifest of a dataset", path=path) from error
     # No digest covers the manifest itself, so a changed byte of it shows only by this comparison.
@@ -166,7 +166,7 @@ def read_named_manifest(directory: Path) -> tuple[str, tuple[FileEntry, ...]]:
 
 
 def is_as_written(directory: Path, name: str) -> bool:
-    """Whether there is a manifest, and it says of a file of a dataset that it is as it was written."""
+    """Whether there is a manifest, and a file of the dataset is as the manifest says."""
     try:
         return entry_of_file(directory / name) in read_manifest(directory)
     except DatasetError:
@@ -174,7 +174,7 @@ def is_as_written(directory: Path, name: str) -> bool:
 
 
 def was_changed(directory: Path, name: str) -> bool:
-    """Whether there is a manifest, and it says of a file of a dataset that it is another one than was written."""
+    """Whether there is a manifest, and a file of the dataset is not as the manifest says."""
     try:
         entries = [entry for entry in read_manifest(directory) if entry.path == name]
         return any(entry != entry_of_file(directory / name) for entry in entries)
@@ -185,7 +185,7 @@ def was_changed(directory: Path, name: str) -> bool:
 def find_manifest_problems(directory: Path, name: str | None) -> Iterator[Finding]:
     """Find where the manifest of a dataset and its files differ; every byte of the promised files is read.
 
-    The name of the collection is compared, too, unless it is None because nobody knows it.
+    The name of the collection is compared, too, unless it is unknown (None).
     """
     if not (directory / MANIFEST).exists():
         rebuild = command("dataset", "rebuild", directory)
@@ -228,11 +228,11 @@ def find_changed_files(directory: Path, entries: Iterable[FileEntry], *, in_full
             )
 
 
-def _entry(resource: Any) -> FileEntry:
+def _read_entry(resource: Any) -> FileEntry:
     path, size, digest = resource["path"], resource["bytes"], str(resource["hash"]).removeprefix(_HASH)
     if not isinstance(path, str) or not _NAME.fullmatch(path):
         raise ValueError(path)
-    # Not by `isinstance`, as `true` is an `int` in Python.
+    # `isinstance` would also take `true`, which is an `int` in Python.
     if type(size) is not int or not is_digest(digest):
         raise ValueError(size, digest)
     return FileEntry(path, size, digest)

@@ -39,7 +39,7 @@ _LATCHED_LEVEL = 9
 
 
 def declarations(channels: Sequence[Channel]) -> tuple[list[records.Schema], list[records.Channel]]:
-    """Schema and Channel records, as rosbag2 writes them."""
+    """Make the Schema and Channel records, as rosbag2 writes them."""
     types = list(dict.fromkeys(channel.type_name for channel in channels))
     schemas = [
         records.Schema(id=number, data=message_definition(name).encode(), encoding="ros2msg", name=name)
@@ -97,7 +97,7 @@ class RecordGroup:
 
 
 def _index_chunk(chunk: Chunk, indexes: Mapping[int, bytes], start: int) -> records.ChunkIndex:
-    """Index of a chunk that begins at `start` [bytes] and is followed by its message indexes."""
+    """Make the index of a chunk that begins at `start` [bytes] and is followed by its message indexes."""
     end = start + chunk.record_size
     offsets, offset = {}, end
     for channel, index in indexes.items():
@@ -117,7 +117,7 @@ def _index_chunk(chunk: Chunk, indexes: Mapping[int, bytes], start: int) -> reco
 
 
 def _end_of(index: records.ChunkIndex) -> int:
-    """Where the message indexes of a chunk end [bytes]."""
+    """Find where the message indexes of a chunk end [bytes]."""
     return int(index.chunk_start_offset + index.chunk_length + index.message_index_length)
 
 
@@ -196,7 +196,7 @@ class McapFile:
         return summary
 
     def _encode_summary_section(self, summary: FileSummary) -> bytes:
-        """Everything between the end of the data and the closing magic (MCAP specification, Summary Section)."""
+        """Encode everything between the end of the data and the closing magic (MCAP specification, Summary Section)."""
         schemas, channels = self._declarations
         statistics = records.Statistics(
             attachment_count=0,

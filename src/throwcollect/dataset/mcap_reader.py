@@ -81,13 +81,13 @@ class StoredChunk:
 class StoredEpisode:
     """An episode's run of records as it lies in a file: its chunks, the state chunk first, and a Metadata record.
 
-    `said_digest` is its digest as this record, `facts`, has it; None if it has none.
+    `stated_digest` is the digest that this record, `facts`, states; None if it states none.
     """
 
     episode: Episode
     chunks: tuple[StoredChunk, ...]
     facts: McapRecord
-    said_digest: str | None
+    stated_digest: str | None
 
     @property
     def offset(self) -> int:
@@ -100,16 +100,16 @@ class StoredEpisode:
         return self.facts.end
 
     @classmethod
-    def of(cls, chunks: Sequence[StoredChunk], facts: McapRecord, said: Mapping[str, str]) -> StoredEpisode:
-        """Make the episode of some chunks and of the Metadata record `facts` behind them, whose contents are `said`.
+    def of(cls, chunks: Sequence[StoredChunk], facts: McapRecord, stated: Mapping[str, str]) -> StoredEpisode:
+        """Make the episode of some chunks and of the Metadata record `facts` behind them, whose contents are `stated`.
 
         Raises:
-            DatasetError: If the metadata are not those of an episode with so many chunks; the contents of the chunks
-                are not looked at.
+            DatasetError: If the metadata are not those of an episode with this number of chunks; the contents of the
+                chunks are not looked at.
         """
-        hashes = [said.get("records_sha256", ""), *said.get(SENSORS_SHA256, "").split()]
-        episode = make_episode(said.get("header", ""), hashes, [Chunk.parse(each.record.data) for each in chunks])
-        return cls(episode, tuple(chunks), facts, said.get("digest"))
+        hashes = [stated.get("records_sha256", ""), *stated.get(SENSORS_SHA256, "").split()]
+        episode = make_episode(stated.get("header", ""), hashes, [Chunk.parse(each.record.data) for each in chunks])
+        return cls(episode, tuple(chunks), facts, stated.get("digest"))
 
     @cached_property
     def intact_run(self) -> RecordGroup:
@@ -121,7 +121,7 @@ class StoredEpisode:
         return episode_run(self.episode)
 
     def run(self) -> RecordGroup:
-        """Its records as they lie in the file, whether or not they fit each other."""
+        """Make the run of its records as they lie in the file, whether or not they fit each other."""
         chunks = zip(self.episode.chunks, self.chunks, strict=True)
         runs = [(each.chunk, {channel: index.data for channel, index in at.indexes.items()}) for each, at in chunks]
         return RecordGroup.of(runs, self.facts.data)
@@ -133,7 +133,7 @@ class StoredEpisode:
             DatasetError: If a chunk or the header is damaged, or does not have its hash.
         """
         self.episode.check_records()
-        if self.said_digest != self.episode.digest:
+        if self.stated_digest != self.episode.digest:
             place, expected = f"byte {self.facts.offset}", self.episode.digest
             raise DatasetError("the digest is not that of the header", place=place, expected=expected)
 
@@ -148,7 +148,7 @@ class McapContents:
         return len(self._data)
 
     def slice(self, start: int, end: int) -> bytes:
-        """Bytes of the file from `start` to `end`, not included."""
+        """Return the bytes of the file from `start` to `end`, not included."""
         return self._data[start:end]
 
     def record(self, offset: int) -> McapRecord:

@@ -23,7 +23,7 @@ class Moments:
 
     @classmethod
     def of(cls, rows: NDArray[np.float64]) -> Moments:
-        """Compute those of some rows, shape ``(n_rows, n_columns)``, at least one."""
+        """Compute the moments of some rows, shape ``(n_rows, n_columns)``, at least one."""
         mean = rows.mean(axis=0)
         return cls(len(rows), rows.min(axis=0), rows.max(axis=0), mean, ((rows - mean) ** 2).sum(axis=0))
 
@@ -34,7 +34,7 @@ class Moments:
         return deviations
 
     def with_more(self, more: Moments) -> Moments:
-        """Compute those of these rows and `more` together."""
+        """Compute the moments of these rows and of those of `more` together."""
         count = self.count + more.count
         step = more.mean - self.mean
         return Moments(

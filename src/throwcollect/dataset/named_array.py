@@ -73,7 +73,7 @@ class NamedArray:
         return len(self.values)
 
     def __getitem__(self, name: str) -> NDArray[np.float64]:
-        """One column.
+        """Return one column.
 
         Raises:
             ConfigError: If there is none of this name; it is also a `KeyError`.

@@ -18,7 +18,7 @@ class NextCommand(NamedTuple):
 
 
 def find_next_command(directory: Path) -> NextCommand:
-    """Find the state of an unfinished dataset; on a file system without locks, no run is known to work on it."""
+    """Find the state of an unfinished dataset; on file systems without locks, a run that works on it goes unnoticed."""
     if is_locked(directory):
         return NextCommand("is being collected", command("wait", "--run", directory), "waits for its end")
     return NextCommand("is not finished", command("resume", directory), "goes on with it")

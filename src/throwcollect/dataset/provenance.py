@@ -89,7 +89,7 @@ class Provenance:
             host=os.environ.get(HOST_VARIABLE, socket.gethostname()) or None,
             platform=platform.platform(),
             python=platform.python_version(),
-            libraries={"throwcollect": __version__, **_versions()},
+            libraries={"throwcollect": __version__, **_find_versions()},
             simulations=simulations,
             wall_s=wall_s,
             was_open=was_open,
@@ -99,7 +99,7 @@ class Provenance:
         )
 
     def facts(self) -> dict[str, str]:
-        """Its facts in words, by name; unknown ones are left out."""
+        """List its facts in words, by name; unknown ones are left out."""
         facts = {
             "finished": self.finished.isoformat(timespec="seconds"),
             "host": self.host,
@@ -135,7 +135,7 @@ def read_provenance(directory: Path) -> Provenance | None:
 
 @cache
 def _read_revision() -> str | None:
-    """Git revision of the clone that these sources lie in; None if there is none, or no git."""
+    """Find the Git revision of the clone that these sources lie in; None if there is none, or no git."""
     root = Path(__file__).parents[3]
     if not (root / ".git").exists():
         return None
@@ -144,13 +144,13 @@ def _read_revision() -> str | None:
     # Without tags, `--always` gives the whole hash of the revision.
     words += ["--always", "--abbrev=40", "--dirty", "--exclude=*"]
     with suppress(OSError, subprocess.SubprocessError):
-        said = subprocess.run(words, capture_output=True, text=True, timeout=_GIT_S, check=True)
-        return said.stdout.strip() or None
+        described = subprocess.run(words, capture_output=True, text=True, timeout=_GIT_S, check=True)
+        return described.stdout.strip() or None
     return None
 
 
 @cache
-def _versions() -> Mapping[str, str]:
+def _find_versions() -> Mapping[str, str]:
     versions = {}
     for name in _LIBRARIES:
         # A machine that only coordinates has no engines.

@@ -82,7 +82,7 @@ class Dataset(Sequence[Throw]):
         try:
             throws = read_throws(path, plan)
         except DatasetError as error:
-            # The table follows from the recordings, so one that is damaged is mended as one that is missing.
+            # The table follows from the recordings, so a damaged one is made again in the same way as a missing one.
             error.hint = error.hint or command("dataset", "rebuild", path)
             raise
         return cls(path, plan, throws, bag)
@@ -97,12 +97,12 @@ class Dataset(Sequence[Throw]):
     @overload
     def __getitem__(self, which: str) -> NDArray[Any]: ...
     def __getitem__(self, which: int | slice | str) -> Throw | Dataset | NDArray[Any]:
-        """A throw by its position, the throws of a slice, or a column of `throws` by its name.
+        """Return a throw by its position, the throws of a slice, or a column of `throws` by its name.
 
         A column is an array with one value a throw; a number that is missing is NaN, a text None.
 
         Raises:
-            IndexError: If there are not so many throws.
+            IndexError: If there is no throw at this position.
             ConfigError: If there is no such column; it is also a `KeyError`.
             TypeError: If it is none of these.
         """
@@ -176,7 +176,7 @@ class Dataset(Sequence[Throw]):
         return NamedArray.of(self.throws, _LANDING, limits)
 
     def to_pandas(self) -> DataFrame:
-        """The table of throws as a DataFrame, one row a throw, with the number of the trial as its index.
+        """Convert the table of throws to a DataFrame, one row a throw, with the number of the trial as its index.
 
         Raises:
             MissingExtraError: If pandas is not installed.
@@ -190,7 +190,7 @@ class Dataset(Sequence[Throw]):
         Raises:
             DatasetError: If the metadata do not have it.
         """
-        return self._custom("throwcollect.digest")
+        return self._read_custom("throwcollect.digest")
 
     @property
     def layout(self) -> str:
@@ -199,7 +199,7 @@ class Dataset(Sequence[Throw]):
         Raises:
             DatasetError: If the metadata do not have it.
         """
-        return self._custom("throwcollect.format")
+        return self._read_custom("throwcollect.format")
 
     @property
     def shards(self) -> tuple[str, ...]:
@@ -210,7 +210,7 @@ class Dataset(Sequence[Throw]):
         """
         names = self._bag.get("relative_file_paths")
         if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
-            raise self._lacks("relative_file_paths")
+            raise self._make_missing_error("relative_file_paths")
         return tuple(names)
 
     @property
@@ -224,12 +224,12 @@ class Dataset(Sequence[Throw]):
             counts = self._bag["topics_with_message_count"]
             return {str(each["topic_metadata"]["name"]): int(each["message_count"]) for each in counts}
         except (KeyError, TypeError, ValueError, OverflowError) as error:
-            raise self._lacks("topics_with_message_count") from error
+            raise self._make_missing_error("topics_with_message_count") from error
 
-    def _lacks(self, name: str) -> DatasetError:
+    def _make_missing_error(self, name: str) -> DatasetError:
         return DatasetError(f"{name} is missing", path=self.directory / METADATA)
 
-    def _custom(self, name: str) -> str:
+    def _read_custom(self, name: str) -> str:
         """Return what the product itself wrote into the metadata.
 
         Raises:
@@ -238,13 +238,13 @@ class Dataset(Sequence[Throw]):
         custom = self._bag.get("custom_data")
         value = custom.get(name) if isinstance(custom, dict) else None
         if not isinstance(value, str):
-            raise self._lacks(name)
+            raise self._make_missing_error(name)
         return value
 
     @property
     def recorded(self) -> Dataset:
         """The throws that have a trajectory: all but the refused and the lost."""
-        return self._with(self.throws.filter(self.throws["shard"].is_valid()))
+        return self._replace_throws(self.throws.filter(self.throws["shard"].is_valid()))
 
     def episode(self, trial: int) -> Episode:
         """Read the episode of a trial by its number, with everything that was recorded.
@@ -281,7 +281,7 @@ class Dataset(Sequence[Throw]):
         return (stored.read() for stored in self._stored if stored is not None)
 
     def select(self, which: str | Iterable[Any]) -> Dataset:
-        """Some of the throws.
+        """Select some of the throws.
 
         Args:
             which: A condition on the columns of `throws` as `throwcollect dataset filter` takes it, such as
@@ -292,7 +292,7 @@ class Dataset(Sequence[Throw]):
             ConfigError: If it is none of these.
             DatasetError: If a trial is not among the throws.
         """
-        # These imports take long, and most who open a dataset select nothing.
+        # These imports take long, and most programs that open a dataset select nothing.
         import pyarrow.compute as pc
 
         from throwcollect.dataset.expression import Expression
@@ -301,22 +301,22 @@ class Dataset(Sequence[Throw]):
             return self._take(Expression(which, place="select", is_argument=False).rows(self.throws))
         if isinstance(which, pc.Expression):
             try:
-                return self._with(self.throws.filter(which))
+                return self._replace_throws(self.throws.filter(which))
             except pa.ArrowException as error:
                 raise ConfigError(f"select: {str(error).splitlines()[0]}") from error
-        values = _as_array(which)
+        values = _make_array(which)
         if pa.types.is_boolean(values.type):
             if len(values) != len(self):
                 raise ConfigError(
                     f"select: a mask of {len(values)}", expected=f"one boolean for each of {len(self)} throws"
                 )
-            return self._with(self.throws.filter(values))
+            return self._replace_throws(self.throws.filter(values))
         # A number above the largest int64 becomes a negative one, which no trial has.
         rows = pc.index_in(values.cast(pa.int64(), safe=False), value_set=self.throws["trial"].combine_chunks())
         if rows.null_count:
             missing = values.filter(pc.is_null(rows))[0]
             raise DatasetError(f"no trial {missing} among the {len(self)} throws", path=self.directory)
-        return self._with(self.throws.take(rows))
+        return self._replace_throws(self.throws.take(rows))
 
     def trajectories(
         self, columns: Iterable[str] = COLUMNS, *, joints: Iterable[str] | None = None, threads: int | None = None
@@ -327,11 +327,11 @@ class Dataset(Sequence[Throw]):
             columns: Which of `COLUMNS`; nothing else is copied.
             joints: Joints that the columns of joints have, in this order; None for all. `moving_joints` leaves out the
                 constant ones.
-            threads: How many of them work; None for one a core, up to 4.
+            threads: How many threads read; None for one for each core, up to 4.
 
         Raises:
             ConfigError: If there is no such column or joint, columns or joints are no list of names, or `threads` is no
-                number of them.
+                whole number above 0.
             DatasetError: If an episode is not where the table says, or it is damaged; CRCs are compared.
         """
         if threads is not None:
@@ -367,13 +367,13 @@ class Dataset(Sequence[Throw]):
         ]
 
     def _take(self, rows: Iterable[int]) -> Dataset:
-        return self._with(self.throws.take(pa.array(rows, pa.int64())))
+        return self._replace_throws(self.throws.take(pa.array(rows, pa.int64())))
 
-    def _with(self, throws: pa.Table) -> Dataset:
+    def _replace_throws(self, throws: pa.Table) -> Dataset:
         return replace(self, throws=throws)
 
 
-def _as_array(which: Any) -> pa.Array:
+def _make_array(which: Any) -> pa.Array:
     """Make an Arrow array of booleans or integers, from whatever holds them.
 
     Raises:

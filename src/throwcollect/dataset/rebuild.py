@@ -1,4 +1,4 @@
-"""Writes the files of a dataset anew that follow from the others: table of throws, manifest, metadata and data card."""
+"""Writes again those files of a dataset that follow from others: table of throws, manifest, metadata and data card."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ _MOST_CARD_BYTES = 10_000_000
 
 @dataclass(frozen=True)
 class Rejudged:
-    """A trial that is judged otherwise than the earlier table of throws says: its outcomes `before` and `after`."""
+    """A trial that is judged differently than in the earlier table of throws: its outcomes `before` and `after`."""
 
     trial: int
     before: str
@@ -57,7 +57,7 @@ class Rebuilt:
 
     Attributes:
         lost: Trials that should have an episode and have none.
-        rejudged: Trials whose outcome is another one than before.
+        rejudged: Trials whose outcome has changed.
     """
 
     trials: int
@@ -72,7 +72,7 @@ def rebuild(directory: Path) -> Rebuilt:
 
     They follow from the configuration, the plan and the recordings, which are checked as `verify` does. The earlier
     table, if it can be read, says why trials are lost and which recordings there should be. Where the recordings are
-    judged otherwise than it says, the data card gets the new numbers of outcomes.
+    judged differently than it says, the data card gets the new numbers of outcomes.
 
     Raises:
         DatasetError: If the plan or a recording is missing or damaged, ``config.yaml`` is not as the manifest says,
@@ -108,7 +108,7 @@ def _read_plan(directory: Path, config: Config, repair: str) -> Plan:
 
     Raises:
         DatasetError: If it is missing or damaged; its hint is to repair the dataset, which makes the plan again.
-        ForeignPlanError: If it is that of another configuration.
+        ForeignPlanError: If it is the plan of another configuration.
     """
     try:
         return Plan.read(directory / PLAN, config)
@@ -123,7 +123,7 @@ def _rebuild(directory: Path) -> Rebuilt:
     config = _read_config(directory)
     repair = command("dataset", "repair", directory, "OUTPUT")
     plan = _read_plan(directory, config, repair)
-    # This comes before `*.part` is looked for: earlier versions called an unfinished plan so, and it can be removed.
+    # This comes before the search for `*.part`, a name that earlier versions gave to unfinished plans, which may go.
     remove_unfinished(directory)
     if unfinished := sorted(path.name for path in directory.glob("*.part")):
         raise DatasetError(
@@ -148,7 +148,7 @@ def _rebuild(directory: Path) -> Rebuilt:
             raise DatasetError(f"{name} is missing", path=directory, hint=repair)
     table, task = ThrowsTable.of(plan), task_of(config)
     rows = [
-        recordings.rows.get(trial.number) or _row_without_episode(table, task, trial, earlier.get(trial.number))
+        recordings.rows.get(trial.number) or _make_row_without_episode(table, task, trial, earlier.get(trial.number))
         for trial in plan.trials
     ]
     throws = table.table(rows)
@@ -193,7 +193,7 @@ def read_earlier_rows(directory: Path, plan: Plan) -> Mapping[int, Row]:
     return {}
 
 
-def _row_without_episode(table: ThrowsTable, task: Task[Any], trial: Trial, earlier: Row | None) -> Row:
+def _make_row_without_episode(table: ThrowsTable, task: Task[Any], trial: Trial, earlier: Row | None) -> Row:
     """Make the row of a trial that has no episode; one that was lost before keeps its reason."""
     if trial.refused is not None:
         return table.make_refused_row(trial)
@@ -201,7 +201,7 @@ def _row_without_episode(table: ThrowsTable, task: Task[Any], trial: Trial, earl
 
 
 def reason_lost(earlier: Row | None) -> str | None:
-    """Why an earlier row says that its trial was lost; None if it says no such thing."""
+    """Find the reason why a trial was lost according to an earlier row; None if the row does not say that it was."""
     if earlier is None or earlier["outcome"] != LOST:
         return None
     return str(earlier["reason"] or NO_EPISODE)
@@ -225,17 +225,17 @@ class _Recordings:
 
     def read(self, path: Path) -> list[Finding]:
         """Read a file and return its findings; only a file without findings counts."""
-        checked = check_shard(path, self._plan.config, None, self._problems)
+        checked = check_shard(path, self._plan.config, None, self._find_problems)
         if not checked.findings and checked.summary is not None:
             self.summaries.append(checked.summary)
             self.channels = checked.channels
         return checked.findings
 
-    def _problems(self, stored: StoredEpisode, shard: str, channels: Channels | None) -> Iterator[str]:
+    def _find_problems(self, stored: StoredEpisode, shard: str, channels: Channels | None) -> Iterator[str]:
         problems = list(self._check.find_problems(stored, shard, channels))
         yield from problems
         if not problems:
             trial = self._plan.trial(stored.episode.header.trial)
             if trial.refused is not None or shard != shard_of(self._plan, trial.number):
-                yield "its episode does not belong into this file"
+                yield "its episode does not belong in this file"
             self.rows[trial.number] = self._check.row(stored, shard)

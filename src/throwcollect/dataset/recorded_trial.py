@@ -16,11 +16,11 @@ from throwcollect.robots.trajectory import JointTrajectory
 from throwcollect.units import NS_PER_S
 
 EXECUTING, SUCCEEDED, CANCELED, ABORTED = 2, 4, 5, 6
-"""Of action_msgs/msg/GoalStatus."""
+"""Numbers of action_msgs/msg/GoalStatus."""
 _short = reprlib.Repr()
 _short.maxstring = 60
 shorten = _short.repr
-"""A value in words, however long a forged file makes it."""
+"""Writes a value in words, and cuts it, as a forged file may hold a very long one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +63,7 @@ class RecordedTrial:
         return any(goal.status in (CANCELED, ABORTED) for goal in self.header.goals)
 
     def step_at(self, instant_ns: int) -> int | None:
-        """The step that ends at an instant [ns]; None if none of the trial does."""
+        """Find the step that ends at an instant [ns]; None if no step of the trial does."""
         hz = self.config.sim.physics_hz
         step = round((instant_ns - self.header.start_ns) * hz / NS_PER_S)
         # The simulation's clock is rounded down like this, so a true instant of a step is hit to the nanosecond.
@@ -71,7 +71,7 @@ class RecordedTrial:
         return step if on_step and 0 <= step <= self.last_step else None
 
     def steps_of(self, contact: Contact) -> tuple[int, int] | None:
-        """First step of a contact and the one after its last; None if it does not begin and end on steps, in order."""
+        """Find the first step of a contact and the one after its last; None if these are no two steps in order."""
         begin = self.step_at(contact.start_ns)
         end = self.last_step + 1 if contact.end_ns is None else self.step_at(contact.end_ns)
         return None if begin is None or end is None or end <= begin else (begin, end)
@@ -86,9 +86,9 @@ class RecordedTrial:
         return pressed
 
     def name_contact(self, contact: Contact) -> str:
-        """A contact in words, however long the name of its body is."""
+        """Name a contact in words; a long name of its body is cut."""
         return f"the contact with {shorten(contact.body)} at {self.tell_time(contact.start_ns)}"
 
     def tell_time(self, instant_ns: int) -> str:
-        """An instant as time since the start of the trial, in words."""
+        """Write an instant as the time since the start of the trial."""
         return f"{(instant_ns - self.header.start_ns) / NS_PER_S:.3f} s"

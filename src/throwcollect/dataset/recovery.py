@@ -1,8 +1,8 @@
 """Takes in what an interrupted collection left of a shard: every intact episode stays, the other trials run again.
 
-Afterwards, one of two things holds. Either the shard's final file is there and is, byte for byte, what its episodes
-call for; or all that is left of it lies in the file with the ending ``.part``, to which the writer can append as if it
-had never stopped.
+Afterwards, one of two things holds. Either the shard's final file is there and is, byte for byte, what the writer makes
+of its episodes; or all that is left of it lies in the file with the ending ``.part``, to which the writer can append as
+if it had never stopped.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ from throwcollect.sweep.plan import Plan
 from throwcollect.tasks.result import Result
 
 _MANY_EPISODES = 1000
-"""From here on, looking through files side by side is worth the start of processes."""
+"""From this number of episodes on, starting processes that look through files side by side saves time."""
 
 
 @dataclass(frozen=True)
@@ -59,10 +59,10 @@ class LeftOfShard:
     """The episodes that are left of a shard, by trial.
 
     Attributes:
-        final: Those in its final file.
-        begun: Those in the file that it is filled in; not looked for if the final file stays.
-        finished: The final file, if it has an episode of every trial and is, byte for byte, what these call for; else
-            None, and the shard is filled further.
+        final: Episodes in its final file.
+        begun: Episodes in its unfinished file; not looked for if the final file stays.
+        finished: The final file, if it has an episode of every trial and is, byte for byte, what the writer makes of
+            these; else None, and the shard is filled further.
     """
 
     final: Mapping[int, RecoveredEpisode]
@@ -74,7 +74,7 @@ class LeftOfShard:
 class LeftShard:
     """A shard of which something may be left: its final path, its trials, and whether no trial will be added to it.
 
-    Then its final file may stay if it has an episode of each.
+    If it is settled, its final file may stay if it has an episode of each trial.
     """
 
     path: Path
@@ -90,14 +90,14 @@ def remove_unfinished(directory: Path) -> None:
     """
     for name in (CONFIG, PLAN, TRIALS, SOURCES, THROWS, CARD, PROVENANCE, MANIFEST, METADATA):
         remove(directory / f"{name}.new")
-    # Earlier versions called an unfinished plan so.
+    # Earlier versions gave this name to an unfinished plan.
     remove(directory / f"{PLAN}.part")
 
 
 def find_left(parts: Sequence[LeftShard], channels: Channels, *, processes: int = 1) -> Iterator[LeftOfShard]:
     """Look for what is left of shards, in several of them at a time if there are many episodes. Changes nothing.
 
-    More than one process import the program that calls this, as those of `multiprocessing` do.
+    If there is more than one process, they may import the program that calls this, as those of `multiprocessing` do.
 
     Yields:
         What is left of each, in order.
@@ -169,7 +169,7 @@ def find_episodes(path: Path, plan: Plan, channels: Channels | None = None) -> d
     Args:
         path: The file; if it is missing, it has none.
         plan: The trials; episodes of others, and of refused ones, are left out.
-        channels: What is recorded; None if nobody has to append to the file, and then channels are not compared.
+        channels: What is recorded; None if the file is only read, and then channels are not compared.
 
     Raises:
         DatasetError: If the file cannot be read.
@@ -193,7 +193,7 @@ def find_episodes(path: Path, plan: Plan, channels: Channels | None = None) -> d
 
 
 def _check_finished(path: Path, channels: Channels, episodes: Mapping[int, RecoveredEpisode]) -> FinishedShard | None:
-    """The shard that a file is; None if it is not what its episodes call for."""
+    """Describe a finished file; None if it is not, byte for byte, what the writer makes of its episodes."""
     written = 0
     same = True
     with map_file(path) as contents:

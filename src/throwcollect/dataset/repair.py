@@ -79,17 +79,17 @@ def repair(directory: Path, output: Path, *, remake: Remake) -> Repaired:
 
     Args:
         directory: Directory of the damaged dataset; it stays as it is.
-        output: Directory of the new one; must not exist, or be empty.
+        output: Directory of the new one; must be new or empty.
         remake: Draws the plan if neither the one in the directory nor the table of throws can be read.
 
     Raises:
         ConfigError: If `output` holds something already.
-        DatasetError: If there is no way to configuration or plan, or files cannot be read or written.
+        DatasetError: If configuration or plan cannot be read or made again, or files cannot be read or written.
     """
     refuse_other_directory(directory)
-    config = _configuration(directory)
+    config = _read_configuration(directory)
     remarks: list[str] = []
-    plan = _plan(directory, config, remake, remarks)
+    plan = _read_or_remake_plan(directory, config, remake, remarks)
     earlier = read_earlier_rows(directory, plan)
     with new_directory(output) as beside:
         writer = DatasetWriter.create(beside, plan, listed=_find_list(directory, plan, remarks))
@@ -107,7 +107,7 @@ def repair(directory: Path, output: Path, *, remake: Remake) -> Repaired:
     return Repaired(len(plan.trials), len(sorting.taken), lost, tuple(sorting.differing), tuple(remarks))
 
 
-def _configuration(directory: Path) -> Config:
+def _read_configuration(directory: Path) -> Config:
     try:
         return load(config_path(directory))
     except (ConfigError, DatasetError) as error:
@@ -119,7 +119,7 @@ def _configuration(directory: Path) -> Config:
         ) from error
 
 
-def _plan(directory: Path, config: Config, remake: Remake, remarks: list[str]) -> Plan:
+def _read_or_remake_plan(directory: Path, config: Config, remake: Remake, remarks: list[str]) -> Plan:
     path = directory / PLAN
     try:
         plan = Plan.read(path, config)
@@ -134,7 +134,7 @@ def _plan(directory: Path, config: Config, remake: Remake, remarks: list[str]) -
     except DatasetError as error:
         reason = error.details
     try:
-        plan, source = _plan_of_table(directory / THROWS, config), THROWS
+        plan, source = _make_plan_of_table(directory / THROWS, config), THROWS
     except DatasetError as error:
         if config.grows:
             raise DatasetError(
@@ -150,7 +150,7 @@ def _plan(directory: Path, config: Config, remake: Remake, remarks: list[str]) -
     return plan
 
 
-def _plan_of_table(path: Path, config: Config) -> Plan:
+def _make_plan_of_table(path: Path, config: Config) -> Plan:
     """Make the plan of the trials that a table of throws has.
 
     Raises:
@@ -195,7 +195,7 @@ class _Sorting:
     Attributes:
         plan: The trials.
         writer: Writes the new dataset.
-        digests: Digests of the right episodes, by trial, as far as the table of throws tells them.
+        digests: Digests of the right episodes, by trial, as far as the table of throws has them.
         remarks: Receives a sentence for everything that is wrong.
         taken: File and digest of the episode of each trial that was written.
         differing: Episodes that were written and have another digest than the right one.
@@ -258,14 +258,14 @@ class _Sorting:
                 else:
                     self._write(episode.file, _find_again(directory / episode.file, episode))
                     self.differing.append(episode)
-                    self.remarks.append(f"{remark}; kept, as nothing else speaks against it")
+                    self.remarks.append(f"{remark}; kept, as it passes all other checks")
 
     def _write(self, name: str, episode: Episode) -> None:
         self.writer.append(episode, self._check.judge(episode))
         self.taken[episode.header.trial] = (name, episode.digest)
 
     def give_up(self, earlier: Mapping[int, Row]) -> tuple[LostTrial, ...]:
-        """Write down the trials that have no episode; returns those that were not lost before."""
+        """Write that the other trials have no episode; return those that were not lost before."""
         lost = []
         for trial in self.plan.trials:
             if trial.refused is not None or trial.number in self.taken:

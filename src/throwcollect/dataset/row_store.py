@@ -1,4 +1,4 @@
-"""Keeps rows of the table of throws on disk until it is written, as those of a million trials fill half a gigabyte."""
+"""Keeps rows of the table of throws on disk until it is written, as a million rows fill half a gigabyte of memory."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _ALIGNED_BYTES = 64
 """Buffers of Arrow begin at multiples of this."""
 
 _SHARDS_AT_ONCE = 50
-"""So many are read before their memory is freed, as the kernel maps the bytes around a value along with it."""
+"""Number of shards that are read before their memory is freed: the kernel also maps the bytes around each value."""
 
 _Place = tuple[int, int]
 """First byte and number of bytes."""
@@ -37,7 +37,7 @@ class _NamelessFile:
         self._map: mmap.mmap | None = None
 
     def append(self, parts: Iterable[pa.Buffer]) -> _Place:
-        """Append bytes, those of each part right behind those of the one before.
+        """Append the bytes of some parts, each right behind the one before.
 
         Raises:
             DatasetError: If they cannot be written.
@@ -65,11 +65,11 @@ class _NamelessFile:
             self._map = mmap.mmap(self._file.fileno(), self._size, prot=mmap.PROT_READ)
 
     def read(self, place: _Place) -> pa.Buffer:
-        """The appended bytes of a place; the system reads them from the disk when they are looked at."""
+        """Return the appended bytes of a place; the system reads them from the disk when they are looked at."""
         return pa.py_buffer(self._map).slice(*place)
 
     def let_go(self) -> None:
-        """Free the memory of what was read; the system reads it again if somebody looks at it again."""
+        """Free the memory of what was read; the system reads it again when it is looked at again."""
         if self._map is not None:
             self._map.madvise(mmap.MADV_DONTNEED)
 
@@ -100,7 +100,7 @@ class RowStore:
         self._places[number] = self._by_shards.append([sink.getvalue()])
 
     def take(self, number: int) -> list[dict[str, Any]]:
-        """Return the rows of a shard, and have them no longer."""
+        """Return the rows of a shard, and remove them from the store."""
         self._by_shards.map()
         rows: list[dict[str, Any]] = self._read(self._places.pop(number)).to_pylist()
         return rows
@@ -173,7 +173,7 @@ class Digests(Mapping[int, str]):
         self._digests = throws["digest"]
 
     def __getitem__(self, trial: int) -> str:
-        """The digest of a trial's episode.
+        """Return the digest of a trial's episode.
 
         Raises:
             KeyError: If it has none.

@@ -91,7 +91,7 @@ def scan_whole(path: Path) -> Iterator[FoundEpisode]:
 
 
 def _find(contents: McapContents, first: McapRecord, facts: int) -> FoundEpisode | None:
-    """Read the episode whose first chunk a record is; None if it is none.
+    """Read the episode whose first chunk a record is; None if the record begins no episode.
 
     `facts` is where the next metadata of an episode begin [bytes]; negative if there are none.
     """
@@ -120,11 +120,11 @@ def _gather(contents: McapContents, first: McapRecord, facts: McapRecord) -> Sto
         DatasetError: If they do not belong together.
     """
     chunks = [StoredChunk(first, {})]
-    said = facts.parse(records.Metadata).metadata
+    stated = facts.parse(records.Metadata).metadata
     # A forged file may name any number of hashes.
-    for _ in said.get(SENSORS_SHA256, "").split()[:MOST_CHUNKS]:
+    for _ in stated.get(SENSORS_SHA256, "").split()[:MOST_CHUNKS]:
         offset = contents.next_chunk(chunks[-1].record.end)
         if not 0 <= offset < facts.offset:
             break
         chunks.append(StoredChunk(contents.record(offset), {}))
-    return StoredEpisode.of(chunks, facts, said)
+    return StoredEpisode.of(chunks, facts, stated)

@@ -1,6 +1,6 @@
 """One shard while it is filled: episodes in order of arrival, and at the end the same in order of trials.
 
-While a shard is filled it is called ``<name>_00000.mcap.part``: a complete MCAP file but for its summary and footer, in
+While a shard is filled it is called ``<name>_00000.mcap.part``: an MCAP file that lacks only its summary and footer, in
 which every episode is one run of records. When its last trial is in, the runs are copied in order of trials into the
 file ``<name>_00000.mcap``, and the other vanishes.
 """
@@ -53,7 +53,7 @@ def write_in_order(
 ) -> FinishedShard:
     """Write the finished file of some episodes, which depends on nothing but them.
 
-    The runs lie in another file, of which `read` gives the bytes from an offset on, of a certain length.
+    The runs lie in another file; `read`, called with an offset and a length, returns bytes of it.
     """
     sha256 = RunningHash()
 
@@ -122,7 +122,7 @@ class OpenShard:
             if self._descriptor is None:
                 self._descriptor = open_regular(self.part, os.O_RDWR | os.O_CREAT | os.O_EXCL)
             if not start:
-                # To make it writes the beginning of the file, and an unfinished file needs no more of it.
+                # Making an `McapFile` writes the beginning of the file; an unfinished file needs it for nothing else.
                 McapFile(self._write, self._channels, start_ns=episode.chunk.start_ns)
             offset = self._size
             self._write(run.data)
@@ -142,7 +142,7 @@ class OpenShard:
         """
         finished = FinishedShard(None, {})
         if self._runs:
-            # The final file is on the disk before the unfinished one is removed, so no moment is without all episodes.
+            # The final file is on the disk before the unfinished one is removed, so at any moment one has all episodes.
             with replacing(self.path) as descriptor:
                 write = partial(write_all, descriptor)
                 finished = write_in_order(write, self._channels, self._runs, self._read, name=self.path.name)
@@ -172,7 +172,7 @@ class OpenShard:
             self._descriptor = None
 
     def _remember(self, trial: int, offset: int, run: RecordGroup) -> None:
-        # The file has the bytes; with them, whole shards would be in memory.
+        # The bytes are dropped, as the file has them; otherwise, whole shards would be in memory.
         self._runs[trial] = (offset, replace(run, data=b""))
         self.missing.discard(trial)
 

@@ -21,20 +21,20 @@ class ShardLayout:
     growing: bool
 
     def number_of(self, trial: int) -> int:
-        """Number of the shard of a trial."""
+        """Find the number of the shard of a trial."""
         return trial // self._trials_per_shard
 
     def numbers_of(self, trials: range) -> range:
-        """Numbers of the shards of consecutive trials."""
+        """Find the numbers of the shards of consecutive trials."""
         return range(self.number_of(trials.start), self.number_of(trials.stop - 1) + 1)
 
     def members(self, number: int) -> range:
-        """Numbers of the trials of a shard."""
+        """Find the numbers of the trials of a shard."""
         size, numbers = self._trials_per_shard, self.plan.trials.numbers
         return range(max(number * size, numbers.start), min((number + 1) * size, numbers.stop))
 
     def to_run(self, number: int) -> Iterator[int]:
-        """Numbers of the trials of a shard that are not refused."""
+        """Find the numbers of the trials of a shard that are not refused."""
         return (each for each in self.members(number) if each not in self.plan.trials.refused)
 
     def is_settled(self, number: int) -> bool:
@@ -42,7 +42,7 @@ class ShardLayout:
         return not self.growing or len(self.plan.trials) >= (number + 1) * self._trials_per_shard
 
     def path(self, number: int) -> Path:
-        """Path of a shard once it is finished."""
+        """Make the path of a shard once it is finished."""
         return self.directory / shard_name(self.plan.config.name, number)
 
     def has_file(self, number: int) -> bool:

@@ -1,6 +1,6 @@
 """Directories of the slices of a dataset while many tasks collect it, and how the files of a slice appear all at once.
 
-A slice is collected as a dataset of its own, in a directory that nobody else uses: that of an **attempt**. When it is
+A slice is collected as a dataset of its own, in a directory that nobody else uses, called an **attempt**. When it is
 finished, its recordings, its table and its manifest go to the directory of the slice by one rename, which succeeds for
 one attempt alone. So nothing has to be locked, and an attempt that seemed dead, or was started twice, does no harm, as
 it would put the same bytes there::
@@ -8,8 +8,9 @@ it would put the same bytes there::
     slices/3-of-8/                      a finished slice
     slices/3-of-8.attempt-<id>/         an attempt, unfinished; its logs are in it
 
-An attempt begins with what earlier ones have recorded. It removes those that were stopped in order, so that a task that
-is queued again and again does not fill the disk; those that ended otherwise stay for their logs.
+An attempt begins with what earlier ones have recorded. It removes attempts that were stopped and shut down properly, so
+that a task that is queued again and again does not fill the disk; attempts that ended in another way stay, as their
+logs may say why.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ from throwcollect.files import unreadable, unwritable
 from throwcollect.sweep.slice import Slice
 
 SLICES = "slices"
-"""Name of the directory of slices in that of a dataset."""
+"""Name of the directory of slices, inside the directory of a dataset."""
 
 _UNFINISHED = f"{SHARD_SUFFIX}.part"
 _STOPPED = "stopped"
@@ -36,7 +37,7 @@ _NAME = re.compile(r"(\d+)-of-(\d+)", re.ASCII)
 
 
 def slice_directory(directory: Path, slice: Slice) -> Path:
-    """Directory of a finished slice of a dataset."""
+    """Make the path of the directory of a finished slice of a dataset."""
     return directory / SLICES / f"{slice.index}-of-{slice.count}"
 
 
@@ -76,7 +77,7 @@ def make_attempt(directory: Path, slice: Slice, *, scratch: Path | None = None) 
 
 
 def take_recordings(earlier: Sequence[Path], attempt: Path) -> None:
-    """Copy what earlier attempts have recorded into the directory of a new one: of each shard the longest copy.
+    """Copy what earlier attempts have recorded into the directory of a new one: the longest copy of each shard.
 
     A finished file counts as longer than an unfinished one. Unfinished files are not moved, as an earlier attempt may
     still write to them; the new one looks for whole episodes in its copy.
@@ -86,7 +87,7 @@ def take_recordings(earlier: Sequence[Path], attempt: Path) -> None:
     """
     most: dict[str, Path] = {}
     # The longest copy comes last, and takes the place of the shorter ones.
-    for path in sorted((each / name for each in earlier for name in _list(each)), key=_how_much):
+    for path in sorted((each / name for each in earlier for name in _list(each)), key=_rank_copy):
         if path.name.endswith((SHARD_SUFFIX, _UNFINISHED)):
             most[path.name.removesuffix(".part")] = path
     for path in most.values():
@@ -99,8 +100,8 @@ def take_recordings(earlier: Sequence[Path], attempt: Path) -> None:
             raise unwritable(target, error) from error
 
 
-def _how_much(path: Path) -> tuple[bool, int]:
-    """Key that sorts the recordings of one shard: unfinished ones by length, then finished ones."""
+def _rank_copy(path: Path) -> tuple[bool, int]:
+    """Make the key that sorts the recordings of one shard: unfinished ones by length, then finished ones."""
     try:
         return not path.name.endswith(_UNFINISHED), path.lstat().st_size
     except FileNotFoundError:
@@ -108,13 +109,13 @@ def _how_much(path: Path) -> tuple[bool, int]:
 
 
 def mark_stopped(attempt: Path) -> None:
-    """Mark an attempt as stopped in order, after which nobody writes to it any more."""
+    """Mark an attempt as shut down properly: nobody writes to it any more."""
     with suppress(OSError):  # without the mark, it only stays on disk
         (attempt / _STOPPED).touch()
 
 
 def remove_stopped(attempts: Sequence[Path]) -> None:
-    """Remove those of some attempts that were stopped in order, once another one has their recordings."""
+    """Remove those of some attempts that were shut down properly, once another one has their recordings."""
     for attempt in attempts:
         if (attempt / _STOPPED).exists():
             shutil.rmtree(attempt, ignore_errors=True)

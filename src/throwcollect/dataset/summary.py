@@ -1,4 +1,4 @@
-"""The summary of a dataset, apart from what computes it, as commands that only read records of runs must start fast."""
+"""The summary of a dataset, without what computes it, so that commands that only read records of runs start fast."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class Info:
         samples: Number of samples in all episodes.
         duration_s: Simulated time of all episodes together [s].
         shards: Number of MCAP files.
-        recordings_bytes: Size of these files; `size_bytes` is that of all files.
+        recordings_bytes: Size of these files; `size_bytes` is the size of all files.
         topics: Number of messages of each topic.
         digest: Hash over all episodes in order of trials, and their targets, as it was written.
         wall_s: Real time for which it was collected, without pauses [s]; None if no journal tells.

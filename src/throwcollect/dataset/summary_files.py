@@ -45,7 +45,7 @@ def write_description(
     Raises:
         DatasetError: If a file cannot be read or written.
     """
-    digest = combine_digests(_digests(throws, on_piece), read_targets(throws))
+    digest = combine_digests(_read_digests(throws, on_piece), read_targets(throws))
     custom = {"throwcollect.format": FORMAT, "throwcollect.digest": digest}
     bag = bag_information([summary for summary, _ in recordings], channels.all, custom)
     # The manifest covers metadata.yaml, which is written after it, so the entry is made of these bytes.
@@ -72,8 +72,8 @@ def write_description(
     write_file(directory / METADATA, metadata)
 
 
-def _digests(throws: pa.Table, on_piece: Callable[[], object]) -> Iterator[str]:
-    """Digests of the episodes, in order, some at a time: as Python texts, those of a million would fill 100 MB."""
+def _read_digests(throws: pa.Table, on_piece: Callable[[], object]) -> Iterator[str]:
+    """Read the digests of the episodes, in order, some at a time: as Python texts, a million would fill 100 MB."""
     for first in range(0, len(throws), _ROWS_AT_ONCE):
         yield from throws["digest"].slice(first, _ROWS_AT_ONCE).drop_null().to_pylist()
         on_piece()

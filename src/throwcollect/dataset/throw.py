@@ -82,7 +82,7 @@ class _Recording:
         return self._recorded.read_rows()
 
     def column(self, name: str) -> Column:
-        """A column in an array of its own."""
+        """Read a column into an array of its own."""
         joints = self._recorded.joints
         columns = empty_columns([name], self._recorded.samples, len(joints))
         fill(columns, [self._recorded], [self._rows], joints)
@@ -103,7 +103,7 @@ class _Series:
     def __repr__(self) -> str:
         return f"{type(self).__name__}({len(self)} samples, {self.time_s[-1]:.3f} s)"
 
-    def _column(self, name: str) -> Column:
+    def _read_column(self, name: str) -> Column:
         return self._recording.column(f"{self._prefix}.{name}")
 
     @cached_property
@@ -125,22 +125,22 @@ class Ball(_Series):
     @cached_property
     def position(self) -> NDArray[np.float64]:
         """Centre [m], shape ``(n_samples, 3)``."""
-        return self._column("position")
+        return self._read_column("position")
 
     @cached_property
     def velocity(self) -> NDArray[np.float64]:
         """Of the centre [m/s], shape ``(n_samples, 3)``."""
-        return self._column("velocity")
+        return self._read_column("velocity")
 
     @cached_property
     def orientation_xyzw(self) -> NDArray[np.float64]:
         """Unit quaternion, ball to world, shape ``(n_samples, 4)``."""
-        return self._column("orientation_xyzw")
+        return self._read_column("orientation_xyzw")
 
     @cached_property
     def angular_velocity(self) -> NDArray[np.float64]:
         """[rad/s], shape ``(n_samples, 3)``."""
-        return self._column("angular_velocity")
+        return self._read_column("angular_velocity")
 
 
 @dataclass(frozen=True)
@@ -168,7 +168,7 @@ class Joints(_Series):
     _prefix = "joints"
 
     def __getitem__(self, name: str) -> Joint:
-        """One joint, whose arrays are columns of those of all.
+        """Return one joint; its arrays are columns of the arrays of all joints.
 
         Raises:
             ConfigError: If the robot has none of this name; it is also a `KeyError`.
@@ -189,17 +189,17 @@ class Joints(_Series):
     @cached_property
     def position(self) -> NDArray[np.float64]:
         """[rad], shape ``(n_samples, n_joints)``."""
-        return self._column("position")
+        return self._read_column("position")
 
     @cached_property
     def velocity(self) -> NDArray[np.float64]:
         """[rad/s], shape ``(n_samples, n_joints)``."""
-        return self._column("velocity")
+        return self._read_column("velocity")
 
     @cached_property
     def effort(self) -> NDArray[np.float64]:
         """Torques of the motors [Nm], shape ``(n_samples, n_joints)``; 0 for locked joints."""
-        return self._column("effort")
+        return self._read_column("effort")
 
 
 class Events:
@@ -278,7 +278,7 @@ class Throw:
             raise refuse_attribute(self, name, THROW)
 
     def __getitem__(self, column: str) -> Any:
-        """Its value in a column of the table of throws, such as ``throw["landing_x_m"]``; None if there is none.
+        """Return its value in a column of the table of throws, such as ``throw["landing_x_m"]``; None if there is none.
 
         Raises:
             ConfigError: If there is no such column; it is also a `KeyError`.
@@ -313,7 +313,7 @@ class Throw:
 
     @property
     def target(self) -> dict[str, float]:
-        """Where it should end, by column of the table such as ``target_x_m``; empty if nobody said so."""
+        """Where it should end, by column of the table such as ``target_x_m``; empty if it has no target."""
         return {name: value for name, value in self.row.items() if is_target(name) and value is not None}
 
     @property
@@ -382,7 +382,7 @@ class Throw:
         return Joints(self._recording)
 
     def to_pandas(self) -> DataFrame:
-        """The motion of ball and joints as a DataFrame: one row a sample, by the time since the start of the trial.
+        """Make a DataFrame of the motion of ball and joints: one row a sample, by time since the start of the trial.
 
         Columns are named as those of `throwcollect dataset export --to parquet`, such as ``ball_x_m`` and
         ``arm_right_4_joint_position_rad``.

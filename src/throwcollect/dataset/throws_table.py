@@ -35,7 +35,7 @@ Row = dict[str, Any]
 _KINDS = {"number": pa.float64(), "count": pa.int64(), "text": pa.string()}
 """Types of the columns that tasks declare."""
 _ROWS_A_PIECE = 500
-"""So many rows are made at a time: enough that making them costs no more than making all at once."""
+"""Number of rows that are made at a time: enough that this takes no longer than making all at once."""
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ class EpisodePlace:
     digest: str
 
 
-def _field(name: str, kind: pa.DataType, description: str) -> pa.Field:
+def _make_field(name: str, kind: pa.DataType, description: str) -> pa.Field:
     return pa.field(name, kind, metadata={"description": description})
 
 
@@ -62,7 +62,7 @@ def _describe_swept(key: str) -> pa.Field:
 
 
 def name_alias(key: str) -> str:
-    """Name of a swept key without dots and with its unit at the end, for SQL and formulas."""
+    """Make the name of a swept key without dots and with its unit at the end, for SQL and formulas."""
     name = key.replace(".", "_")
     # The unit is written as names of keys have it: m/s² is mps2.
     unit = unit_of_key(key).replace("/", "p").replace("²", "2").replace("³", "3").replace(" ", "")
@@ -118,24 +118,24 @@ class ThrowsTable:
         self.later = frozenset(each.name for each in self._columns.columns if each.later)
         self.schema = pa.schema(
             [
-                _field("trial", pa.int64(), "Number of the trial."),
+                _make_field("trial", pa.int64(), "Number of the trial."),
                 *map(_describe_swept, parameters),
-                *(_field(each.name, pa.float64(), each.description) for each in self._misses.targets),
-                _field("outcome", pa.string(), f"{', '.join(each.value for each in task.outcomes)} or {REFUSED}."),
-                _field("reason", pa.string(), task.reasons),
-                *(_field(each.name, _KINDS[each.kind], each.description) for each in self._columns.columns),
-                *(_field(name, pa.float64(), text) for name, text in self._misses.descriptions.items()),
-                _field("shard", pa.string(), "MCAP file that holds the episode; null when there is none."),
-                _field("chunk_offset", pa.int64(), "Where the episode's chunk begins in that file [bytes]."),
-                _field("samples", pa.int64(), "Number of samples of the episode."),
-                _field("digest", pa.string(), "SHA-256 of the episode: of its header and its message records."),
+                *(_make_field(each.name, pa.float64(), each.description) for each in self._misses.targets),
+                _make_field("outcome", pa.string(), f"{', '.join(each.value for each in task.outcomes)} or {REFUSED}."),
+                _make_field("reason", pa.string(), task.reasons),
+                *(_make_field(each.name, _KINDS[each.kind], each.description) for each in self._columns.columns),
+                *(_make_field(name, pa.float64(), text) for name, text in self._misses.descriptions.items()),
+                _make_field("shard", pa.string(), "MCAP file that holds the episode; null when there is none."),
+                _make_field("chunk_offset", pa.int64(), "Where the episode's chunk begins in that file [bytes]."),
+                _make_field("samples", pa.int64(), "Number of samples of the episode."),
+                _make_field("digest", pa.string(), "SHA-256 of the episode: of its header and its message records."),
             ]
         )
         _check_task(task, self.schema.names)
 
     @classmethod
     def of(cls, plan: Plan) -> ThrowsTable:
-        """The table of a plan's trials."""
+        """Make the table of a plan's trials."""
         return cls(plan.keys, plan.config, plan.trials.target_names)
 
     def row(self, trial: Trial, result: Result, place: EpisodePlace | None) -> Row:
@@ -186,10 +186,10 @@ def read_throws_table(path: Path, plan: Plan) -> pa.Table:
 
 
 class RowsByTrial(Mapping[int, Row]):
-    """The rows of a table of throws, by trial; those of no trial are left out.
+    """The rows of a table of throws, by trial; rows without a trial are left out.
 
-    Only a piece of the table at a time is made into rows, which take ten times its memory: those of a million throws
-    would take 3 GB.
+    Only a piece of the table at a time is made into rows, which take ten times its memory: a million rows would take
+    3 GB.
     """
 
     def __init__(self, table: pa.Table) -> None:
@@ -228,14 +228,14 @@ def read_throws(directory: Path, plan: Plan) -> pa.Table:
 
 
 def _explain_unusable(table: pa.Table, plan: Plan) -> str | None:
-    """Say what in a table, which may come from anybody, cannot be worked with; None if all can be, right or not."""
+    """Say what makes a table unusable, as it may come from anybody; None if it is usable, even with wrong numbers."""
     known = {
         "outcome": {REFUSED, *(each.value for each in task_of(plan.config).outcomes)},
         "shard": {None, *list_shards(plan)},
     }
     for name, values in known.items():
-        if strange := count_values(table[name]).keys() - values:
-            return f"{name} is {min(map(repr, strange))} in some row, which no row of this plan can have"
+        if unknown := count_values(table[name]).keys() - values:
+            return f"{name} is {min(map(repr, unknown))} in some row, which no row of this plan can have"
     places = ("shard", "chunk_offset", "samples", "digest")
     shard, *rest = (read_validity(table[name].combine_chunks()) for name in places)
     if not all(np.array_equal(each, shard) for each in rest):

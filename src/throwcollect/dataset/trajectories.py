@@ -57,11 +57,11 @@ class Trajectories:
     @overload
     def __getitem__(self, which: int) -> dict[str, Column]: ...
     def __getitem__(self, which: str | int) -> Column | dict[str, Column]:
-        """A column of all throws by its name, or all columns of one throw by its position.
+        """Return a column of all throws by its name, or all columns of one throw by its position.
 
         Raises:
             KeyError: If the column was not read.
-            IndexError: If there are not so many throws.
+            IndexError: If there is no throw at this position.
         """
         if isinstance(which, str):
             return self.columns[which]
@@ -104,7 +104,7 @@ def read_trajectories(
 ) -> Trajectories:
     """Read the trajectories of trials, whose episodes lie at these places; None for a trial that has none.
 
-    All else is as `Dataset.trajectories` takes it.
+    The other arguments are those of `Dataset.trajectories`.
 
     Raises:
         ConfigError: If there is no such column.

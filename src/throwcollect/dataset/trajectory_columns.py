@@ -120,9 +120,9 @@ class StoredThrow:
 
 
 def name_components(column: str, joints: Sequence[str]) -> tuple[str, ...]:
-    """Names, with units, of the components of a column, where each has a column of its own.
+    """Name the components of a column, with units, for a table in which each has a column of its own.
 
-    The column is any of `COLUMNS` but times and stamps. If it is one of joints, it has these joints.
+    The column is any of `COLUMNS` but times and stamps. A column of joints has the joints `joints`.
     """
     series, _, quantity = column.partition(".")
     if series == "joints":
@@ -136,10 +136,10 @@ def empty_columns(columns: Iterable[str], samples: int, joints: int) -> dict[str
     `joints` is the number of joints that the columns of joints have.
     """
     shapes = {TIMES: (samples,), **column_shapes(samples, joints)}
-    return {name: _empty(shapes[name], np.int64 if name == STAMPS else np.float64) for name in columns}
+    return {name: _make_empty(shapes[name], np.int64 if name == STAMPS else np.float64) for name in columns}
 
 
-def _empty(shape: tuple[int, ...], dtype: type[np.generic]) -> Column:
+def _make_empty(shape: tuple[int, ...], dtype: type[np.generic]) -> Column:
     size = math.prod(shape) * np.dtype(dtype).itemsize
     if size < _LARGE_BYTES:
         return np.empty(shape, dtype)
@@ -196,7 +196,8 @@ def fill(
     needed = {TIMES: STAMPS, **dict.fromkeys(velocities, BALL_ORIENTATION)}
     missing = {source for name, source in needed.items() if name in columns} - columns.keys()
     recorded = {**columns, **empty_columns(missing, sum(lengths), len(known))}
-    # Whole columns are copied as bytes; those of only some joints go through `every`, out of which `take` picks them.
+    # Whole columns are copied as bytes. Columns of only some joints are copied to `every`, from which `take` picks
+    # them.
     chosen = [] if joints == known else [name for name in JOINT_COLUMNS if name in columns]
     targets = [(view_as_bytes(recorded[name]), name) for name in recorded if name != TIMES and name not in chosen]
     indexes = np.array([known.index(joint) for joint in joints], np.intp)

@@ -24,9 +24,9 @@ class UnfinishedDatasetWarning(UserWarning):
 def load(directory: StrPath) -> Dataset:
     """Open a dataset for reading.
 
-    Its tables are read and checked against each other; recordings are opened when they are looked at. Of a dataset that
-    is not finished, the recordings are read through, and its rows are the trials that have ended so far: row i is not
-    trial i, and `Dataset.digest` is an error.
+    Its tables are read and checked against each other; recordings are opened when they are looked at. If the dataset is
+    not finished, its recordings are read through, and its rows are the trials that have ended so far: row i need not be
+    trial i, and `Dataset.digest` raises an error.
 
     Raises:
         DatasetError: If the directory holds no dataset, or its tables or plan are damaged.
@@ -36,15 +36,15 @@ def load(directory: StrPath) -> Dataset:
         UnfinishedDatasetWarning: If it is not finished.
     """
     path = Path(directory)
-    # Of a directory that is no dataset at all, `open` says what is wrong.
+    # If the directory is no dataset at all, `open` says what is wrong.
     if is_there(path / METADATA) or not is_there(path / PLAN):
         return Dataset.open(path)
     plan = Plan.read(path / PLAN, read_config(path))
     rows = sorted(_list_rows(path, plan), key=lambda row: int(row["trial"]))
-    on = find_next_command(path)
+    found = find_next_command(path)
     warnings.warn(
-        f"{path} {on.state}: it has {len(rows)} of {format_count(len(plan.trials), 'trial')} so far; "
-        f"`{on.command}` {on.purpose}",
+        f"{path} {found.state}: it has {len(rows)} of {format_count(len(plan.trials), 'trial')} so far; "
+        f"`{found.command}` {found.purpose}",
         UnfinishedDatasetWarning,
         stacklevel=2,
     )

@@ -45,14 +45,14 @@ from throwcollect.sweep.plan import Plan
 from throwcollect.wording import format_count
 
 _MANY_EPISODES = 1000
-"""From here on, checking files side by side is worth the start of processes."""
+"""From this number of episodes on, starting processes that check files side by side saves time."""
 _TELL_EVERY_S = 2.0
 _UNFINISHED = (".part", ".new")
 _short = reprlib.Repr()
 _short.maxstring = _short.maxother = 120
 _short.maxlevel = _short.maxdict = _short.maxlist = 3
 _shorten = _short.repr
-"""A value of a file in words; somebody may have made it as large and as deep as possible."""
+"""Writes a value of a file in words, and cuts it, as somebody may have made it as large and deep as possible."""
 
 
 def verify(
@@ -72,9 +72,9 @@ def verify(
 
     Args:
         directory: Its directory.
-        check_of: Makes the check that says which trials the plan refuses; None leaves refusals as they are.
-        processes: How many processes may check the recordings of a large dataset; more than one import the program that
-            calls this, as those of `multiprocessing` do.
+        check_of: Makes the check that says which trials the plan refuses; None leaves refusals unchecked.
+        processes: How many processes may check the recordings of a large dataset. If more than one, they may import the
+            program that calls this, as those of `multiprocessing` do.
         say: Receives the progress of the check of a large dataset.
 
     Returns:
@@ -96,12 +96,12 @@ def verify(
     with _checking_shards(directory, tables, processes, say) as reports:
         findings += find_manifest_problems(directory, tables.config.name if tables.config else None)
         findings += tables.findings
-        findings += _plan_findings(directory, tables, check_of)
+        findings += _find_plan_problems(directory, tables, check_of)
         checks = dict(reports)
     findings += [finding for check in checks.values() for finding in check.findings]
     if bag is not None:
         findings += _find_bag_problems(bag, checks)
-        # Targets are part of the digest, and only the plan has those of a list.
+        # Targets are part of the digest, and the targets of a list are only in the plan.
         if tables.plan is not None or not (directory / TRIALS).exists():
             findings += _find_digest_problems(bag, tables, checks)
     findings += _find_stray_files(directory, checks)
@@ -109,7 +109,7 @@ def verify(
 
 
 def find_unchecked(config: Config) -> tuple[str, ...]:
-    """What `verify` leaves out, as packages of the extra ``collect`` are not installed; empty if it is nothing."""
+    """List what `verify` leaves out, as packages of the extra ``collect`` are not installed; empty if nothing."""
     left_out: tuple[str, ...] = () if can_draw(config) else ("whether the configuration draws these trials",)
     if not robot_is_available(config):
         left_out += ("whether the robot can do them", "how its joints moved", "what came of the throws")
@@ -138,7 +138,7 @@ def find_damage(directory: Path, plan: Plan | None, *, in_full: bool) -> list[Fi
     return list(find_changed_files(directory, entries, in_full=in_full))
 
 
-def _plan_findings(directory: Path, tables: Tables, check_of: CheckOf | None) -> Iterator[Finding]:
+def _find_plan_problems(directory: Path, tables: Tables, check_of: CheckOf | None) -> Iterator[Finding]:
     if tables.plan is None:
         return
     yield from find_drawing_problems(directory, tables.plan, tables.rows)
@@ -151,14 +151,14 @@ def _checking_shards(
     directory: Path, tables: Tables, processes: int, say: Callable[[str], object]
 ) -> Iterator[Iterator[tuple[str, ShardReport]]]:
     """Start to check the files that rows name, or all that are there if there are no rows."""
-    expected = _trials_by_file(directory, tables)
+    expected = _list_trials_by_file(directory, tables)
     names = sorted(_list_shards(directory) if expected is None else expected)
     many = expected is not None and sum(map(len, expected.values())) >= _MANY_EPISODES
     if many:
         say(f"checks {format_count(len(names), 'recording')}")
     with working_side_by_side(
         names,
-        _file_check,
+        _make_file_check,
         (directory, tables, expected),
         processes=processes if many else 1,
         doing="checks recordings",
@@ -179,7 +179,7 @@ def _tell(
             say(f"{number} of {format_count(count, 'recording')} checked")
 
 
-def _file_check(
+def _make_file_check(
     directory: Path, tables: Tables, expected: Mapping[str, list[int]] | None
 ) -> Callable[[str], ShardReport]:
     """Make the function that checks a file of a dataset, by its name."""
@@ -193,16 +193,16 @@ def _file_check(
     return check_file
 
 
-def _trials_by_file(directory: Path, tables: Tables) -> dict[str, list[int]] | None:
+def _list_trials_by_file(directory: Path, tables: Tables) -> dict[str, list[int]] | None:
     """List the trials whose episodes each file should hold, in order; None if that is not known."""
     if tables.plan is None or tables.rows is None:
         return None
     names, expected = _list_shards(directory), dict[str, list[int]]()
     refused = tables.plan.trials.refused
-    # The table may have rows of trials that the plan has not, and lack others.
+    # The table may have rows of trials that the plan does not have, and lack others.
     for trial in sorted({*range(len(tables.plan.trials)), *tables.rows}):
         name, row = shard_of(tables.plan, trial), tables.rows.get(trial)
-        # If the row of a trial is missing, its episode is most likely in its file all the same.
+        # If the row of a trial is missing, its episode is most likely in its file nevertheless.
         if (trial not in refused and name in names) if row is None else row["shard"] == name:
             expected.setdefault(name, []).append(trial)
     return expected

@@ -49,9 +49,9 @@ class EpisodeCheck:
     """Checks the episodes of one dataset.
 
     Args:
-        plan: Its trials; None if they are not known, and then neither rows nor physics are looked at.
+        plan: Its trials; None if they are not known, and then neither rows nor physics are checked.
         rows: Rows of the table of throws, by trial; where there is none, the episode is not compared with it.
-        doubtful: Trials that the plan has wrong; neither rows nor physics of theirs are looked at.
+        doubtful: Trials that are wrong in the plan; neither their rows nor their physics are checked.
         robot: Whether the robot's model is available, which the motion of the joints, the names of bodies that the ball
             touches, and the result of the trial need.
     """
@@ -164,13 +164,13 @@ def _place_of(stored: StoredEpisode, shard: str) -> EpisodePlace:
 
 def _find_row_problems(expected: Mapping[str, Any], row: Mapping[str, Any]) -> Iterator[str]:
     # A dataset of an earlier version has fewer columns.
-    wrong = [name for name, value in expected.items() if name in row and not _same(value, row[name])]
+    wrong = [name for name, value in expected.items() if name in row and not _are_same(value, row[name])]
     if wrong:
         told = ", ".join(
             f"{name} = {row[name]!r}, the episode gives {expected[name]!r}" for name in wrong[:_MOST_NAMED]
         )
         more = f"; {len(wrong) - _MOST_NAMED} more columns differ" if len(wrong) > _MOST_NAMED else ""
-        hint = "; to have it judged anew: throwcollect dataset rebuild" if "outcome" in wrong else ""
+        hint = "; to judge it again: throwcollect dataset rebuild" if "outcome" in wrong else ""
         yield f"throws.parquet has {told}{more}{hint}"
 
 
@@ -195,7 +195,7 @@ def _find_message_problems(episode: Episode, channels: Channels) -> Iterator[str
 
 
 def _find_record_problems(stored: StoredEpisode) -> Iterator[str]:
-    """Find differences between the records around chunks and those that their contents call for."""
+    """Find differences between the records around chunks and those that the writer makes for these chunks."""
     run = stored.intact_run
     for chunk, expected in zip(stored.chunks, run.chunk_indexes, strict=True):
         first = expected.chunk_start_offset + expected.chunk_length
@@ -241,7 +241,7 @@ def _find_stamp_problems(episode: Episode, samples: Samples, config: Config) -> 
         yield f"stamps are not spaced by 1/{config.record.rate_hz} s: {steps.min()} to {steps.max()} ns"
 
 
-def _same(value: object, other: object) -> bool:
+def _are_same(value: object, other: object) -> bool:
     # The same build computes equal numbers, so `isclose` is rarely needed.
     return value == other or (
         isinstance(value, float)

@@ -16,7 +16,7 @@ _REST_S = 0.5
 _REST_SPEED = 0.01
 """The simulation ends a trial as `rest` when the ball has been slower than this [m/s] for so long [s]."""
 _LEAST_ERROR_CODE = -5
-"""Of control_msgs/action/FollowJointTrajectory; 0 is success."""
+"""Lowest error code of control_msgs/action/FollowJointTrajectory; 0 is success."""
 _ROUNDING = 1e-9
 
 
@@ -47,7 +47,7 @@ def _find_contact_problems(trial: RecordedTrial, bodies: Collection[str] | None)
         if interval is None:
             yield f"{what} to {contact.end_ns} ns does not begin and end, in this order, on physics steps of the trial"
         else:
-            # In the step at which a contact ends, the body is not touched, so the next one begins later.
+            # In the step at which a contact ends, the body is not touched, so its next contact begins later.
             if interval[0] <= ends.get(contact.body, -1):
                 yield f"{what} begins before the one before it has ended"
             ends[contact.body] = interval[1]
@@ -101,7 +101,7 @@ def _find_end_problems(trial: RecordedTrial) -> Iterator[str]:
 
 
 def _explain_unrest(trial: RecordedTrial) -> str | None:
-    """Why a trial cannot have ended as `rest`; None if nothing is against it."""
+    """Say why a trial cannot have ended as `rest`; None if it can have."""
     physics_hz = trial.config.sim.physics_hz
     since = trial.last_step - _REST_S * physics_hz
     resting = np.arange(0, trial.last_step + 1, trial.stride) > since

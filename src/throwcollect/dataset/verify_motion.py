@@ -32,7 +32,7 @@ _AFTER_CONTACT_S = 0.02
 _AFTER_CONTACT_STEPS = 10
 """The contact solver may act on a ball for some steps after its normal force has gone: up to 12 ms were seen."""
 _REACH_M = 0.02
-"""Bullet lets bodies press on each other that are still so far apart."""
+"""Distance at which Bullet lets bodies press on each other already."""
 _FOLLOW_RAD = 0.02
 """With the default gains, motors that are not saturated stay within 0.0002 rad of their commands."""
 _AT_LIMIT = 0.999
@@ -56,7 +56,7 @@ def find_joint_problems(trial: RecordedTrial) -> Iterator[str]:
     if peaks.max() > 1 + 1e-6:
         joint = robot.joints[int(peaks.argmax())]
         yield f"the torque of {joint} is {peaks.max():.4f} of the most that its motor has"
-    tolerance = _following_tolerance(config)
+    tolerance = _compute_following_tolerance(config)
     apart = np.abs(samples.position[0] - list(start_posture(config).values()))
     if apart.max() > tolerance:
         joint = robot.joints[int(apart.argmax())]
@@ -67,7 +67,7 @@ def find_joint_problems(trial: RecordedTrial) -> Iterator[str]:
     followed = len(samples)
     if peaks.max() >= _AT_LIMIT:
         followed = int((torques / limits >= _AT_LIMIT).any(axis=1).argmax())
-    wanted = _where_motors_should_be(trial)[:followed]
+    wanted = _compute_motor_positions(trial)[:followed]
     moving = [robot.joints.index(joint) for joint in trajectory.joints]
     errors = np.abs(samples.position[:followed, moving] - wanted)
     if followed and errors.max() > tolerance:
@@ -76,8 +76,8 @@ def find_joint_problems(trial: RecordedTrial) -> Iterator[str]:
         yield f"{joint} {said}, although its torque is below its limit"
 
 
-def _where_motors_should_be(trial: RecordedTrial) -> NDArray[np.float64]:
-    """Positions at each sample of motors that follow their commands [rad], shape ``(n_samples, n_moving)``."""
+def _compute_motor_positions(trial: RecordedTrial) -> NDArray[np.float64]:
+    """Compute where motors are that follow their commands, at each sample [rad], shape ``(n_samples, n_moving)``."""
     config, trajectory = trial.config, trial.trajectory
     speed, lag_s, hz = config.robot.speed_scale, config.robot.motor_lag_s, config.sim.physics_hz
     if not lag_s:
@@ -91,8 +91,8 @@ def _where_motors_should_be(trial: RecordedTrial) -> NDArray[np.float64]:
     return np.concatenate([start, reached[stride - 1 :: stride]])
 
 
-def _following_tolerance(config: Config) -> float:
-    """How far a motor may be from its command without being saturated [rad]: weak gains follow less well."""
+def _compute_following_tolerance(config: Config) -> float:
+    """Compute how far a motor may be from its command without being saturated [rad]: weak gains follow less well."""
     robot = config.robot
     weak = max(1.0, 100 / robot.position_gain_per_s) * max(1.0, 1 / robot.velocity_gain) ** 2
     return _FOLLOW_RAD * weak * max(1.0, 10 / config.sim.solver_iterations)
@@ -101,15 +101,15 @@ def _following_tolerance(config: Config) -> float:
 def find_ball_problems(trial: RecordedTrial) -> Iterator[str]:
     """Find what the ball cannot have done, given its contacts.
 
-    From one sample to the next, the motion of a ball that nothing touches follows from the physics, bit for bit but for
-    rounding; that of a ball that something presses on does not.
+    From one sample to the next, the motion of a ball that nothing touches follows from the physics, except for
+    rounding; the motion of a ball that something presses on does not.
 
     Yields:
         What is wrong, a sentence each.
     """
     samples = trial.samples
     off_unit = np.abs(_measure_lengths(samples.ball_orientation_xyzw) - 1).max()
-    # Unlike `>`, `not <=` is true of NaN, too.
+    # Unlike `>`, `not <=` is true for NaN, too.
     if not off_unit <= _UNIT:
         yield f"the ball's orientation is no unit quaternion: its length is off by {off_unit:.3g}"
         return
@@ -129,7 +129,7 @@ def find_ball_problems(trial: RecordedTrial) -> Iterator[str]:
         if interval is None:
             continue
         first, touched, held = _find_intervals(interval, trial)
-        # Of a contact that is shorter than a sample, one of the intervals that it lies in must show it.
+        # If a contact is too short to fill an interval, one of the intervals that it touches must show it.
         moved = (
             velocity[held] > tolerance if held.stop > held.start else np.array([velocity[touched].max()]) > tolerance
         )
@@ -141,9 +141,9 @@ def find_ball_problems(trial: RecordedTrial) -> Iterator[str]:
 
 
 def _find_intervals(contact: tuple[int, int], trial: RecordedTrial) -> tuple[int, slice, slice]:
-    """Find, of a contact in steps, the sample at or after its start, and the intervals that it touches, and fills.
+    """Find the first sample at or after the start of a contact, and the intervals that it touches and those it fills.
 
-    Interval k has the steps after sample k, up to and with that of sample k + 1.
+    The contact is given in steps. Interval k has the steps after sample k, up to and including that of sample k + 1.
     """
     stride = trial.stride
     # Step 0 is the first sample itself and in no interval, so a contact counts from step 1 on.
@@ -202,20 +202,20 @@ def _turn(orientation: NDArray[np.float64], spin: NDArray[np.float64], duration_
 
 
 def _multiply_rows(left: NDArray[np.float64], right: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Scalar product of each row with the same row of the other, shape ``(n,)``."""
+    """Compute the scalar product of each row with the same row of the other array, shape ``(n,)``."""
     # `sum` and `norm` over an axis of three or four take several times as long.
     products: NDArray[np.float64] = np.einsum("ij,ij->i", left, right)
     return products
 
 
 def _measure_lengths(rows: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Length of each row, shape ``(n,)``."""
+    """Compute the length of each row, shape ``(n,)``."""
     lengths: NDArray[np.float64] = np.sqrt(_multiply_rows(rows, rows))
     return lengths
 
 
 def _explain_off_ground(trial: RecordedTrial, first: int) -> str | None:
-    """Say why a contact with the ground cannot begin by this sample; None if nothing is against it."""
+    """Say why a contact with the ground cannot begin by this sample; None if it can."""
     config, samples = trial.config, trial.samples
     if not config.scene.landing_height_m > 0:
         return "the ground stops nothing, as the landing plane is on it"

@@ -38,9 +38,9 @@ def find_drawing_problems(directory: Path, plan: Plan, rows: Mapping[int, Row] |
     """Find trials that are not those that the configuration draws.
 
     The rounds of a plan that grows are drawn from the results in the table of throws, which other checks compare with
-    the episodes. Those behind a lost trial are not compared if they are not those that follow from its loss, as they
-    may follow from the episode that it had. If the rows of the table of throws are not known, only what depends on no
-    result is drawn again. A plan that cannot be drawn here (see `can_draw`) is not compared.
+    the episodes. Rounds after a lost trial that do not follow from its loss are not compared, as they may follow from
+    an episode that it had when they were drawn. If the rows of the table of throws are not known, only what depends on
+    no result is drawn again. A plan that cannot be drawn here (see `can_draw`) is not compared.
     """
     if not can_draw(plan.config):
         return
@@ -58,9 +58,11 @@ def find_drawing_problems(directory: Path, plan: Plan, rows: Mapping[int, Row] |
         trial, again = planned[int(index)], drawn[int(index)]
         for key, value in again.values.items():
             if not find_same(np.array(trial.values[key]), np.array(value)):
-                yield _of_trial(again.number, f"has {key} = {trial.values[key]!r}, the configuration draws {value!r}")
+                yield _make_finding(
+                    again.number, f"has {key} = {trial.values[key]!r}, the configuration draws {value!r}"
+                )
         if trial.seed != again.seed:
-            yield _of_trial(again.number, f"has seed {trial.seed}, the configuration gives {again.seed}")
+            yield _make_finding(again.number, f"has seed {trial.seed}, the configuration gives {again.seed}")
 
 
 def find_refusal_problems(plan: Plan, doubtful: Collection[int], check_of: CheckOf) -> Iterator[Finding]:
@@ -71,14 +73,14 @@ def find_refusal_problems(plan: Plan, doubtful: Collection[int], check_of: Check
     """
     refused = plan.trials.refused
     others = [number for number in plan.trials.numbers if number not in refused]
-    # Each verification checks the same ones again, so that two of them agree.
+    # Every verification checks the same trials again, so that two verifications agree.
     chosen = np.random.default_rng(plan.config.seed).permutation(len(others))[:CHECKED_AGAIN]
     check = check_of(plan.config)
     for number in sorted({*refused, *(others[index] for index in chosen)} - set(doubtful)):
         trial = plan.trial(number)
         again = refusal(plan.config_of(trial), check)
-        if _kind(again) != _kind(trial.refused):
-            yield _of_trial(number, f"is refused as {trial.refused!r}, the check says {again!r}")
+        if _strip_numbers(again) != _strip_numbers(trial.refused):
+            yield _make_finding(number, f"is refused as {trial.refused!r}, the check says {again!r}")
 
 
 class _Drawing(NamedTuple):
@@ -100,7 +102,7 @@ def _draw(directory: Path, plan: Plan) -> _Drawing:
     if plan.config.sweep.file is not None:
         # The list lies beside the plan and is compared with it there.
         return _Drawing(plan.trials.values, None)
-    points = _of_keys(draw_points(plan.config, directory=directory), plan)
+    points = _require_keys(draw_points(plan.config, directory=directory), plan)
     count, there = len(points.values), len(plan.trials)
     return _Drawing(
         points.values,
@@ -123,7 +125,7 @@ def _draw_rounds(plan: Plan, rows: Mapping[int, Row] | None) -> _Drawing:
         return lost is not None and rounds.planned >= (lost // ROUND_TRIALS + 2) * ROUND_TRIALS
 
     while rounds.due and not rounds.over and rounds.planned < there:
-        points = _of_keys(rounds.draw(), plan)
+        points = _require_keys(rounds.draw(), plan)
         added = plan.trials[rounds.planned : rounds.planned + len(points.values)]
         if is_doubtful() and not find_same(added.values, points.values[: len(added)]).all():
             break
@@ -139,20 +141,20 @@ def _draw_rounds(plan: Plan, rows: Mapping[int, Row] | None) -> _Drawing:
         if count > there or (rounds.over and count < there):
             problem = f"has {format_count(there, 'trial')}, the configuration draws {count}"
         elif rounds.due and not rounds.over:
-            problem = f"ends with trial {there - 1}, and by the results more would follow"
+            problem = f"ends with trial {there - 1}, but more would follow from the results"
     return _Drawing(np.vstack(values), problem)
 
 
-def _of_keys(points: Points, plan: Plan) -> Points:
+def _require_keys(points: Points, plan: Plan) -> Points:
     if points.keys != plan.keys:
         raise ConfigError(f"it sweeps {', '.join(points.keys)}, the plan {', '.join(plan.keys)}")
     return points
 
 
-def _kind(reason: str | None) -> str | None:
+def _strip_numbers(reason: str | None) -> str | None:
     """Replace the numbers of a reason, whose last digits may differ on another machine."""
     return None if reason is None else blank_numbers(reason)
 
 
-def _of_trial(number: int, problem: str) -> Finding:
+def _make_finding(number: int, problem: str) -> Finding:
     return Finding(PLAN, f"trial {number}", problem)

@@ -1,4 +1,4 @@
-"""Checks one MCAP file of a dataset: that it is, byte for byte, what its episodes call for.
+"""Checks one MCAP file of a dataset: that it is, byte for byte, what the writer makes of its episodes.
 
 The episodes are found by `scan`. All else in the file follows from them and from what is recorded, so it is written
 once more, as the writer of the file does, and compared record by record.
@@ -90,8 +90,8 @@ def check_shard(
 class _ShardCheck:
     """Checks the contents of one file once, and fills in the result; see `check_shard`.
 
-    `waiting` are the trials whose episodes have not come yet, and `places` has the offset of each episode that has
-    [bytes]; `latest` is the highest trial of these. `model` writes the file once more into `expected`.
+    `waiting` are the trials whose episodes have not come yet; `places` has the offsets [bytes] of those that have come,
+    by trial, and `latest` is the highest of these trials. `model` writes the file once more into `expected`.
     """
 
     name: str
@@ -198,7 +198,7 @@ class _ShardCheck:
     def _report_difference(self, actual: McapRecord, wanted: McapRecord) -> None:
         place = f"byte {actual.offset}"
         if wanted.opcode == Opcode.SCHEMA:
-            self._report("schemas", f"that of {wanted.parse(records.Schema).name} is another one")
+            self._report("schemas", f"the schema of {wanted.parse(records.Schema).name} is another one")
         elif wanted.opcode == Opcode.CHANNEL:
             self._report("channels", f"are not those of the configuration: {wanted.parse(records.Channel).topic}")
         elif wanted.opcode == Opcode.CHUNK:
@@ -238,12 +238,12 @@ class _ShardCheck:
         for found in scan(contents, start) if start >= 0 else ():
             stored = found.stored
             if stored.offset < expected or not found.readable:
-                # Within the records of an episode that is damaged, or damaged so that its records lead nowhere.
+                # It lies within the records of a damaged episode, or its own records do not follow each other.
                 continue
             if stored.offset > expected:
                 self._report_gap(expected, resumed=stored.offset)
             if self.model is not None:
-                # The model gets the bytes as they lie here, as its indexes and its CRC are compared with those here.
+                # The model gets the bytes as they are in the file, whose indexes and CRC are compared with the model's.
                 self.model.append(replace(stored.run(), data=contents.slice(stored.offset, stored.end)))
                 # The bytes of episodes are checked elsewhere, so here only those before and behind them are kept.
                 self.expected.clear()
@@ -270,7 +270,7 @@ class _ShardCheck:
         self._report_damage(reason, start=start, resumed=resumed)
 
     def _check_place(self, stored: StoredEpisode) -> None:
-        """Check an episode, and that it should come now."""
+        """Check an episode, and that it is expected at this place."""
         trial, offset = stored.episode.header.trial, stored.offset
         place = f"trial {trial}"
         if trial in self.places:
@@ -297,7 +297,7 @@ class _ShardCheck:
         return ends
 
     def _check_footer(self) -> None:
-        """Check only the CRC of the summary, as nobody knows the contents that it should have.
+        """Check only the CRC of the summary, as it is not known which contents it should have.
 
         Raises:
             DatasetError: If the file does not end with a footer.
@@ -308,13 +308,13 @@ class _ShardCheck:
         footer = contents.record(len(contents) - len(MAGIC) - len(_FOOTER))
         if footer.opcode != Opcode.FOOTER or len(footer.data) != len(_FOOTER):
             raise DatasetError(f"a {footer.kind} where the footer should be", place=f"byte {footer.offset}")
-        said = footer.parse(records.Footer)
+        fields = footer.parse(records.Footer)
         # The CRC does not cover its own four bytes.
-        if said.summary_crc != _crc(contents, said.summary_start, footer.end - 4):
+        if fields.summary_crc != _compute_crc(contents, fields.summary_start, footer.end - 4):
             self._report(f"byte {footer.offset}", "summary: its CRC differs from its contents")
 
 
-def _crc(contents: McapContents, start: int, end: int) -> int:
+def _compute_crc(contents: McapContents, start: int, end: int) -> int:
     crc = 0
     for block in range(start, end, _CRC_BLOCK):
         crc = crc32(contents.slice(block, min(block + _CRC_BLOCK, end)), crc)

@@ -29,7 +29,7 @@ class Tables:
         config: The configuration; None if it cannot be read or is not the plan's.
         plan: The trials; None if they cannot be read or are not the configuration's.
         rows: Rows of the table of throws, by trial; None if it cannot be read.
-        doubtful: Trials whose values or seed in the plan do not have their digest.
+        doubtful: Trials whose values or seed in the plan do not fit their digest.
         findings: What is wrong.
     """
 
@@ -79,7 +79,7 @@ def check_tables(directory: Path) -> Tables:
         else:
             tables.findings += _find_row_problems(tables.plan, throws["trial"].to_pylist())
             tables.rows = RowsByTrial(throws)
-            tables.findings += _plan_findings(tables.plan, tables.rows, tables.doubtful)
+            tables.findings += _find_plan_problems(tables.plan, tables.rows, tables.doubtful)
     return tables
 
 
@@ -134,13 +134,13 @@ def _find_row_problems(plan: Plan, trials: list[int | None]) -> Iterator[Finding
         yield Finding(THROWS, "", "the rows are not in order of trials")
 
 
-def _plan_findings(plan: Plan, rows: Mapping[int, Row], doubtful: Collection[int]) -> Iterator[Finding]:
+def _find_plan_problems(plan: Plan, rows: Mapping[int, Row], doubtful: Collection[int]) -> Iterator[Finding]:
     for trial in plan.trials:
         if (row := rows.get(trial.number)) is None:
             continue
         place = f"trial {trial.number}"
         for key, value in trial.values.items():
-            # Of a doubtful trial, the plan itself is known to be wrong.
+            # The plan itself is known to be wrong about a doubtful trial.
             if row[key] != value and trial.number not in doubtful:
                 yield Finding(THROWS, place, f"has {key} = {row[key]!r}, the plan {value!r}")
         for name in plan.trials.target_names:

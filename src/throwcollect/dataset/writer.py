@@ -55,7 +55,7 @@ class DatasetWriter:
         plan: The plan in that directory.
         journal: Receives events; None for datasets that are written in one go.
         growing: Whether trials may still be added to the plan, until `close_plan`.
-        channels: What is recorded; None for what the robot that is installed here gives.
+        channels: What is recorded; None for the channels of the robot that is installed here.
     """
 
     def __init__(
@@ -126,11 +126,11 @@ class DatasetWriter:
     def recover(self, tell: Tell = lambda *_: None, *, processes: int = 1) -> int:
         """Take in what earlier writers have left: every episode that is whole stays, everything else is removed.
 
-        A finished dataset is an unfinished one then, even if all its trials have ended; `finish` writes the same files.
+        A finished dataset then counts as unfinished, even if all its trials have ended; `finish` writes the same files.
 
         Args:
             tell: Called for each trial that has an episode, in order of shards.
-            processes: How many processes may look through the recordings of a large dataset, as `find_left` takes it.
+            processes: How many processes may look through the recordings of a large dataset, as for `find_left`.
 
         Returns:
             Number of episodes.
@@ -154,7 +154,7 @@ class DatasetWriter:
             count += len(episodes)
             if left.finished is not None:
                 self._close_shard(number, left.finished)
-            elif episodes or not self._shard(number).missing:
+            elif episodes or not self._get_shard(number).missing:
                 self._finish_shard_if_complete(number)
             else:
                 del self._shards[number], self._rows[number]
@@ -168,7 +168,7 @@ class DatasetWriter:
         Raises:
             DatasetError: If the plan cannot be written.
         """
-        # Where a plan that was lost is made again, files of its later shards are still there.
+        # If a lost plan was made again, files of its later shards are still there.
         for number in self._layout.numbers_of(trials.numbers):
             if number not in self._unfinished:
                 self._layout.remove_files(number)
@@ -178,7 +178,7 @@ class DatasetWriter:
         self._expect(trials)
 
     def cut(self, first: int) -> None:
-        """Take the trials from a number on out of the plan, with their episodes, as if they had never been planned.
+        """Remove the trials from a number on from the plan, with their episodes, as if they had never been planned.
 
         If this is interrupted, the plan still has them, or `recover` leaves out what remains of them.
 
@@ -186,8 +186,8 @@ class DatasetWriter:
             DatasetError: If the disk fails.
         """
         shards = self._layout.numbers_of(range(first, self.plan.trials.numbers.stop))
-        rows = [self._let_go_of(number) for number in shards]
-        # The first of these shards has trials that stay, unless it begins with the first one that goes.
+        rows = [self._forget_shard(number) for number in shards]
+        # The first of these shards has trials that stay, unless it begins with the first trial that goes.
         is_shared = self._layout.members(shards[0]).start < first
         for number in shards[is_shared:]:
             self._layout.remove_files(number)
@@ -210,7 +210,7 @@ class DatasetWriter:
             self._finish_shard_if_complete(number)
 
     def take_shard(self, number: int, recording: Recording | None, rows: pa.Table) -> None:
-        """Take in a finished shard, with the rows of its trials, whose file lies under its name already if it has one.
+        """Take in a finished shard with the rows of its trials; its file, if it has one, already has its final name.
 
         Raises:
             DatasetError: If the disk fails.
@@ -227,12 +227,12 @@ class DatasetWriter:
             DatasetError: If the episode is damaged, is of no trial that is waited for, or cannot be written.
         """
         trial = episode.header.trial
-        number = self._waiting_shard(trial)
-        shard = self._shard(number)
+        number = self._find_waiting_shard(trial)
+        shard = self._get_shard(number)
         shard.append(episode)
         # The offset is not known before the shard is written in order of trials; `_close_shard` puts it in.
         place = EpisodePlace(shard.path.name, -1, episode.header.samples, episode.digest)
-        row = self._rows[number][trial] = self._row(trial, result, place)
+        row = self._rows[number][trial] = self._make_row(trial, result, place)
         ends = {name: row[name] for name in self._config.task.targets if row.get(name) is not None}
         self.note("commit", trial=trial, outcome=result.outcome.value, digest=episode.digest, **ends)
         self._finish_shard_if_complete(number)
@@ -243,9 +243,9 @@ class DatasetWriter:
         Raises:
             DatasetError: If the trial is not waited for, or the shard that it completes cannot be written.
         """
-        number = self._waiting_shard(trial)
+        number = self._find_waiting_shard(trial)
         self._shards[number].missing.remove(trial)
-        self._rows[number][trial] = self._row(trial, task_of(self._config).lose(reason), None)
+        self._rows[number][trial] = self._make_row(trial, task_of(self._config).lose(reason), None)
         self.note("lost", trial=trial, reason=reason)
         self._finish_shard_if_complete(number)
 
@@ -268,7 +268,7 @@ class DatasetWriter:
             shard.sync()
 
     def digests(self) -> Digests:
-        """Digest of each episode, by trial; all shards must be finished.
+        """Return the digest of each episode, by trial; all shards must be finished.
 
         Raises:
             DatasetError: If the disk fails.
@@ -289,7 +289,7 @@ class DatasetWriter:
             DatasetError: If trials are missing, or a file cannot be written.
         """
         if self._unfinished:
-            missing = sorted(trial for number in self._unfinished for trial in self._shard(number).missing)
+            missing = sorted(trial for number in self._unfinished for trial in self._get_shard(number).missing)
             example = f", such as {missing[0]}" if missing else ""
             raise DatasetError(f"lacks {format_count(len(missing), 'trial')}{example}", path=self._directory)
         throws = self._finished_rows.table
@@ -298,7 +298,7 @@ class DatasetWriter:
         provenance = Provenance.of_this_machine(
             simulations=simulations, wall_s=wall_s, was_open=was_open(self._directory), robot=self._channels.robot
         )
-        # How it was run must not change the dataset, so only files that the manifest does not cover tell that.
+        # How it was run must not change the dataset, so only files that the manifest does not cover say that.
         config = self._config.without_run()
         write_provenance(self._directory, provenance)
         write_file(self._directory / CARD, data_card(config, throws, provenance).encode())
@@ -326,8 +326,8 @@ class DatasetWriter:
             if number in self._shards or next(self._layout.to_run(number), None) is None:
                 self._finish_shard_if_complete(number)
 
-    def _let_go_of(self, number: int) -> list[Row]:
-        """Forget a shard, but for its files; returns the rows of the trials that have ended."""
+    def _forget_shard(self, number: int) -> list[Row]:
+        """Forget a shard, but keep its files; return the rows of the trials that have ended."""
         self._recordings.pop(number, None)
         if number not in self._unfinished:
             return self._finished_rows.take(number)
@@ -338,11 +338,11 @@ class DatasetWriter:
         return [*self._rows.pop(number).values()]
 
     def _reopen(self, number: int, rows: list[Row]) -> None:
-        """Fill a shard further of which trials have left the plan; `rows` are those that it had."""
+        """Go on filling a shard after some of its trials have left the plan; `rows` are the rows that it had."""
         self._unfinished.add(number)
         [left] = find_left([self._layout.part(number)], self._channels)
         self._take_left(number, left)
-        # Trials that were lost before and are so again have no episode by which they would be found.
+        # Lost trials have no episode by which `find_left` would find them, so their rows are kept.
         for row in rows:
             if row["outcome"] == LOST and row["trial"] in self._layout.members(number):
                 self._rows[number][row["trial"]] = row
@@ -350,32 +350,32 @@ class DatasetWriter:
 
     def _take_left(self, number: int, left: LeftOfShard) -> list[RecoveredEpisode]:
         """Take in what is left of an unfinished shard; returns its episodes in order of trials."""
-        shard = self._shard(number)
+        shard = self._get_shard(number)
         episodes = recover_shard(shard, left)
         for each in episodes:
             place = replace(each.place, shard=shard.path.name)
-            self._rows[number][each.trial] = self._row(each.trial, each.result, place)
+            self._rows[number][each.trial] = self._make_row(each.trial, each.result, place)
         return episodes
 
-    def _shard(self, number: int) -> OpenShard:
-        """An unfinished shard, which takes memory only from when it is first asked for."""
+    def _get_shard(self, number: int) -> OpenShard:
+        """Return an unfinished shard, which takes memory only once it has been asked for."""
         if number not in self._shards:
             shard = OpenShard(self._layout.path(number), self._channels)
             shard.expect(self._layout.to_run(number))
             self._shards[number], self._rows[number] = shard, {}
         return self._shards[number]
 
-    def _row(self, trial: int, result: Result, place: EpisodePlace | None) -> Row:
+    def _make_row(self, trial: int, result: Result, place: EpisodePlace | None) -> Row:
         return self._table.row(self.plan.trial(trial), result, place)
 
-    def _waiting_shard(self, trial: int) -> int:
+    def _find_waiting_shard(self, trial: int) -> int:
         shard = self._layout.number_of(trial)
-        if shard not in self._unfinished or trial not in self._shard(shard).missing:
+        if shard not in self._unfinished or trial not in self._get_shard(shard).missing:
             raise DatasetError(f"no episode of trial {trial} is waited for", path=self._directory)
         return shard
 
     def _finish_shard_if_complete(self, number: int) -> None:
-        shard = self._shard(number)
+        shard = self._get_shard(number)
         if not shard.missing and self._layout.is_settled(number):
             self._close_shard(number, shard.finish())
 

@@ -53,15 +53,15 @@ class Derived:
     digest: str
 
     def as_dict(self) -> dict[str, Any]:
-        """The same for JSON."""
+        """Return the same as a dictionary, for JSON."""
         return asdict(self)
 
 
 def derive(sources: Sequence[Source], output: Path, *, name: str | None = None) -> Derived:
     """Make the dataset that consists of the trials of some others, at least one, in their order, renumbered from 0.
 
-    Its directory must not exist or be empty, and nothing is left there after an error. Without a name of its own, it
-    has that of the first source.
+    Its directory must be new or empty, and nothing is left there after an error. Without `name`, it has the name of the
+    first source.
 
     Raises:
         ConfigError: If there is no trial, the sources do not go together, or the directory cannot be used.
@@ -86,7 +86,7 @@ def _write(sources: Sequence[Source], directory: Path, name: str | None) -> Deri
     with closing(DatasetWriter(directory, plan, channels=channels)) as writer:
         write_file(directory / SOURCES, encode_sources(sources))
         table = ThrowsTable.of(plan)
-        for episode, row in _episodes(sources, Restamper(config, channels)):
+        for episode, row in _restamp_episodes(sources, Restamper(config, channels)):
             if table.later <= row.keys():
                 result = table.result(row)
             else:
@@ -106,26 +106,26 @@ def _write(sources: Sequence[Source], directory: Path, name: str | None) -> Deri
     )
 
 
-def _episodes(sources: Sequence[Source], restamper: Restamper) -> Iterator[tuple[Episode, Row]]:
+def _restamp_episodes(sources: Sequence[Source], restamper: Restamper) -> Iterator[tuple[Episode, Row]]:
     """Restamp episodes to their new numbers, in order, each with its row in the table of its source."""
     threads = min(_MOST_THREADS, os.cpu_count() or 1)
     pending: deque[tuple[Future[Episode], Row]] = deque()
     with ThreadPoolExecutor(threads) as pool:
-        for number, (dataset, row) in enumerate(_rows(sources)):
+        for number, (dataset, row) in enumerate(_list_rows(sources)):
             pending.append((pool.submit(_restamp, restamper, dataset, row, number), row))
             # More episodes than this would only wait in memory, as they are written in order by one thread.
             if len(pending) > 2 * threads:
-                yield _result(pending)
+                yield _take_result(pending)
         while pending:
-            yield _result(pending)
+            yield _take_result(pending)
 
 
-def _result(pending: deque[tuple[Future[Episode], Row]]) -> tuple[Episode, Row]:
+def _take_result(pending: deque[tuple[Future[Episode], Row]]) -> tuple[Episode, Row]:
     future, row = pending.popleft()
     return future.result(), row
 
 
-def _rows(sources: Sequence[Source]) -> Iterator[tuple[Dataset, Row]]:
+def _list_rows(sources: Sequence[Source]) -> Iterator[tuple[Dataset, Row]]:
     for each in sources:
         for start in range(0, len(each.trials), _ROWS_AT_ONCE):
             numbers = each.trials[start : start + _ROWS_AT_ONCE]

@@ -50,18 +50,18 @@ def sources_section(sources: Sequence[Source]) -> str:
     return "\n".join([*lines, ""])
 
 
-def _field(name: str, kind: pa.DataType, description: str) -> pa.Field:
+def _make_field(name: str, kind: pa.DataType, description: str) -> pa.Field:
     return pa.field(name, kind, metadata={"description": description})
 
 
 _SOURCES = pa.schema(
     [
-        _field("trial", pa.int64(), "Number of the trial here."),
-        _field("source_name", pa.string(), "Name of the dataset that the trial comes from."),
-        _field("source_directory", pa.string(), "Directory of that dataset, as it was given."),
-        _field("source_digest", pa.string(), "Digest of that dataset."),
-        _field("source_trial", pa.int64(), "Number of the trial there."),
-        _field("source_trial_digest", pa.string(), "Digest of the trial in the plan there."),
-        _field("source_episode_digest", pa.string(), "Digest of the episode there."),
+        _make_field("trial", pa.int64(), "Number of the trial here."),
+        _make_field("source_name", pa.string(), "Name of the dataset that the trial comes from."),
+        _make_field("source_directory", pa.string(), "Directory of that dataset, as it was given."),
+        _make_field("source_digest", pa.string(), "Digest of that dataset."),
+        _make_field("source_trial", pa.int64(), "Number of the trial there."),
+        _make_field("source_trial_digest", pa.string(), "Digest of the trial in the plan there."),
+        _make_field("source_episode_digest", pa.string(), "Digest of the episode there."),
     ]
 )

@@ -1,6 +1,6 @@
 """Datasets made of some trials of one dataset, or of all trials of several.
 
-The directory of the new dataset must not exist, or be empty.
+The directory of the new dataset must be new or empty.
 """
 
 from __future__ import annotations
@@ -50,10 +50,10 @@ def filter_trials(directory: StrPath, output: StrPath, *, where: str) -> Derived
 def sample(directory: StrPath, output: StrPath, *, count: int, seed: int = 0) -> Derived:
     """Take `count` trials at random, all equally likely and none twice; they stay in their order.
 
-    With the same seed, which is not negative, fewer trials are some of more.
+    With the same seed, a smaller sample is a part of a larger one. The seed must not be negative.
 
     Raises:
-        ConfigError: If the dataset has fewer episodes, a number is none, or the directory cannot be used.
+        ConfigError: If the dataset has fewer episodes, a number is wrong, or the directory cannot be used.
         DatasetError: If the dataset is damaged, or the new one cannot be written.
     """
     check_whole_number("seed", seed, least=0)

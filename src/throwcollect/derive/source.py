@@ -25,7 +25,7 @@ class Source:
 
 
 def source(dataset: Dataset, trials: Collection[int] | None = None) -> Source:
-    """Take the trials of a dataset that have an episode, of some trials or of all."""
+    """Take those of the given trials of a dataset, or of all its trials, that have an episode."""
     numbers = range(len(dataset.throws)) if trials is None else sorted(trials)
     outcomes = dataset.throws["outcome"].to_pylist()
     has_episode = dataset.throws["shard"].is_valid().to_pylist()

@@ -1,8 +1,8 @@
 """Splits a dataset into parts so that throws to the same place go to the same part.
 
 Space is cut into cells, such as squares of the ground. The hash of a cell and a seed decides to which part the cell
-goes, so it does not depend on other trials. A trial that is in no cell, because it did not land, goes to the part that
-a hash over everything that determines the trial, except its number, decides on.
+goes, so it does not depend on other trials. For a trial that is in no cell, because it did not land, a hash over
+everything that determines the trial, except its number, decides on the part.
 """
 
 from __future__ import annotations
@@ -71,7 +71,7 @@ class Split:
     without_episode: Mapping[str, int]
 
     def as_dict(self) -> dict[str, Any]:
-        """The same for JSON."""
+        """Return the same as a dictionary, for JSON."""
         return asdict(self)
 
 
@@ -87,10 +87,11 @@ def split(
 
     Args:
         directory: The dataset.
-        output: Directory that gets one directory a part; it must not exist or be empty.
-        fractions: Names of the parts and their shares of the cells: ``train=0.8,test=0.2``, or a mapping of them.
-        cells: Axes of the space that is cut into cells: an expression on columns of the table of throws (see
-            `dataset.expression`) and the width of the cells along it, each: ``landing_x_m=0.05``.
+        output: Directory that gets one directory for each part; it must be new or empty.
+        fractions: Names of the parts and their shares of the cells: ``train=0.8,test=0.2``, or a mapping from names to
+            shares.
+        cells: Axes of the space that is cut into cells. Each is an expression on columns of the table of throws (see
+            `dataset.expression`) and the width of the cells along this axis, such as ``landing_x_m=0.05``.
         seed: Seed of the choice, 0 or more.
 
     Raises:
@@ -104,7 +105,7 @@ def split(
     parts = {}
     with new_directory(Path(output)) as beside:
         for name, places in members.items():
-            derived = derive([source(dataset, places)], beside / name, name=_part_name(dataset.config.name, name))
+            derived = derive([source(dataset, places)], beside / name, name=_name_part(dataset.config.name, name))
             held = list(places.values())
             parts[name] = SplitPart(derived, len({cell for cell in held if cell is not None}), held.count(None))
     return Split(parts, everything.without_episode)
@@ -124,7 +125,7 @@ def assign(
     shares = _read_shares(fractions)
     places = _find_cells(cells, everything.dataset.throws.take(everything.trials))
     config, points = list_of_trials([everything])
-    # Seeds follow from the numbers of trials, on which the part of a trial must not depend.
+    # All seeds are taken as 0: they follow from the numbers of trials, on which the part of a trial must not depend.
     contents = trial_digests(config, points, [0] * len(points.values))
     members: dict[str, dict[int, Cell | None]] = {name: {} for name in shares}
     for trial, cell, digest in zip(everything.trials, places, contents, strict=True):
@@ -167,7 +168,7 @@ def _choose_part(hashed: str, shares: Mapping[str, Fraction], seed: int) -> str:
 
 
 def _write_shares(shares: object) -> str:
-    """Write a mapping as commands have it; shares as fractions, as a float that is a third makes no whole.
+    """Write a mapping as users of commands write it; as fractions, because floats of 1/3 would not add up to 1.
 
     Raises:
         ConfigError: If it is no mapping.
@@ -210,7 +211,7 @@ def _read_pair(text: str, argument: str, what: str) -> tuple[str, Fraction]:
     name, _, number = text.rpartition("=")
     try:
         value = Fraction(number) if _NUMBER.fullmatch(number) else None
-        # This is an error if the number is too large for a float, which all others can be made into.
+        # This raises an error if the number is too large for a float.
         float(value or 0)
     except (ValueError, ArithmeticError):
         value = None
@@ -219,7 +220,7 @@ def _read_pair(text: str, argument: str, what: str) -> tuple[str, Fraction]:
     return name.strip(), value
 
 
-def _part_name(name: str, part: str) -> str:
+def _name_part(name: str, part: str) -> str:
     """Put the names of a dataset and of a part together; the first is cut, or left out, where there is no room."""
     room = _LONGEST_NAME - len(part) - 1
     return f"{name[:room]}-{part}" if room > 0 else part

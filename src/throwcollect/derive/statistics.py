@@ -1,4 +1,4 @@
-"""Statistics of a dataset: of the columns of its table, and of its signals, by which people normalise them."""
+"""Statistics of a dataset: of the columns of its table, and of its signals, which people need to normalise them."""
 
 from __future__ import annotations
 
@@ -85,7 +85,7 @@ class Statistics:
     signals: Mapping[str, Mapping[str, SignalStatistics]]
 
     def as_dict(self) -> dict[str, Any]:
-        """The same for JSON."""
+        """Return the same as a dictionary, for JSON."""
         return asdict(self)
 
 

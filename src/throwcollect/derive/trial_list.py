@@ -24,8 +24,8 @@ def list_of_trials(sources: Sequence[Source]) -> tuple[Config, Points]:
     """Make a configuration whose trials are those of all sources, at least one, one after the other.
 
     Returns:
-        The configuration of the first source, which takes its points from a file; and the points. Swept are the keys
-        that any source sweeps, and those that the sources have fixed at different values.
+        The configuration of the first source, which takes its points from a file; and the points. The sweep varies the
+        keys that any source sweeps, and those that the sources have fixed at different values.
 
     Raises:
         ConfigError: If the sources differ in keys that cannot be swept; it shows all of them.

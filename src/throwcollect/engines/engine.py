@@ -28,7 +28,7 @@ position, orientation, linear and angular velocity of the ball. These are bare n
 every few steps and objects would slow it down."""
 
 BALL_NUMBERS = 13
-"""The last so many numbers of a sample belong to the ball."""
+"""How many numbers at the end of a sample belong to the ball."""
 
 GROUND = "ground"
 """Name of the ground in contacts of the ball."""
@@ -42,7 +42,7 @@ class BodyState:
     """A body at one instant.
 
     Attributes:
-        position: Its origin in world [m]; that of the ball is its centre.
+        position: Its origin in world [m]; the origin of the ball is its centre.
         orientation_xyzw: Unit quaternion, body to world.
         linear_velocity: In world [m/s].
         angular_velocity: In world [rad/s].
@@ -138,8 +138,8 @@ class Steps:
     """Physics steps to take, with their commands.
 
     Attributes:
-        targets: Commanded positions of the moving joints [rad], shape ``(n_steps + 1, n_moving)``: one row at the begin
-            of each step, and one at the end of the last.
+        targets: Commanded positions of the moving joints [rad], shape ``(n_steps + 1, n_moving)``: one row for the
+            beginning of each step, and one for the end of the last.
         velocities: Velocities that lead from each row to the next [rad/s], shape ``(n_steps, n_moving)``.
         first_sample: Number of the first step after which a sample is due; the first step is number 1.
         stride: Steps from one sample to the next.
@@ -161,7 +161,7 @@ class Observer:
 
         Args:
             step: Number of the first step in which they do.
-            bodies: Their names: that of the tool, `GROUND`, a link of the robot, or ``body/link`` of an added body.
+            bodies: Their names: the tool, `GROUND`, a link of the robot, or ``body/link`` of an added body.
         """
 
     def on_sample(self, step: int, sample: Sample) -> bool:
@@ -245,12 +245,12 @@ class Bodies(ABC):
 class Engine(ABC):
     """One world with a robot, a ball and the ground.
 
-    The results of a state and commands do not depend on anything that happened in the world before, to the last bit.
+    What follows from a state and commands does not depend, in any bit, on what happened in the world before.
 
     Attributes:
         bodies: Further bodies; None if the engine has no place for them.
-        can_be_forked: Whether a world goes on in a process that is forked off the one that made it, with the same bits.
-            It does not if it needs threads, open files or devices.
+        can_be_forked: Whether a world computes the same bits in a process that was forked off the one that made it. A
+            world that needs threads, open files or devices does not.
     """
 
     bodies: Bodies | None = None
@@ -294,10 +294,10 @@ class Engine(ABC):
     def run(self, steps: Steps, observer: Observer) -> int:
         """Take steps until the observer stops them.
 
-        A ball that nothing touches goes by the arithmetic with which `dataset verify` compares it, whatever the engine:
+        Every engine moves a ball that nothing touches by the same arithmetic, which `dataset verify` repeats:
         in each step of dt, v += (g - drag_kgpm / ball_mass_kg · |v| · v) · dt, and then x += v · dt.
 
-        An engine may compute ahead, but it ends in the state of the last step that the observer wants.
+        An engine may compute further steps, but its world ends in the state of the step at which the observer stopped.
 
         Returns:
             Number of steps taken.

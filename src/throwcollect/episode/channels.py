@@ -35,9 +35,9 @@ _INFINITE_S, _INFINITE_NS = 9223372036, 854775807
 
 @dataclass(frozen=True)
 class Qos:
-    """Offered quality of service of a reliable publisher that keeps the last messages, `depth` of them.
+    """Offered quality of service of a reliable publisher that keeps its last `depth` messages.
 
-    With the durability ``transient_local``, late subscribers get them, too.
+    With the durability ``transient_local``, late subscribers get these messages, too.
     """
 
     durability: Literal["volatile", "transient_local"]
@@ -113,7 +113,7 @@ class Channels:
     def __init__(self, config: Config, urdf: str) -> None:
         self.robot = urdf
         self._frames: FrameTree = read_frames(urdf, base_height=config.robot.base_height_m)
-        topics = _topics(config, self._frames)
+        topics = _make_topics(config, self._frames)
         self.sensors = tuple(SENSORS)
         self.recorded: dict[Channel, Topic] = {
             Channel(number, topic.name, topic.type_name, _TRANSFORMS if number == _TF_ID else _SAMPLED): topic
@@ -131,7 +131,7 @@ class Channels:
         return tuple(tuple(channel.id for channel in chunk) for chunk in (self.recorded, *self.sensors))
 
     def fit(self, numbers: tuple[tuple[int, ...], ...]) -> bool:
-        """Say whether chunks with these channels fit; that of a sensor may lack some, as it may have no data."""
+        """Say whether chunks with these channels fit; the chunk of a sensor may lack channels that have no data."""
         state, *sensors = self.numbers
         return (
             len(numbers) == len(self.numbers)
@@ -152,7 +152,7 @@ class Channels:
         }
 
 
-def _topics(config: Config, frames: FrameTree) -> dict[int, Topic]:
+def _make_topics(config: Config, frames: FrameTree) -> dict[int, Topic]:
     chosen, robot = config.record.topics, robot_of(config)
     topics = {JOINT_STATES_ID: joint_states(robot.joints), BALL_ODOMETRY_ID: ball_odometry()}
     if "clock" in chosen:
@@ -161,7 +161,7 @@ def _topics(config: Config, frames: FrameTree) -> dict[int, Topic]:
         topics[_TF_ID] = transforms(frames.moving, robot.joints)
     if "controller_state" in chosen:
         moved = {robot.controller_of(joint) for joint in config.task.end}
-        # All controllers count, so that one has the same number in each dataset, whichever others are recorded.
+        # All controllers are counted, so that each has the same number in every dataset, whichever ones are recorded.
         for number, name in enumerate(robot.controllers, start=_FIRST_CONTROLLER_ID):
             if name in moved:
                 topics[number] = controller_state(robot, name)

@@ -2,8 +2,8 @@
 
 Its layout names the parts of its data: ``header``, an `EpisodeHeader` in JSON; ``result``, the result of the trial in
 JSON; ``conditions``, the conditions of the episode in JSON; ``hashes``, the SHA-256 of the records of each chunk as 32
-bytes; ``chunk``, one or more MCAP Chunk records; and ``signature``, that of all parts before it. The coordinator trusts
-a sender who has the key of the run, so it does not decompress, hash or judge the episode again.
+bytes; ``chunk``, one or more MCAP Chunk records; and ``signature``, which covers all parts before it. The coordinator
+trusts a sender who has the key of the run, so it does not decompress, hash or judge the episode again.
 
 The same message carries a refusal: its header and its chunk are empty, its result is the reason, and its conditions
 are the token of the lease that was refused.
@@ -128,7 +128,7 @@ def header_to_json(header: EpisodeHeader) -> str:
 
 
 def header_from_json(text: bytes | str) -> EpisodeHeader:
-    """Read the text that `header_to_json` writes, also with other blanks.
+    """Read the text that `header_to_json` writes, or one that differs from it only in blanks.
 
     Raises:
         DatasetError: If the text is anything else.
@@ -146,7 +146,7 @@ def header_from_json(text: bytes | str) -> EpisodeHeader:
 
 
 @cache
-def _layout() -> MessageLayout:
+def _make_layout() -> MessageLayout:
     dimension = get_message("std_msgs/msg/MultiArrayDimension")
     layout = get_message("std_msgs/msg/MultiArrayLayout")(dim=[dimension(label=part) for part in _PARTS])
     message = get_message("std_msgs/msg/UInt8MultiArray")(layout=layout)
@@ -185,14 +185,14 @@ def pack(handed: Delivery | TrialRefusal, signer: Signer) -> bytes:
             b"".join(chunk.chunk.record() for chunk in episode.chunks),
         ]
     signature = signer.sign(*parts).encode()
-    return b"".join((_prefix([*map(len, parts), len(signature)]), *parts, signature))
+    return b"".join((_encode_prefix([*map(len, parts), len(signature)]), *parts, signature))
 
 
-def _prefix(sizes: list[int]) -> bytes:
+def _encode_prefix(sizes: list[int]) -> bytes:
     """Encode everything before the data: the layout, and at the end the size of the data."""
-    prefix = bytearray(_layout().template)
-    np.frombuffer(prefix, _layout().dtype)[0] = tuple(size for size in sizes for _ in ("size", "stride"))
-    # The sizes may be those of a stranger's message, whose sum need not fit; such a message is refused by its length.
+    prefix = bytearray(_make_layout().template)
+    np.frombuffer(prefix, _make_layout().dtype)[0] = tuple(size for size in sizes for _ in ("size", "stride"))
+    # A stranger's message may have sizes whose sum does not fit; such a message is refused later, by its length.
     _COUNT.pack_into(prefix, len(prefix) - _COUNT.size, sum(sizes) % 2**32)
     return bytes(prefix)
 
@@ -203,13 +203,13 @@ def unpack(message: bytes, signer: Signer) -> Delivery | TrialRefusal:
     Raises:
         DatasetError: If it is another message, or is signed with another key.
     """
-    layout = _layout()
+    layout = _make_layout()
     length = len(layout.template)
     if len(message) < length:
         raise DatasetError(f"episode: a message of {len(message)} bytes", expected=f"at least {length}")
     sizes = list(np.frombuffer(message, layout.dtype, count=1)[0].item()[::2])
     # Names of the parts, strides and the size of the data follow from the sizes, so one comparison checks them all.
-    if message[:length] != _prefix(sizes):
+    if message[:length] != _encode_prefix(sizes):
         raise DatasetError(f"episode: not a UInt8MultiArray of the parts {', '.join(_PARTS)}")
     # Some RMWs hand over messages with padding behind them.
     if len(message) < length + sum(sizes):
@@ -226,8 +226,8 @@ def unpack(message: bytes, signer: Signer) -> Delivery | TrialRefusal:
         raise DatasetError("episode: its result or its conditions are no UTF-8 text") from error
     if not header:
         return TrialRefusal(token=texts[1], reason=texts[0])
-    said = [hashes[start : start + _HASH_BYTES].hex() for start in range(0, len(hashes), _HASH_BYTES)]
-    return Delivery(make_episode(bytes(header), said, Chunk.parse_all(chunks)), *texts)
+    given = [hashes[start : start + _HASH_BYTES].hex() for start in range(0, len(hashes), _HASH_BYTES)]
+    return Delivery(make_episode(bytes(header), given, Chunk.parse_all(chunks)), *texts)
 
 
 def make_episode(header: bytes | str, hashes: Sequence[str], chunks: Sequence[Chunk]) -> Episode:
@@ -237,9 +237,9 @@ def make_episode(header: bytes | str, hashes: Sequence[str], chunks: Sequence[Ch
         DatasetError: If the header cannot be read, a hash is no SHA-256 in hexadecimal, or there are not as many hashes
             as chunks.
     """
-    for said in hashes:
-        if not _SHA256.fullmatch(said):
-            raise DatasetError(f"episode: SHA-256 {said[:80]!r}", expected="64 hexadecimal digits")
+    for given in hashes:
+        if not _SHA256.fullmatch(given):
+            raise DatasetError(f"episode: SHA-256 {given[:80]!r}", expected="64 hexadecimal digits")
     if len(hashes) != len(chunks) or not chunks:
         raise DatasetError(f"episode: {len(chunks)} chunks", expected=f"{len(hashes)}, as many as it has hashes of")
     return Episode(header_from_json(header), *map(RecordedChunk, chunks, hashes))

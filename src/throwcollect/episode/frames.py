@@ -76,7 +76,7 @@ class FrameTree:
 def read_frames(urdf: str, *, base_height: float) -> FrameTree:
     """Read the frames of a robot whose root link is at a height above the ground [m].
 
-    They are cached, as several parts of a process need those of its only robot.
+    They are cached, as several parts of a process need the frames of its only robot.
 
     Raises:
         ConfigError: If the text is not a URDF, or a joint of it is neither fixed nor revolute.
@@ -107,7 +107,7 @@ def _read_joint(joint: ElementTree.Element) -> Frame:
         if kind == "fixed":
             return Frame(parent, child, translation, rotation)
         # The default is that of the URDF specification.
-        x, y, z = _vector(joint, "axis", "xyz", "1 0 0")
+        x, y, z = _read_vector(joint, "axis", "xyz", "1 0 0")
         length = math.hypot(x, y, z)
         return MovingFrame(parent, child, translation, rotation, name, (x / length, y / length, z / length))
     except (AttributeError, KeyError, ValueError, ZeroDivisionError) as error:
@@ -121,17 +121,17 @@ def read_origin(owner: ElementTree.Element) -> tuple[tuple[float, float, float],
         ValueError: If it is not made of numbers.
     """
     # The defaults are those of the URDF specification.
-    roll, pitch, yaw = _vector(owner, "origin", "rpy", "0 0 0")
-    return _vector(owner, "origin", "xyz", "0 0 0"), _quaternion(roll, pitch, yaw)
+    roll, pitch, yaw = _read_vector(owner, "origin", "rpy", "0 0 0")
+    return _read_vector(owner, "origin", "xyz", "0 0 0"), _make_quaternion(roll, pitch, yaw)
 
 
-def _vector(owner: ElementTree.Element, tag: str, key: str, default: str) -> tuple[float, float, float]:
+def _read_vector(owner: ElementTree.Element, tag: str, key: str, default: str) -> tuple[float, float, float]:
     element = owner.find(tag)
     x, y, z = map(float, (default if element is None else element.get(key, default)).split())
     return x, y, z
 
 
-def _quaternion(roll: float, pitch: float, yaw: float) -> tuple[float, float, float, float]:
+def _make_quaternion(roll: float, pitch: float, yaw: float) -> tuple[float, float, float, float]:
     """Make the unit quaternion (x, y, z, w) of rotations about the fixed axes x, y, z in this order, as in URDF."""
     (sr, cr), (sp, cp), (sy, cy) = ((math.sin(angle / 2), math.cos(angle / 2)) for angle in (roll, pitch, yaw))
     return (

@@ -39,7 +39,7 @@ def _align(offset: int, size: int) -> int:
 
 
 def _walk(message: Message, path: str, offset: int) -> Generator[_Numbers, None, int]:
-    """Find the places of all numbers of a message, in order; returns the place of its end."""
+    """Find the places of all numbers of a message, in order, and return the place of its end."""
     for field in message.FIELDS:
         if field.sequence:
             # The number of elements comes first, as uint32.
@@ -52,7 +52,7 @@ def _walk_field(field: Field, value: Any, path: str, offset: int) -> Generator[_
     is_array = field.sequence or field.length is not None
     if field.type in DTYPES:
         shape = (len(value),) if is_array else ()
-        # Of a sequence without elements there is no padding for the alignment of elements either.
+        # A sequence without elements has no padding for the alignment of elements either.
         if 0 in shape:
             return offset
         dtype = DTYPES[field.type].newbyteorder("<")
@@ -107,7 +107,7 @@ class MessageLayout:
         self._fixed = int.from_bytes(self.template, "little") & self._fixed_bits
 
     def describes_message(self, message: bytes | bytearray) -> bool:
-        """Say the same as `describes` of one message, in a tenth of the time."""
+        """Say the same as `describes` about one message, in a tenth of the time."""
         # One operation on an integer as long as the message is faster than several on arrays.
         fixed = int.from_bytes(message, "little") & self._fixed_bits
         return len(message) == len(self.template) and fixed == self._fixed

@@ -45,7 +45,7 @@ _STAMP_OFFSET = 4
 
 
 class RecordPlace(NamedTuple):
-    """Place of a record in a chunk; that in the first row is the place of the records of its channel in each row."""
+    """Place of a record in a chunk. The records of a channel have the same place in each row as in the first."""
 
     offset: int
     size: int
@@ -54,10 +54,10 @@ class RecordPlace(NamedTuple):
 def _find_records(
     contents: bytes | bytearray | memoryview, *, shortest: int, wrong: str
 ) -> Iterator[tuple[int, RecordPlace]]:
-    """Find the places of Message records that follow each other, with their channels; none is below `shortest` bytes.
+    """Find the channels and places of Message records that follow each other, each of at least `shortest` bytes.
 
     Raises:
-        DatasetError: If the contents are anything else, with `wrong` for what they are.
+        DatasetError: If the contents are anything else; `wrong` says in the message what they are.
     """
     offset = 0
     while offset < len(contents):
@@ -78,7 +78,7 @@ class RowLayout:
         columns: Place of each channel's record in a row, by the channel's number.
 
     Raises:
-        DatasetError: If the contents cannot be so many rows, or the first one is not one message per channel.
+        DatasetError: If the contents cannot be this number of rows, or the first row is not one message per channel.
     """
 
     def __init__(self, contents: bytes | bytearray | memoryview, samples: int) -> None:
@@ -99,7 +99,7 @@ class RowLayout:
         Raises:
             DatasetError: If there is no readable joint state.
         """
-        return read_joint_names(bytes(self._first_message(JOINT_STATES_ID, "/joint_states")))
+        return read_joint_names(bytes(self._find_first_message(JOINT_STATES_ID, "/joint_states")))
 
     def check_topic(self, channel: int, topic: Topic) -> None:
         """Check that the message of a channel has the layout of a topic.
@@ -107,12 +107,12 @@ class RowLayout:
         Raises:
             DatasetError: If there is no such channel, or its message has another layout.
         """
-        if not topic.layout.describes_message(self._first_message(channel, topic.name)):
+        if not topic.layout.describes_message(self._find_first_message(channel, topic.name)):
             raise DatasetError(
                 f"chunk: the messages of {topic.name} have another layout than {topic.type_name} written here"
             )
 
-    def _first_message(self, channel: int, topic: str) -> bytes | bytearray:
+    def _find_first_message(self, channel: int, topic: str) -> bytes | bytearray:
         if channel not in self.columns:
             raise DatasetError(f"chunk: no messages of {topic}")
         column = self.columns[channel]
@@ -244,7 +244,7 @@ class MessageList:
         stamps = np.empty(len(self), STAMP)
         put_stamps(stamps, "stamp", self.stamps_ns + by_ns)
         for time in ("log_time", "publish_time"):
-            # Times are unsigned, and the way may be negative.
+            # Times are unsigned, but `by_ns` may be negative.
             self.headers[time] = self.headers[time].astype(np.int64) + by_ns
         self._scatter(MESSAGE_HEADER.size + _STAMP_OFFSET, stamps)
         self._scatter(0, self.headers)

@@ -112,7 +112,7 @@ class EpisodeHeader:
         end_reason: Reason for its end.
         contacts: All contacts of the ball, by start time.
         goals: One entry per controller that had a goal.
-        samples: Number of samples; at most as many as sequence numbers of message records can count.
+        samples: Number of samples; the sequence numbers of message records can count up to this bound.
     """
 
     trial: Annotated[int, Field(ge=0)]

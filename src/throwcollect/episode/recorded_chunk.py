@@ -15,13 +15,13 @@ class RecordedChunk:
 
     Attributes:
         chunk: The recorded messages, compressed.
-        said_sha256: SHA-256 of the uncompressed message records in hexadecimal, as it was written beside them; None if
-            it is not known yet.
+        stated_sha256: SHA-256 of the uncompressed message records in hexadecimal, as it was written beside them; None
+            if it is not known yet.
     """
 
-    def __init__(self, chunk: Chunk, said_sha256: str | None = None) -> None:
+    def __init__(self, chunk: Chunk, stated_sha256: str | None = None) -> None:
         self.chunk = chunk
-        self.said_sha256 = said_sha256
+        self.stated_sha256 = stated_sha256
 
     @cached_property
     def contents(self) -> bytes:
@@ -34,12 +34,12 @@ class RecordedChunk:
 
     @cached_property
     def records_sha256(self) -> str:
-        """SHA-256 of the uncompressed message records in hexadecimal: `said_sha256`, or else computed.
+        """SHA-256 of the uncompressed message records in hexadecimal: `stated_sha256`, or else computed.
 
         Raises:
             DatasetError: If it has to be computed and the chunk is damaged.
         """
-        return self.said_sha256 or self._contents_sha256
+        return self.stated_sha256 or self._contents_sha256
 
     @cached_property
     def messages(self) -> MessageList:

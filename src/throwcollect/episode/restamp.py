@@ -64,7 +64,7 @@ class Restamper:
         return self._pack(contents, sensor.chunk, by_ns)
 
     def _pack(self, contents: bytearray, like: Chunk, by_ns: int) -> RecordedChunk:
-        """Make the chunk of records that are `by_ns` later than those of the chunk `like`."""
+        """Make the chunk of records that are `by_ns` later than the records of the chunk `like`."""
         data = zstandard.compress(contents, self._config.record.zstd_level)
         chunk = Chunk.of(contents, data, start_ns=like.start_ns + by_ns, end_ns=like.end_ns + by_ns)
         return RecordedChunk(chunk, hashlib.sha256(contents).hexdigest())

@@ -83,27 +83,27 @@ def read_stamps(rows: Rows, prefix: str) -> NDArray[np.int64]:
 def rotate(quaternion_xyzw: NDArray[np.float64], *vectors: NDArray[np.float64], inverse: bool) -> NDArray[np.float64]:
     """Turn vectors, each of shape ``(n, 3)``, by unit quaternions, shape ``(n, 4)``, or in the opposite direction.
 
-    It is done element by element, so a row's result does not depend on other rows.
+    This is computed element by element, so the result of a row does not depend on other rows.
 
     Returns:
         Shape ``(len(vectors), n, 3)``.
     """
     # The elements of recorded columns lie far apart in memory, and the code below reads them many times.
     *axis, w = np.ascontiguousarray(quaternion_xyzw.T)
-    u = _twice((np.negative(axis) if inverse else np.array(axis))[:, np.newaxis])
-    v = _twice(np.array([vector.T for vector in vectors]).swapaxes(0, 1))
+    u = _repeat_axes((np.negative(axis) if inverse else np.array(axis))[:, np.newaxis])
+    v = _repeat_axes(np.array([vector.T for vector in vectors]).swapaxes(0, 1))
     # v' = v + w t + u × t with t = 2 u × v, for a unit quaternion (u, w).
-    t = _twice(2 * _cross(u, v))
-    return np.ascontiguousarray((v[:3] + w * t[:3] + _cross(u, t)).transpose(1, 2, 0))
+    t = _repeat_axes(2 * _compute_cross(u, v))
+    return np.ascontiguousarray((v[:3] + w * t[:3] + _compute_cross(u, t)).transpose(1, 2, 0))
 
 
-def _twice(axes: NDArray[np.float64]) -> NDArray[np.float64]:
+def _repeat_axes(axes: NDArray[np.float64]) -> NDArray[np.float64]:
     """Repeat the first axis, x, y, z, x, y, z, so that cyclic permutations of the axes are slices."""
     return np.concatenate([axes, axes])
 
 
-def _cross(left: NDArray[np.float64], right: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Compute the cross products of two results of `_twice`."""
+def _compute_cross(left: NDArray[np.float64], right: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Compute the cross products of two results of `_repeat_axes`."""
     crossed: NDArray[np.float64] = left[1:4] * right[2:5] - left[2:5] * right[1:4]
     return crossed
 

@@ -50,7 +50,7 @@ def column_shapes(samples: int, joints: int) -> Mapping[str, tuple[int, ...]]:
 
 
 @cache
-def _row_type(joints: tuple[str, ...], starts: tuple[int, ...], size: int) -> np.dtype[np.void]:
+def _make_row_type(joints: tuple[str, ...], starts: tuple[int, ...], size: int) -> np.dtype[np.void]:
     """Make the type of a row of `size` bytes with the records of joint states and odometry at `starts`."""
     names, formats, offsets = [], [], []
     for topic, start, columns in zip((joint_states(joints), ball_odometry()), starts, _FIELDS.values(), strict=True):
@@ -79,7 +79,7 @@ def trajectory_rows(contents: bytes, samples: int, joints: tuple[str, ...]) -> N
     for channel, topic in zip(_FIELDS, (joint_states(joints), ball_odometry()), strict=True):
         row.check_topic(channel, topic)
     starts = tuple(row.columns[channel].offset for channel in _FIELDS)
-    return np.frombuffer(contents, _row_type(joints, starts, len(contents) // samples))
+    return np.frombuffer(contents, _make_row_type(joints, starts, len(contents) // samples))
 
 
 def view_as_bytes(array: NDArray[np.float64] | NDArray[np.int64]) -> NDArray[np.void]:

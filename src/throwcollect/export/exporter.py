@@ -1,4 +1,4 @@
-"""What a format that datasets are exported to consists of."""
+"""The parts of a format that datasets are exported to."""
 
 from __future__ import annotations
 

@@ -49,7 +49,7 @@ class Feature:
         return kind if self.names is None else pa.list_(kind, len(self.names))
 
     def as_dict(self) -> dict[str, object]:
-        """Its entry in ``meta/info.json``."""
+        """Make its entry in ``meta/info.json``."""
         names = None if self.names is None else list(self.names)
         # In LeRobot, a scalar has the shape (1,), although its column in the file is no list.
         return {"dtype": self.dtype, "shape": [len(self.names or ("",))], "names": names}

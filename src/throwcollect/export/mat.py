@@ -128,7 +128,7 @@ def _save(path: Path, variables: Mapping[str, Any]) -> None:
 
 
 def _count_bytes(value: Any) -> int:
-    """Bytes of all numbers in nested structures."""
+    """Count the bytes of all numbers in nested structures."""
     if isinstance(value, dict):
         return sum(map(_count_bytes, value.values()))
     if isinstance(value, np.ndarray):
@@ -140,7 +140,7 @@ def _name_field(column: str) -> str:
     return column.replace(".", "_")
 
 
-def _to_cell(values: Sequence[Any]) -> NDArray[np.object_]:
+def _make_cell(values: Sequence[Any]) -> NDArray[np.object_]:
     cell = np.empty((1, len(values)), dtype=object)
     # NumPy would make a matrix of arrays with equal shapes, if it were given all of them at once.
     for index, value in enumerate(values):
@@ -167,17 +167,17 @@ def _gather_throws(
         balls.append(_stack_signals(throw, "ball_position_m", "ball_velocity_mps", of=[0, 1, 2]))
     return {
         "robot_data": {
-            "joints": _to_cell(source.dataset.moving_joints),
+            "joints": _make_cell(source.dataset.moving_joints),
             "base": np.array([[0.0, 0.0, source.dataset.config.robot.base_height_m]]),
             "dt": 1 / source.rate_hz,
         },
-        "qPath": _to_cell(paths),
+        "qPath": _make_cell(paths),
         "targets": np.array(targets),
         **_list_goals(source, goals),
-        "DMP": _to_cell(_describe_primitives(motions, source.rate_hz)),
+        "DMP": _make_cell(_describe_primitives(motions, source.rate_hz)),
         "trial": np.array([[float(entry.trial)] for entry in entries]),
-        "measured": _to_cell(measured),
-        "ball": _to_cell(balls),
+        "measured": _make_cell(measured),
+        "ball": _make_cell(balls),
     }
 
 
@@ -186,7 +186,7 @@ def _list_goals(source: ExportSource, goals: Sequence[Mapping[str, float]]) -> d
     if not source.targets:
         return {}
     names = [each.name for each in source.targets]
-    return {"wanted": np.array([[each[name] for name in names] for each in goals]), "wanted_names": _to_cell(names)}
+    return {"wanted": np.array([[each[name] for name in names] for each in goals]), "wanted_names": _make_cell(names)}
 
 
 def _sample_path(trajectory: JointTrajectory, rate_hz: int) -> NDArray[np.float64]:

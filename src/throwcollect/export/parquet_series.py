@@ -31,10 +31,10 @@ class ParquetSeries:
             self._writer = None
 
     def place(self) -> tuple[int, int]:
-        """Numbers of directory and file that the next table goes to."""
+        """Find the numbers of the directory and the file that the next table goes to."""
         if self.paths and self.paths[-1].stat().st_size >= MEGABYTES_PER_FILE * 2**20:
             self.close()
-        # The last path is that of the open file, if one is open, and the next table goes there.
+        # If a file is open, the last path is its path, and the next table goes there.
         return divmod(len(self.paths) - (self._writer is not None), FILES_PER_CHUNK)
 
     def append(self, table: pa.Table) -> None:

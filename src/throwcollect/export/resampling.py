@@ -13,7 +13,7 @@ interpolate = lazily("scipy.interpolate", extra="export")
 
 
 def count_resampled(samples: int, *, recorded_hz: int, rate_hz: int) -> int:
-    """Number of samples that `resample` gives for so many recorded ones."""
+    """Count the samples that `resample` makes of a number of recorded ones."""
     return (samples - 1) * rate_hz // recorded_hz + 1
 
 
@@ -29,20 +29,20 @@ def resample(samples: Samples, *, recorded_hz: int, rate_hz: int) -> Samples:
     count = count_resampled(len(samples), recorded_hz=recorded_hz, rate_hz=rate_hz)
     # In units of the recorded spacing, so that instants of recorded samples are hit exactly.
     places = np.arange(count) * recorded_hz / rate_hz
-    orientation = _linear(_without_flips(samples.ball_orientation_xyzw), places)
+    orientation = _interpolate_linearly(_remove_flips(samples.ball_orientation_xyzw), places)
     return Samples(
         stamps_ns=samples.stamps_ns[0] + np.round(np.arange(count) * (NS_PER_S / rate_hz)).astype(np.int64),
-        position=_cubic(samples.position, samples.velocity / recorded_hz, places),
-        velocity=_linear(samples.velocity, places),
-        effort=_linear(samples.effort, places),
-        ball_position=_cubic(samples.ball_position, samples.ball_linear_velocity / recorded_hz, places),
+        position=_interpolate_cubically(samples.position, samples.velocity / recorded_hz, places),
+        velocity=_interpolate_linearly(samples.velocity, places),
+        effort=_interpolate_linearly(samples.effort, places),
+        ball_position=_interpolate_cubically(samples.ball_position, samples.ball_linear_velocity / recorded_hz, places),
         ball_orientation_xyzw=orientation / np.linalg.norm(orientation, axis=1, keepdims=True),
-        ball_linear_velocity=_linear(samples.ball_linear_velocity, places),
-        ball_angular_velocity=_linear(samples.ball_angular_velocity, places),
+        ball_linear_velocity=_interpolate_linearly(samples.ball_linear_velocity, places),
+        ball_angular_velocity=_interpolate_linearly(samples.ball_angular_velocity, places),
     )
 
 
-def _linear(values: NDArray[np.float64], places: NDArray[np.float64]) -> NDArray[np.float64]:
+def _interpolate_linearly(values: NDArray[np.float64], places: NDArray[np.float64]) -> NDArray[np.float64]:
     before = np.minimum(places.astype(np.intp), len(values) - 1)
     after = np.minimum(before + 1, len(values) - 1)
     share = (places - before)[:, np.newaxis]
@@ -50,7 +50,7 @@ def _linear(values: NDArray[np.float64], places: NDArray[np.float64]) -> NDArray
     return between
 
 
-def _cubic(
+def _interpolate_cubically(
     values: NDArray[np.float64], slopes: NDArray[np.float64], places: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     if len(values) < 2:
@@ -59,7 +59,7 @@ def _cubic(
     return curve
 
 
-def _without_flips(quaternions: NDArray[np.float64]) -> NDArray[np.float64]:
+def _remove_flips(quaternions: NDArray[np.float64]) -> NDArray[np.float64]:
     """Choose, of the two quaternions of each orientation, the one that is near the quaternion before."""
     # Each flip turns the sign of all quaternions that follow, so that two flips cancel out.
     turns = np.sum(quaternions[1:] * quaternions[:-1], axis=1) < 0

@@ -13,7 +13,7 @@ _ASCII = str.maketrans({"²": "^2", "³": "^3"})
 
 
 def unit_of(column: str) -> str:
-    """Unit of a column of numbers or of a dotted key in ASCII, such as ``m/s^2``; ``1`` for counts and shares."""
+    """Find the unit of a column of numbers or a dotted key in ASCII, such as ``m/s^2``; ``1`` for counts and shares."""
     return unit_of_key(column).translate(_ASCII) or "1"
 
 

@@ -31,7 +31,7 @@ Signals = Mapping[str, NDArray[np.float64]]
 
 @dataclass(frozen=True)
 class ExportableThrow:
-    """A throw that can be exported, before it is read; its samples are as many as the export will have."""
+    """A throw that can be exported, before it is read; `samples` is the number of samples in the export."""
 
     trial: int
     samples: int
@@ -90,7 +90,7 @@ class ExportSource:
 
     @classmethod
     def open(cls, directory: Path, *, rate_hz: int | None = None) -> ExportSource:
-        """Open a dataset to export it, with so many samples per second, or else as many as were recorded.
+        """Open a dataset to export it, at a number of samples per second, or else at the recorded one.
 
         Raises:
             DatasetError: If the directory holds no finished dataset, or one without episodes.
@@ -149,7 +149,7 @@ def _list_entries(dataset: Dataset, rate_hz: int) -> dict[str, tuple[ExportableT
         if row["shard"] is not None:
             count = count_resampled(row["samples"], recorded_hz=dataset.config.record.rate_hz, rate_hz=rate_hz)
             entry = ExportableThrow(row["trial"], count, row["outcome"] == dataset.config.task.success)
-            # The name becomes that of a file of the export, so it must lead nowhere else.
+            # The name becomes the name of a file of the export, so it must not lead to another directory.
             shards.setdefault(Path(row["shard"]).stem, []).append(entry)
     return {shard: tuple(entries) for shard, entries in shards.items()}
 
@@ -192,5 +192,5 @@ def add_units(throws: pa.Table) -> pa.Table:
 
 
 def read_metadata(field: pa.Field) -> dict[str, str]:
-    """Metadata of a column of the table, such as its ``unit`` and ``description``."""
+    """Read the metadata of a column of the table, such as its ``unit`` and ``description``."""
     return {key.decode(): value.decode() for key, value in (field.metadata or {}).items()}

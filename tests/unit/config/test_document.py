@@ -95,7 +95,9 @@ def test_what_does_not_fit_its_tag_or_any_number_is_a_problem(read, text, senten
 
 @pytest.mark.parametrize("escaped", [r"\UFFFFFFFF", r"\U00110000", r"\ud800"])
 def test_characters_that_unicode_does_not_have_are_no_yaml(read, escaped):
-    with pytest.raises(ConfigError, match=r"run\.yaml:2: not valid YAML: an escaped character is none of Unicode"):
+    with pytest.raises(
+        ConfigError, match=r"run\.yaml:2: not valid YAML: an escaped character does not exist in Unicode"
+    ):
         read(f'a: 1\n"{escaped}": 2\n')
 
 

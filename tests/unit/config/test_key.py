@@ -78,7 +78,7 @@ def test_a_key_of_the_operator_is_found_in_a_section_of_any_member():
         part: Annotated[any_of({"own": Own, "other": Other}, str), Key(Effect.TASK)] = Own()
         maybe: Own | None = None
 
-    assert list(values._operator_keys(Whole)) == ["part.table", "maybe.table"]
+    assert list(values._find_operator_keys(Whole)) == ["part.table", "maybe.table"]
 
 
 def test_more_trials_may_follow_from_few_keys():

@@ -95,7 +95,7 @@ JOINT_LIST = "joint names, each with a number from -6.3 to 6.3 rad"
             "sim: {engine: auto}",
             [
                 "run.yaml:1: sim.engine: should be one of 'bullet', 'mujoco', 'ballistic', got 'auto'; "
-                "none is chosen by itself, as the same file would give other throws on another machine"
+                "none is chosen automatically, as the same file would give other throws on another machine"
             ],
         ),
         (

@@ -62,7 +62,7 @@ def test_tasks_may_have_successes_of_one_name(monkeypatch):
     tasks = {"throw": ThrowConfig, "lob": LobConfig}
     monkeypatch.setattr(schema, "names_of", lambda _: tuple(tasks))
     monkeypatch.setattr(schema, "load_member", lambda _, name: tasks[name])
-    until = TypeAdapter(schema._untils()).validate_python({"landed": 3})
+    until = TypeAdapter(schema._make_until_type()).validate_python({"landed": 3})
     assert type(until) is UntilLanded
     monkeypatch.undo()
     for task in (ThrowConfig(), LobConfig()):

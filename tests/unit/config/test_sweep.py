@@ -87,8 +87,8 @@ def test_samplers_get_what_they_need_and_nothing_else(problems_of, sweep, messag
 
 def test_samplers_that_draw_need_a_number_of_trials(problems_of):
     assert problems_of("sweep: {parameters: {ball.mass_kg: {min: 1, max: 2}}}") == [
-        "run.yaml: trials: missing; the sampler sobol should know how many trials to draw, or until how many have "
-        "landed"
+        "run.yaml: trials: missing; the sampler sobol should know how many trials to draw, or (until) how many "
+        "should have landed"
     ]
 
 
@@ -136,8 +136,8 @@ def test_a_target_begins_with_sobol_and_has_parameters(problems_of):
         "run.yaml:2: sweep.parameters: missing; target should have parameters to reach it with"
     ]
     assert problems_of(f"sweep: {{{PARAMETERS}, {target}}}") == [
-        "run.yaml: trials: missing; the sampler sobol should know how many trials to draw, or until how many have "
-        "landed"
+        "run.yaml: trials: missing; the sampler sobol should know how many trials to draw, or (until) how many "
+        "should have landed"
     ]
 
 

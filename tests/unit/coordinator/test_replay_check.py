@@ -93,7 +93,7 @@ def test_an_early_process_that_fails_is_replaced(check, digests, started) -> Non
 def test_a_trial_that_came_out_otherwise_is_an_error(check, digests, early) -> None:
     if early:
         check.begin(NUMBERS)
-    with pytest.raises(DatasetError, match=f"1 of 2 trials came out otherwise in a fresh process: trial {CHOSEN[1]}"):
+    with pytest.raises(DatasetError, match=f"1 of 2 trials came out differently in a fresh process: trial {CHOSEN[1]}"):
         compare(check, {**digests, CHOSEN[1]: "0" * 64})
 
 

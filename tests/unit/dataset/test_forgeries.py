@@ -308,7 +308,7 @@ def test_what_depends_on_results_is_not_judged_without_them(tmp_path: Path) -> N
         (128, 128, None),
         (100, 100, "has 100 trials, the configuration draws 128"),
         (192, 192, "has 192 trials, the configuration draws 128"),
-        (128, 10, "ends with trial 127, and by the results more would follow"),
+        (128, 10, "ends with trial 127, but more would follow from the results"),
     ],
 )
 def test_the_rounds_of_a_plan_that_grew_follow_from_the_results(

@@ -131,7 +131,7 @@ def test_recordings_under_each_others_names_are_refused(dataset: Path) -> None:
     one, other = first.read_bytes(), second.read_bytes()
     first.write_bytes(other)
     second.write_bytes(one)
-    with pytest.raises(DatasetError, match=r"quick_00000\.mcap: trial 3: its episode does not belong into this file"):
+    with pytest.raises(DatasetError, match=r"quick_00000\.mcap: trial 3: its episode does not belong in this file"):
         rebuild(dataset)
 
 

@@ -208,8 +208,8 @@ def test_an_episode_that_is_not_the_one_of_the_table_is_kept_with_a_remark(
     assert (repaired.episodes, repaired.lost) == (7, ())
     assert repaired.differing == (DifferingEpisode(4, SHARD, digest=wrong, expected=right),)
     assert repaired.remarks == (
-        f"{SHARD}: trial 4: an episode with digest {wrong}, not {right} as in throws.parquet; kept, as nothing else "
-        "speaks against it",
+        f"{SHARD}: trial 4: an episode with digest {wrong}, not {right} as in throws.parquet; kept, as it passes "
+        "all other checks",
     )
     assert verify(output) == []
 

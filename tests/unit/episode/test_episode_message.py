@@ -47,7 +47,7 @@ def test_an_episode_arrives_as_it_was_sent(sent: Episode, make_samples: Any) -> 
     episode, result, conditions = unpack(pack(Delivery(sent, RESULT, CONDITIONS), SIGNER), SIGNER)
     assert (result, conditions) == (RESULT, CONDITIONS)
     assert (episode.header, episode.chunk, episode.sensors) == (sent.header, sent.chunk, ())
-    assert episode.state.said_sha256 == sent.state.records_sha256
+    assert episode.state.stated_sha256 == sent.state.records_sha256
     assert episode.digest == sent.digest
     assert episode.samples().ball_position.tolist() == make_samples(50).ball_position.tolist()
 

@@ -66,7 +66,7 @@ def split_dataset(
     ],
     cells: Annotated[
         list[str] | None,
-        typer.Option("--cells", metavar="EXPRESSION=WIDTH", help="Axis of cells that are not torn apart; repeatable."),
+        typer.Option("--cells", metavar="EXPRESSION=WIDTH", help="Axis of the cells that stay whole; may be repeated."),
     ] = None,
     seed: SeedOption = 0,
     json: JsonOption = False,

@@ -26,7 +26,7 @@ def show_info(directory: DatasetArgument, json: JsonOption = False) -> None:
 
     found = info(directory)
     print_result(asdict(found), describe(found), json=json)
-    # The summary follows from the tables, which are there all the same.
+    # The summary needs only the tables, so it is printed even if recordings are missing.
     check_recordings_are_there(directory)
 
 
@@ -67,7 +67,7 @@ def print_summary(found: Info, directory: Path | None, *, as_json: bool) -> None
 
 
 def describe(found: Info) -> str:
-    """Put the summary of a dataset into words, one fact a line; that of a run also says if anybody could join it."""
+    """Put the summary of a dataset into words, one fact a line; a run's summary also says if anybody could join it."""
     from throwcollect.runs.run_record import Summary
 
     outcomes = ", ".join(f"{count} {outcome}" for outcome, count in found.outcomes.items())
@@ -110,6 +110,6 @@ def _describe_misses(name: str, misses: MissSummary) -> str:
 def _describe_landing(landing: Mapping[str, tuple[float, float]] | None) -> str:
     if landing is None:
         return "no ball landed"
-    # Adding 0 makes 0 of what rounds to a negative one.
+    # Adding 0 turns a negative zero into 0.
     x, y = ([round(end, 3) + 0.0 for end in landing[name]] for name in ("x_m", "y_m"))
     return f"x {x[0]:.3f} to {x[1]:.3f} m, y {y[0]:.3f} to {y[1]:.3f} m"

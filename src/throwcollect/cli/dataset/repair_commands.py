@@ -28,7 +28,7 @@ def rebuild_dataset(directory: DatasetArgument, json: JsonOption = False) -> Non
     if rejudged := rebuilt.rejudged:
         changes = [f"trial {each.trial}: {each.before} -> {each.after}" for each in rejudged]
         verb = "is" if len(rejudged) == 1 else "are"
-        typer.echo(f"{format_count(len(rejudged), 'throw')} {verb} judged otherwise: {_join(changes)}")
+        typer.echo(f"{format_count(len(rejudged), 'throw')} {verb} judged differently: {_join(changes)}")
     if rebuilt.lost:
         typer.echo(f"lost: {_join([str(trial) for trial in rebuilt.lost])}")
 
@@ -62,7 +62,7 @@ def repair_dataset(directory: DatasetArgument, output: OutputArgument, json: Jso
     if repaired.differing:
         first = repaired.differing[0].trial
         raise LossError(
-            f"{output}: {format_count(len(repaired.differing), 'episode')} kept, such as that of trial {first}, "
-            f"which {THROWS} had otherwise",
+            f"{output}: {format_count(len(repaired.differing), 'episode')} kept that differ from {THROWS}, "
+            f"such as that of trial {first}",
             hint=f"{command('dataset', 'replay', output, '--trial', first)} simulates it again and compares",
         )

@@ -26,7 +26,7 @@ def replay_dataset(
     ] = None,
     everything: Annotated[bool, typer.Option("--all", help="All trials.")] = False,
     sample: Annotated[
-        int | None, typer.Option("--sample", metavar="N", min=1, help="With --all: so many of them, chosen at random.")
+        int | None, typer.Option("--sample", metavar="N", min=1, help="With --all: N of them, chosen at random.")
     ] = None,
     engine: Annotated[
         str | None, typer.Option(metavar="NAME", help="Simulate them with another engine: how much differs?")
@@ -66,8 +66,8 @@ def replay_dataset(
     differ = sum(bool(comparison.differences) for comparison in comparisons)
     if differ:
         raise DatasetError(
-            f"{directory}: {differ} of {format_count(len(comparisons), 'throw')} came out otherwise",
-            hint="README.md in it says with which processor and versions it was made",
+            f"{directory}: {differ} of {format_count(len(comparisons), 'throw')} came out differently",
+            hint="its README.md says with which processor and versions it was made",
         )
     if not json:
         typer.echo(f"{directory}: {format_count(len(comparisons), 'throw')} replayed, the same bit for bit")
@@ -87,7 +87,7 @@ def _compare_engines(directory: Path, engine: str, trials: Sequence[int], plot: 
 
         check_picture(plot)
     deviations = list(simulate_with(directory, engine, trials))
-    # The numbers come first: a picture that cannot be drawn after all does not cost them.
+    # Print the numbers first, so that they are not lost if the picture cannot be drawn after all.
     _print_deviations(directory, engine, deviations, json=json)
     if plot is not None:
         from throwcollect.report.throw.deviations import write_deviations

@@ -64,5 +64,5 @@ def _describe_unchecked(dataset: Dataset, replay: int | None) -> str:
             text += f" ({error.message})"
     run = len(dataset.plan.trials) - len(dataset.plan.trials.refused)
     if run > CHECKED_AGAIN and is_available(dataset.config):
-        text += f"; whether the robot can do them was checked of {CHECKED_AGAIN} of {run} trials"
+        text += f"; whether the robot can do them was checked for {CHECKED_AGAIN} of {run} trials"
     return text

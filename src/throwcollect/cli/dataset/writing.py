@@ -53,7 +53,7 @@ def report_dataset(
         typer.Option("--png", metavar="DIR", help="Also write the main plots as pictures; must be new or empty."),
     ] = None,
     model: Annotated[
-        Path | None, typer.Option("--model", metavar="MODEL", help="A model of the dataset, and how it hits.")
+        Path | None, typer.Option("--model", metavar="MODEL", help="Also show a model of the dataset, and how it hits.")
     ] = None,
     json: JsonOption = False,
 ) -> None:

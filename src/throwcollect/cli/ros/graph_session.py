@@ -12,7 +12,7 @@ from throwcollect import ros
 from throwcollect.errors import ConfigError, Interrupted, ThrowcollectError, WorkerError
 from throwcollect.ros.graph_names import is_hidden, make_own_name
 
-_SLICE_S = 0.2
+_WAIT_S = 0.2
 """Longest single wait: rclpy handles signals only between two waits."""
 _QUIET_S = 0.5
 """Time without anything new after which discovery counts as complete."""
@@ -32,7 +32,7 @@ class GraphSession:
     def spin_until(self, done: Callable[[], bool]) -> None:
         """Run callbacks until a condition holds."""
         while not done():
-            self._executor.spin_once(timeout_sec=_SLICE_S)
+            self._executor.spin_once(timeout_sec=_WAIT_S)
 
     def look_around(self) -> None:
         """Wait until other nodes are discovered, and nothing new follows for a moment.
@@ -42,17 +42,17 @@ class GraphSession:
         known: set[object] = set()
         start = changed = time.monotonic()
         while (now := time.monotonic()) < start + _LOOKING_S:
-            self._executor.spin_once(timeout_sec=_SLICE_S)
+            self._executor.spin_once(timeout_sec=_WAIT_S)
             nodes = set(self.node.get_node_names_and_namespaces())
             discovered: set[object] = {*nodes, *(name for name, _ in self.node.get_topic_names_and_types())}
             if discovered != known:
                 known, changed = discovered, now
-            # The own node is always among them, so one node means that nobody else was found yet.
+            # This node is always among them, so a single node means that no other was found yet.
             elif len(nodes) > 1 and now > changed + _QUIET_S:
                 return
 
     def answer(self, future: ros.Future, *, alive: Callable[[], bool], who: str) -> Any:
-        """Wait for the answer to a request to a node or service; `alive` tells whether that still exists.
+        """Wait for the answer to a request to a node or service; `alive` tells whether that one still exists.
 
         Raises:
             WorkerError: If the node has vanished.
@@ -76,7 +76,7 @@ class GraphSession:
 
 @contextmanager
 def join_graph(run: str | None) -> Iterator[GraphSession]:
-    """Join the graph of a run, or without one that of the router that the environment names.
+    """Join the graph of a run, or without a run, the graph of the router that the environment names.
 
     Raises:
         ConfigError: If there is no such run or no router.
@@ -89,9 +89,9 @@ def join_graph(run: str | None) -> Iterator[GraphSession]:
     connection = None
     try:
         if run is not None:
-            from throwcollect.cli.ros.joined_run import find_way
+            from throwcollect.cli.ros.joined_run import find_run_and_connection
 
-            connection = find_way(run)[1]
+            connection = find_run_and_connection(run)[1]
         try:
             ros.init(connection=connection)
         except ConfigError:

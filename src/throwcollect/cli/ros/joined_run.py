@@ -8,7 +8,7 @@ from throwcollect.runs.records import Records, Run
 from throwcollect.runs.run_selection import find_run_to_change, require_living
 
 
-def find_way(run: str | None) -> tuple[Run, Connection]:
+def find_run_and_connection(run: str | None) -> tuple[Run, Connection]:
     """Find a run, or the only one that lives, and the connection by which our own processes join it.
 
     Raises:

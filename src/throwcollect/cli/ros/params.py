@@ -71,7 +71,7 @@ def show_parameter(node: NodeArgument, name: ParameterArgument, run: RunOption =
         print(label, plain(getattr(values[0], field)))
 
 
-# A value may be a negative number, which is no option.
+# A value may be a negative number, which would otherwise be taken for an option.
 @param_app.command("set", context_settings={"ignore_unknown_options": True})
 def set_parameter(
     node: NodeArgument,

@@ -8,14 +8,14 @@ import typer
 
 
 def _settle_middleware(run: str | None) -> str | None:
-    """Make this process use the middleware of the run; it has to, before it takes any name from `throwcollect.ros`.
+    """Make this process use the middleware of the run; without a run, the environment decides.
 
-    Without a run, the environment decides.
+    This has to happen before the process takes any name from `throwcollect.ros`.
     """
     if run is not None:
-        from throwcollect.cli.ros.joined_run import find_way
+        from throwcollect.cli.ros.joined_run import find_run_and_connection
 
-        find_way(run)[1].middleware.settle()
+        find_run_and_connection(run)[1].middleware.settle()
     return run
 
 

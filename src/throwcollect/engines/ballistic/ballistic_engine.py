@@ -105,10 +105,10 @@ class BallisticEngine(Engine):
     def run(self, steps: Steps, observer: Observer) -> int:
         """Take steps until the observer stops them."""
         number, due = 0, steps.first_sample
-        for number, (position, velocity, touching) in enumerate(self._path(steps), start=1):
+        for number, (position, velocity, touching) in enumerate(self._compute_path(steps), start=1):
             self._joints, self._velocities = steps.targets[number], steps.velocities[number - 1]
             self._position, self._velocity, self._touching = position, velocity, touching
-            # Observers hear of changes only, also from engines with contacts.
+            # Every engine tells observers only of changes.
             if touching != self._told:
                 self._told = touching
                 observer.on_touch(number, touching)
@@ -138,7 +138,7 @@ class BallisticEngine(Engine):
         ball = (*self._position, *self._orientation, *self._velocity, 0.0, 0.0, 0.0)
         return (*self._joints.tolist(), *self._velocities.tolist(), *torques, *ball)
 
-    def _path(self, steps: Steps) -> Iterator[_Moment]:
+    def _compute_path(self, steps: Steps) -> Iterator[_Moment]:
         """Compute the ball after each step."""
         moment = self._position, self._velocity, self._touching
         steps_left = len(steps.velocities)

@@ -22,7 +22,7 @@ class _Joint:
     """One joint between base and tool.
 
     Attributes:
-        turn: Orientation of its frame in that of the link before, shape ``(3, 3)``.
+        turn: Orientation of its frame in the frame of the link before, shape ``(3, 3)``.
         place: Origin of its frame there [m], shape ``(3, 1)``.
         axis: Unit vector that it turns about, in its frame.
         column: Column of the commands that it follows; None if it is fixed.
@@ -44,12 +44,12 @@ class ToolPath:
     def __init__(self, scene: Scene) -> None:
         # `Scene` says that its description can be trusted.
         joints = ElementTree.fromstring(scene.urdf.encode()).findall("joint")  # noqa: S314
-        above = {_link(joint, "child"): joint for joint in joints}
+        above = {_find_link(joint, "child"): joint for joint in joints}
         chain = []
         link = scene.tool.link
         while (joint := above.get(link)) is not None:
-            chain.append(_read(joint, scene.moving))
-            link = _link(joint, "parent")
+            chain.append(_read_joint(joint, scene.moving))
+            link = _find_link(joint, "parent")
         self._chain = chain[::-1]
         self._base = np.array([[0.0], [0.0], [scene.base_height_m]])
 
@@ -68,39 +68,39 @@ class ToolPath:
             place = place + matmul(turn, joint.place)
             turn = matmul(turn, joint.turn)
             if joint.column is not None:
-                turn = matmul(turn, _rotations(joint.axis, positions[:, joint.column]))
+                turn = matmul(turn, _make_rotations(joint.axis, positions[:, joint.column]))
         return place, turn
 
 
-def _read(joint: ElementTree.Element, moving: Sequence[str]) -> _Joint:
+def _read_joint(joint: ElementTree.Element, moving: Sequence[str]) -> _Joint:
     name, kind = joint.get("name", ""), joint.get("type")
     if kind not in ("fixed", "revolute", "continuous"):
         raise ConfigError(f"joint {name}: the engine ballistic knows no {kind} joints between base and tool")
-    place = _numbers(joint, "origin", "xyz", (0.0, 0.0, 0.0))
-    angles = _numbers(joint, "origin", "rpy", (0.0, 0.0, 0.0))
+    place = _read_numbers(joint, "origin", "xyz", (0.0, 0.0, 0.0))
+    angles = _read_numbers(joint, "origin", "rpy", (0.0, 0.0, 0.0))
     turn = np.eye(3)
     # URDF's roll, pitch and yaw turn about the axes of the link before, roll first: the matrix of yaw times that of
     # pitch times that of roll.
     for axis, angle in zip(((0, 0, 1), (0, 1, 0), (1, 0, 0)), angles[::-1], strict=True):
-        turn = matmul(turn, _rotations(axis, np.array([angle]))[0])
-    x, y, z = _numbers(joint, "axis", "xyz", (1.0, 0.0, 0.0))
+        turn = matmul(turn, _make_rotations(axis, np.array([angle]))[0])
+    x, y, z = _read_numbers(joint, "axis", "xyz", (1.0, 0.0, 0.0))
     length = math.hypot(x, y, z)
     column = None if kind == "fixed" else moving.index(name)
     return _Joint(turn, np.array(place).reshape(3, 1), (x / length, y / length, z / length), column)
 
 
-def _link(joint: ElementTree.Element, end: str) -> str:
+def _find_link(joint: ElementTree.Element, end: str) -> str:
     element = joint.find(end)
     return "" if element is None else element.get("link", "")
 
 
-def _numbers(joint: ElementTree.Element, tag: str, key: str, default: Vector) -> Sequence[float]:
+def _read_numbers(joint: ElementTree.Element, tag: str, key: str, default: Vector) -> Sequence[float]:
     element = joint.find(tag)
     text = None if element is None else element.get(key)
     return default if text is None else [float(word) for word in text.split()]
 
 
-def _rotations(axis: Sequence[float], angles: Array) -> Array:
+def _make_rotations(axis: Sequence[float], angles: Array) -> Array:
     """Make rotations about a unit vector, by Rodrigues' formula, shape ``(n, 3, 3)``."""
     x, y, z = axis
     across = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])

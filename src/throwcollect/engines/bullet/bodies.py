@@ -45,7 +45,7 @@ class BulletBodies(Bodies):
     def add(self, name: str, model: BodyModel, start: BodyState) -> None:
         """Put a body into the world; see `Bodies.add`."""
         client = self._client
-        # This is noted before the body is loaded, because one that Bullet refuses may leave something behind, too.
+        # This is set before the body is loaded, because a body that Bullet refuses may leave traces, too.
         self.leave_traces = True
         body = _load(client, model, start)
         self._bodies[name] = body, model
@@ -84,15 +84,17 @@ class BulletBodies(Bodies):
         body, _ = self._bodies[name]
         centre, turn = pybullet.getBasePositionAndOrientation(body, self._client)
         linear, angular = pybullet.getBaseVelocity(body, self._client)
-        inward = pybullet.invertTransform(*self._inertial_frame(body))
+        inward = pybullet.invertTransform(*self._find_inertial_frame(body))
         position, orientation = pybullet.multiplyTransforms(centre, turn, *inward)
-        return BodyState(position, orientation, _velocity_at(linear, angular, centre, position), angular)
+        return BodyState(position, orientation, _find_velocity_at(linear, angular, centre, position), angular)
 
     def place(self, name: str, state: BodyState) -> None:
         """Set pose and velocity of the root link of a body; its joints stay as they are."""
         body, _ = self._bodies[name]
-        centre, turn = pybullet.multiplyTransforms(state.position, state.orientation_xyzw, *self._inertial_frame(body))
-        linear = _velocity_at(state.linear_velocity, state.angular_velocity, state.position, centre)
+        centre, turn = pybullet.multiplyTransforms(
+            state.position, state.orientation_xyzw, *self._find_inertial_frame(body)
+        )
+        linear = _find_velocity_at(state.linear_velocity, state.angular_velocity, state.position, centre)
         pybullet.resetBasePositionAndOrientation(body, centre, turn, physicsClientId=self._client)
         pybullet.resetBaseVelocity(body, linear, state.angular_velocity, physicsClientId=self._client)
 
@@ -116,7 +118,7 @@ class BulletBodies(Bodies):
         finally:
             pybullet.disconnect(aside)
 
-    def _inertial_frame(self, body: int) -> tuple[Vector, Quaternion]:
+    def _find_inertial_frame(self, body: int) -> tuple[Vector, Quaternion]:
         """Find centre of mass and principal axes in the root link; by these the engine locates a body."""
         info: Sequence[tuple[float, ...]] = pybullet.getDynamicsInfo(body, BASE, physicsClientId=self._client)
         position: Vector = tuple(info[_INERTIAL_POSITION])  # type: ignore[assignment]
@@ -146,7 +148,7 @@ def _load(client: int, model: BodyModel, start: BodyState, *, flags: int = pybul
             raise RequestError("RESOURCE_PARSE_ERROR", f"the physics engine cannot load it: {error}") from error
 
 
-def _velocity_at(linear: Vector, angular: Vector, origin: Vector, other: Vector) -> Vector:
+def _find_velocity_at(linear: Vector, angular: Vector, origin: Vector, other: Vector) -> Vector:
     """Find the velocity of another point of a body that turns."""
     x, y, z = (b - a for a, b in zip(origin, other, strict=True))
     u, v, w = angular

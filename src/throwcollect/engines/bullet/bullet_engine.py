@@ -72,7 +72,7 @@ class BulletEngine(Engine):
 
     def load(self, scene: Scene) -> None:
         """Make the world of a scene; if nothing but the ball's radius differs, only the ball changes."""
-        # The engine has no scene meanwhile, because a world that could not be loaded must not be kept the next time.
+        # Forget the scene until the world is loaded: if loading fails, the next call must not keep anything of it.
         kept, self._scene = self._scene, None
         if (
             kept is None
@@ -183,7 +183,7 @@ class BulletEngine(Engine):
         return boxes(self._client, self._scenery.robot)
 
     def _tell_touch(self, step: int, observer: Observer) -> None:
-        """Tell the observer which bodies press on the ball now, unless these are other surfaces of the same names."""
+        """Tell the observer which bodies press on the ball now, unless only other surfaces of the same bodies do."""
         touching = frozenset(self._names[surface] for surface in self._pressing or ())
         if touching != self._touching:
             self._touching = touching

@@ -35,7 +35,7 @@ class Renderer:
     def __init__(
         self, urdf: str, base_height_m: float, ball_radius_m: float, ball_rgba: tuple[float, float, float, float]
     ) -> None:
-        heavy = _with_masses(urdf)
+        heavy = _add_masses(urdf)
         self._client = connect()
         try:
             self._robot = load_robot(self._client, heavy, base_height_m)
@@ -103,7 +103,7 @@ class Renderer:
         return picture
 
 
-def _with_masses(urdf: str) -> str:
+def _add_masses(urdf: str) -> str:
     """Give every link of a description a mass: Bullet prints a warning to standard output for each link without one."""
     robot = ElementTree.fromstring(urdf)  # noqa: S314 - the dataset's own description
     for link in robot.iter("link"):

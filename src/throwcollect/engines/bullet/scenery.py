@@ -70,7 +70,7 @@ def load_scenery(client: int, scene: Scene) -> Scenery:
     names = {(ground, BASE): GROUND, (robot, BASE): root}
     for number in links(client, robot)[1:]:
         info = pybullet.getJointInfo(robot, number, physicsClientId=client)
-        # Field 1 is the name of the joint, field 12 that of the link which it moves.
+        # Field 1 is the name of the joint, field 12 the name of the link that it moves.
         joints[info[1].decode()] = number
         names[robot, number] = info[12].decode()
     tool = next(link for (_, link), name in names.items() if name == scene.tool.link)
@@ -137,7 +137,7 @@ def boxes(client: int, body: int) -> list[Box]:
 
 
 def set_physics(client: int, scenery: Scenery, ball: int, physics: Physics) -> None:
-    """Set time step, solver, gravity, masses and surfaces; all of them, so that none of the trial before remains."""
+    """Set time step, solver, gravity, masses and surfaces: all of them, so that nothing of an earlier trial stays."""
     pybullet.setPhysicsEngineParameter(
         fixedTimeStep=1 / physics.hz,
         numSolverIterations=physics.solver_iterations,
@@ -159,7 +159,7 @@ def set_physics(client: int, scenery: Scenery, ball: int, physics: Physics) -> N
         **undamped,
     )
     for body, link in scenery.names:
-        # Bullet multiplies restitutions: with 1 here, that of the ball alone counts.
+        # Bullet multiplies restitutions: with 1 here, only the restitution of the ball counts.
         pybullet.changeDynamics(
             body,
             link,

@@ -22,7 +22,7 @@ class _Added:
 
     Attributes:
         model: Its model.
-        links: Names of its links; that of the root comes first.
+        links: Names of its links; the root link comes first.
         state: The state that it was last put into.
     """
 
@@ -99,8 +99,8 @@ class MujocoBodies(Bodies):
             text, body.links = _number_links(body.model.urdf)
             child = read_urdf(text, body.model.encode_meshes())
             for joint in child.joints:
-                # MuJoCo reads the effort of a URDF's limit as a range of motor torques. It brakes the joint once it is
-                # dry friction.
+                # MuJoCo reads the effort limit of a URDF as a range of motor torques. Set as dry friction instead, it
+                # brakes the joint.
                 joint.frictionloss = max(joint.actfrcrange[1], 0.0)
                 joint.actfrclimited = mujoco.mjtLimited.mjLIMITED_FALSE
             if not body.model.is_fixed:
@@ -149,7 +149,7 @@ class MujocoBodies(Bodies):
         model, data = self._world()
         # MuJoCo computes the poses of shapes at the beginning of a step, so those of now are not known yet.
         mujoco.mj_kinematics(model, data)
-        return boxes(model, data, self._numbers(name))
+        return boxes(model, data, self._list_body_numbers(name))
 
     def bounds(self, name: str) -> list[Box]:
         """Find the boxes around the links of a body, along the axes of its root link."""
@@ -157,9 +157,9 @@ class MujocoBodies(Bodies):
         mujoco.mj_kinematics(model, data)
         root = model.body(f"{name}/0").id
         frame = data.xpos[root], rotation(data.xquat[root])
-        return boxes(model, data, self._numbers(name), frame)
+        return boxes(model, data, self._list_body_numbers(name), frame)
 
-    def _numbers(self, name: str) -> list[int]:
+    def _list_body_numbers(self, name: str) -> list[int]:
         """List MuJoCo's body number of each link of a body."""
         model, _ = self._world()
         return [model.body(f"{name}/{number}").id for number in range(len(self._bodies[name].links))]

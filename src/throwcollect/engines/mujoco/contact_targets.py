@@ -1,8 +1,8 @@
 """Target velocities of contacts, as Bullet has them.
 
-MuJoCo computes the acceleration that a contact asks for from the velocities at the begin of a step, and ignores that
-the surfaces turn. A tool that swings turns so fast that a ball, which it holds with less and less force, would begin to
-hop long before it leaves. So this module gives each contact in each step the velocity that it should have after it.
+MuJoCo computes the acceleration that a contact asks for from the velocities at the beginning of a step, and ignores
+that the surfaces turn. A tool that swings turns so fast that a ball, which it holds with less and less force, would
+begin to hop long before it leaves. So this module gives each contact the velocity that it should have after the step.
 """
 
 from __future__ import annotations

@@ -127,7 +127,7 @@ class MujocoEngine(Engine):
         self._physics = physics
         set_physics(self._model, physics)
         self._restitutions = restitutions_of(self._model, physics)
-        self._pick = _find_sample(self._model, self._places)
+        self._pick = _make_sample_picker(self._model, self._places)
 
     def rest(self, joints: Sequence[float], seat: Vector) -> None:
         """Put the joints into positions and the ball into the tool, all at rest."""
@@ -150,7 +150,7 @@ class MujocoEngine(Engine):
         data.qpos[:count], data.qvel[:count] = positions[self._columns], velocities[self._columns]
         self.place_ball(ball_of(state.sample))
         self._touching = state.touching
-        self._bear()
+        self._compute_contact_forces()
 
     @property
     def state(self) -> State:
@@ -186,7 +186,7 @@ class MujocoEngine(Engine):
         drag, due, stride = steps.drag_kgpm, steps.first_sample, steps.stride
         restitutions = self._restitutions
         untouched = presses.tobytes()
-        # This equals no state of the surfaces, so that the first step is compared with what pressed before.
+        # This equals no state of the surfaces, so the first step compares what presses with what pressed before.
         last_presses, number = b"", 0
         for want in list(pull * steps.targets[:-1, self._columns] + brake * steps.velocities[:, self._columns]):
             begin_step(model, data)
@@ -229,13 +229,13 @@ class MujocoEngine(Engine):
 
     def ball_boxes(self) -> list[Box]:
         """Find the box around the ball, along the axes of the world."""
-        return self._boxes([self._model.body(BALL).id])
+        return self._find_boxes([self._model.body(BALL).id])
 
     def robot_boxes(self) -> list[Box]:
         """Find the boxes around the links of the robot, along the axes of the world."""
-        return self._boxes(range(1, self._model.body(BALL).id))
+        return self._find_boxes(range(1, self._model.body(BALL).id))
 
-    def _bear(self) -> None:
+    def _compute_contact_forces(self) -> None:
         """Compute the contact forces on the robot that motors need in the first step, as if they had held it before."""
         model, data, count = self._model, self._data, len(self._columns)
         mujoco.mj_step1(model, data)
@@ -245,7 +245,7 @@ class MujocoEngine(Engine):
         mujoco.mj_fwdAcceleration(model, data)
         mujoco.mj_fwdConstraint(model, data)
 
-    def _boxes(self, bodies: Sequence[int]) -> list[Box]:
+    def _find_boxes(self, bodies: Sequence[int]) -> list[Box]:
         mujoco.mj_kinematics(self._model, self._data)
         return boxes(self._model, self._data, bodies)
 
@@ -271,11 +271,11 @@ class MujocoEngine(Engine):
         self._data.qfrc_applied[first : first + 3] = [factor * component for component in velocity]
 
 
-def _find_sample(model: mujoco.MjModel, order: Sequence[int]) -> Callable[[list[float]], Sample]:
+def _make_sample_picker(model: mujoco.MjModel, order: Sequence[int]) -> Callable[[list[float]], Sample]:
     """Make a function that picks a sample from all positions, velocities and forces.
 
-    The ball's angular velocity is still in the frame of the ball then. `order` is the place of each moving joint among
-    those of the model.
+    The function leaves the ball's angular velocity in the frame of the ball. `order` is the place of each moving joint
+    among the joints of the model.
     """
     ball = len(order)
     x, y, z, w, i, j, k = range(ball, ball + 7)

@@ -178,7 +178,7 @@ def resize_ball(model: mujoco.MjModel, radius: float) -> None:
 
 
 def set_physics(model: mujoco.MjModel, physics: Physics) -> None:
-    """Set time step, solver, gravity, masses and surfaces; all of them, so that none of the trial before remains."""
+    """Set time step, solver, gravity, masses and surfaces: all of them, so that nothing of an earlier trial stays."""
     model.opt.timestep = 1 / physics.hz
     model.opt.iterations = physics.solver_iterations
     model.opt.gravity[:] = (0.0, 0.0, -physics.gravity_mps2)
@@ -231,14 +231,14 @@ def boxes(model: mujoco.MjModel, data: mujoco.MjData, bodies: Iterable[int], fra
     for body in bodies:
         first, count = int(model.body_geomadr[body]), int(model.body_geomnum[body])
         if count:
-            corners = [_reach(model, data, geom, frame) for geom in range(first, first + count)]
+            corners = [_find_extent(model, data, geom, frame) for geom in range(first, first + count)]
             lowest = np.min([low for low, _ in corners], axis=0)
             highest = np.max([high for _, high in corners], axis=0)
             enclosing.append((tuple(lowest.tolist()), tuple(highest.tolist())))
     return enclosing
 
 
-def _reach(
+def _find_extent(
     model: mujoco.MjModel, data: mujoco.MjData, geom: int, frame: Frame
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Find the lowest and highest corner of the box around a shape's own box."""

@@ -90,13 +90,13 @@ def test_rebuild_says_what_is_judged_otherwise(run: Run, source: Path, capsys: p
 
     misjudge(2)
     assert run("dataset", "verify", source) == 4
-    assert "trial 1: throws.parquet has outcome = 'dropped', the episode gives 'landed'; to have it judged anew: " in (
+    assert "trial 1: throws.parquet has outcome = 'dropped', the episode gives 'landed'; to judge it again: " in (
         capsys.readouterr().out
     )
     assert run("dataset", "rebuild", source) == 0
     assert capsys.readouterr().out == (
         f"{source}: 3 trials, 3 episodes; wrote throws.parquet, datapackage.json, metadata.yaml, README.md\n"
-        "2 throws are judged otherwise: trial 0: dropped -> landed, trial 1: dropped -> landed\n"
+        "2 throws are judged differently: trial 0: dropped -> landed, trial 1: dropped -> landed\n"
     )
     assert (source / "README.md").read_text() == card + "mine\n"
     assert (source / "metadata.yaml").read_bytes() == metadata
@@ -155,6 +155,6 @@ def test_repair_that_keeps_another_episode_than_the_tables_ends_with_5(
     output = tmp_path / "output"
     assert run("dataset", "repair", source, output) == 5
     told = capsys.readouterr()
-    assert told.out.count("as in throws.parquet; kept, as nothing else speaks against it") == 3
-    assert f"{output}: 3 episodes kept, such as that of trial 0, which throws.parquet had otherwise" in told.err
+    assert told.out.count("as in throws.parquet; kept, as it passes all other checks") == 3
+    assert f"{output}: 3 episodes kept that differ from throws.parquet, such as that of trial 0" in told.err
     assert f"try: throwcollect dataset replay {output} --trial 0" in told.err

@@ -49,7 +49,7 @@ def test_throws_that_come_out_again_are_counted(chosen: list[int], capsys: pytes
 def test_a_throw_that_comes_out_otherwise_is_an_error_with_its_differences(
     chosen: list[int], capsys: pytest.CaptureFixture[str]
 ) -> None:
-    with pytest.raises(DatasetError, match="data: 1 of 2 throws came out otherwise"):
+    with pytest.raises(DatasetError, match="data: 1 of 2 throws came out differently"):
         replay_dataset(Path("data"), [4, 5], everything=False, sample=None, json=False)
     assert capsys.readouterr().out == f"trial 5: {'; '.join(DIFFERENT.differences)}\n"
 
