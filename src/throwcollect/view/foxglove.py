@@ -74,6 +74,7 @@ def _scene() -> dict[str, Any]:
         "scene": {"meshUpAxis": "z_up", "transforms": {"showLabel": False, "axisScale": 0, "lineWidth": 0}},
         "topics": {
             "/view/robot": {"visible": True, "showOutlines": False},
+            "/view/tool": {"visible": True, "showOutlines": False},
             "/view/throw": {"visible": True, "showOutlines": False},
             "/view/throws": {"visible": True, "showOutlines": False},
             "/view/path": {"visible": False},

@@ -15,7 +15,7 @@ from throwcollect.dataset.throws_table import Row, ball_state
 from throwcollect.episode.frames import WORLD
 from throwcollect.episode.topics import BALL, make_header
 from throwcollect.errors import ConfigError
-from throwcollect.view.drawn_robot import BALL_RGBA, DrawnRobot, Rgba
+from throwcollect.view.drawn_robot import BALL_RGBA, DrawnShape, Rgba
 from throwcollect.view.shown_throws import ShownThrow
 
 _HELD: Rgba = (0.6, 0.6, 0.6, 0.8)
@@ -31,21 +31,27 @@ _POINTS_PER_S = 100
 """Points of a path for each second of it: the eye could not tell more apart."""
 
 
-def robot_markers(robot: DrawnRobot, stamp_ns: int) -> Any:
-    """A visualization_msgs/MarkerArray with the robot's shapes in the frames of its links.
+def shape_markers(name: str, shapes: Sequence[DrawnShape], share: Path, stamp_ns: int) -> Any:
+    """A visualization_msgs/MarkerArray with shapes of the robot in the frames of their links.
 
     Meshes are ``data:`` URLs, so that viewers need no files.
+
+    Args:
+        name: Namespace of the markers.
+        shapes: The shapes.
+        share: Directory that the paths of meshes are relative to.
+        stamp_ns: Stamp of the markers [ns].
 
     Raises:
         ConfigError: If a mesh cannot be read.
     """
-    array, marker = (get_message(f"visualization_msgs/msg/{name}") for name in ("MarkerArray", "Marker"))
+    array, marker = (get_message(f"visualization_msgs/msg/{kind}") for kind in ("MarkerArray", "Marker"))
     kinds = {"mesh": marker.MESH_RESOURCE, "box": marker.CUBE, "cylinder": marker.CYLINDER, "sphere": marker.SPHERE}
-    meshes = {mesh: _data_url(robot.share / mesh) for mesh in robot.meshes}
+    meshes = {mesh: _data_url(share / mesh) for mesh in {shape.mesh for shape in shapes if shape.mesh}}
     markers = []
-    for number, shape in enumerate(robot.shapes):
-        drawn = _marker("robot", kinds[shape.kind], shape.rgba, shape.size, stamp_ns, number=number)
-        # Viewers move a locked marker with its frame, so that the robot is published only once.
+    for number, shape in enumerate(shapes):
+        drawn = _marker(name, kinds[shape.kind], shape.rgba, shape.size, stamp_ns, number=number)
+        # Viewers move a locked marker with its frame, so that the shapes are published only once.
         drawn.header.frame_id, drawn.frame_locked = shape.link, True
         drawn.mesh_resource = meshes.get(shape.mesh, "")
         _place(drawn, *shape.position)

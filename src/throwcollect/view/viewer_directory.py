@@ -61,7 +61,7 @@ def view(directory: Path, output: Path, trials: Iterable[int] | None = None) -> 
         path = beside / RECORDING
         with path.open("wb") as stream:
             recording = ViewRecording(stream, config)
-            recording.write(throws, lambda throw: _samples(dataset, throw.row), robot)
+            recording.write(throws, lambda throw: _samples(dataset, throw.row))
             summary = recording.finish(RECORDING)
         information = {"rosbag2_bagfile_information": bag_information([summary], recording.channels, {})}
         (beside / METADATA).write_text(to_yaml(information), encoding="utf-8")

@@ -14,12 +14,13 @@ from throwcollect.config.schema import Config
 from throwcollect.dataset.bag import FileSummary
 from throwcollect.dataset.mcap_file import LIBRARY, PROFILE, declarations
 from throwcollect.episode.channels import Channel, Qos
-from throwcollect.episode.frames import read_frames
+from throwcollect.episode.frames import FrameTree, read_frames
 from throwcollect.episode.record import Samples
 from throwcollect.episode.topics import Recording, ball_odometry, joint_states, transform_message, transforms
 from throwcollect.robots.description import full_description, robot_of
-from throwcollect.view.drawn_robot import DrawnRobot, ball_urdf
-from throwcollect.view.markers import all_markers, path_cloud, robot_markers, throw_markers
+from throwcollect.tools.tool import tool_of
+from throwcollect.view.drawn_robot import ball_urdf, draw_robot_of
+from throwcollect.view.markers import all_markers, path_cloud, shape_markers, throw_markers
 from throwcollect.view.sampled import ball_speed, range_shares
 from throwcollect.view.shown_throws import ShownThrow
 from throwcollect.view.throw_status import throw_facts
@@ -31,6 +32,7 @@ _LATCHED_TYPES = {
     "/view/ball/robot_description": "std_msgs/msg/String",
     "/tf_static": "tf2_msgs/msg/TFMessage",
     "/view/robot": "visualization_msgs/msg/MarkerArray",
+    "/view/tool": "visualization_msgs/msg/MarkerArray",
     "/view/throws": "visualization_msgs/msg/MarkerArray",
     "/view/throw": "visualization_msgs/msg/MarkerArray",
     "/view/path": "sensor_msgs/msg/PointCloud2",
@@ -46,11 +48,10 @@ class ViewRecording:
     """
 
     def __init__(self, stream: IO[bytes], config: Config) -> None:
-        self._config = config
-        self._frames = read_frames(full_description(config), base_height=config.robot.base_height_m)
+        self._looks: tuple[str, str, float] | None = None
         robot = robot_of(config)
         self._topics = [
-            transforms(self._frames.moving, robot.joints),
+            transforms(_read_frames(config).moving, robot.joints),
             joint_states(robot.joints),
             ball_odometry(),
             ball_speed(),
@@ -76,25 +77,17 @@ class ViewRecording:
             for channel in channels
         }
 
-    def write(self, throws: Sequence[ShownThrow], samples: Callable[[ShownThrow], Samples], robot: DrawnRobot) -> None:
+    def write(self, throws: Sequence[ShownThrow], samples: Callable[[ShownThrow], Samples]) -> None:
         """Write throws in order of time, at least one, with their samples and everything else that viewers draw.
 
         Raises:
             DatasetError: If an episode cannot be read.
             ConfigError: If the robot's files cannot be read.
         """
-        start = throws[0].start_ns
-        string = get_message("std_msgs/msg/String")
-        self._put("/robot_description", start, string(data=robot.urdf))
-        self._put("/view/ball/robot_description", start, string(data=ball_urdf(self._config.ball)))
-        fixed = [
-            transform_message(frame.parent, frame.child, frame.translation, frame.rotation_xyzw, start)
-            for frame in self._frames.fixed
-        ]
-        self._put("/tf_static", start, get_message("tf2_msgs/msg/TFMessage")(transforms=fixed))
-        self._put("/view/robot", start, robot_markers(robot, start))
-        self._put("/view/throws", start, all_markers(throws))
+        self._put_looks(throws[0])
+        self._put("/view/throws", throws[0].start_ns, all_markers(throws))
         for throw in throws:
+            self._put_looks(throw)
             self._put("/view/throw", throw.start_ns, throw_markers(throw))
             self._put("/view/path", throw.start_ns, path_cloud(throw))
             self._put("/view/facts", throw.start_ns, throw_facts(throw))
@@ -104,6 +97,29 @@ class ViewRecording:
         """Write the end of the file, and sum up for a bag's metadata what it holds under its name."""
         self._writer.finish()  # type: ignore[no-untyped-call]
         return FileSummary(name, *self._times, dict(sorted(self._counts.items())))
+
+    def _put_looks(self, throw: ShownThrow) -> None:
+        """Write how robot, tool and ball of a throw look, unless they look like those of the throw before."""
+        config, start = throw.config, throw.start_ns
+        looks = full_description(config), ball_urdf(config.ball), config.robot.base_height_m
+        if looks == self._looks:
+            return
+        string, transforms_type = get_message("std_msgs/msg/String"), get_message("tf2_msgs/msg/TFMessage")
+        robot, tool = draw_robot_of(config), tool_of(config.tool).link
+        self._put("/robot_description", start, string(data=robot.urdf))
+        self._put("/view/ball/robot_description", start, string(data=ball_urdf(config.ball)))
+        fixed = [
+            transform_message(frame.parent, frame.child, frame.translation, frame.rotation_xyzw, start)
+            for frame in _read_frames(config).fixed
+        ]
+        self._put("/tf_static", start, transforms_type(transforms=fixed))
+        parts = {"tool": [shape for shape in robot.shapes if shape.link == tool]}
+        if self._looks is None:
+            # The robot's meshes are large, and the same in all trials.
+            parts["robot"] = [shape for shape in robot.shapes if shape.link != tool]
+        for name, shapes in parts.items():
+            self._put(f"/view/{name}", start, shape_markers(name, shapes, robot.share, start))
+        self._looks = looks
 
     def _put(self, topic: str, stamp_ns: int, message: Message) -> None:
         self._put_data(self._numbers[topic], stamp_ns, serialize(message))
@@ -121,3 +137,7 @@ class ViewRecording:
         for number, stamp in enumerate(stamps.tolist()):
             for channel, messages in columns:
                 self._put_data(channel, stamp, messages[number].tobytes())
+
+
+def _read_frames(config: Config) -> FrameTree:
+    return read_frames(full_description(config), base_height=config.robot.base_height_m)

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from throwcollect.view.drawn_robot import DrawnRobot, read_drawn_robot
-from throwcollect.view.markers import robot_markers
+from throwcollect.view.markers import shape_markers
 
 URDF = """\
 <robot name="snowman">
@@ -27,7 +27,7 @@ def snowman(tmp_path: Path) -> DrawnRobot:
 
 
 def test_a_sphere_is_drawn_with_its_diameter(snowman: DrawnRobot) -> None:
-    head, nose = robot_markers(snowman, 0).markers
+    head, nose = shape_markers("robot", snowman.shapes, snowman.share, 0).markers
     assert (head.type, head.scale.x, head.scale.y, head.scale.z) == (head.SPHERE, 0.2, 0.2, 0.2)
     assert (nose.type, nose.mesh_resource) == (nose.MESH_RESOURCE, "data:model/stl;base64,c29saWQgbm9zZQ==")
 

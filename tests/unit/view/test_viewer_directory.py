@@ -23,6 +23,7 @@ from throwcollect.episode.record import EpisodeHeader, Samples
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.robots.limits import joint_limits
 from throwcollect.robots.talos import TALOS
+from throwcollect.view.drawn_robot import draw_robot_of
 from throwcollect.view.viewer_directory import View, view
 
 CHOSEN = [5, 0]
@@ -70,7 +71,9 @@ def test_the_view_directory_is_a_rosbag(written: View) -> None:
     with Reader(written.recording.parent) as bag:
         counts = {connection.topic: connection.msgcount for connection in bag.connections}
     assert sum(counts.values()) == written.messages
-    assert {counts[topic] for topic in ("/robot_description", "/view/robot", "/tf_static", "/view/throws")} == {1}
+    assert {
+        counts[topic] for topic in ("/robot_description", "/view/robot", "/view/tool", "/tf_static", "/view/throws")
+    } == {1}
     assert {counts[topic] for topic in ("/view/throw", "/view/path", "/view/facts")} == {len(CHOSEN)}
     assert len({counts[topic] for topic in SAMPLED}) == 1
 
@@ -114,7 +117,8 @@ def test_joints_are_shown_within_their_limits(collected: Path, messages: Message
 def test_every_shape_moves_with_an_existing_frame(messages: Messages) -> None:
     transforms = [each for topic in ("/tf", "/tf_static") for each in messages[topic][0][1].transforms]
     frames = {"world", *(each.child_frame_id for each in transforms)}
-    drawn = [marker for topic in ("/view/robot", "/view/throws") for marker in messages[topic][0][1].markers]
+    topics = ("/view/robot", "/view/tool", "/view/throws")
+    drawn = [marker for topic in topics for marker in messages[topic][0][1].markers]
     drawn += [marker for _, array in messages["/view/throw"] for marker in array.markers]
     assert {marker.header.frame_id for marker in drawn} <= frames
     moving = {marker.header.frame_id for marker in drawn if marker.frame_locked}
@@ -123,10 +127,12 @@ def test_every_shape_moves_with_an_existing_frame(messages: Messages) -> None:
 
 
 def test_the_recording_embeds_the_meshes_of_the_robot(messages: Messages) -> None:
-    (_, description), (_, robot) = messages["/robot_description"][0], messages["/view/robot"][0]
+    description = messages["/robot_description"][0][1]
     visuals = list(ElementTree.fromstring(description.data).iter("visual"))  # noqa: S314
-    assert len(visuals) == len(robot.markers) > 50
-    for visual, marker in zip(visuals, robot.markers, strict=True):
+    # The tool is the last link of the description.
+    markers = [marker for part in ("robot", "tool") for marker in messages[f"/view/{part}"][0][1].markers]
+    assert len(visuals) == len(markers) > 50
+    for visual, marker in zip(visuals, markers, strict=True):
         mesh = visual.find("geometry/mesh")
         if mesh is None:
             assert (marker.type in (marker.CUBE, marker.CYLINDER), marker.mesh_resource) == (True, "")
@@ -140,8 +146,8 @@ def test_the_recording_embeds_the_meshes_of_the_robot(messages: Messages) -> Non
 
 
 def test_the_robot_has_the_colours_of_its_description(messages: Messages) -> None:
-    robot = messages["/view/robot"][0][1]
-    colors = {marker.header.frame_id: fields(marker.color, *"rgba") for marker in robot.markers}
+    markers = [marker for part in ("robot", "tool") for marker in messages[f"/view/{part}"][0][1].markers]
+    colors = {marker.header.frame_id: fields(marker.color, *"rgba") for marker in markers}
     assert colors["torso_2_link"] == pytest.approx([0.9, 0.9, 0.9, 1.0])
     assert colors["arm_right_1_link"] == pytest.approx([0.2, 0.2, 0.2, 1.0])
     assert colors["spoon_link"] == pytest.approx([0.55, 0.35, 0.2, 1.0])
@@ -249,6 +255,27 @@ def test_the_layout_shows_only_topics_of_the_recording(written: View, messages: 
 def test_the_same_throws_give_the_same_bytes(collected: Path, written: View, tmp_path: Path) -> None:
     again = view(collected, tmp_path / "again", CHOSEN)
     assert again.recording.read_bytes() == written.recording.read_bytes()
+
+
+def test_each_throw_is_shown_with_its_own_tool_and_ball(make_collection: Any, tmp_path: Path) -> None:
+    swept = {"tool.handle_length_m": {"values": [0.15, 0.2]}, "ball.radius_m": {"values": [0.018, 0.02]}}
+    dataset = make_collection({"trials": None, "sweep": {"sampler": "grid", "parameters": swept}}).collect(
+        tmp_path / "a"
+    )
+    shown = messages_of(view(dataset, tmp_path / "view").recording)
+    # Each of the four throws looks unlike the one before, but the robot without its tool is always the same.
+    starts = [start for start, _ in shown["/view/throw"]]
+    changing = ("/robot_description", "/view/ball/robot_description", "/tf_static", "/view/tool")
+    assert [[start for start, _ in shown[topic]] for topic in changing] == [starts] * 4
+    assert len(shown["/view/robot"]) == 1
+    plan = Dataset.open(dataset).plan
+    for trial, (_, description), (_, ball) in zip(
+        plan.trials, shown["/robot_description"], shown["/view/ball/robot_description"], strict=True
+    ):
+        config = plan.config_of(trial)
+        assert description.data == draw_robot_of(config).urdf
+        assert f'radius="{config.ball.radius_m}"' in ball.data
+    assert len({description.data for _, description in shown["/robot_description"]}) == 2
 
 
 def hold_ball(samples: Samples, header: EpisodeHeader) -> tuple[Samples, EpisodeHeader]:
