@@ -220,7 +220,7 @@ def test_a_goal_survives_a_clock_that_jumps_back() -> None:
     assert bench.results[0][0] == 100
 
 
-def test_each_joint_brakes_from_its_own_speed_after_a_cancel() -> None:
+def test_joints_brake_each_from_its_own_speed_after_a_cancel() -> None:
     bench = Bench(braking(10.0), Plant("frozen", velocity=(0.2, -0.1, 0.0)))
     bench.send(goal(to(1.0, 2.1)))
     bench.step(1)
@@ -290,7 +290,7 @@ ELSEWHERE = {
     "D1": (HERE, "test_a_new_goal_preempts_the_old_one_and_starts_from_the_measured_state"),
     "D2": (HERE, "test_the_result_of_a_goal_is_kept_when_the_next_goal_begins"),
     "D5": (TRAJECTORIES, "test_goals_that_are_over_or_unknown_are_not_cancelled"),
-    "D6": (HERE, "test_each_joint_brakes_from_its_own_speed_after_a_cancel"),
+    "D6": (HERE, "test_joints_brake_each_from_its_own_speed_after_a_cancel"),
     "D9": (HERE, "test_a_trajectory_from_the_topic_is_followed_without_a_goal"),
     "D12": (HERE, "test_a_command_timeout_stops_a_trajectory_from_the_topic"),
     "D13": (HERE, "test_a_command_timeout_that_is_not_above_the_goal_time_gives_a_warning"),

@@ -47,7 +47,7 @@ def test_empty_joint_names_are_reported_before_missing_points() -> None:
     assert refusal(Trajectory([], []), partial, NOW_NS).startswith("Empty joint names")
 
 
-def test_some_points_may_lack_velocities_and_accelerations() -> None:
+def test_points_may_lack_velocities_and_accelerations() -> None:
     mixed = goal(point(1, (1, 2, 3), (4, 5, 6)), point(2, (1, 2, 3)), point(3, (1, 2, 3), (0, 0, 0), (7, 8, 9)))
     assert refusal(mixed.trajectory, SHIPPED, NOW_NS) is None
     broken = goal(point(1, (1, 2, 3)), point(2, (1, 2, 3), (0, 0, np.inf)), point(3, (1, 2, 3)))
