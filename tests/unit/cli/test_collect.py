@@ -30,7 +30,7 @@ def test_up_refuses_options_that_a_slice_does_not_use(option: str, given: dict[s
 @pytest.fixture
 def submitted(monkeypatch: pytest.MonkeyPatch) -> None:
     """Every dataset was submitted to a cluster, and nothing is left to submit."""
-    # In this order: the module of the first line, if it is imported for it, would keep what the second one patches.
+    # In this order: `submit` copies `is_submitted` when it is imported, and would keep the patched one.
     monkeypatch.setattr("throwcollect.cluster.submit.submit_missing", lambda *_, **__: None)
     monkeypatch.setattr("throwcollect.cluster.submission.is_submitted", lambda _: True)
 

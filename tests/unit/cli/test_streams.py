@@ -88,7 +88,7 @@ def test_messages_are_dropped_when_standard_error_has_no_reader() -> None:
 def test_output_to_a_full_disk_is_an_error_even_if_the_reader_may_leave() -> None:
     said = run("os.dup2(os.open('/dev/full', os.O_WRONLY), 1)\nprint(1)\nstreams.ensure_written(reader_may_leave=True)")
     assert "OutputError: the output cannot be written: No space left on device" in said.stderr
-    # Nothing is tried again when the process ends.
+    # Python does not try to write again when the process ends.
     assert "Exception ignored" not in said.stderr
 
 

@@ -49,7 +49,7 @@ def test_the_progress_bar_fits_the_present_width_of_the_terminal_on_one_line(col
 
 
 class Terminal(io.StringIO):
-    """A terminal that breaks its lines when it is narrowed, as most do; `rows` is what it shows."""
+    """A terminal that breaks its lines when it gets narrower, as most do; `rows` is what it shows."""
 
     def __init__(self, width: int) -> None:
         super().__init__()

@@ -71,7 +71,7 @@ schedules = st.dictionaries(st.integers(0, UPDATES - 1), requests, max_size=3)
 
 
 class Side:
-    """One controller with its plant; `advance` makes updates, singly or many at once."""
+    """One controller with its plant; `step` makes a single update, `take` many at once."""
 
     def __init__(self, parameters: ControllerParameters, kind: str) -> None:
         self.bench = Bench(parameters, Plant(kind, velocity=0.5))
