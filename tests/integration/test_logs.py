@@ -34,7 +34,7 @@ def test_a_refused_goal_logs_one_line_with_its_place_in_the_sources(robot: Robot
         settle(robot)
     lines = find_logged(heard, "not strictly increasing")
     assert len(lines) == 3
-    assert (Path(lines[0].file).name, lines[0].function) == ("controller.py", "_refusal")
+    assert (Path(lines[0].file).name, lines[0].function) == ("controller.py", "_find_refusal")
     assert lines[0].line > 0
 
 

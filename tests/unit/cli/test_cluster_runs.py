@@ -1,4 +1,4 @@
-"""What `events` and `ps` tell of datasets that were submitted to a cluster."""
+"""What `events`, `ps` and `logs` print of datasets that were submitted to a cluster."""
 
 from __future__ import annotations
 
@@ -30,13 +30,13 @@ def looks(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.usefixtures("looks")
-def test_events_are_lines(capsys: pytest.CaptureFixture[str]) -> None:
+def test_events_of_a_cluster_run_are_printed_as_lines(capsys: pytest.CaptureFixture[str]) -> None:
     cluster_runs.print_events(RUN, as_json=False)
     assert capsys.readouterr().out.splitlines() == ["task 0: running on n1", "task 0: completed on n1", "finished"]
 
 
 @pytest.mark.usefixtures("looks")
-def test_events_are_documents_where_json_is_asked_for(capsys: pytest.CaptureFixture[str]) -> None:
+def test_events_of_a_cluster_run_with_json_are_one_document_a_line(capsys: pytest.CaptureFixture[str]) -> None:
     cluster_runs.print_events(RUN, as_json=True)
     assert [json.loads(line) for line in capsys.readouterr().out.splitlines()] == [
         {"event": "task", "task": 0, "state": "running on n1"},
@@ -45,13 +45,13 @@ def test_events_are_documents_where_json_is_asked_for(capsys: pytest.CaptureFixt
     ]
 
 
-def test_a_run_of_which_only_the_joining_job_was_submitted_has_its_number(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_run_is_named_by_its_joining_job_if_nothing_else_was_submitted(monkeypatch: pytest.MonkeyPatch) -> None:
     jobs = [SimpleNamespace(array="7", join="8"), SimpleNamespace(array="", join="9")]
     run: Any = SimpleNamespace(submission=SimpleNamespace(jobs=jobs, tasks=3), directory="data")
     assert cluster_runs.make_document(run, look())["run"] == "9"
 
 
-def test_one_that_cannot_be_read_keeps_the_others_from_no_list(
+def test_a_damaged_submission_gives_a_warning_and_the_other_runs_are_listed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     for name, text in (("damaged", "{"), ("whole", '{"name": "a", "tasks": 2, "program": [], "image": null}')):
@@ -65,13 +65,13 @@ def test_one_that_cannot_be_read_keeps_the_others_from_no_list(
 
 
 @pytest.mark.parametrize("named", ["2", "-1", "²", "sim_0"])
-def test_a_task_that_there_is_not_is_refused(named: str) -> None:
+def test_logs_of_a_task_that_does_not_exist_are_refused(named: str) -> None:
     run: Any = SimpleNamespace(directory="data", logs={}, submission=SimpleNamespace(tasks=2))
     with pytest.raises(ConfigError, match=f"data: has no task '{named}'"):
         cluster_runs.print_logs(run, [named])
 
 
-def test_logs_are_followed_until_the_run_ends(
+def test_logs_of_a_cluster_run_are_followed_until_it_ends(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     logs: dict[str, Path] = {}
@@ -100,7 +100,7 @@ def test_logs_are_followed_until_the_run_ends(
         cluster_runs.print_logs(run, ["1"])
 
 
-def test_one_run_on_several_nodes_is_told_without_a_number(
+def test_events_of_a_run_on_several_nodes_name_no_task_number(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     seen = [look(ArrayTask(None, "COMPLETED", "n[1-2]", "0:0"), complete=True)]

@@ -1,4 +1,4 @@
-"""Options of `up` and `resume` that do not go together, or with the dataset."""
+"""Options of `up` and `resume` that exclude each other, or that the dataset has no use for."""
 
 from __future__ import annotations
 
@@ -22,9 +22,7 @@ from throwcollect.errors import ConfigError
         ("--view", {"view": True}),
     ],
 )
-def test_what_a_slice_has_no_use_for_is_refused_and_not_forgotten(
-    option: str, given: dict[str, Any], tmp_path: Path
-) -> None:
+def test_up_refuses_options_that_a_slice_does_not_use(option: str, given: dict[str, Any], tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match=f"^{option}: should be left out with --slice"):
         up(slice="0/2", output=tmp_path / "data", **given)
 
@@ -32,7 +30,7 @@ def test_what_a_slice_has_no_use_for_is_refused_and_not_forgotten(
 @pytest.fixture
 def submitted(monkeypatch: pytest.MonkeyPatch) -> None:
     """Every dataset was submitted to a cluster, and nothing is left to submit."""
-    # In this order: the module of the first line, if it is imported for it, would keep what the second one patches.
+    # In this order: `submit` copies `is_submitted` when it is imported, and would keep the patched one.
     monkeypatch.setattr("throwcollect.cluster.submit.submit_missing", lambda *_, **__: None)
     monkeypatch.setattr("throwcollect.cluster.submission.is_submitted", lambda _: True)
 
@@ -42,12 +40,16 @@ def submitted(monkeypatch: pytest.MonkeyPatch) -> None:
     ("options", "name"),
     [({"check": True}, "--check"), ({"simulations": "4"}, "-n"), ({"runtime": "docker"}, "--runtime")],
 )
-def test_what_tasks_of_a_cluster_would_not_heed_is_refused(options: dict[str, Any], name: str, tmp_path: Path) -> None:
+def test_resume_of_a_submitted_dataset_refuses_options_that_array_tasks_do_not_use(
+    options: dict[str, Any], name: str, tmp_path: Path
+) -> None:
     with pytest.raises(ConfigError, match=f"^{name}: should be left out"):
         resume(tmp_path, **options)
 
 
 @pytest.mark.usefixtures("submitted")
-def test_what_is_submitted_is_told_as_json(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_resume_of_a_submitted_dataset_prints_the_jobs_as_json(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     resume(tmp_path, json=True)
     assert json.loads(capsys.readouterr().out) == {"directory": str(tmp_path), "array": "", "join": ""}

@@ -1,4 +1,4 @@
-"""Errors as users of commands read them."""
+"""What a user of a command reads when it fails."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from throwcollect.errors import ConfigError, NotFoundError, Problem
 
 
 def describe(error: Exception, capsys: pytest.CaptureFixture[str]) -> str:
-    """What a command prints that ends with an error."""
+    """The message of a command that fails with this error."""
 
     def fail(**_: object) -> None:
         raise error
@@ -22,13 +22,15 @@ def describe(error: Exception, capsys: pytest.CaptureFixture[str]) -> str:
 
 
 @pytest.mark.parametrize(("argument", "option"), [("where", "--where"), ("rate_hz", "--rate")])
-def test_an_argument_is_shown_as_its_option(argument: str, option: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_error_about_an_argument_names_its_command_line_option(
+    argument: str, option: str, capsys: pytest.CaptureFixture[str]
+) -> None:
     error = refuse_argument(argument, "got 'a'", expected="b", hint="c")
     assert str(error).startswith(f"{argument}: got 'a'")
     assert describe(error, capsys) == f"throwcollect: {option}: got 'a'\n  expected: b\n  try: c\n"
 
 
-def test_keys_of_configurations_stay_as_they_are(capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_error_about_a_configuration_key_names_the_key_unchanged(capsys: pytest.CaptureFixture[str]) -> None:
     both = NotFoundError([Problem("is not there", "task.end"), Problem("is not there", "seed", argument=True)])
     assert describe(both, capsys) == "throwcollect: task.end: is not there\n--seed: is not there\n"
     assert describe(ConfigError("no target"), capsys) == "throwcollect: no target\n"

@@ -1,4 +1,4 @@
-"""The page on commands tells the exit code of every error."""
+"""docs/cli.md lists the exit code of every error."""
 
 import re
 from pathlib import Path
@@ -12,7 +12,7 @@ def all_kinds(kind: type[ThrowcollectError]) -> list[type[ThrowcollectError]]:
     return [kind, *(each for below in kind.__subclasses__() for each in all_kinds(below))]
 
 
-def test_the_page_tells_all_exit_codes() -> None:
+def test_the_page_on_commands_lists_all_exit_codes() -> None:
     section = PAGE.read_text(encoding="utf-8").partition("## Exit codes")[2].partition("\n## ")[0]
     told = [int(code) for code in re.findall(r"^\| (\d+) \|", section, flags=re.MULTILINE)]
     raised = {

@@ -3,8 +3,8 @@ import signal
 from throwcollect.cli.interruptions import count_interruptions
 
 
-def test_signals_are_counted_and_then_what_they_were() -> None:
-    # Whoever starts the tests by `nohup` has it ignored.
+def test_signals_are_counted_and_their_handlers_restored_afterwards() -> None:
+    # `nohup` starts the tests with this signal ignored.
     signal.signal(signal.SIGHUP, signal.SIG_DFL)
     before = signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)
     with count_interruptions() as interruptions:
@@ -16,7 +16,7 @@ def test_signals_are_counted_and_then_what_they_were() -> None:
     assert (signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)) == before
 
 
-def test_a_hangup_that_is_ignored_stays_so() -> None:
+def test_a_hangup_signal_that_was_ignored_stays_ignored() -> None:
     signal.signal(signal.SIGHUP, signal.SIG_IGN)
     with count_interruptions() as interruptions:
         signal.raise_signal(signal.SIGHUP)

@@ -1,4 +1,4 @@
-"""The tables of docs/cli.md have the commands that there are, each with its options, and `--help` is well formed."""
+"""The tables of docs/cli.md have every command with its options, and `--help` is well formed."""
 
 import re
 from collections.abc import Iterator
@@ -31,7 +31,7 @@ def list_commands(found: Any, path: tuple[str, ...] = ()) -> Iterator[tuple[tupl
 
 
 def read_options() -> dict[tuple[str, ...], set[str]]:
-    """The options that the page has of each command."""
+    """The options that the page lists for each command."""
     told: dict[tuple[str, ...], set[str]] = {}
     for cell in re.findall(r"^\| (`.*?`) \| ", PAGE, flags=re.MULTILINE):
         for line in re.findall(r"`([^`]*)`", cell.replace("\\|", "|")):
@@ -40,13 +40,13 @@ def read_options() -> dict[tuple[str, ...], set[str]]:
     return told
 
 
-def test_the_page_has_the_commands_and_the_options_that_there_are() -> None:
+def test_the_page_on_commands_has_every_command_with_its_options() -> None:
     told, wrong = read_options(), []
     for path, found in list_commands(COMMAND):
         if path not in told:
             wrong.append(f"{' '.join(path)}: is missing")
             continue
-        # What a line has for a group, such as `ros topic|node ... [--run RUN]`, is that of all commands in it.
+        # Options in the line of a group, such as `ros topic|node ... [--run RUN]`, belong to all commands of the group.
         named = set().union(*(told.get(path[:length], ()) for length in range(1, len(path) + 1)))
         options = [each.opts for each in found.params if each.param_type_name == "option" and each.name != "help"]
         known = {name for names in options for name in names}
@@ -55,14 +55,14 @@ def test_the_page_has_the_commands_and_the_options_that_there_are() -> None:
     assert wrong == []
 
 
-def test_help_shows_arguments_that_may_be_left_out_in_one_pair_of_brackets() -> None:
+def test_help_shows_optional_arguments_in_one_pair_of_brackets() -> None:
     for path, found in list_commands(COMMAND):
         context = found.make_context(path[-1], [], resilient_parsing=True)
         usage = " ".join(found.collect_usage_pieces(context))
         assert not re.search(r"\[\[|\.\.\.[\]}]", usage), f"{' '.join(path)}: {usage}"
 
 
-def test_a_command_line_assembles_only_what_it_needs() -> None:
+def test_a_command_line_assembles_only_the_command_that_it_names() -> None:
     for name, whole in COMMAND.commands.items():
         made: Any = assemble_command(name)
         assert list(made.commands) == [name]

@@ -1,4 +1,4 @@
-"""With `--json` the result is one document, and standard error has only what is wrong."""
+"""With `--json` a command prints one document, and only warnings and errors to standard error."""
 
 from __future__ import annotations
 
@@ -18,11 +18,13 @@ SLICED = CONFIG + "record: {{trials_per_shard: 1}}\n"
 
 
 def call_without_and_with_json(*arguments: str | Path) -> tuple[str, CompletedProcess[str]]:
-    """Call a command twice; returns what it says besides its result, and all that it prints with `--json`."""
+    """Call a command twice; returns its standard error without `--json`, and all that it prints with it."""
     return call_here(*arguments).stderr, call_here(*arguments, "--json")
 
 
-def test_of_a_large_plan_only_the_document_is_printed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_plan_with_json_prints_only_the_document_even_for_a_large_plan(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(prepare, "_ANNOUNCED_TRIALS", 1)
     said, printed = call_without_and_with_json("plan", write_config(tmp_path, trials=2, sim=FAST))
     assert "plan: checks 2 trials" in said
@@ -30,7 +32,7 @@ def test_of_a_large_plan_only_the_document_is_printed(tmp_path: Path, monkeypatc
     assert len(json.loads(printed.stdout)) == 2
 
 
-def test_a_misplaced_robot_is_told_in_spite_of_json(tmp_path: Path) -> None:
+def test_plan_with_json_still_warns_of_a_robot_below_the_ground(tmp_path: Path) -> None:
     sunken = CONFIG + "robot: {{base_height_m: 0.5}}\n"
     said, printed = call_without_and_with_json("plan", write_config(tmp_path, trials=2, text=sunken, sim=FAST))
     assert "below the ground" in said
@@ -38,7 +40,9 @@ def test_a_misplaced_robot_is_told_in_spite_of_json(tmp_path: Path) -> None:
     assert "below the ground" in printed.stderr
 
 
-def test_of_a_large_dataset_only_the_document_is_printed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_verify_with_json_prints_only_the_document_even_for_a_large_dataset(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     source = Collection({"trials": 2}).collect(tmp_path / "data")
     monkeypatch.setattr(verify, "_MANY_EPISODES", 1)
     said, printed = call_without_and_with_json("dataset", "verify", source)
@@ -46,7 +50,7 @@ def test_of_a_large_dataset_only_the_document_is_printed(tmp_path: Path, monkeyp
     assert (printed.stderr, json.loads(printed.stdout)) == ("", [])
 
 
-def test_of_a_submission_only_the_document_is_printed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_submit_and_resume_with_json_print_only_the_document(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(slurm, "submit", lambda *_: "7")
     monkeypatch.setattr(slurm, "check", lambda _: None)
     monkeypatch.setattr(slurm, "find_largest_array", lambda: None)

@@ -1,4 +1,4 @@
-"""Output whose readers leave, and streams that were closed: in processes of their own, as they have but three."""
+"""Output whose readers leave, and standard streams that were closed. Each test needs a process of its own."""
 
 import os
 import subprocess
@@ -35,7 +35,7 @@ def run(code: str, closed: tuple[int, ...] = ()) -> subprocess.CompletedProcess[
 
 
 @pytest.mark.parametrize("closed", [(0,), (1,), (2,), (0, 1, 2)])
-def test_a_closed_stream_is_opened_so_that_no_file_takes_its_place(closed: tuple[int, ...]) -> None:
+def test_a_closed_standard_stream_is_opened_so_that_no_file_takes_its_number(closed: tuple[int, ...]) -> None:
     code = (
         "print('result'); print('message', file=sys.stderr); sys.stdin.read(); sys.stdout.flush()\n"
         "number = os.open('/', os.O_RDONLY)\n"
@@ -57,7 +57,7 @@ def test_a_closed_stream_is_opened_so_that_no_file_takes_its_place(closed: tuple
         ("streams.end_with_reader(); print(2, flush=True)", "ReaderGone"),
     ],
 )
-def test_a_reader_that_leaves_ends_nothing_but_what_is_done_for_it(call: str, said_last: str) -> None:
+def test_a_reader_that_leaves_ends_only_processes_that_work_for_it(call: str, said_last: str) -> None:
     first = "" if "end_with_reader" in call else "print(1, flush=True)\n"
     said = run(f"lose(1)\n{first}{call}\nprint('goes on', file=sys.stderr)")
     assert said.stderr.rstrip().endswith(said_last)
@@ -73,24 +73,24 @@ def test_a_reader_that_leaves_ends_nothing_but_what_is_done_for_it(call: str, sa
         ("os.dup2(os.openpty()[1], 1)", True),
     ],
 )
-def test_that_a_reader_has_left_is_known_before_anything_is_written(
+def test_has_reader_tells_without_writing_whether_the_reader_has_left(
     output: str, read: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
     assert run(f"{output}\nprint(streams.has_reader(), file=sys.stderr)").stderr == f"{read}\n"
 
 
-def test_what_cannot_be_said_is_dropped() -> None:
+def test_messages_are_dropped_when_standard_error_has_no_reader() -> None:
     said = run("lose(2)\nfor _ in range(3): print('warning', file=sys.stderr)\nprint('done')")
     assert (said.returncode, said.stdout) == (0, "done\n")
 
 
-def test_a_full_disk_is_an_error_even_if_the_reader_may_leave() -> None:
+def test_output_to_a_full_disk_is_an_error_even_if_the_reader_may_leave() -> None:
     said = run("os.dup2(os.open('/dev/full', os.O_WRONLY), 1)\nprint(1)\nstreams.ensure_written(reader_may_leave=True)")
     assert "OutputError: the output cannot be written: No space left on device" in said.stderr
-    # Nothing is tried again when the process ends.
+    # Python does not try to write again when the process ends.
     assert "Exception ignored" not in said.stderr
 
 
-def test_a_name_that_is_no_text_can_be_printed() -> None:
+def test_a_name_that_is_not_valid_utf_8_can_be_printed() -> None:
     assert run("print('a\\udcffb')").stdout == "a\\udcffb\n"

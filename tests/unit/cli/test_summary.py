@@ -1,4 +1,4 @@
-"""What is said of a collection at its end."""
+"""The summary that a collection prints at its end."""
 
 import pytest
 
@@ -10,7 +10,7 @@ from throwcollect.dataset.summary import Info
     ("wanted", "said"),
     [(None, ""), (5, ""), (6, "; 6 should have landed, but all trials were used up")],
 )
-def test_it_says_if_too_few_throws_landed(wanted: int | None, said: str) -> None:
+def test_the_summary_says_if_too_few_throws_landed(wanted: int | None, said: str) -> None:
     outcomes = {"landed": 5, "recaught": 2}
     found = Info("few", 7, 7, outcomes, wanted, None, 70, 1.0, 1, 10, 5, {"/clock": 7}, "0" * 64)
     assert describe(found).splitlines()[0] == f"trials    7: 5 landed, 2 recaught{said}"

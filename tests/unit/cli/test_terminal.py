@@ -11,14 +11,14 @@ def progress(ended: int, **outcomes: int) -> Progress:
     return Progress(total=10, ended=ended, outcomes=outcomes, simulations=2, throws_per_s=3.14, hung=[])
 
 
-def test_counts_tell_failures_and_losses() -> None:
+def test_the_progress_counts_failed_and_lost_trials() -> None:
     assert progress(3, landed=3).counts == "3 landed, 0 failed, 2 simulations, 3.1 throws/s"
     assert progress(6, landed=3, self_hit=1, timeout=1, lost=1).counts == (
         "3 landed, 2 failed, 1 lost, 2 simulations, 3.1 throws/s"
     )
 
 
-def test_lines_come_now_and_then_and_at_the_end(capsys: pytest.CaptureFixture[str]) -> None:
+def test_progress_lines_are_printed_at_intervals_and_once_at_the_end(capsys: pytest.CaptureFixture[str]) -> None:
     with display(quiet=False) as shown:
         for ended in (1, 2, 3, 10, 10, 10):
             shown.update(progress(ended, landed=ended))
@@ -26,7 +26,7 @@ def test_lines_come_now_and_then_and_at_the_end(capsys: pytest.CaptureFixture[st
     assert [line.split()[0] for line in lines] == ["1/10", "10/10"]
 
 
-def test_who_wants_quiet_hears_warnings_only(capsys: pytest.CaptureFixture[str]) -> None:
+def test_quiet_shows_only_warnings(capsys: pytest.CaptureFixture[str]) -> None:
     with display(quiet=True) as shown:
         shown.say("plan: 10 trials")
         shown.update(progress(10, landed=10))
@@ -35,7 +35,7 @@ def test_who_wants_quiet_hears_warnings_only(capsys: pytest.CaptureFixture[str])
 
 
 @pytest.mark.parametrize(("columns", "cells"), [(200, 40), (90, 18), (60, 4)])
-def test_the_bar_fits_the_terminal_as_it_is_now_and_no_text_takes_a_second_line(columns: int, cells: int) -> None:
+def test_the_progress_bar_fits_the_present_width_of_the_terminal_on_one_line(columns: int, cells: int) -> None:
     shown = _Bar()
     console = shown._progress.console
     console.width = 80
@@ -49,7 +49,7 @@ def test_the_bar_fits_the_terminal_as_it_is_now_and_no_text_takes_a_second_line(
 
 
 class Terminal(io.StringIO):
-    """A terminal that breaks its lines when it is narrowed, as most do; `rows` is what it shows."""
+    """A terminal that breaks its lines when it gets narrower, as most do; `rows` is what it shows."""
 
     def __init__(self, width: int) -> None:
         super().__init__()
@@ -106,7 +106,9 @@ class Terminal(io.StringIO):
 
 
 @pytest.mark.parametrize("told", [True, False])
-def test_a_terminal_that_is_narrowed_shows_no_remains_of_the_bar(monkeypatch: pytest.MonkeyPatch, told: bool) -> None:
+def test_narrowing_the_terminal_leaves_no_remains_of_the_progress_bar(
+    monkeypatch: pytest.MonkeyPatch, told: bool
+) -> None:
     terminal = Terminal(120)
     monkeypatch.setattr("sys.stderr", terminal)
     monkeypatch.setenv("TERM", "xterm")

@@ -1,4 +1,4 @@
-"""What is told of a dataset on a cluster while it is followed."""
+"""The progress of a dataset that is collected on a cluster."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def run(tmp_path: Path) -> Any:
     )
 
 
-def test_the_speed_is_that_of_the_trials_which_ended_while_one_looked(
+def test_the_speed_counts_only_trials_that_ended_since_the_first_look(
     run: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     seconds = iter([100.0, 110.0])
@@ -37,6 +37,6 @@ def test_the_speed_is_that_of_the_trials_which_ended_while_one_looked(
     assert [progress.at(look).throws_per_s for look in looks] == [0.0, 3.0]
 
 
-def test_whoever_first_looks_at_a_finished_dataset_is_told_what_came_of_its_trials(run: Any) -> None:
+def test_the_first_look_at_a_finished_dataset_counts_all_outcomes(run: Any) -> None:
     progress = ProgressOfSlices(run).at(SlicesLook(frozenset(), (), None, complete=True))
     assert (progress.ended, progress.outcomes) == (30, {"landed": 27, "not_released": 3})

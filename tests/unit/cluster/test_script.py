@@ -1,4 +1,4 @@
-"""Batch scripts: what Slurm and the shell read of them is what the configuration says."""
+"""Slurm and the shell read from batch scripts what the configuration says."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def scripts(directory: Path, *, image: Path | None = None, **cluster: Any) -> Ba
 
 
 def options(script: str) -> dict[str, str]:
-    """Options of a script, as sbatch reads them: by the rules of a shell."""
+    """The options of a script. sbatch reads them by the rules of a shell."""
     found = {}
     for line in script.splitlines():
         if line.startswith("#SBATCH "):
@@ -32,7 +32,7 @@ def options(script: str) -> dict[str, str]:
 
 
 def run(script: str, directory: Path, **programs: str) -> subprocess.CompletedProcess[str]:
-    """Run a script in which commands are replaced by others."""
+    """Run a script with other programs in place of its commands."""
     for name in ("srun", "scontrol", "module"):
         path = directory / "bin" / name
         path.parent.mkdir(exist_ok=True)
@@ -55,7 +55,7 @@ def directory(tmp_path: Path, request: pytest.FixtureRequest) -> Path:
     return path
 
 
-def test_options_follow_from_the_configuration(tmp_path: Path) -> None:
+def test_options_of_the_batch_script_follow_from_the_configuration(tmp_path: Path) -> None:
     script = scripts(
         tmp_path, partition="long", account="robots", qos="low", constraint="avx2", time="4:00:00", memory="8G",
         cores=4, at_once=20, requeue=0,
@@ -69,20 +69,20 @@ def test_options_follow_from_the_configuration(tmp_path: Path) -> None:
     assert "scontrol" not in script
 
 
-def test_what_the_configuration_leaves_out_is_left_to_the_scheduler(tmp_path: Path) -> None:
+def test_options_that_the_configuration_leaves_out_are_left_to_the_scheduler(tmp_path: Path) -> None:
     found = options(scripts(tmp_path).collect(8, "0-7"))
     assert not found.keys() & {"partition", "account", "qos", "constraint", "time", "mem"}
     assert found["array"] == "0-7"
     assert "requeue" in found
 
 
-def test_logs_and_comment_name_the_directory_whatever_it_is_called(directory: Path) -> None:
+def test_logs_and_comment_name_the_directory_despite_special_characters(directory: Path) -> None:
     found = options(scripts(directory).collect(8, "0-7"))
     assert found["output"].replace("%%", "%").replace("%A_%a", "") == f"{directory}/cluster/logs/.log"
     assert found["comment"] == f"throwcollect:{directory}"
 
 
-def test_a_task_collects_its_slice(directory: Path, tmp_path: Path) -> None:
+def test_an_array_task_collects_its_slice(directory: Path, tmp_path: Path) -> None:
     done = run(scripts(directory, cores=4).collect(8, "0-7"), tmp_path, srun='printf "%s\\n" "$@"')
     words = done.stdout.splitlines()
     assert done.returncode == 0, done.stderr
@@ -93,7 +93,7 @@ def test_a_task_collects_its_slice(directory: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("scratch", ["$SCRATCH/mine", "/local/$NAME"])
-def test_in_an_image_it_sees_its_directories_and_no_variables_of_the_host(tmp_path: Path, scratch: str) -> None:
+def test_a_task_in_an_image_gets_its_directories_and_no_variables_of_the_host(tmp_path: Path, scratch: str) -> None:
     (tmp_path / "plan.parquet").touch()
     made = scripts(tmp_path, image=Path("/images/t.sif"), binds=["/data:/inside:ro", "/$NAME"], scratch=scratch)
     done = run(made.collect(8, "0-7"), tmp_path, srun='printf "%s\\n" "$@"', SCRATCH="/local", NAME="mine")
@@ -115,7 +115,7 @@ def test_lines_and_modules_of_the_site_come_before_the_task(tmp_path: Path) -> N
     assert done.stdout.splitlines() == ["module load apptainer/1.4", "SITE=here"]
 
 
-def test_a_node_that_does_not_see_the_directory_says_so_and_runs_nothing(tmp_path: Path) -> None:
+def test_the_script_fails_without_running_if_the_node_does_not_see_the_directory(tmp_path: Path) -> None:
     done = run(scripts(tmp_path / "nowhere").collect(8, "0-7"), tmp_path, srun="echo ran")
     assert done.returncode == 2
     assert re.search(r"does not see .*nowhere/plan.parquet: is it on a file system that all nodes share\?", done.stderr)
@@ -125,7 +125,7 @@ def test_a_node_that_does_not_see_the_directory_says_so_and_runs_nothing(tmp_pat
 @pytest.mark.parametrize(
     ("code", "restarts", "queued"), [(130, 0, True), (130, 10, False), (3, 0, False), (0, 0, False)]
 )
-def test_a_task_that_was_stopped_in_order_is_queued_again(
+def test_an_interrupted_task_is_queued_again_up_to_ten_times(
     tmp_path: Path, code: int, restarts: int, queued: bool
 ) -> None:
     (tmp_path / "plan.parquet").touch()
@@ -140,7 +140,7 @@ def test_a_task_that_was_stopped_in_order_is_queued_again(
     assert done.returncode == code
 
 
-def test_in_one_run_the_first_task_begins_and_the_others_join(directory: Path, tmp_path: Path) -> None:
+def test_in_one_run_on_several_nodes_the_first_task_begins_and_the_others_join(directory: Path, tmp_path: Path) -> None:
     (directory / "cluster").mkdir()
     script = scripts(directory, cores=2).live(3)
     found = options(script)
@@ -161,13 +161,13 @@ def test_in_one_run_the_first_task_begins_and_the_others_join(directory: Path, t
     assert not Path(token).exists()
 
 
-def test_where_the_run_ends_at_once_the_other_tasks_do_not_wait_for_it(directory: Path, tmp_path: Path) -> None:
+def test_the_other_tasks_do_not_wait_for_a_run_that_ends_at_once(directory: Path, tmp_path: Path) -> None:
     (directory / "cluster").mkdir()
     script = scripts(directory).live(2)
     both = 'while [ "$1" != bash ]; do shift; done; (SLURM_PROCID=0; export SLURM_PROCID; "$@"); one=$?; exec "$@"'
     (tmp_path / "bin").mkdir()
     node = tmp_path / "bin" / "throwcollect"
-    # The shell above it is signalled as well, and outlives it.
+    # The shell that started it gets a signal too, and lives on.
     node.write_text('#!/bin/bash\nkill -TERM $PPID; sleep 0.1; echo "$1"; exit 3\n')
     node.chmod(0o755)
     done = run(script, tmp_path, srun=both.replace("one=$?", "echo $?"), SLURM_PROCID="1")
@@ -175,7 +175,7 @@ def test_where_the_run_ends_at_once_the_other_tasks_do_not_wait_for_it(directory
     assert not list((directory / "cluster").iterdir())
 
 
-def test_the_joining_job_joins(directory: Path, tmp_path: Path) -> None:
+def test_the_joining_job_calls_join_with_the_directory(directory: Path, tmp_path: Path) -> None:
     done = run(scripts(directory).join(), tmp_path, srun='printf "%s\\n" "$@"')
     assert done.stdout.splitlines()[2:] == ["throwcollect", "join", str(directory)]
 
@@ -193,6 +193,6 @@ def test_the_joining_job_joins(directory: Path, tmp_path: Path) -> None:
         ("cores", 0),
     ],
 )
-def test_what_a_script_could_not_hold_is_refused(key: str, value: object) -> None:
+def test_cluster_values_that_a_script_cannot_hold_are_refused(key: str, value: object) -> None:
     with pytest.raises(ValueError, match=key):
         ClusterConfig.model_validate({key: value})

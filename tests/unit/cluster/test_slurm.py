@@ -1,4 +1,4 @@
-"""What Slurm's commands print is understood."""
+"""How the output of Slurm's commands is read."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ QUEUE = """\
 """
 
 
-def test_a_task_that_is_being_warned_of_its_time_limit_still_runs(
+def test_a_task_that_slurm_warns_of_its_time_limit_counts_as_running(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Whoever takes it for ended, submits it once more."""
+    """Otherwise its slice would be submitted once more."""
     (tmp_path / "squeue").write_text(f"#!/bin/sh\ncat <<END\n{QUEUE}END\n")
     (tmp_path / "squeue").chmod(0o755)
     monkeypatch.setenv("PATH", f"{tmp_path}:/usr/bin:/bin")
@@ -34,9 +34,7 @@ def test_a_task_that_is_being_warned_of_its_time_limit_still_runs(
     ]
 
 
-def test_without_a_controller_one_sentence_says_so_in_place_of_internals(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_without_a_slurm_controller_the_error_is_one_sentence(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     said = """\
 scontrol: error: resolve_ctls_from_dns_srv: res_nsearch error: Unknown host
 scontrol: error: fetch_config: DNS SRV lookup failed
@@ -54,7 +52,7 @@ scontrol: fatal: Could not establish a configuration source
     assert "try: run this on a login node" in str(refused.value)
 
 
-def test_whoever_is_refused_by_slurm_is_told_where_to_correct_it(
+def test_a_refusal_by_slurm_names_the_file_and_option_that_correct_it(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "sbatch").write_text("#!/bin/sh\necho 'invalid partition specified: standard' >&2\nexit 1\n")

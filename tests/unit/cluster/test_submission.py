@@ -1,4 +1,4 @@
-"""What was submitted is remembered in the dataset's directory; what Slurm says of it is read as it is meant."""
+"""The record of submitted jobs in the directory of a dataset, and what Slurm says of these jobs."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ SUBMISSION = Submission(
 )
 
 
-def test_it_is_read_as_it_was_written(tmp_path: Path) -> None:
+def test_a_submission_reads_back_equal_after_it_is_written(tmp_path: Path) -> None:
     assert not is_submitted(tmp_path)
     (tmp_path / "cluster").mkdir()
     write_submission(tmp_path, SUBMISSION)
@@ -35,7 +35,7 @@ def test_it_is_read_as_it_was_written(tmp_path: Path) -> None:
     assert read_submission(tmp_path) == SUBMISSION
 
 
-def test_one_that_is_damaged_is_an_error(tmp_path: Path) -> None:
+def test_a_damaged_submission_is_an_error(tmp_path: Path) -> None:
     (tmp_path / "cluster").mkdir()
     (tmp_path / "cluster" / "submission.json").write_text('{"name": "many"}')
     with pytest.raises(ConfigError, match=r"submission.json: does not say what was submitted: it is damaged"):
@@ -45,12 +45,12 @@ def test_one_that_is_damaged_is_an_error(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("indexes", "text"), [((0,), "0"), ((0, 1, 2), "0-2"), ((0, 2, 3, 7), "0,2-3,7"), (tuple(range(1000)), "0-999")]
 )
-def test_indexes_are_written_as_ranges(indexes: tuple[int, ...], text: str) -> None:
+def test_indexes_of_array_tasks_are_written_as_ranges(indexes: tuple[int, ...], text: str) -> None:
     assert format_indexes(indexes) == text
 
 
 def answer(monkeypatch: pytest.MonkeyPatch, directory: Path, **programs: str) -> None:
-    """Have commands of Slurm print something."""
+    """Replace commands of Slurm by scripts that print these texts."""
     for name, text in programs.items():
         path = directory / name
         path.write_text(f"#!/bin/sh\ncat <<'END'\n{text}\nEND\n")
@@ -71,7 +71,7 @@ def test_the_queue_is_read_task_by_task(monkeypatch: pytest.MonkeyPatch, tmp_pat
     assert (joining.index, joining.reason) == (None, "Dependency")
 
 
-def test_how_tasks_ended_comes_from_the_controller_and_rather_from_accounting(
+def test_the_end_of_a_task_comes_from_accounting_or_else_from_the_controller(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     lines = [
@@ -94,7 +94,7 @@ def test_how_tasks_ended_comes_from_the_controller_and_rather_from_accounting(
     assert not ended[0].saw_no_directory
 
 
-def test_directories_of_other_jobs_are_left_out(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_directories_in_the_queue_leave_out_jobs_of_others(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     ours = "throwcollect:/data/with blank|x"
     answer(monkeypatch, tmp_path, squeue=f"12|{ours}\n11|{ours}\n13|(null)\n14|somebody else's")
     assert slurm.find_directories() == ["/data/with blank|x"]

@@ -34,7 +34,7 @@ def test_an_array_whose_joining_job_is_refused_is_cancelled(tmp_path: Path, monk
 
 
 @pytest.mark.parametrize(("tasks", "error", "said"), [(2, WorkerError, "submitted"), (3, ConfigError, "at most 2")])
-def test_an_array_may_be_as_large_as_slurm_says(
+def test_an_array_with_more_tasks_than_slurm_allows_is_refused(
     tasks: int, error: type[Exception], said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     config = write_config(tmp_path, trials=6, text=CONFIG + "record: {{trials_per_shard: 2}}\n", sim=FAST)
@@ -49,7 +49,9 @@ def test_an_array_may_be_as_large_as_slurm_says(
         submit(config, tmp_path / "data", tasks, onlooker=SILENT)
 
 
-def test_a_directory_that_is_refused_keeps_its_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_submission_refused_for_a_used_directory_keeps_its_files(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     config = write_config(tmp_path, trials=4, text=CONFIG + "record: {{trials_per_shard: 2}}\n", sim=FAST)
     for name in ("config.yaml", "trials.parquet", "cluster/mine.txt", "notes.txt"):
         (tmp_path / "mine" / name).parent.mkdir(parents=True, exist_ok=True)

@@ -1,4 +1,4 @@
-"""Configurations that are written by tests, and what is said of them."""
+"""Fixtures that write a configuration and read the problems that loading it reports."""
 
 import textwrap
 from pathlib import Path
@@ -21,7 +21,7 @@ def write(tmp_path):
 
 @pytest.fixture
 def problems_of(write):
-    """Messages of all problems of a file, without the directory that it is in."""
+    """Messages of all problems of a file, without its directory."""
 
     def problems_of(text: str, *overrides: str) -> list[str]:
         path = write(text)

@@ -50,7 +50,7 @@ containers:
 """
 
 
-def test_everything_that_may_be_said_of_containers_is_read_and_written_again(tmp_path: Path) -> None:
+def test_every_container_key_reads_back_equal_after_it_is_written(tmp_path: Path) -> None:
     path = tmp_path / "run.yaml"
     path.write_text(FULL)
     config = load(path)
@@ -141,11 +141,11 @@ def test_a_single_core_needs_no_quotes(tmp_path: Path) -> None:
         ),
     ],
 )
-def test_mistakes_are_named_with_file_line_and_key(tmp_path: Path, section: str, message: str) -> None:
+def test_a_wrong_container_value_is_reported_with_file_line_and_key(tmp_path: Path, section: str, message: str) -> None:
     assert problems(tmp_path, f"containers:\n  {section}") == [f"run.yaml:2: containers.{message}"]
 
 
-def test_what_is_unknown_is_reported_beside_what_is_refused(tmp_path: Path) -> None:
+def test_unknown_options_of_containers_are_reported_beside_refused_ones(tmp_path: Path) -> None:
     text = "containers:\n  sim: {options: {privileged: true, shm_siez: 1m, user: root, pids_limit: 0}}"
     assert problems(tmp_path, text) == [
         f"run.yaml:2: containers.sim.options.privileged: {POWER}",
@@ -163,20 +163,20 @@ def test_what_is_unknown_is_reported_beside_what_is_refused(tmp_path: Path) -> N
         for device in ("/dev/dri:/dev/dri", "/dev/dri/renderD128:/dev/dri/renderD128", "/dev/nvidia0:/dev/nvidia0")
     ],
 )
-def test_data_and_graphics_processors_are_handed_over(tmp_path: Path, option: str) -> None:
+def test_mounts_of_data_and_graphics_devices_are_accepted(tmp_path: Path, option: str) -> None:
     path = tmp_path / "run.yaml"
     path.write_text(f"containers:\n  sim: {{{option}}}")
     load(path)
 
 
-def test_a_port_of_this_machine_is_given_away_once(tmp_path: Path) -> None:
+def test_two_nodes_cannot_publish_the_same_port_of_this_machine(tmp_path: Path) -> None:
     text = "containers:\n  router: {ports: {80: 9000}}\n  coordinator: {ports: {81: 9000}}"
     assert problems(tmp_path, text) == [
         "run.yaml:3: containers.coordinator.ports.81: should differ from router.ports.80, got 9000, too"
     ]
 
 
-def test_several_simulations_cannot_share_a_port(tmp_path: Path) -> None:
+def test_several_simulations_cannot_publish_a_port(tmp_path: Path) -> None:
     text = "run: {{simulations: {}}}\ncontainers: {{sim: {{ports: {{80: 80}}}}}}"
     assert problems(tmp_path, text.format(3)) == [
         "run.yaml:2: containers.sim.ports: should be left out, as 3 simulations cannot share a port of this machine"
@@ -187,10 +187,10 @@ def test_several_simulations_cannot_share_a_port(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("option", ContainerOptions.__annotations__)
-def test_every_option_is_a_keyword_of_the_sdk(option: str) -> None:
+def test_every_container_option_is_a_keyword_of_the_docker_sdk(option: str) -> None:
     assert option in {*sdk.RUN_CREATE_KWARGS, *sdk.RUN_HOST_CONFIG_KWARGS}
 
 
-def test_containers_do_not_change_the_dataset() -> None:
+def test_keys_of_containers_do_not_change_the_dataset() -> None:
     containers = ContainersConfig(image="other", volume="throws")
     assert Config(containers=containers).without_run() == Config()

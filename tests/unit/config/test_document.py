@@ -48,7 +48,7 @@ def test_values_are_those_of_yaml_1_2(read, text, value):
     assert type(found) is type(value)
 
 
-def test_anchors_may_be_used_again(read):
+def test_an_alias_has_the_value_of_its_anchor(read):
     assert read("a: &range {min: 1}\nb: *range\n").values == {"a": {"min": 1}, "b": {"min": 1}}
 
 
@@ -56,17 +56,17 @@ def test_an_anchor_inside_itself_is_a_problem(read):
     assert facts(read("a: &a\n  b: *a\n")) == [("a.b", 1, "an alias cannot be inside its own anchor")]
 
 
-def test_a_key_that_is_there_twice_is_a_problem_and_keeps_its_first_value(read):
+def test_a_repeated_key_is_a_problem_and_keeps_its_first_value(read):
     document = read("ball:\n  mass_kg: 1\n  radius_m: 2\n  mass_kg: 3\n")
     assert facts(document) == [("ball.mass_kg", 4, "the key is here twice, first in line 2")]
     assert document.values == {"ball": {"mass_kg": 1, "radius_m": 2}}
 
 
-def test_keys_that_are_no_words_are_problems(read):
+def test_a_key_that_is_a_list_is_a_problem(read):
     assert facts(read("? [a, b]\n: 1\n")) == [("", 1, "a key should be a word")]
 
 
-def test_tags_that_mean_nothing_are_problems(read):
+def test_unknown_yaml_tags_are_problems(read):
     document = read("a: !!python/name:os.system x\nb: !units 3\nc: !!set {x}\n")
     assert facts(document) == [
         ("a", 1, "the tag python/name:os.system means nothing here"),
@@ -75,7 +75,7 @@ def test_tags_that_mean_nothing_are_problems(read):
     ]
 
 
-def test_numbers_of_absurd_length_are_problems(read):
+def test_a_number_of_thousands_of_digits_is_a_problem(read):
     assert [(key, line) for key, line, _ in facts(read(f"a: 1\nb: {'9' * 5000}\n"))] == [("b", 2)]
 
 
@@ -89,38 +89,38 @@ def test_numbers_of_absurd_length_are_problems(read):
         ("-1" + "0" * 400, "the number is too large"),
     ],
 )
-def test_what_does_not_fit_its_tag_or_any_number_is_a_problem(read, text, sentence):
+def test_a_value_that_does_not_fit_its_tag_or_is_too_large_is_a_problem(read, text, sentence):
     assert facts(read(f"a: 1\nb: {text}\n")) == [("b", 2, sentence)]
 
 
 @pytest.mark.parametrize("escaped", [r"\UFFFFFFFF", r"\U00110000", r"\ud800"])
-def test_characters_that_unicode_does_not_have_are_no_yaml(read, escaped):
+def test_escapes_of_characters_that_unicode_lacks_are_invalid_yaml(read, escaped):
     with pytest.raises(
         ConfigError, match=r"run\.yaml:2: not valid YAML: an escaped character does not exist in Unicode"
     ):
         read(f'a: 1\n"{escaped}": 2\n')
 
 
-def test_an_override_that_is_too_large_does_not_name_the_file(read):
+def test_the_error_for_a_too_large_override_does_not_name_the_file(read):
     document = read("a: 1\n")
-    # Reading the same thousand values thirty times takes less time than thirty thousand.
+    # A thousand values with 29 aliases: faster to read than 30000 values.
     with pytest.raises(ConfigError, match=r"^b: holds more than 30000 values$"):
         document.override(f"b=[&a [{1000 * '1,'}]{29 * ',*a'}]")
 
 
-def test_an_index_of_absurd_length_is_no_index(read):
+def test_an_override_with_an_index_of_thousands_of_digits_is_a_problem(read):
     document = read("a: [1]\n")
     document.override(f"a.{'9' * 5000}=2")
     assert [problem.message for problem in document.problems] == ["nothing of this name can be set; got '2'"]
 
 
-def test_a_swept_key_that_is_called_as_a_field_keeps_its_name(read):
+def test_an_override_can_set_a_swept_key_that_is_named_like_a_field(read):
     document = read("a: 1\n")
     document.override("sweep.parameters.min=1")
     assert document.values["sweep"] == {"parameters": {"min": 1}}
 
 
-def test_a_byte_order_mark_is_no_part_of_the_first_key(read):
+def test_a_byte_order_mark_does_not_belong_to_the_first_key(read):
     assert read("\ufeffa: 1\n").values == {"a": 1}
 
 
@@ -135,12 +135,12 @@ def test_a_byte_order_mark_is_no_part_of_the_first_key(read):
         (("missing",), None),
     ],
 )
-def test_problems_have_the_line_of_the_key_or_of_what_should_hold_it(read, location, line):
+def test_a_problem_has_the_line_of_its_key_or_of_the_section_that_lacks_it(read, location, line):
     document = read("# comment\na:\n  b:\n    - 1\n    - c: 2\n")
     assert document.problem(location, "wrong").line == line
 
 
-def test_problems_with_overrides_have_no_file(read):
+def test_problems_in_overridden_values_name_no_file(read):
     document = read("a: {b: 1, c: 2}\n")
     document.override("a.b=3")
     document.override("d.e={f: 1}")
@@ -151,7 +151,7 @@ def test_problems_with_overrides_have_no_file(read):
     assert [path is None for path in places] == [True, True, True, False]
 
 
-def test_an_override_wipes_out_the_lines_of_what_it_replaces(read):
+def test_an_override_of_a_section_removes_the_lines_of_its_old_keys(read):
     document = read("a:\n  b: {c: 1}\n")
     document.override("a.b={d: 2}")
     assert document.problem(("a", "b", "c"), "missing").path is None
@@ -164,7 +164,7 @@ def test_overrides_fill_sections_that_are_left_empty(read):
 
 
 @pytest.mark.parametrize("key", ["sweep.parameters.min.max", "sweep.parameters.a.b.c.scale", "sweep.parameters.a.b.c"])
-def test_dots_in_swept_keys_part_nothing_but_their_fields(read, key):
+def test_an_override_does_not_split_the_name_of_a_swept_key_at_its_dots(read, key):
     document = read("a: 1\n")
     document.override(f"{key}=1")
     name, _, field = key.removeprefix("sweep.parameters.").rpartition(".")
@@ -172,13 +172,13 @@ def test_dots_in_swept_keys_part_nothing_but_their_fields(read, key):
     assert document.values["sweep"] == {"parameters": expected}
 
 
-def test_yaml_errors_name_the_line(read):
+def test_an_error_in_the_yaml_names_its_line(read):
     with pytest.raises(ConfigError, match=r"run\.yaml:2: not valid YAML: mapping values are not allowed here"):
         read("a: 1\nb: c: d\n")
 
 
 def chain_aliases(levels: int) -> str:
-    """A text that is nested by its aliases alone."""
+    """A text that is nested only by its aliases."""
     return "k0: &k0 [1]\n" + "".join(f"k{n}: &k{n} [*k{n - 1}]\n" for n in range(1, levels))
 
 
@@ -191,7 +191,7 @@ def chain_aliases(levels: int) -> str:
         chain_aliases(200),
     ],
 )
-def test_what_is_nested_too_deeply_is_refused_at_once(text, read):
+def test_values_that_are_nested_too_deeply_are_refused(text, read):
     try:
         message = read(text).problems[0].message
     except ConfigError as error:
@@ -207,17 +207,17 @@ def test_an_override_that_is_nested_too_deeply_is_a_problem(read):
 
 
 @pytest.mark.parametrize(("text", "message"), [("!!set {a, b}\n", "the tag set"), ("!x {a: 1}\n", "the tag !x")])
-def test_a_file_whose_tag_is_not_that_of_keys_and_values_is_a_problem(text, message, read):
+def test_a_file_with_an_unknown_tag_at_its_top_is_refused(text, message, read):
     with pytest.raises(ConfigError, match=f"run.yaml:1: {message} means nothing here"):
         read(text)
 
 
-def test_a_name_that_no_file_can_have_is_refused():
+def test_a_file_name_with_a_null_character_is_refused():
     with pytest.raises(ConfigError, match="no file can have this name"):
         Document(Path("a\0b"))
 
 
-def test_a_pipe_is_not_waited_for(tmp_path):
+def test_a_pipe_as_configuration_is_refused_without_waiting(tmp_path):
     os.mkfifo(tmp_path / "pipe")
     with pytest.raises(ConfigError, match="pipe: should be a YAML file, got a pipe or a device"):
         Document(tmp_path / "pipe")

@@ -15,7 +15,7 @@ LEARNED = Config().task.model_copy(
 KEYS = {leaf.name: leaf for config in (Config(), Config(task=LEARNED)) for leaf in leaves(config)}
 
 
-def test_every_key_says_what_it_has_an_effect_on():
+def test_every_key_declares_its_effect():
     assert [name for name, leaf in KEYS.items() if leaf.key.effect is None] == []
 
 
@@ -37,17 +37,17 @@ def test_every_key_says_what_it_has_an_effect_on():
         ("run.ros", Effect.RUN),
     ],
 )
-def test_a_key_has_the_effect_of_its_section_unless_it_says_otherwise(name, effect):
+def test_a_key_has_the_effect_of_its_section_unless_it_declares_its_own(name, effect):
     assert KEYS[name].key.effect is effect
 
 
-def test_only_what_determines_samples_can_be_swept():
+def test_only_keys_that_determine_samples_can_be_swept():
     swept = [leaf for leaf in KEYS.values() if leaf.key.swept]
     assert swept
     assert all(leaf.key.determines_samples for leaf in swept)
 
 
-def test_keys_of_an_effect_are_a_part_of_all():
+def test_sweepable_keys_are_those_with_an_effect_on_physics_or_task():
     config = Config(task=LEARNED)
     physics = sweepable_keys(config, Effect.PHYSICS)
     task = sweepable_keys(config, Effect.TASK)
@@ -56,18 +56,18 @@ def test_keys_of_an_effect_are_a_part_of_all():
     assert "task.duration_s" in task
 
 
-def test_a_value_is_told_from_its_default():
+def test_leaves_of_a_configuration_know_whether_they_have_their_default():
     changed = Config(task=LEARNED)
     defaults = {leaf.name: leaf.is_default for leaf in leaves(changed)}
     assert defaults["controllers.hold"]
     assert not defaults["task.trajectory.weights.torso_1_joint.1"]
 
 
-def test_keys_that_name_files_or_resources_of_a_machine_are_its_operators():
+def test_keys_that_name_files_or_resources_of_a_machine_are_operator_keys():
     assert list_operator_keys() == ("sweep.file", "run", "containers", "cluster")
 
 
-def test_a_key_of_the_operator_is_found_in_a_section_of_any_member():
+def test_operator_keys_are_found_in_sections_of_unions_and_optional_sections():
     class Own(Section):
         table: Annotated[str, Key(operator=True)] = ""
 
@@ -81,6 +81,6 @@ def test_a_key_of_the_operator_is_found_in_a_section_of_any_member():
     assert list(values._find_operator_keys(Whole)) == ["part.table", "maybe.table"]
 
 
-def test_more_trials_may_follow_from_few_keys():
+def test_only_trials_and_until_can_make_a_plan_grow():
     grows = Config.model_validate({"until": {"landed": 5}})
     assert [leaf.name for leaf in leaves(grows) if leaf.key.grows] == ["trials", "until.landed"]

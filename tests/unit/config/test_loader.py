@@ -1,4 +1,4 @@
-"""Configurations are read from files and overrides, and written so that they read back the same."""
+"""Configurations are read from files and overrides, and are equal after they are written and read back."""
 
 import re
 from pathlib import Path
@@ -24,12 +24,12 @@ CONFIGS = Path(__file__).parents[3] / "configs"
 
 
 @pytest.mark.parametrize("path", sorted(CONFIGS.glob("*.yaml")), ids=lambda path: path.name)
-def test_ready_configurations_load(path):
+def test_every_configuration_in_configs_loads_under_its_name(path):
     config = load(path)
     assert config.name == path.stem
 
 
-def test_what_is_left_out_has_its_default(write):
+def test_a_missing_key_takes_its_default(write):
     assert load(write("name: short")) == Config(name="short")
 
 
@@ -61,7 +61,7 @@ def test_the_family_of_a_trajectory_may_be_left_out(write):
         (b"name: " + 5_000_000 * b"x", "run.yaml: larger than 5000000 bytes"),
     ],
 )
-def test_files_that_are_no_configuration(tmp_path, content, message):
+def test_a_file_that_holds_no_configuration_is_refused_with_its_line(tmp_path, content, message):
     path = tmp_path / "run.yaml"
     path.write_bytes(content)
     with pytest.raises(ConfigError, match=re.escape(f"{tmp_path}/{message}")) as caught:
@@ -69,14 +69,14 @@ def test_files_that_are_no_configuration(tmp_path, content, message):
     assert [str(problem) for problem in caught.value.problems] == [f"{tmp_path}/{message}"]
 
 
-def test_files_that_cannot_be_read(tmp_path, monkeypatch):
+def test_a_file_that_cannot_be_read_is_refused_with_the_reason(tmp_path, monkeypatch):
     with pytest.raises(ConfigError, match=r"missing\.yaml: no such file$"):
         load(tmp_path / "missing.yaml")
     with pytest.raises(ConfigError, match=r"should be a YAML file, got a directory$"):
         load(tmp_path)
     forbidden = tmp_path / "forbidden.yaml"
     forbidden.write_text("name: secret")
-    # Root may read everything, so the refusal is played where the file is opened.
+    # Root may read every file, so `open` is replaced to refuse.
     monkeypatch.setattr(Path, "open", _refuse)
     with pytest.raises(ConfigError, match=r"no permission to read the file$"):
         load(forbidden)
@@ -86,7 +86,7 @@ def _refuse(path, *_):
     raise PermissionError(13, "Permission denied", str(path))
 
 
-def test_overrides_win_over_the_file_and_later_ones_over_earlier_ones(write):
+def test_overrides_replace_values_of_the_file_and_earlier_overrides(write):
     path = write("trials: 3\nball: {mass_kg: 0.1}\nsweep: {parameters: {ball.mass_kg: {min: 0.1, max: 0.2}}}")
     config = load(
         path,
@@ -128,7 +128,7 @@ def test_overrides_win_over_the_file_and_later_ones_over_earlier_ones(write):
         ("record.topics.last=tf", "record.topics.last: nothing of this name can be set; got 'tf'"),
     ],
 )
-def test_wrong_overrides_are_named_without_a_line_of_the_file(problems_of, override, message):
+def test_a_wrong_override_is_reported_without_a_line_of_the_file(problems_of, override, message):
     file = "ball: {mass_kg: 0.1}\nrecord: {topics: [joint_states, ball/odometry]}"
     assert problems_of(file, override) == [message]
 
@@ -181,7 +181,7 @@ configs = st.builds(
 
 @settings(deadline=None, max_examples=60)
 @given(config=configs)
-def test_resolved_text_loads_back_to_an_equal_configuration(tmp_path_factory, config):
+def test_a_dumped_configuration_loads_back_equal(tmp_path_factory, config):
     path = tmp_path_factory.getbasetemp() / "resolved.yaml"
     text = dump_yaml(config)
     path.write_text(text, encoding="utf-8", newline="")
@@ -190,7 +190,7 @@ def test_resolved_text_loads_back_to_an_equal_configuration(tmp_path_factory, co
     assert dump_yaml(loaded) == text
 
 
-def test_resolved_text_shows_every_key():
+def test_a_dumped_configuration_shows_defaults_too():
     lines = dump_yaml(Config()).splitlines()
     assert "  mass_kg: 0.045" in lines
     assert "  topics: [joint_states, ball/odometry]" in lines
@@ -198,19 +198,19 @@ def test_resolved_text_shows_every_key():
     assert dump_yaml(Config(name="on")).startswith('name: "on"\n')
 
 
-def test_an_override_replaces_one_joint_and_leaves_the_others_as_they_are_by_default(tmp_path: Path) -> None:
+def test_an_override_of_one_joint_keeps_the_values_of_the_others(tmp_path: Path) -> None:
     path = tmp_path / "throws.yaml"
     path.write_text("name: throws\n")
     default = load(path).task.end
     changed = load(path, ["task.end.arm_right_4_joint=-0.3", "task.end.torso_1_joint=0.1"]).task.end
     assert changed == {**default, "arm_right_4_joint": -0.3, "torso_1_joint": 0.1}
-    # What the file says of the moving joints stays so.
+    # The file names the moving joints: an override adds to these.
     path.write_text("name: throws\ntask: {end: {arm_right_4_joint: -0.5}}\n")
     assert load(path, ["task.end.arm_right_7_joint=0.4"]).task.end == {
         "arm_right_4_joint": -0.5,
         "arm_right_7_joint": 0.4,
     }
-    # A problem is told at the override, and nothing of the defaults is in its way.
+    # A wrong joint is reported at the override, not at the defaults.
     path.write_text("name: throws\n")
     with pytest.raises(ConfigError, match=r"^task\.end\.arm_right_9_joint: "):
         load(path, ["task.end.arm_right_9_joint=1"])
@@ -219,22 +219,22 @@ def test_an_override_replaces_one_joint_and_leaves_the_others_as_they_are_by_def
 @pytest.mark.parametrize(
     "asked", [("run.simulations=3",), ("run.simulations=1", "run={runtime: inprocess, simulations: 3}")]
 )
-def test_more_simulations_than_a_runtime_has_cannot_be_asked_for(problems_of, asked: tuple[str, ...]) -> None:
+def test_an_override_cannot_ask_for_more_simulations_than_the_runtime_has(problems_of, asked: tuple[str, ...]) -> None:
     (problem,) = problems_of("run: {simulations: 4}", "run.runtime=inprocess", *asked)
     assert problem == "run.simulations: should be 1 with the runtime inprocess, got 3"
 
 
 @pytest.mark.parametrize("asked", [(), ("run.simulations=1",), ("run.replay=0",)])
-def test_the_number_of_simulations_in_a_file_is_for_other_runtimes(write, asked: tuple[str, ...]) -> None:
+def test_a_runtime_of_one_simulation_ignores_the_number_in_the_file(write, asked: tuple[str, ...]) -> None:
     assert load(write("run: {simulations: 4}"), ["run.runtime=inprocess", *asked]).run.runtime == "inprocess"
 
 
-def test_a_wrong_number_of_simulations_is_told_once(problems_of) -> None:
+def test_a_wrong_number_of_simulations_is_reported_once(problems_of) -> None:
     (problem,) = problems_of("name: a", "run.runtime=inprocess", "run.simulations=many")
     assert problem.startswith("run.simulations: should be a whole number")
 
 
-def test_overrides_that_are_no_list_of_texts_are_refused_at_once(write) -> None:
+def test_overrides_that_are_not_a_list_of_texts_are_refused(write) -> None:
     path = write("name: some")
     with pytest.raises(ConfigError, match=r"^overrides: 'task\.duration_s=1' is a text") as caught:
         load(path, "task.duration_s=1")

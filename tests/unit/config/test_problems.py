@@ -1,4 +1,4 @@
-"""What is wrong in a configuration is named with its place, its value and what would be right."""
+"""A problem in a configuration is reported with its place, its value and what is expected."""
 
 from pathlib import Path
 
@@ -20,7 +20,7 @@ JOINT_LIST = "joint names, each with a number from -6.3 to 6.3 rad"
     ("text", "messages"),
     [
         ("trails: 3", [f"run.yaml:1: trails{MEANT_TRIALS}"]),
-        # What is written under a wrong name is not told to be missing under its right one.
+        # A key under a misspelt name is not reported as missing too.
         ("trails: 3\nsweep: {parameters: {ball.mass_kg: {min: 1, max: 2}}}", [f"run.yaml:1: trails{MEANT_TRIALS}"]),
         ("until: {swung: 5}", ["run.yaml:1: until.swung: unknown key; known keys here: landed"]),
         ("until: {landd: 5}", ["run.yaml:1: until.landd: unknown key; did you mean 'landed'?"]),
@@ -150,11 +150,11 @@ JOINT_LIST = "joint names, each with a number from -6.3 to 6.3 rad"
         ),
     ],
 )
-def test_wrong_values_are_named_with_place_and_expectation(problems_of, text, messages):
+def test_a_wrong_value_is_reported_with_its_line_key_and_expectation(problems_of, text, messages):
     assert problems_of(text) == messages
 
 
-def test_all_problems_are_reported_at_once_and_unknown_keys_first(problems_of):
+def test_problems_are_reported_all_at_once_with_unknown_keys_first(problems_of):
     found = problems_of(
         """
         seed: x
@@ -192,7 +192,7 @@ def test_all_problems_are_reported_at_once_and_unknown_keys_first(problems_of):
         ("ball: {mass_kg: 0}", "ball.mass_kgs", "ball.mass_kg"),
     ],
 )
-def test_a_misspelt_swept_key_is_found_beside_a_wrong_value_of_the_right_one(problems_of, text, swept, meant):
+def test_a_misspelt_swept_key_is_reported_beside_a_wrong_value_of_the_right_key(problems_of, text, swept, meant):
     found = problems_of(f"trials: 1\n{text}\nsweep: {{parameters: {{{swept}: {{values: [1]}}}}}}")
     assert len(found) == 2
     assert found[0] == f"run.yaml:3: sweep.parameters.{swept}: unknown key; did you mean '{meant}'?"
@@ -210,11 +210,11 @@ def test_a_misspelt_swept_key_is_found_beside_a_wrong_value_of_the_right_one(pro
         "sweep: {sampler: lost, parameters: {ball.mass_kg: {min: 1, max: 2, count: 3}}}\ntrials: 1",
     ],
 )
-def test_a_default_in_the_place_of_a_wrong_value_causes_no_further_problems(problems_of, text):
+def test_a_single_wrong_value_causes_only_one_problem(problems_of, text):
     assert len(problems_of(text)) == 1
 
 
-def test_problems_carry_their_facts_as_fields(write):
+def test_a_problem_has_its_file_line_and_key_as_fields(write):
     path = write("name: x\nball:\n  mass_kg: heavy")
     with pytest.raises(ConfigError, match="heavy") as caught:
         load(path)
@@ -234,7 +234,7 @@ def test_problems_carry_their_facts_as_fields(write):
         ("sweep", "run.yaml:2: "),
     ],
 )
-def test_what_is_found_later_is_named_with_the_place_of_its_key(write, key, where):
+def test_an_error_raised_after_loading_gets_the_line_of_its_key(write, key, where):
     path = write("""
         trials: 3
         sweep:
@@ -252,7 +252,7 @@ def test_what_is_found_later_is_named_with_the_place_of_its_key(write, key, wher
 
 
 @pytest.mark.parametrize("problem", [Problem("torn", "trials", Path("list.csv"), 8), Problem("torn")])
-def test_what_has_another_place_or_none_keeps_it(write, problem):
+def test_an_error_about_another_file_or_without_a_key_keeps_its_place(write, problem):
     with pytest.raises(ConfigError, match="torn") as caught, load_locating_errors(write("trials: 3")):
         raise ConfigError([problem])
     assert caught.value.problems == [problem]
@@ -265,7 +265,7 @@ def test_what_has_another_place_or_none_keeps_it(write, problem):
         ("name: a\n", "name: the key is here twice, first in line 1"),
     ],
 )
-def test_of_very_many_problems_the_first_are_told_and_the_others_counted(line, message, tmp_path):
+def test_only_twenty_of_many_problems_are_listed_and_the_rest_are_counted(line, message, tmp_path):
     path = tmp_path / "many.yaml"
     path.write_text("name: a\n" + "".join(line.format(number) for number in range(500)))
     with pytest.raises(ConfigError) as caught:
@@ -276,7 +276,7 @@ def test_of_very_many_problems_the_first_are_told_and_the_others_counted(line, m
     assert lines[-1] == "and 480 more"
 
 
-def test_suggestions_are_not_looked_for_where_nobody_would_read_them(tmp_path, monkeypatch):
+def test_suggestions_are_searched_only_for_the_first_of_many_problems(tmp_path, monkeypatch):
     asked = []
 
     def near(word, known, count):
@@ -291,7 +291,7 @@ def test_suggestions_are_not_looked_for_where_nobody_would_read_them(tmp_path, m
     assert len(asked) <= 200
 
 
-def test_a_value_that_cannot_be_read_is_told_once(problems_of):
+def test_a_value_that_cannot_be_read_is_reported_once(problems_of):
     assert problems_of("seed: !!int x\nball: {mass_kg: !!bool maybe}") == [
         "run.yaml:1: seed: 'x' is not of the kind int",
         "run.yaml:2: ball.mass_kg: 'maybe' is not of the kind bool",

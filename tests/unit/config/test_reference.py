@@ -10,7 +10,7 @@ def print_reference(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
     return run_with_plugins("throwcollect.config.reference", *arguments)
 
 
-def test_the_page_is_up_to_date_whatever_is_installed() -> None:
+def test_the_page_on_configuration_is_up_to_date_even_with_plugins_installed() -> None:
     done = print_reference()
     assert (done.returncode, done.stderr) == (0, "")
     assert done.stdout == (ROOT / "docs" / "configuration.md").read_text(encoding="utf-8"), (
@@ -18,7 +18,7 @@ def test_the_page_is_up_to_date_whatever_is_installed() -> None:
     )
 
 
-def test_a_file_holds_what_is_printed(tmp_path: Path) -> None:
+def test_the_output_option_writes_the_same_page_as_is_printed(tmp_path: Path) -> None:
     page = tmp_path / "page.md"
     done = print_reference("--output", page)
     assert (done.returncode, done.stdout, done.stderr) == (0, "", "")

@@ -8,19 +8,19 @@ KEYS = [(model, key) for model, schema in MODELS.items() for key in schema["prop
 
 
 @pytest.mark.parametrize(("model", "key"), KEYS, ids=".".join)
-def test_every_key_has_a_meaning(model, key):
+def test_every_key_has_a_description_that_is_a_sentence(model, key):
     node = MODELS[model]["properties"][key]
     meaning = node.get("description") or MODELS[node["$ref"].rpartition("/")[2]]["description"]
     assert meaning.endswith(".")
 
 
-def test_every_key_is_on_the_page():
+def test_every_key_is_on_the_reference_page():
     text = page()
     missing = [key for _, key in KEYS if f"`{key}`" not in text and f".{key}`" not in text]
     assert missing == []
 
 
-def test_tables_are_not_torn_by_bars_in_their_cells():
+def test_rows_of_the_reference_tables_have_equally_many_cells():
     table = 0
     for line in page().splitlines():
         bars = line.count("|") if line.startswith("|") else 0

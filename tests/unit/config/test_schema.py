@@ -12,26 +12,26 @@ from throwcollect.config.until import UntilConfig, Wanted
 from throwcollect.tasks.throw.throw_config import ThrowConfig, UntilLanded
 
 
-def test_every_key_has_a_default_so_that_an_empty_configuration_is_one():
+def test_an_empty_configuration_is_valid():
     assert Config().task.trajectory.family == "minimum_jerk"
 
 
-def test_defaults_are_the_same_objects_in_all_configurations():
+def test_configurations_share_their_default_objects():
     assert Config().ball is Config(trials=3).ball
     assert Config().task.end is Config(trials=3).task.end
 
 
-def test_values_never_change():
+def test_values_of_a_configuration_cannot_be_assigned():
     with pytest.raises(ValidationError, match="frozen"):
         Config().ball.mass_kg = 1.0
 
 
-def test_parameters_are_told_apart_by_their_keys():
+def test_swept_parameters_with_values_and_with_min_and_max_are_distinguished():
     sweep = SweepConfig.model_validate({"parameters": {"a": {"values": [1]}, "b": {"min": 1, "max": 2}}})
     assert sweep.parameters == {"a": Values(values=[1.0]), "b": Range(min=1.0, max=2.0)}
 
 
-def test_contradictions_name_every_key_that_takes_part():
+def test_a_contradiction_names_every_key_that_takes_part():
     with pytest.raises(
         ValidationError, match=r"end\.head_1_joint: start should name .*; end\.head_2_joint: start should name"
     ):
@@ -46,19 +46,19 @@ def test_slots_of_trials_do_not_overlap_and_none_starts_at_zero():
 
 
 class UntilLandedToo(UntilConfig):
-    """The section `until` of somebody else's task."""
+    """The section `until` of a task of another package."""
 
     landed: Wanted
 
 
 class LobConfig(ThrowConfig):
-    """A task whose success has the name that the one of `throw` has."""
+    """A task that names its success as `throw` does."""
 
     until: ClassVar[type[UntilConfig]] = UntilLandedToo
     name: Literal["lob"] = "lob"
 
 
-def test_tasks_may_have_successes_of_one_name(monkeypatch):
+def test_two_tasks_may_name_their_success_alike(monkeypatch):
     tasks = {"throw": ThrowConfig, "lob": LobConfig}
     monkeypatch.setattr(schema, "names_of", lambda _: tuple(tasks))
     monkeypatch.setattr(schema, "load_member", lambda _, name: tasks[name])
@@ -69,14 +69,14 @@ def test_tasks_may_have_successes_of_one_name(monkeypatch):
         assert list(Config().model_copy(update={"until": until, "task": task})._find_contradictions()) == []
 
 
-def test_classes_of_two_packages_may_have_one_name():
+def test_task_classes_of_two_packages_may_have_the_same_name():
     namesake = type("ThrowConfig", (LobConfig,), {"__module__": "somebody.elses"})
     kind = TypeAdapter(any_of({"throw": ThrowConfig, "lob": namesake}, lambda value: value["name"]))
     assert [type(kind.validate_python({"name": name})) for name in ("throw", "lob")] == [ThrowConfig, namesake]
 
 
 @pytest.mark.parametrize("wide", [Range, lambda **ends: Bins(bins=2, **ends)])
-def test_ends_whose_distance_is_no_number_are_refused(wide):
+def test_a_range_whose_width_overflows_is_refused(wide):
     with pytest.raises(ValidationError, match=r"max: should be nearer to min, -1e\+308, got 1e\+308"):
         wide(min=-1e308, max=1e308)
 
@@ -89,6 +89,6 @@ def test_ends_whose_distance_is_no_number_are_refused(wide):
         (RunConfig, "listen", "tcp/0.0.0.0:744\N{ARABIC-INDIC DIGIT FOUR}"),
     ],
 )
-def test_digits_are_those_of_ascii(section, key, value):
+def test_digits_beyond_ascii_are_refused_in_times_sizes_and_addresses(section, key, value):
     with pytest.raises(ValidationError, match=f"should be .*, got '{value}'"):
         section(**{key: value})

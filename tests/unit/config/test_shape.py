@@ -23,17 +23,17 @@ from throwcollect.config.shape import json_schema, shape_of
         (("nowhere",), "anything"),
     ],
 )
-def test_shapes_say_in_words_what_a_key_holds(location, words):
+def test_the_shape_of_a_key_says_in_words_what_it_holds(location, words):
     assert str(shape_of(location)) == words
 
 
-def test_the_keys_of_a_union_are_those_of_all_alternatives():
+def test_the_shape_of_a_union_has_the_keys_of_all_alternatives():
     assert {"gamma", "alpha_z"} < set(shape_of(("task", "trajectory")).keys)
     alternatives = shape_of(("task", "trajectory")).alternatives
     assert set(alternatives[0].keys) == {"family", "gamma"}
 
 
-def test_the_schema_says_which_standard_it_follows_and_forbids_unknown_keys():
+def test_the_json_schema_names_its_standard_and_forbids_unknown_keys():
     schema = json_schema()
     assert schema["$schema"] == "https://json-schema.org/draft/2020-12/schema"
     assert not schema["additionalProperties"]

@@ -1,4 +1,4 @@
-"""What is wrong with samplers, targets and the end of a collection is named in the words of the file."""
+"""Problems with samplers, targets and `until` are reported by the keys of the file."""
 
 import pytest
 
@@ -52,7 +52,7 @@ from throwcollect.config.loader import dump_yaml, load
         ),
     ],
 )
-def test_wrong_sweeps_are_named_with_place_and_expectation(problems_of, sweep, messages):
+def test_a_wrong_sweep_is_reported_with_its_line_key_and_expectation(problems_of, sweep, messages):
     text = f"trials: 1\nsweep:\n  parameters:\n    {sweep}"
     assert problems_of(text) == [f"run.yaml:4: sweep.parameters.{message}" for message in messages]
 
@@ -81,11 +81,11 @@ def test_wrong_sweeps_are_named_with_place_and_expectation(problems_of, sweep, m
         ),
     ],
 )
-def test_samplers_get_what_they_need_and_nothing_else(problems_of, sweep, message):
+def test_a_sampler_refuses_missing_and_unneeded_keys(problems_of, sweep, message):
     assert problems_of(f"trials: 1\nsweep: {sweep}") == [f"run.yaml:2: {message}"]
 
 
-def test_samplers_that_draw_need_a_number_of_trials(problems_of):
+def test_a_sampler_that_draws_needs_a_number_of_trials(problems_of):
     assert problems_of("sweep: {parameters: {ball.mass_kg: {min: 1, max: 2}}}") == [
         "run.yaml: trials: missing; the sampler sobol should know how many trials to draw, or (until) how many "
         "should have landed"
@@ -121,13 +121,13 @@ PARAMETERS = "parameters: {task.duration_s: {min: 1, max: 1.2}}"
         ),
     ],
 )
-def test_targets_that_cannot_be_spread_over_are_named(problems_of, target, message):
+def test_a_wrong_target_of_a_sweep_is_reported_with_its_key(problems_of, target, message):
     assert problems_of(f"trials: 9\nsweep: {{{PARAMETERS}, target: {target}}}") == [
         f"run.yaml:2: sweep.target.{message}"
     ]
 
 
-def test_a_target_begins_with_sobol_and_has_parameters(problems_of):
+def test_a_target_needs_the_sampler_sobol_parameters_and_a_number_of_trials(problems_of):
     target = "target: {distance_m: {min: 1, max: 2, bins: 4}}"
     assert problems_of(f"trials: 9\nsweep: {{sampler: uniform, {PARAMETERS}, {target}}}") == [
         "run.yaml:2: sweep.sampler: should be sobol, with which the search for target begins, got uniform"
@@ -141,7 +141,7 @@ def test_a_target_begins_with_sobol_and_has_parameters(problems_of):
     ]
 
 
-def test_until_wants_a_number_and_a_sampler_that_goes_on(problems_of):
+def test_until_needs_a_positive_number_and_a_sampler_that_can_draw_more(problems_of):
     assert problems_of("until: 5") == ["run.yaml:1: until: should be {landed: …} or null, got 5"]
     assert problems_of("until: {landed: 0}") == [
         "run.yaml:1: until.landed: should be a whole number from 1 to 1000000, got 0"
@@ -151,7 +151,7 @@ def test_until_wants_a_number_and_a_sampler_that_goes_on(problems_of):
     ]
 
 
-def test_until_is_enough_for_samplers_that_draw(tmp_path):
+def test_a_sampler_that_draws_needs_no_number_of_trials_beside_until(tmp_path):
     path = tmp_path / "run.yaml"
     path.write_text(f"until: {{landed: 5}}\nsweep: {{{PARAMETERS}}}")
     config = load(path)

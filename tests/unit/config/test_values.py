@@ -30,20 +30,20 @@ BOUNDS = {
 
 @settings(deadline=None, max_examples=40)
 @given(st.fixed_dictionaries({}, optional={key: st.floats(*bounds) for key, bounds in BOUNDS.items()}))
-def test_replaced_values_equal_edited_yaml(tmp_path_factory, values):
+def test_with_values_gives_the_same_configuration_as_overrides(tmp_path_factory, values):
     path = tmp_path_factory.getbasetemp() / "edited.yaml"
     path.write_text(dump_yaml(LEARNED))
     edited = load(path, [f"{key}={value!r}" for key, value in values.items()])
     assert with_values(LEARNED, values) == edited
 
 
-def test_the_configuration_itself_stays_as_it_is():
+def test_with_values_does_not_change_the_given_configuration():
     before = dump_yaml(LEARNED)
     with_values(LEARNED, {key: 1.0 for key in BOUNDS if key != "sim.command_delay_s"})
     assert dump_yaml(LEARNED) == before
 
 
-def test_numbers_of_numpy_are_numbers():
+def test_with_values_accepts_numbers_of_numpy():
     assert with_values(Config(), {"ball.mass_kg": np.float64(0.25)}).ball.mass_kg == 0.25
 
 
@@ -71,12 +71,12 @@ def test_numbers_of_numpy_are_numbers():
         ({"record.rate_hz": 300}, r"^record\.rate_hz: should divide sim\.physics_hz, 500, got 300$"),
     ],
 )
-def test_values_that_do_not_fit_are_named(values, message):
+def test_with_values_refuses_wrong_keys_and_values_with_a_reason(values, message):
     with pytest.raises(ConfigError, match=message):
         with_values(LEARNED, values)
 
 
-def test_leaves_are_what_holds_nothing_further():
+def test_leaves_of_a_configuration_are_the_keys_without_keys_below():
     found = values_by_key(LEARNED)
     assert found["ball.mass_kg"] == 0.045
     assert found["task.trajectory.weights.arm_right_4_joint.1"] == 2.0
@@ -85,7 +85,7 @@ def test_leaves_are_what_holds_nothing_further():
 
 
 @pytest.mark.parametrize("key", [*BOUNDS, "scene.gravity_mps2", "sim.settle_s", "robot.velocity_gain"])
-def test_what_a_trial_may_change_can_be_swept(key):
+def test_keys_that_may_vary_between_trials_can_be_swept(key):
     assert reason_not_sweepable(LEARNED, key) is None
     assert key in sweepable_keys(LEARNED)
 
@@ -112,6 +112,6 @@ def test_what_a_trial_may_change_can_be_swept(key):
         ("seed", "cannot vary from trial to trial"),
     ],
 )
-def test_what_a_trial_may_not_change_has_a_reason(key, reason):
+def test_keys_that_cannot_be_swept_have_a_reason(key, reason):
     assert reason_not_sweepable(LEARNED, key) == reason
     assert key not in sweepable_keys(LEARNED)

@@ -1,4 +1,4 @@
-"""The fixture of the acceptance cases: a controller of three joints, a plant, and a clock."""
+"""A controller of three joints, a plant and a clock for the acceptance cases."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def point(time_s: float, positions: Sequence[float], velocities=(), acceleration
 
 
 def to(time_s: float, j1: float, degree: int = 1) -> TrajectoryPoint:
-    """A point for joint 1, at rest as far as the degree goes; the other joints stay."""
+    """A point for joint 1, at rest if the degree has velocities or accelerations; the other joints stay."""
     still = (0.0, 0.0, 0.0)
     return point(time_s, (j1, *START[1:]), still if degree > 1 else (), still if degree > 3 else ())
 
@@ -91,7 +91,7 @@ class Plant:
 
 
 class Bench:
-    """A controller that is driven step by step; `k` counts the updates since the last goal."""
+    """Drives a controller step by step; `k` counts the updates since the last goal."""
 
     def __init__(
         self,

@@ -1,4 +1,4 @@
-"""What a client of ros2_controllers' joint trajectory controller sees beside the course of one goal."""
+"""Acceptance cases, taken from ros2_controllers' joint trajectory controller, beyond the course of a single goal."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ from .test_answers import ANSWERS
 from .test_courses import COURSES
 
 
-def test_tolerance_texts_go_on_with_joint_error_and_tolerance() -> None:
+def test_texts_of_broken_tolerances_name_joint_error_and_tolerance() -> None:
     off_path = Bench(constrain(trajectory=0.105), Plant("frozen"))
     off_path.send(goal(to(1.0, 2.1)))
     off_path.step(20)
@@ -52,7 +52,7 @@ def test_tolerance_texts_go_on_with_joint_error_and_tolerance() -> None:
     )
 
 
-def test_desired_is_one_step_behind_the_command() -> None:
+def test_the_desired_position_is_one_step_behind_the_command() -> None:
     bench = Bench()
     bench.send(goal(to(1.0, 2.1)))
     desired = []
@@ -62,7 +62,7 @@ def test_desired_is_one_step_behind_the_command() -> None:
     assert np.array(desired)[[0, 49, 98, 99, 100]] == pytest.approx([1.10, 1.59, 2.08, 2.09, 2.10], abs=1e-6)
 
 
-def test_new_goals_preempt_and_start_from_the_measured_state() -> None:
+def test_a_new_goal_preempts_the_old_one_and_starts_from_the_measured_state() -> None:
     bench = Bench()
     bench.send(goal(to(2.0, 4.0)), "A")
     bench.step(20)
@@ -77,7 +77,7 @@ def test_new_goals_preempt_and_start_from_the_measured_state() -> None:
     assert (second.goal_id, second.status, second.error_string, k) == ("B", REACHED[0], REACHED[2], 10)
 
 
-def test_results_outlive_the_next_goal() -> None:
+def test_the_result_of_a_goal_is_kept_when_the_next_goal_begins() -> None:
     bench = Bench()
     bench.controller.submit("A", goal(to(0.0, 2.1)), bench.now_ns)
     bench.controller.update(bench.now_ns + 1, bench.plant.measure())
@@ -85,7 +85,7 @@ def test_results_outlive_the_next_goal() -> None:
     assert [(result.goal_id, result.status) for result in bench.controller.pop_results()] == [("A", REACHED[0])]
 
 
-def test_parameters_that_change_during_a_goal_hold_for_the_next() -> None:
+def test_parameters_changed_during_a_goal_apply_to_the_next_goal() -> None:
     bench = Bench(TALOS, Plant("frozen"))
     bench.send(goal(to(0.5, 1.6)), "A")
     bench.step(10)
@@ -96,7 +96,7 @@ def test_parameters_that_change_during_a_goal_hold_for_the_next() -> None:
     assert [result.status for _, result in bench.results] == [GoalStatus.ABORTED, GoalStatus.SUCCEEDED]
 
 
-def test_topic_trajectories_need_no_goal() -> None:
+def test_a_trajectory_from_the_topic_is_followed_without_a_goal() -> None:
     bench = Bench()
     assert bench.controller.replace(goal(to(0.2, 1.3)).trajectory, bench.now_ns) is None
     bench.step(30)
@@ -105,7 +105,7 @@ def test_topic_trajectories_need_no_goal() -> None:
     assert bench.controller.goal_id is None
 
 
-def test_topic_trajectories_do_not_inherit_the_tolerances_of_the_last_goal() -> None:
+def test_a_trajectory_from_the_topic_does_not_keep_tolerances_of_an_ended_goal() -> None:
     bench = Bench(plant=Plant("frozen"))
     bench.send(goal(to(1.0, 1.2), path_tolerance=("j1", 0.05)))
     bench.step(60)
@@ -123,7 +123,7 @@ def test_an_open_goal_keeps_its_tolerances_on_a_trajectory_from_the_topic() -> N
     assert bench.results[0][1].error_code == ErrorCode.PATH_TOLERANCE_VIOLATED
 
 
-def test_topic_trajectories_that_break_a_tolerance_end_in_a_hold() -> None:
+def test_a_trajectory_from_the_topic_that_breaks_a_tolerance_ends_in_a_hold() -> None:
     bench = Bench(TALOS, Plant("frozen"))
     bench.controller.replace(goal(to(0.5, 1.6)).trajectory, bench.now_ns)
     bench.step(110)
@@ -134,7 +134,9 @@ def test_topic_trajectories_that_break_a_tolerance_end_in_a_hold() -> None:
 
 
 @pytest.mark.parametrize(("parameters", "velocities"), [(braking(10.0), 3), (TALOS, 0)])
-def test_state_has_the_fields_of_the_interfaces(parameters: ControllerParameters, velocities: int) -> None:
+def test_the_controller_state_has_the_fields_of_the_state_interfaces(
+    parameters: ControllerParameters, velocities: int
+) -> None:
     bench = Bench(parameters, Plant("lag"))
     bench.send(goal(point(1.0, (2, 3, 1)), names=["j2", "j3", "j1"]))
     bench.step(30)
@@ -147,7 +149,7 @@ def test_state_has_the_fields_of_the_interfaces(parameters: ControllerParameters
     assert np.abs(state.error.positions).max() > 0.005
 
 
-def test_state_of_an_update_tells_reference_feedback_output_and_times() -> None:
+def test_the_controller_state_has_reference_feedback_output_and_times() -> None:
     bench = Bench()
     bench.step(10)
     bench.send(goal(to(1.0, 2.1)))
@@ -161,7 +163,7 @@ def test_state_of_an_update_tells_reference_feedback_output_and_times() -> None:
     assert (state.desired.time_from_start_ns, state.actual.time_from_start_ns) == (seconds(0.49), seconds(0.49))
 
 
-def test_query_succeeds_from_the_first_update_until_the_end() -> None:
+def test_a_query_succeeds_from_the_first_update_to_the_end_of_the_trajectory() -> None:
     bench = Bench()
     bench.step(10)
     bench.send(goal(to(1.0, 2.1), to(2.0, 3.1)))
@@ -171,7 +173,7 @@ def test_query_succeeds_from_the_first_update_until_the_end() -> None:
     assert [answers[time].positions[0] for time in (1000.20, 1002.05, 1003.0)] == pytest.approx([1.19, 3.04, 3.1])
 
 
-def test_reset_aborts_the_goal_and_holds_the_pose_after_it() -> None:
+def test_a_reset_aborts_the_goal_and_holds_the_pose_measured_after_it() -> None:
     bench = Bench()
     bench.send(goal(to(1.0, 2.1)))
     bench.step(50)
@@ -189,7 +191,7 @@ def test_reset_aborts_the_goal_and_holds_the_pose_after_it() -> None:
     assert bench.commands[1][0] == pytest.approx(0.52)
 
 
-def test_partial_goals_freeze_the_other_joints_at_their_last_command() -> None:
+def test_a_partial_goal_holds_the_other_joints_at_their_last_command() -> None:
     bench = Bench(PARTIAL, Plant("lag"))
     bench.send(goal(point(1.0, (1.1, 2.1, 4.1))))
     bench.step(50)
@@ -198,7 +200,7 @@ def test_partial_goals_freeze_the_other_joints_at_their_last_command() -> None:
     assert bench.commands[20] == pytest.approx([1.0, 2.1, 3.6])
 
 
-def test_a_last_point_with_velocity_is_held_after_success() -> None:
+def test_a_last_point_with_a_velocity_is_held_after_success() -> None:
     bench = Bench(MOVING_END)
     bench.send(goal(point(1.0, (2.1, 2.1, 3.1), (1.0, 0, 0))))
     bench.step(150)
@@ -218,7 +220,7 @@ def test_a_goal_survives_a_clock_that_jumps_back() -> None:
     assert bench.results[0][0] == 100
 
 
-def test_each_joint_brakes_from_its_own_speed() -> None:
+def test_joints_brake_each_from_its_own_speed_after_a_cancel() -> None:
     bench = Bench(braking(10.0), Plant("frozen", velocity=(0.2, -0.1, 0.0)))
     bench.send(goal(to(1.0, 2.1)))
     bench.step(1)
@@ -228,7 +230,7 @@ def test_each_joint_brakes_from_its_own_speed() -> None:
     assert bench.controller.state().desired.velocities.tolist() == [0, 0, 0]
 
 
-def test_a_command_timeout_holds_what_came_by_the_topic() -> None:
+def test_a_command_timeout_stops_a_trajectory_from_the_topic() -> None:
     bench = Bench(dataclasses.replace(SHIPPED, cmd_timeout=0.1), Plant("offset"))
     bench.controller.replace(goal(to(0.25, 1.2), to(0.5, 1.3), to(0.75, 1.4)).trajectory, bench.now_ns)
     bench.step(120)
@@ -238,7 +240,7 @@ def test_a_command_timeout_holds_what_came_by_the_topic() -> None:
     assert bench.results == []
 
 
-def test_a_command_timeout_below_the_goal_time_is_off_and_warned_of(caplog: pytest.LogCaptureFixture) -> None:
+def test_a_command_timeout_that_is_not_above_the_goal_time_gives_a_warning(caplog: pytest.LogCaptureFixture) -> None:
     bench = Bench(dataclasses.replace(TALOS, cmd_timeout=0.6), Plant("offset"))
     assert "Command timeout must be higher than goal_time tolerance (0.6 vs. 0.6)" in caplog.text
     caplog.clear()
@@ -246,7 +248,9 @@ def test_a_command_timeout_below_the_goal_time_is_off_and_warned_of(caplog: pyte
     assert caplog.text == ""
 
 
-def test_speeds_that_make_no_sense_are_warned_of(caplog: pytest.LogCaptureFixture) -> None:
+def test_negative_and_infinite_speed_factors_give_a_warning_and_change_nothing(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
     controller = Bench().controller
     controller.scale_speed(0.765)
     for factor in (-0.12, math.nan, math.inf, 1e300):
@@ -257,7 +261,7 @@ def test_speeds_that_make_no_sense_are_warned_of(caplog: pytest.LogCaptureFixtur
     assert controller.state().speed_scaling_factor == 0.0
 
 
-def test_scaled_and_real_time_are_told_apart() -> None:
+def test_the_state_has_scaled_time_for_desired_and_real_time_for_actual() -> None:
     bench = Bench()
     bench.controller.scale_speed(0.5)
     bench.send(goal(to(1.0, 2.1)))
@@ -268,7 +272,7 @@ def test_scaled_and_real_time_are_told_apart() -> None:
     assert state.speed_scaling_factor == 0.5
 
 
-def test_a_reset_brings_the_initial_speed_back() -> None:
+def test_a_reset_restores_the_initial_speed() -> None:
     bench = Bench()
     bench.controller.scale_speed(0.25)
     bench.controller.reset(bench.now_ns, bench.plant.measure())
@@ -282,17 +286,17 @@ CONTROLLERS, STEPPING = "tests/integration/test_controllers.py", "tests/integrat
 
 
 ELSEWHERE = {
-    "C13": (HERE, "test_parameters_that_change_during_a_goal_hold_for_the_next"),
-    "D1": (HERE, "test_new_goals_preempt_and_start_from_the_measured_state"),
-    "D2": (HERE, "test_results_outlive_the_next_goal"),
+    "C13": (HERE, "test_parameters_changed_during_a_goal_apply_to_the_next_goal"),
+    "D1": (HERE, "test_a_new_goal_preempts_the_old_one_and_starts_from_the_measured_state"),
+    "D2": (HERE, "test_the_result_of_a_goal_is_kept_when_the_next_goal_begins"),
     "D5": (TRAJECTORIES, "test_goals_that_are_over_or_unknown_are_not_cancelled"),
-    "D6": (HERE, "test_each_joint_brakes_from_its_own_speed"),
-    "D9": (HERE, "test_topic_trajectories_need_no_goal"),
-    "D12": (HERE, "test_a_command_timeout_holds_what_came_by_the_topic"),
-    "D13": (HERE, "test_a_command_timeout_below_the_goal_time_is_off_and_warned_of"),
+    "D6": (HERE, "test_joints_brake_each_from_its_own_speed_after_a_cancel"),
+    "D9": (HERE, "test_a_trajectory_from_the_topic_is_followed_without_a_goal"),
+    "D12": (HERE, "test_a_command_timeout_stops_a_trajectory_from_the_topic"),
+    "D13": (HERE, "test_a_command_timeout_that_is_not_above_the_goal_time_gives_a_warning"),
     "E1": (TRAJECTORIES, "test_feedback_comes_at_20_hz_of_simulated_time_from_the_start_on"),
-    "E2": (HERE, "test_state_has_the_fields_of_the_interfaces"),
-    "E3": (HERE, "test_state_of_an_update_tells_reference_feedback_output_and_times"),
+    "E2": (HERE, "test_the_controller_state_has_the_fields_of_the_state_interfaces"),
+    "E3": (HERE, "test_the_controller_state_has_reference_feedback_output_and_times"),
     "F1": (TRAJECTORIES, "test_feedback_is_sent_only_when_time_goes_on"),
     "F2": (CONTROLLERS, "test_steps_advance_a_trajectory_by_as_many_periods"),
     "F3": (TRAJECTORIES, "test_a_reset_right_after_a_goal_aborts_it"),
@@ -316,7 +320,7 @@ CASES = (
 
 
 @pytest.mark.parametrize("case", CASES.split())
-def test_every_case_is_tested_here_or_where_the_table_says(case: str) -> None:
+def test_every_acceptance_case_has_a_test(case: str) -> None:
     if case in {each.id.split()[0] for each in (*ANSWERS, *COURSES)}:
         return
     path, name = ELSEWHERE[case]

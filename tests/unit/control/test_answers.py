@@ -1,4 +1,4 @@
-"""Whether a goal is taken, and the words of its refusal, as ros2_controllers' joint trajectory controller has them."""
+"""Goals are accepted, or refused with the same words, as by ros2_controllers' joint trajectory controller."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ ANSWERS = [
 
 
 @pytest.mark.parametrize("case", ANSWERS, ids=lambda case: case.id)
-def test_goals_are_answered_with_the_words_of_upstream(case: Answer) -> None:
+def test_goals_are_accepted_or_refused_with_the_words_of_ros2_controllers(case: Answer) -> None:
     bench = Bench(case.parameters)
     refusal = bench.send(case.goal)
     assert (refusal is None) == (not case.refusal)
@@ -112,13 +112,13 @@ REFUSED = {
 @pytest.mark.parametrize(
     ("code", "request_"), [(code, request) for code, requests in REFUSED.items() for request in requests]
 )
-def test_refusals_have_the_codes_of_the_action(code: ErrorCode, request_: TrajectoryGoal) -> None:
+def test_a_refusal_has_the_error_code_of_the_action(code: ErrorCode, request_: TrajectoryGoal) -> None:
     refusal = Bench().send(request_)
     assert isinstance(refusal, TrajectoryRefusal)
     assert refusal.error_code == code
 
 
-def test_stamps_of_another_clock_are_warned_of(caplog: pytest.LogCaptureFixture) -> None:
+def test_a_trajectory_stamped_by_another_clock_gives_a_warning(caplog: pytest.LogCaptureFixture) -> None:
     bench = Bench()
     assert bench.send(goal(to(1.0, 2.1), stamp_s=1003.0)) is None
     assert caplog.text == ""

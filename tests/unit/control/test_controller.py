@@ -1,4 +1,4 @@
-"""Driving a controller: many updates at once do what single ones do; misuse is told."""
+"""Driving a controller: many updates at once equal single ones, and mistakes are reported."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ schedules = st.dictionaries(st.integers(0, UPDATES - 1), requests, max_size=3)
 
 
 class Side:
-    """One controller with its plant; `advance` makes updates, singly or many at once."""
+    """One controller with its plant; `step` makes a single update, `take` many at once."""
 
     def __init__(self, parameters: ControllerParameters, kind: str) -> None:
         self.bench = Bench(parameters, Plant(kind, velocity=0.5))
@@ -114,7 +114,7 @@ class Side:
 
 
 def plain(value: object) -> object:
-    """Nested lists, so that whole states can be compared at once."""
+    """The value as nested lists, so that whole states can be compared."""
     if isinstance(value, np.ndarray):
         return value.tolist()
     if dataclasses.is_dataclass(value):
@@ -154,7 +154,7 @@ def test_many_updates_at_once_equal_single_updates(parameters, kind, schedule, c
     assert single.outcome() == bulk.outcome()
 
 
-def test_only_the_first_update_and_those_at_the_end_of_a_goal_need_a_look() -> None:
+def test_a_goal_needs_decisions_only_in_its_first_update_and_at_its_end() -> None:
     bench = Bench(TALOS)
     assert bench.controller.next_decision() == sys.maxsize
     bench.send(goal(to(1.0, 2.1)))
@@ -169,7 +169,7 @@ def test_only_the_first_update_and_those_at_the_end_of_a_goal_need_a_look() -> N
     assert bench.controller.next_decision() == sys.maxsize
 
 
-def test_path_tolerances_need_a_look_in_every_update() -> None:
+def test_a_goal_with_path_tolerances_needs_a_decision_in_every_update() -> None:
     bench = Bench(constrain(trajectory=0.5))
     bench.send(goal(to(1.0, 2.1)))
     for _ in range(100):
@@ -178,7 +178,7 @@ def test_path_tolerances_need_a_look_in_every_update() -> None:
     assert bench.controller.next_decision() == sys.maxsize
 
 
-def test_trajectories_from_the_topic_need_a_look_once_they_are_late() -> None:
+def test_a_trajectory_from_the_topic_needs_a_decision_once_it_is_late() -> None:
     bench = Bench(TALOS)
     bench.controller.replace(goal(to(1.0, 2.1)).trajectory, bench.now_ns)
     bench.step()
@@ -191,13 +191,13 @@ def test_trajectories_from_the_topic_need_a_look_once_they_are_late() -> None:
     assert bench.controller.command[0] == 2.1
 
 
-def test_an_idle_controller_repeats_one_row() -> None:
+def test_an_idle_controller_gives_any_number_of_commands_in_one_row_of_memory() -> None:
     commands = Bench().controller.take(1_000_000)
     assert commands.shape == (1_000_000, 3)
     assert commands.strides[0] == 0
 
 
-def test_a_trajectory_of_years_is_computed_in_parts() -> None:
+def test_a_trajectory_that_lasts_years_can_be_taken_in_parts() -> None:
     bench = Bench()
     bench.send(goal(to(1.5e9, 2.1)))
     bench.step()
@@ -213,7 +213,7 @@ def test_commands_cannot_be_changed_from_outside() -> None:
             positions[0] = 9.0
 
 
-def test_cancel_tells_whether_the_goal_was_being_executed() -> None:
+def test_cancel_returns_whether_the_goal_was_being_executed() -> None:
     bench = Bench()
     bench.send(goal(to(0.0, 2.1)), "A")
     assert not bench.controller.cancel("B")
@@ -222,7 +222,7 @@ def test_cancel_tells_whether_the_goal_was_being_executed() -> None:
     assert not bench.controller.cancel(None)
 
 
-def test_joint_order_of_a_goal_does_not_matter() -> None:
+def test_the_order_of_joints_in_a_goal_does_not_matter() -> None:
     ordered, shuffled = Bench(), Bench()
     ordered.send(TrajectoryGoal(Trajectory(JOINTS, [TrajectoryPoint(seconds(0.5), (1, 2, 3), (0, 0, 0), (1, 2, 3))])))
     names = ("j3", "j1", "j2")
@@ -232,7 +232,7 @@ def test_joint_order_of_a_goal_does_not_matter() -> None:
     assert all(np.array_equal(ordered.commands[k], shuffled.commands[k]) for k in range(1, 61))
 
 
-def test_refusals_and_stops_are_logged(caplog: pytest.LogCaptureFixture) -> None:
+def test_refused_goals_and_broken_path_tolerances_are_logged(caplog: pytest.LogCaptureFixture) -> None:
     bench = Bench(constrain(trajectory=0.1), Plant("frozen"))
     bench.send(goal())
     bench.controller.replace(goal(to(1.0, 2.1)).trajectory, bench.now_ns)

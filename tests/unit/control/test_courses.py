@@ -1,4 +1,4 @@
-"""What follows from a goal, with the numbers that ros2_controllers' joint trajectory controller printed."""
+"""Commands and results of a goal, with the numbers of ros2_controllers' joint trajectory controller."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ from .bench import (
 
 @dataclass(frozen=True)
 class Course:
-    """What follows from a goal: commands of joint 1 by update, and the result with its update."""
+    """A goal with the commands of joint 1 by update, and the result with the update in which it comes."""
 
     id: str
     goal: TrajectoryGoal
@@ -390,7 +390,7 @@ COURSES = [
 
 
 @pytest.mark.parametrize("case", COURSES, ids=lambda case: case.id)
-def test_goals_take_the_course_they_take_upstream(case: Course) -> None:
+def test_a_goal_gives_the_same_commands_and_result_as_in_ros2_controllers(case: Course) -> None:
     plant = dataclasses.replace(case.plant, position=np.array(case.start))
     bench = Bench(case.parameters, plant, **case.deviations)
     bench.step(case.idle)

@@ -1,4 +1,4 @@
-"""The clock of a motion, and its rows."""
+"""The clock of a motion, and its rows of commands."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def motion(end_ns: int = 100, first_ns: int = 1000) -> Motion:
     return Motion(curve, start_ns=1000, first_ns=first_ns, period_ns=PERIOD_NS)
 
 
-def test_command_and_desired_are_one_period_apart_in_either_order() -> None:
+def test_the_command_is_one_period_ahead_of_desired_whichever_is_read_first() -> None:
     moving = motion()
     assert (moving.command[0], moving.desired[0]) == pytest.approx((10, 0))
     moving.advance()
@@ -30,7 +30,7 @@ def test_command_and_desired_are_one_period_apart_in_either_order() -> None:
 
 
 @pytest.mark.parametrize(("end_ns", "past_end"), [(100, 9), (101, 10), (109, 10), (110, 10), (111, 11)])
-def test_the_end_is_noticed_one_period_early(end_ns: int, past_end: int) -> None:
+def test_the_end_of_a_motion_is_noticed_one_period_early(end_ns: int, past_end: int) -> None:
     moving = motion(end_ns)
     assert moving.updates_until_end() == past_end - 1
     seen = []
@@ -41,7 +41,7 @@ def test_the_end_is_noticed_one_period_early(end_ns: int, past_end: int) -> None
     assert all(seen[past_end:])
 
 
-def test_rows_go_on_with_the_last_point() -> None:
+def test_rows_of_a_motion_repeat_the_last_point_after_its_end() -> None:
     moving = motion(35)
     assert moving.skip(5)[:, 0] == pytest.approx([20, 30, 35, 35, 35])
     assert moving.clock_ns == 50
@@ -50,7 +50,7 @@ def test_rows_go_on_with_the_last_point() -> None:
 
 
 @pytest.mark.parametrize(("tolerance_ns", "updates"), [(0, 10), (5, 10), (6, 11), (15, 11), (16, 12)])
-def test_lateness_is_strict(tolerance_ns: int, updates: int) -> None:
+def test_a_motion_is_late_only_beyond_its_tolerance(tolerance_ns: int, updates: int) -> None:
     moving = motion(104)
     assert moving.updates_until_late(tolerance_ns) == updates
     moving.skip(updates)

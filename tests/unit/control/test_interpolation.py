@@ -1,4 +1,4 @@
-"""Curves pass their points with the velocities and accelerations that both ends of a segment have."""
+"""Curves pass through their points with the velocities and accelerations that both ends of a segment have."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def curve_of(trajectory: Trajectory, start=(0.5, -0.5), velocity=(0.2, -0.2)) ->
 
 @settings(max_examples=200, deadline=None)
 @given(trajectory=trajectories())
-def test_segments_meet_the_conditions_of_both_ends(trajectory: Trajectory) -> None:
+def test_a_segment_has_positions_velocities_and_accelerations_of_both_ends(trajectory: Trajectory) -> None:
     curve = curve_of(trajectory)
     first = trajectory.points[0]
     fields = [(0.5, -0.5), (0.2, -0.2) if len(first.velocities) else (), (0, 0) if len(first.accelerations) else ()]
@@ -67,7 +67,7 @@ def test_segments_meet_the_conditions_of_both_ends(trajectory: Trajectory) -> No
 
 @settings(max_examples=50, deadline=None)
 @given(trajectory=trajectories())
-def test_joints_do_not_depend_on_their_order(trajectory: Trajectory) -> None:
+def test_a_curve_does_not_depend_on_the_order_of_joints_in_the_trajectory(trajectory: Trajectory) -> None:
     mirrored = Trajectory(
         ("b", "a"),
         [
@@ -82,7 +82,7 @@ def test_joints_do_not_depend_on_their_order(trajectory: Trajectory) -> None:
 
 @settings(max_examples=50, deadline=None)
 @given(trajectory=trajectories())
-def test_many_times_at_once_equal_single_times(trajectory: Trajectory) -> None:
+def test_a_curve_gives_the_same_positions_for_many_times_and_for_single_times(trajectory: Trajectory) -> None:
     curve = curve_of(trajectory)
     times_ns = np.linspace(0, trajectory.points[-1].time_from_start_ns * 1.1, 50).astype(np.int64)
     singly = [curve.state(int(time_ns))[0] for time_ns in times_ns]
@@ -97,7 +97,7 @@ def test_cubic_segments_reproduce_a_cubic() -> None:
 
 
 def test_quintic_segments_reproduce_a_quintic() -> None:
-    # x(x-1)(x-2)(x-3)(x-4) from 0 to 2, where upstream expects the middle (0, -6, 10).
+    # x(x-1)(x-2)(x-3)(x-4) from 0 to 2: in the middle, ros2_controllers expects (0, -6, 10).
     points = [
         TrajectoryPoint(seconds(1), (0, 0), (24, 24), (-100, -100)),
         TrajectoryPoint(seconds(3), (0, 0), (4, 4), (0, 0)),
@@ -106,30 +106,30 @@ def test_quintic_segments_reproduce_a_quintic() -> None:
     assert (position[0], velocity[0], acceleration[0]) == pytest.approx((0, -6, 10), abs=1e-6)
 
 
-def test_motion_starts_with_the_measured_velocity() -> None:
+def test_a_curve_starts_with_the_measured_velocity() -> None:
     curve = curve_of(Trajectory(JOINTS, [TrajectoryPoint(seconds(0.5), (2.1, 0), (0, 0))]), (1.6, 0), (1, 0))
     assert curve.positions(np.array([seconds(0.01)]))[0, 0] == pytest.approx(1.610196, abs=1e-6)
 
 
-def test_the_last_point_is_held_with_what_it_has() -> None:
+def test_a_curve_keeps_position_and_velocity_of_its_last_point() -> None:
     curve = curve_of(Trajectory(JOINTS, [TrajectoryPoint(seconds(1), (2, 3), (0.5, 0.25))]))
     position, velocity, acceleration = curve.state(seconds(5))
     assert (position.tolist(), velocity.tolist(), acceleration.tolist()) == ([2, 3], [0.5, 0.25], [0, 0])
 
 
-def test_accelerations_without_velocities_make_no_curve() -> None:
+def test_accelerations_without_velocities_are_ignored() -> None:
     points = [TrajectoryPoint(seconds(time), (time, 0), (), (9, 9)) for time in (1, 2)]
     assert curve_of(Trajectory(JOINTS, points)).state(seconds(1.5))[0][0] == pytest.approx(1.5)
 
 
-def test_points_that_are_over_are_not_blended() -> None:
+def test_points_in_the_past_are_not_blended_with_the_measured_state() -> None:
     state, start_ns = JointState(np.array((9.0, 9.0))), seconds(0.5)
     trajectory = Trajectory(JOINTS, [TrajectoryPoint(0, (1, 1)), TrajectoryPoint(seconds(1), (2, 2))])
     curve = interpolate(arrange(trajectory, JOINTS, np.zeros(2), state, start_ns), state, start_ns)
     assert curve.positions(np.array([seconds(0.5), seconds(0.75)]))[:, 0] == pytest.approx([1.5, 1.75])
 
 
-def test_a_single_point_is_held_from_the_start() -> None:
+def test_a_curve_of_a_single_point_holds_it_from_the_start() -> None:
     curve = interpolate(Waypoints.single(np.array((1.0, 2.0))), JointState(np.array((9.0, 9.0))), 0)
     assert curve.end_ns == 0
     assert curve.positions(np.array([0, 10**18])).tolist() == [[1, 2], [1, 2]]

@@ -1,4 +1,4 @@
-"""Parameters with upstream's names and defaults; wrong ones are refused, all at once."""
+"""Parameters have the names and defaults of ros2_controllers; all wrong ones are reported at once."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from throwcollect.control import (
 from throwcollect.errors import ConfigError
 
 
-def test_defaults_are_those_of_ros2_controllers() -> None:
+def test_parameters_have_the_defaults_of_ros2_controllers() -> None:
     parameters = ControllerParameters(("j1",))
     assert not parameters.allow_partial_joints_goal
     assert not parameters.allow_nonzero_velocity_at_trajectory_end
@@ -46,19 +46,19 @@ WRONG = [
 
 
 @pytest.mark.parametrize(("changes", "message"), WRONG)
-def test_wrong_values_are_refused(changes: dict[str, object], message: str) -> None:
+def test_wrong_values_of_parameters_are_refused(changes: dict[str, object], message: str) -> None:
     with pytest.raises(ConfigError, match=message):
         ControllerParameters(**{"joints": ("a",), **changes})
 
 
-def test_all_problems_are_told_at_once() -> None:
+def test_problems_of_parameters_are_reported_all_at_once() -> None:
     with pytest.raises(ConfigError, match="cmd_timeout") as error:
         ControllerParameters(("a",), cmd_timeout=-1.0, constraints=Constraints(goal_time=math.inf))
     assert [problem.key for problem in error.value.problems] == ["cmd_timeout", "constraints.goal_time"]
 
 
 @pytest.mark.parametrize("longest", [1e300, 1.7e308])
-def test_times_may_be_as_long_as_floats_are(longest: float) -> None:
+def test_tolerated_times_may_be_as_long_as_the_largest_float(longest: float) -> None:
     parameters = ControllerParameters(("a",), cmd_timeout=longest, constraints=Constraints(goal_time=longest / 2))
     controller = JointTrajectoryController("arm", parameters, period_ns=10**6)
     controller.reset(0, JointState(np.zeros(1)))

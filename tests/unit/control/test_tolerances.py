@@ -1,4 +1,4 @@
-"""Tolerances of goals, as upstream resolves them."""
+"""Tolerances of goals are resolved as in ros2_controllers."""
 
 from __future__ import annotations
 
@@ -31,13 +31,13 @@ def test_a_goal_without_tolerances_has_the_defaults() -> None:
     assert resolve() == UNCHANGED
 
 
-def test_positive_numbers_replace_in_any_order_of_joints() -> None:
+def test_positive_tolerances_of_a_goal_replace_the_defaults_in_any_joint_order() -> None:
     path = [JointTolerance("j3", 0.4), JointTolerance("j1", 0.2), JointTolerance("j2", 0.3)]
     goal = [JointTolerance("j2", 2.1, 0.5, 0.5), JointTolerance("j1", 1.1)]
     assert resolve(path, goal, seconds(2)) == ([0.2, 0.3, 0.4], [1.1, 2.1, 0.1], seconds(2))
 
 
-def test_minus_one_switches_off() -> None:
+def test_a_tolerance_of_minus_one_switches_the_check_off() -> None:
     off = [JointTolerance(joint, -1.0, -1.0, -1.0) for joint in JOINTS]
     assert resolve(off, off, seconds(-1)) == ([0, 0, 0], [0, 0, 0], 0)
     assert resolve([JointTolerance("j1", -1.0 + 1e-8)]) == ([0, 0.1, 0.1], *UNCHANGED[1:])
@@ -55,7 +55,7 @@ ILLEGAL = [
 
 
 @pytest.mark.parametrize(("path", "goal", "late_ns"), ILLEGAL)
-def test_one_illegal_number_or_joint_brings_all_defaults_back(path, goal, late_ns, caplog) -> None:
+def test_a_single_illegal_number_or_joint_restores_all_default_tolerances(path, goal, late_ns, caplog) -> None:
     assert resolve(path, goal, late_ns) == UNCHANGED
     (record,) = caplog.records
     assert record.getMessage().endswith("Using default tolerances.")
@@ -74,12 +74,12 @@ def test_an_error_equal_to_the_tolerance_is_within_it() -> None:
     assert violations(error, np.full(3, 8.0), JOINTS) == ""
 
 
-def test_tiny_tolerances_can_be_read() -> None:
+def test_tiny_errors_and_tolerances_are_printed_with_an_exponent() -> None:
     text = violations(np.array((2.5e-7, 0.0, 0.0)), np.array((1e-9, 0.0, 0.0)), JOINTS)
     assert text == "joint j1 has position error 2.5e-07 rad, tolerance 1e-09 rad"
 
 
-def test_all_joints_outside_are_named() -> None:
+def test_every_joint_outside_its_tolerance_is_named() -> None:
     text = violations(np.array((1.0, 0.0, -2.0)), np.full(3, 0.25), JOINTS)
     assert text == (
         "joint j1 has position error 1 rad, tolerance 0.25 rad; joint j3 has position error -2 rad, tolerance 0.25 rad"

@@ -1,4 +1,4 @@
-"""The order in which rules are checked; their texts are in the acceptance cases."""
+"""The order in which the rules for a trajectory are checked; their texts are in the acceptance cases."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def refusal(trajectory: Trajectory, parameters: ControllerParameters, now_ns: in
     return None if reason is None else reason.text
 
 
-# Each trajectory breaks the rule it is named by and all that are checked later.
+# Each trajectory breaks the rule of its text, and rules that are checked later.
 ORDER = [
     ("don't match the controller joints", goal(names=["x"])),
     ("Empty trajectory received", goal(names=["x", "x", "x"])),
@@ -38,29 +38,29 @@ ORDER = [
 
 
 @pytest.mark.parametrize(("words", "request_"), ORDER, ids=[words for words, _ in ORDER])
-def test_the_first_broken_rule_is_told(words: str, request_) -> None:
+def test_a_refusal_names_the_first_broken_rule(words: str, request_) -> None:
     assert words in refusal(request_.trajectory, SHIPPED, NOW_NS)
 
 
-def test_empty_names_are_told_before_missing_points() -> None:
+def test_empty_joint_names_are_reported_before_missing_points() -> None:
     partial = dataclasses.replace(SHIPPED, allow_partial_joints_goal=True)
     assert refusal(Trajectory([], []), partial, NOW_NS).startswith("Empty joint names")
 
 
-def test_some_points_may_lack_velocities_and_accelerations() -> None:
+def test_points_may_lack_velocities_and_accelerations() -> None:
     mixed = goal(point(1, (1, 2, 3), (4, 5, 6)), point(2, (1, 2, 3)), point(3, (1, 2, 3), (0, 0, 0), (7, 8, 9)))
     assert refusal(mixed.trajectory, SHIPPED, NOW_NS) is None
     broken = goal(point(1, (1, 2, 3)), point(2, (1, 2, 3), (0, 0, np.inf)), point(3, (1, 2, 3)))
     assert refusal(broken.trajectory, SHIPPED, NOW_NS) == "Velocity of joint j3 at point #1 is not finite: inf"
 
 
-def test_arrays_are_as_good_as_sequences() -> None:
+def test_numpy_arrays_and_tuples_are_valid_in_a_trajectory() -> None:
     assert refusal(goal(point(1, np.array((1.0, 2.0, 3.0)), np.zeros(3))).trajectory, SHIPPED, NOW_NS) is None
     assert "(got j1, j2, j2)" in refusal(goal(to(1, 1), names=("j1", "j2", "j2")).trajectory, SHIPPED, NOW_NS)
 
 
 @pytest.mark.parametrize("velocity", [1.2e-7, -1.2e-7])
-def test_end_velocities_count_as_zero_up_to_float_precision(velocity: float) -> None:
+def test_an_end_velocity_counts_as_zero_within_float_precision(velocity: float) -> None:
     assert "is not zero" in refusal(goal(point(1, (1, 2, 3), (0, 0, velocity))).trajectory, SHIPPED, NOW_NS)
     almost = goal(point(1, (1, 2, 3), (0, 0, velocity * 0.99)))
     assert refusal(almost.trajectory, SHIPPED, NOW_NS) is None

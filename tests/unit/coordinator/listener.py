@@ -1,4 +1,4 @@
-"""An onlooker that keeps what it is told."""
+"""An onlooker that keeps the lines that it receives."""
 
 from __future__ import annotations
 

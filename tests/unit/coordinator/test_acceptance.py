@@ -1,4 +1,4 @@
-"""Which episodes the coordinator takes."""
+"""Which episodes the coordinator accepts."""
 
 from collections.abc import Iterator
 
@@ -28,17 +28,17 @@ def acceptance() -> Acceptance:
     return Acceptance(CONFIG)
 
 
-def test_what_a_simulation_hands_over_is_taken(acceptance: Acceptance, delivery: Delivery) -> None:
+def test_an_episode_of_its_trial_and_lease_is_accepted(acceptance: Acceptance, delivery: Delivery) -> None:
     assert acceptance.find_difference(delivery.conditions, PLAN, PLAN.trials[1], token="") is None
 
 
-def test_the_episode_of_another_lease_or_trial_is_not(acceptance: Acceptance, delivery: Delivery) -> None:
+def test_an_episode_of_another_lease_or_trial_is_refused(acceptance: Acceptance, delivery: Delivery) -> None:
     said = delivery.conditions
     other = "token of another lease"
     assert acceptance.find_difference(said, PLAN, PLAN.trials[1], token=other) == "it was not simulated for this lease"
     assert "ball.mass_kg was " in (acceptance.find_difference(said, PLAN, PLAN.trials[0], token="") or "")
 
 
-def test_conditions_that_cannot_be_read_are_a_reason(acceptance: Acceptance) -> None:
+def test_an_episode_with_unreadable_conditions_is_refused(acceptance: Acceptance) -> None:
     reason = acceptance.find_difference("{}", PLAN, PLAN.trials[1], token="")
     assert (reason or "").startswith("conditions of the episode: ")

@@ -1,4 +1,4 @@
-"""What becomes of the trials that simulations hold, whatever happens to these."""
+"""What happens to leased trials when their simulation delivers, dies or sends a wrong episode."""
 
 import json
 from collections.abc import Iterator
@@ -52,7 +52,7 @@ def events(directory: Path, kind: str) -> list[dict[str, Any]]:
     return [event for event in map(json.loads, lines) if event["event"] == kind]
 
 
-def test_a_simulation_that_dies_costs_the_trial_that_ran_and_no_other(
+def test_a_simulation_that_dies_loses_only_the_trial_that_it_ran(
     collection: TrialCollection, deliveries: list[Delivery], tmp_path: Path
 ) -> None:
     assert collection.lease("/sim_0") == (0, 1, 2, 3)
@@ -75,7 +75,9 @@ def test_a_simulation_that_dies_costs_the_trial_that_ran_and_no_other(
     assert provenance.simulations == 2
 
 
-def test_more_is_given_when_half_is_done(collection: TrialCollection, deliveries: list[Delivery]) -> None:
+def test_a_simulation_gets_more_trials_once_half_of_its_lease_is_done(
+    collection: TrialCollection, deliveries: list[Delivery]
+) -> None:
     assert collection.lease("/sim_0") == (0, 1, 2, 3)
     collection.take_in("/sim_0", deliveries[0])
     assert collection.lease("/sim_0") == (1, 2, 3)
@@ -83,7 +85,7 @@ def test_more_is_given_when_half_is_done(collection: TrialCollection, deliveries
     assert collection.lease("/sim_0") == (2, 3, 4, 5)
 
 
-def test_draining_leaves_each_simulation_the_trial_that_runs(
+def test_draining_leaves_each_simulation_only_the_trial_that_runs(
     collection: TrialCollection, deliveries: list[Delivery]
 ) -> None:
     changes: list[tuple[int, ...]] = []
@@ -98,7 +100,9 @@ def test_draining_leaves_each_simulation_the_trial_that_runs(
     assert collection.finished
 
 
-def test_an_episode_that_is_another_one_goes_back(collection: TrialCollection, deliveries: list[Delivery]) -> None:
+def test_a_trial_whose_episode_is_refused_goes_to_another_simulation(
+    collection: TrialCollection, deliveries: list[Delivery]
+) -> None:
     said: list[str] = []
     collection.warn = said.append
     collection.lease("/sim_0")

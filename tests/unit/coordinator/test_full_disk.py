@@ -1,4 +1,4 @@
-"""A plan that is too large for its disk: one message, and nothing is left behind."""
+"""A plan that is too large for its disk gives one message and leaves no files."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def refuse_nothing(_: Config) -> None:
     return None
 
 
-def test_a_disk_that_is_too_small_at_any_rate_is_told_of_before_a_trial_is_drawn(
+def test_a_plan_too_large_for_the_disk_is_refused_before_a_trial_is_drawn(
     disk: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.delattr("throwcollect.coordinator.prepare.draw_first_points")
@@ -60,7 +60,9 @@ def test_a_plan_that_fills_the_disk_leaves_nothing_behind(disk: Path, monkeypatc
     assert len(prepare(config(50), disk / "data", sweep_directory=disk).trials) == 50
 
 
-def test_a_dataset_that_would_become_too_large_stays_as_it_is(disk: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_resuming_with_more_trials_than_the_disk_holds_changes_nothing(
+    disk: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr("throwcollect.coordinator.prepare.feasibility_check", lambda _: refuse_nothing)
     prepare(config(50), disk / "data", sweep_directory=disk)
     before = {path: path.read_bytes() for path in (disk / "data").iterdir() if path.is_file()}

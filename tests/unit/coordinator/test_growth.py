@@ -1,4 +1,4 @@
-"""Rounds that are made a little at a time, while trials are run."""
+"""Rounds of a growing plan are drawn step by step, while trials run."""
 
 from collections.abc import Collection
 from pathlib import Path
@@ -42,7 +42,7 @@ def test_a_round_is_drawn_and_checked_trial_by_trial_once_it_is_due() -> None:
     assert growth.step() is None
 
 
-def test_trials_of_later_rounds_are_refused_as_those_of_a_plan_made_at_once() -> None:
+def test_later_rounds_refuse_the_same_trials_as_a_plan_made_at_once() -> None:
     whole = draw_plan(config(landed=100).model_copy(update={"until": None}), directory=Path())
     plan = make_plan(config(landed=100))
     growth = Growth(plan)
@@ -55,7 +55,7 @@ def test_trials_of_later_rounds_are_refused_as_those_of_a_plan_made_at_once() ->
 
 
 def resume(settings: Config, trials: list[Trial], *, lost: Collection[int] = ()) -> Growth:
-    """The growth of a plan that an earlier collection has left with the results of all its trials."""
+    """The growth of a plan that an earlier collection left, with the results of all its trials."""
     growth = Growth(Plan(settings, in_columns(trials)), lost=lost)
     for trial in trials:
         if not growth.keep(trial.number, throw(trial)):
@@ -64,7 +64,7 @@ def resume(settings: Config, trials: list[Trial], *, lost: Collection[int] = ())
 
 
 def go_on(growth: Growth) -> list[Trial]:
-    """Confirm the rounds of an earlier collection with its results, then add one more; returns the trials of that."""
+    """Confirm the rounds of an earlier collection with its results, then draw one more and return its trials."""
     while (earlier := growth.confirm()) is not None:
         for number, result in earlier.results.items():
             growth.recall(number, result)
@@ -74,7 +74,7 @@ def go_on(growth: Growth) -> list[Trial]:
 
 
 @pytest.mark.parametrize("rounds", [2, 3, 4, 6])
-def test_a_plan_that_has_rounds_already_goes_on_where_it_was(rounds: int) -> None:
+def test_a_growing_plan_goes_on_with_the_next_round_after_a_resume(rounds: int) -> None:
     settings = configuration(trials=500)
     growth = resume(settings, collect(settings, rounds=rounds))
     following = [trial.values for trial in collect(settings)[64 * rounds : 64 * (rounds + 1)]]
@@ -82,14 +82,14 @@ def test_a_plan_that_has_rounds_already_goes_on_where_it_was(rounds: int) -> Non
     assert growth.take_wrong() is None
 
 
-def test_a_last_round_that_was_cut_short_is_completed() -> None:
+def test_an_incomplete_last_round_is_completed_after_a_resume_with_more_trials() -> None:
     growth = resume(configuration(trials=500), collect(configuration(trials=330)))
     following = [trial.values for trial in collect(configuration(trials=500))[330:384]]
     assert [trial.values for trial in go_on(growth)] == following
     assert growth.take_wrong() is None
 
 
-def test_rounds_that_the_results_do_not_give_are_found_and_drawn_anew() -> None:
+def test_rounds_that_contradict_the_results_are_reported_and_drawn_again() -> None:
     settings = configuration(trials=500)
     lost = ThrowResult(ThrowOutcome.LOST)
     planned = collect(settings, throw=lambda trial: lost if trial.number == 3 else throw(trial), rounds=6)
@@ -99,7 +99,7 @@ def test_rounds_that_the_results_do_not_give_are_found_and_drawn_anew() -> None:
     assert growth.take_wrong() is None
 
 
-def test_rounds_behind_the_end_are_found() -> None:
+def test_rounds_beyond_the_end_of_the_plan_are_reported() -> None:
     settings = configuration(trials=None, target=None, landed=63)
     lost, landed = ThrowResult(ThrowOutcome.LOST), throw(make_plan(settings).trials[0])
     planned = collect(settings, throw=lambda trial: lost if trial.number in (3, 4) else landed)
@@ -113,7 +113,7 @@ def test_rounds_behind_the_end_are_found() -> None:
     assert growth.over
 
 
-def test_nothing_is_drawn_before_all_rounds_of_the_earlier_collection_are_confirmed() -> None:
+def test_no_round_is_drawn_until_all_earlier_rounds_are_confirmed() -> None:
     settings = configuration(trials=500)
     planned = collect(settings, rounds=4)
     growth = Growth(Plan(settings, in_columns(planned)))
@@ -130,7 +130,7 @@ def test_nothing_is_drawn_before_all_rounds_of_the_earlier_collection_are_confir
     assert growth.confirm() is None
 
 
-def test_it_says_how_many_trials_may_follow() -> None:
+def test_a_growing_plan_says_how_many_trials_may_follow() -> None:
     plan = make_plan(config(landed=100))
     growth = Growth(plan)
     assert growth.most == 22

@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 from throwcollect.coordinator.leases import Leases
 
 
-def test_trials_go_out_by_number() -> None:
+def test_trials_are_leased_in_order_of_their_numbers() -> None:
     leases = Leases([2, 0, 1], retries=0)
     assert [leases.lease("a"), leases.lease("b"), leases.lease("a")] == [0, 1, 2]
     assert leases.find_held("a") == (0, 2)
@@ -16,7 +16,7 @@ def test_trials_go_out_by_number() -> None:
     assert leases.leased == 2
 
 
-def test_a_lost_trial_goes_out_again_before_new_ones() -> None:
+def test_a_failed_trial_is_leased_again_before_new_ones() -> None:
     leases = Leases(range(4), retries=1)
     leases.lease("a")
     leases.lease("b")
@@ -24,7 +24,7 @@ def test_a_lost_trial_goes_out_again_before_new_ones() -> None:
     assert leases.lease("c") == 0
 
 
-def test_trials_that_were_not_begun_go_out_again_and_count_as_nobodys_failure() -> None:
+def test_released_trials_are_leased_again_and_count_as_no_failure() -> None:
     leases = Leases(range(5), retries=0)
     assert [leases.lease("a") for _ in range(3)] == [0, 1, 2]
     leases.release("a")
@@ -33,7 +33,7 @@ def test_trials_that_were_not_begun_go_out_again_and_count_as_nobodys_failure() 
     assert [leases.lease("a", others="ab"), leases.lease("b", others="ab"), leases.lease("b")] == [1, 2, 3]
 
 
-def test_a_trial_is_given_up_with_all_its_evidence() -> None:
+def test_a_trial_that_is_given_up_lists_all_its_failures() -> None:
     leases = Leases([7], retries=1)
     leases.lease("a")
     assert leases.fail("a", 7, "exit 137") is None
@@ -42,7 +42,7 @@ def test_a_trial_is_given_up_with_all_its_evidence() -> None:
     assert leases.finished
 
 
-def test_only_who_holds_a_trial_can_complete_it() -> None:
+def test_only_the_simulation_that_holds_a_trial_can_complete_it() -> None:
     leases = Leases([0], retries=3)
     leases.lease("a")
     leases.fail("a", 0, "timeout")
@@ -105,7 +105,7 @@ BOTH = ("hole", "well")
 
 
 def do_all(leases: Leases) -> list[int]:
-    """Let one simulation refuse whatever it gets, and the other one do everything; trials that were given up."""
+    """One simulation refuses every trial, the other completes every trial; returns the trials that were given up."""
     given_up = []
     while not leases.finished:
         trial = leases.lease("hole", others=BOTH)
@@ -116,7 +116,7 @@ def do_all(leases: Leases) -> list[int]:
     return given_up
 
 
-def test_a_simulation_that_refuses_everything_takes_no_trial_with_it() -> None:
+def test_a_simulation_that_refuses_every_trial_is_set_aside_and_loses_none() -> None:
     leases = Leases(range(60), retries=3)
     assert do_all(leases) == []
     assert leases.why_set_aside("hole") == "no"
@@ -131,14 +131,14 @@ def test_a_returned_trial_goes_to_another_simulation_while_there_is_one() -> Non
     assert leases.lease("b", others="ab") == 0
 
 
-def test_a_simulation_alone_gets_its_trial_back() -> None:
+def test_a_simulation_that_is_alone_gets_its_failed_trial_back() -> None:
     leases = Leases([0], retries=3)
     leases.lease("a", others="a")
     leases.fail("a", 0, "killed")
     assert leases.lease("a", others="a") == 0
 
 
-def test_trials_that_nobody_can_do_cost_no_simulation_its_place() -> None:
+def test_trials_that_every_simulation_refuses_set_no_simulation_aside() -> None:
     leases = Leases(range(30), retries=3)
     lost = []
     while not leases.finished:
@@ -156,7 +156,7 @@ def test_trials_that_nobody_can_do_cost_no_simulation_its_place() -> None:
     assert leases.why_set_aside("b") is None
 
 
-def test_there_is_no_hope_when_all_refuse_and_none_ever_did_a_trial() -> None:
+def test_a_collection_is_hopeless_once_every_simulation_only_refuses_trials() -> None:
     leases = Leases(range(30), retries=3)
     for _ in range(3):
         assert leases.explain_hopelessness("ab") is None
@@ -167,7 +167,7 @@ def test_there_is_no_hope_when_all_refuse_and_none_ever_did_a_trial() -> None:
     assert leases.explain_hopelessness("abc") is None
 
 
-def test_one_completed_trial_gives_hope_for_good() -> None:
+def test_a_collection_with_a_completed_trial_is_never_hopeless() -> None:
     leases = Leases(range(30), retries=3)
     leases.complete("a", leases.lease("a"))
     for _ in range(9):
@@ -175,7 +175,7 @@ def test_one_completed_trial_gives_hope_for_good() -> None:
     assert leases.explain_hopelessness("a") is None
 
 
-def test_a_new_simulation_of_an_old_name_is_not_blamed() -> None:
+def test_a_restarted_simulation_is_not_set_aside_for_earlier_refusals() -> None:
     leases = Leases(range(60), retries=3)
     do_all(leases)
     leases.add([60])

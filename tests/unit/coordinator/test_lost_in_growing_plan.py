@@ -1,4 +1,4 @@
-"""Trials of a plan that grows are lost and run again: the dataset becomes the one of an undisturbed collection."""
+"""Lost trials of a growing plan run again: the dataset becomes the same as that of an undisturbed collection."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from throwcollect.sweep.target_sampler import TargetSampler
 from throwcollect.sweep.trials import Trial
 
 LANDED = 64
-"""All trials land, so the first round alone is enough unless one of it is lost."""
+"""All trials land, so the first round is enough unless one of its trials is lost."""
 PARAMETERS = {"task.duration_s": {"min": 1.0, "max": 1.6}, "task.trajectory.gamma": {"min": 1.0, "max": 1.4}}
 TARGET = {"distance_m": {"min": 0.5, "max": 2.0, "bins": 6}}
 
@@ -44,7 +44,7 @@ def configuration(*, per_shard: int, target: bool) -> Config:
 
 @pytest.fixture(scope="module")
 def simulate() -> Iterator[Callable[[Trial], Delivery]]:
-    """Simulates a trial, each only once, as collections that differ in shards alone have the same ones."""
+    """Simulates a trial, each only once: collections that differ only in shards have the same trials."""
     replayer = Replayer(configuration(per_shard=64, target=False))
     deliveries: dict[tuple[int, str], Delivery] = {}
 
@@ -59,7 +59,7 @@ def simulate() -> Iterator[Callable[[Trial], Delivery]]:
 
 
 def collect(directory: Path, simulate: Callable[[Trial], Delivery], *, lose: Collection[int] = ()) -> str:
-    """Collect what is left of a dataset; trials to lose end the simulation that runs them. Returns what was said."""
+    """Collect the remaining trials of a dataset; `lose` lists trials whose simulation dies. Returns the messages."""
     said: list[str] = []
     with TrialCollection.open(directory, say=said.append) as collection:
         collection.warn = said.append
@@ -101,7 +101,7 @@ def die(*_: object) -> None:
 
 
 @pytest.mark.parametrize(("per_shard", "target"), [(40, False), (300, True)])
-def test_lost_trials_that_are_run_again(
+def test_lost_trials_that_are_run_again_give_the_undisturbed_dataset(
     per_shard: int, target: bool, tmp_path: Path, simulate: Callable[[Trial], Delivery], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     config = configuration(per_shard=per_shard, target=target)
@@ -113,7 +113,7 @@ def test_lost_trials_that_are_run_again(
     assert verify(directory) == []
     lost = fingerprints(directory)
     assert lost["plan.parquet"] != fingerprints(expected)["plan.parquet"]
-    # Where they are lost again, everything stays.
+    # If the same trials are lost again, no file changes.
     assert "removed" not in go_on(config, directory, simulate, lose={1, 3, 120})
     assert fingerprints(directory) == lost
     if target:
@@ -121,12 +121,12 @@ def test_lost_trials_that_are_run_again(
             patch.setattr(DatasetWriter, "_reopen", die)
             with pytest.raises(KeyboardInterrupt):
                 go_on(config, directory, simulate, lose={120})
-    # A trial that is still lost, and ends in a shard of which others are removed, is known to be lost.
+    # Trial 120 stays lost, although other trials of its shard are removed.
     go_on(config, directory, simulate, lose={120})
     assert verify(directory) == []
     go_on(config, directory, simulate)
     assert fingerprints(directory) == fingerprints(expected)
-    # Damage costs episodes by whose results later rounds were drawn. These rounds stay, as they come again.
+    # Damage loses episodes on whose results later rounds depend. These rounds stay, as the same results come again.
     with next(directory.glob("*_00000.mcap")).open("r+b") as shard:
         shard.seek(50_000)
         shard.write(bytes(100_000))
@@ -137,7 +137,7 @@ def test_lost_trials_that_are_run_again(
     assert fingerprints(mended) == fingerprints(expected)
 
 
-def test_rounds_that_other_versions_of_libraries_have_drawn_stay(
+def test_rounds_that_another_library_version_drew_are_kept_on_resume(
     tmp_path: Path, simulate: Callable[[Trial], Delivery], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     config = configuration(per_shard=40, target=True)
@@ -152,7 +152,7 @@ def test_rounds_that_other_versions_of_libraries_have_drawn_stay(
     assert fingerprints(directory) == before
 
 
-def test_a_plan_that_is_gone_is_made_again_over_files_that_its_later_shards_have_left(
+def test_a_missing_plan_is_made_again_beside_unfinished_files_of_later_shards(
     tmp_path: Path, simulate: Callable[[Trial], Delivery]
 ) -> None:
     config = configuration(per_shard=40, target=True)

@@ -1,4 +1,4 @@
-"""A large plan is checked by several processes, and is the one that one process makes."""
+"""Several processes check a large plan, with the same result as one process."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ CONFIG: dict[str, Any] = {
 }
 
 
-def test_the_plan_is_the_same_whoever_checks_it(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_two_processes_make_the_same_plan_as_one(monkeypatch: pytest.MonkeyPatch) -> None:
     config = Config.model_validate(CONFIG)
     alone = prepare.draw_plan(config, directory=Path())
     monkeypatch.setattr(prepare, "_MANY_TRIALS", 50)
@@ -29,16 +29,14 @@ def test_the_plan_is_the_same_whoever_checks_it(monkeypatch: pytest.MonkeyPatch)
     assert prepare.draw_plan(config, directory=Path(), processes=2) == alone
 
 
-def test_a_plan_of_which_no_trial_is_left_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_plan_whose_trials_are_all_refused_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(prepare, "_MANY_TRIALS", 50)
     impossible = {**CONFIG, "sweep": {"parameters": {"task.duration_s": {"min": 0.1, "max": 0.12}}}}
     with pytest.raises(PlanError, match=r"60 trials, all refused"):
         prepare.draw_plan(Config.model_validate(impossible), directory=Path(), processes=2)
 
 
-def test_a_directory_that_is_taken_is_refused_before_trials_are_checked(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_used_directory_is_refused_before_trials_are_drawn(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(prepare, "draw_first_points", lambda *_, **__: pytest.fail("points are drawn"))
     (tmp_path / "notes.txt").touch()
     for directory, reason in ((tmp_path, "holds notes.txt"), (tmp_path / "notes.txt", "cannot be used")):
@@ -46,7 +44,7 @@ def test_a_directory_that_is_taken_is_refused_before_trials_are_checked(
             prepare.prepare(Config.model_validate(CONFIG), directory, sweep_directory=tmp_path)
 
 
-def test_of_a_large_plan_it_is_told_at_once_what_goes_on(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_drawing_and_checking_of_a_large_plan_are_announced(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(prepare, "_ANNOUNCED_TRIALS", 400)
     monkeypatch.setattr(prepare, "_MOST_PIECES", 1)
     monkeypatch.setattr(prepare, "_TELL_FIRST_S", 0.0)
@@ -61,7 +59,7 @@ def test_of_a_large_plan_it_is_told_at_once_what_goes_on(monkeypatch: pytest.Mon
     assert told.warnings == []
 
 
-def test_whoever_wants_is_told_how_far_a_plan_is_and_can_give_it_up(tmp_path: Path) -> None:
+def test_an_onlooker_follows_the_progress_of_a_plan_and_can_interrupt_it(tmp_path: Path) -> None:
     config = Config.model_validate({**CONFIG, "trials": 250})
     told: list[tuple[int, int]] = []
 
@@ -77,7 +75,7 @@ def test_whoever_wants_is_told_how_far_a_plan_is_and_can_give_it_up(tmp_path: Pa
     assert not (tmp_path / "data").exists()
 
 
-def test_users_are_warned_of_a_robot_in_the_ground(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_robot_below_the_ground_gives_a_warning(monkeypatch: pytest.MonkeyPatch) -> None:
     def list_warnings(height_m: float) -> list[str]:
         listener = Listener()
         config = Config.model_validate({**CONFIG, "trials": 1, "robot": {"base_height_m": height_m}})

@@ -1,4 +1,4 @@
-"""What is heard of a collection's progress."""
+"""Messages about the progress of a collection."""
 
 import json
 from dataclasses import asdict, replace
@@ -10,22 +10,22 @@ from throwcollect.coordinator.progress import Progress
 PROGRESS = Progress(10, 4, {"landed": 2, "recaught": 1, "lost": 1}, 2, 7.5, hung=["sim_1"])
 
 
-def test_progress_survives_its_message() -> None:
+def test_progress_reads_back_equal_from_its_message() -> None:
     assert Progress.read(PROGRESS.to_json()) == PROGRESS
     idle = replace(PROGRESS, throws_per_s=0.0, hung=[])
     assert Progress.read(idle.to_json()) == idle
 
 
 @pytest.mark.parametrize("text", ["", "landed", "{}", "[]", "null", '{"total": "ten"}', "{" * 5000, "\0"])
-def test_what_somebody_else_publishes_is_left_alone(text: str) -> None:
+def test_messages_that_are_not_a_progress_are_ignored(text: str) -> None:
     assert Progress.read(text) is None
 
 
-def test_progress_with_a_wrong_part_is_left_alone() -> None:
+def test_a_progress_with_a_wrong_value_is_ignored() -> None:
     assert Progress.read(json.dumps({**asdict(PROGRESS), "outcomes": {"landed": "many"}})) is None
 
 
-def test_the_line_counts_trials_or_throws_that_should_land() -> None:
+def test_the_progress_line_counts_trials_or_throws_that_should_land() -> None:
     alone = replace(PROGRESS, total=1, ended=1, outcomes={"landed": 1}, simulations=1)
     assert alone.line == "1/1 throw: 1 landed, 0 failed, 1 simulation, 7.5 throws/s"
     assert PROGRESS.line == "4/10 throws: 2 landed, 1 failed, 1 lost, 2 simulations, 7.5 throws/s"

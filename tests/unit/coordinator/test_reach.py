@@ -1,4 +1,4 @@
-"""Simulations that are in the ROS graph, whether they can be asked or not, over a real router."""
+"""Simulations in the ROS graph, with and without working services, over a real router."""
 
 import time
 from collections.abc import Callable, Iterator
@@ -69,7 +69,7 @@ def bench(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, request: pytest.Fixtu
             ros.shutdown()
 
 
-def test_a_simulation_that_cannot_be_asked_is_named_after_a_while(bench: Bench) -> None:
+def test_a_simulation_without_parameter_services_is_reported_as_hung(bench: Bench) -> None:
     node = bench.simulation(whole=False)
     assert bench.until(lambda: bench.coordinator.report().simulations == 1)
     assert bench.hung == []
@@ -78,17 +78,17 @@ def test_a_simulation_that_cannot_be_asked_is_named_after_a_while(bench: Bench) 
     assert bench.until(lambda: bench.hung == [])
 
 
-def test_one_that_can_be_asked_is_not(bench: Bench) -> None:
+def test_a_simulation_with_parameter_services_is_not_reported_as_hung(bench: Bench) -> None:
     bench.simulation(whole=True)
     assert bench.until(lambda: bench.coordinator.report().simulations == 1)
     assert not bench.until(lambda: bench.hung != [], seconds=1.5)
 
 
-def test_a_simulation_that_was_started_again_is_another_one(bench: Bench) -> None:
+def test_a_restarted_simulation_replaces_its_predecessor(bench: Bench) -> None:
     first = bench.simulation(whole=True)
     assert bench.until(lambda: bench.coordinator.report().simulations == 1)
     (before,) = bench.coordinator._simulations.values()
-    # Its successor is there before it has gone.
+    # The second simulation appears before the first one is gone.
     second = ros.Node("sim_0", namespace="/sim_0")
     second.create_publisher(UInt8MultiArray, "episode", 10)
     assert bench.until(lambda: list(bench.coordinator._simulations.values()) != [before])
@@ -104,5 +104,5 @@ SLOWED = "run: {{trial_timeout_s: 1.5}}\nsim: {{max_trial_s: 8, real_time_factor
     [(SLOWED.format(factor=factor), patience_s) for factor, patience_s in (("null", 9.5), (20, 9.5), (0.5, 17.5))],
     indirect=["bench"],
 )
-def test_a_trial_has_the_time_that_it_takes_when_it_is_watched(bench: Bench, patience_s: float) -> None:
+def test_a_trial_slower_than_real_time_has_a_longer_timeout(bench: Bench, patience_s: float) -> None:
     assert bench.coordinator._patience_s == patience_s

@@ -1,4 +1,4 @@
-"""Trials that are simulated again in a fresh process, which may be begun before it is known which ones are compared."""
+"""Some trials are simulated again in a fresh process, which may begin before the compared trials are known."""
 
 import json
 import os
@@ -42,7 +42,7 @@ def digests() -> dict[int, str]:
 
 @pytest.fixture
 def started(monkeypatch: pytest.MonkeyPatch) -> list[list[str]]:
-    """Trials of each process that is started."""
+    """The trials of each started process."""
     found: list[list[str]] = []
     popen = subprocess.Popen
 
@@ -70,41 +70,41 @@ def compare(check: ReplayCheck, digests: dict[int, str]) -> str | None:
     return check.compare(digests, meanwhile=lambda: time.sleep(0.01))
 
 
-def test_trials_that_were_begun_early_are_not_simulated_twice(check, digests, started) -> None:
+def test_a_replay_check_uses_the_trials_that_were_begun_early(check, digests, started) -> None:
     check.begin(NUMBERS)
     assert compare(check, digests) == "2 trials simulated again in a fresh process: the same bit for bit"
     assert started == [words(CHOSEN)]
 
 
-def test_what_is_compared_does_not_depend_on_the_guess(check, digests, started) -> None:
+def test_a_replay_check_compares_the_chosen_trials_even_if_others_were_begun(check, digests, started) -> None:
     check.begin(NUMBERS)
     kept = {trial: digest for trial, digest in digests.items() if trial not in CHOSEN}
     compare(check, kept)
     assert started == [words(CHOSEN), words(choose_trials(sorted(kept), count=2, seed=PLAN.config.seed))]
 
 
-def test_an_early_process_that_fails_is_replaced(check, digests, started) -> None:
+def test_a_replay_process_begun_early_that_fails_is_replaced(check, digests, started) -> None:
     check.begin([10**6, 10**6 + 1])
     assert compare(check, digests) is not None
     assert started == [words([10**6, 10**6 + 1]), words(CHOSEN)]
 
 
 @pytest.mark.parametrize("early", [False, True])
-def test_a_trial_that_came_out_otherwise_is_an_error(check, digests, early) -> None:
+def test_a_trial_that_replays_otherwise_is_an_error(check, digests, early) -> None:
     if early:
         check.begin(NUMBERS)
     with pytest.raises(DatasetError, match=f"1 of 2 trials came out differently in a fresh process: trial {CHOSEN[1]}"):
         compare(check, {**digests, CHOSEN[1]: "0" * 64})
 
 
-def test_a_process_that_fails_is_an_error(check, digests, tmp_path) -> None:
+def test_a_replay_process_that_fails_is_an_error(check, digests, tmp_path) -> None:
     (tmp_path / "data" / "plan.parquet").unlink()
     with pytest.raises(WorkerError, match="2 trials could not be simulated again \\(exit code") as caught:
         compare(check, digests)
     assert "plan.parquet" in (caught.value.evidence or "")
 
 
-def test_nothing_is_left_of_a_check_that_is_given_up(check, monkeypatch) -> None:
+def test_closing_a_replay_check_ends_its_process(check, monkeypatch) -> None:
     begun: list[subprocess.Popen[bytes]] = []
     popen = subprocess.Popen
 
@@ -118,7 +118,7 @@ def test_nothing_is_left_of_a_check_that_is_given_up(check, monkeypatch) -> None
     assert begun[0].poll() is not None
 
 
-def test_ctrl_c_does_not_reach_the_process(check, monkeypatch) -> None:
+def test_a_replay_process_has_its_own_session_so_ctrl_c_does_not_reach_it(check, monkeypatch) -> None:
     sessions: list[int] = []
     popen = subprocess.Popen
 
@@ -134,7 +134,7 @@ def test_ctrl_c_does_not_reach_the_process(check, monkeypatch) -> None:
     assert sessions != [os.getsid(0)]
 
 
-def test_without_trials_there_is_nothing_to_do(tmp_path, started) -> None:
+def test_a_replay_check_of_no_trials_starts_no_process(tmp_path, started) -> None:
     check = ReplayCheck(tmp_path, count=0, seed=1)
     check.begin(NUMBERS)
     assert compare(check, {1: json.dumps(1)}) is None

@@ -1,4 +1,4 @@
-"""What a dataset's directory has to hold before a collection goes on with it."""
+"""What resuming needs to find in the directory of a dataset, and what it restores."""
 
 from __future__ import annotations
 
@@ -42,20 +42,20 @@ def contents(directory: Path) -> dict[str, bytes]:
     return {path.name: path.read_bytes() for path in directory.iterdir()}
 
 
-def test_what_is_whole_is_left_alone(directory: Path) -> None:
+def test_resuming_an_undamaged_dataset_changes_no_file(directory: Path) -> None:
     before = {path.name: path.stat().st_mtime_ns for path in directory.iterdir()}
     plan = resume(config_with(), directory, sweep_directory=directory)
     assert len(plan.trials) == 4
     assert {path.name: path.stat().st_mtime_ns for path in directory.iterdir()} == before
 
 
-def test_how_it_is_run_may_change(directory: Path, prepared: dict[str, bytes]) -> None:
+def test_resume_accepts_changed_keys_under_run(directory: Path, prepared: dict[str, bytes]) -> None:
     resume(config_with(run={"simulations": 7}), directory, sweep_directory=directory)
     assert load(directory / "config.yaml").run.simulations == 7
     assert contents(directory)["plan.parquet"] == prepared["plan.parquet"]
 
 
-def test_keys_may_stand_in_another_order(directory: Path, prepared: dict[str, bytes]) -> None:
+def test_resume_accepts_swept_keys_in_another_order(directory: Path, prepared: dict[str, bytes]) -> None:
     parameters = dict(reversed(SETTINGS["sweep"]["parameters"].items()))
     other = config_with(run={"simulations": 7}, sweep={"parameters": parameters})
     for _ in range(2):
@@ -65,7 +65,7 @@ def test_keys_may_stand_in_another_order(directory: Path, prepared: dict[str, by
     assert load(directory / "config.yaml").run.simulations == 7
 
 
-def test_anything_else_may_not_and_all_differences_are_told(directory: Path, prepared: dict[str, bytes]) -> None:
+def test_resume_refuses_other_changed_keys_and_names_them_all(directory: Path, prepared: dict[str, bytes]) -> None:
     other = config_with(ball={"radius_m": 0.03}, seed=5)
     with pytest.raises(ConfigError, match="the same configuration") as raised:
         resume(other, directory, sweep_directory=directory)
@@ -76,7 +76,7 @@ def test_anything_else_may_not_and_all_differences_are_told(directory: Path, pre
     assert contents(directory) == prepared
 
 
-def test_with_another_engine_the_command_that_compares_is_told(tmp_path: Path) -> None:
+def test_resume_with_another_engine_names_the_command_that_compares(tmp_path: Path) -> None:
     directory = tmp_path / "data"
     prepare(config_with(), directory, sweep_directory=tmp_path)
     with pytest.raises(ConfigError, match=r"sim\.engine: .* was begun with 'bullet', got 'mujoco'") as caught:
@@ -85,7 +85,7 @@ def test_with_another_engine_the_command_that_compares_is_told(tmp_path: Path) -
     assert caught.value.hint == f"{compare} tells by how much its throws differ"
 
 
-def test_more_trials_go_on_where_the_others_ended(directory: Path, tmp_path_factory: pytest.TempPathFactory) -> None:
+def test_resume_with_more_trials_continues_the_plan(directory: Path, tmp_path_factory: pytest.TempPathFactory) -> None:
     before = resume(config_with(), directory, sweep_directory=directory)
     after = resume(config_with(trials=6), directory, sweep_directory=directory)
     assert after.trials[:4] == before.trials
@@ -94,13 +94,13 @@ def test_more_trials_go_on_where_the_others_ended(directory: Path, tmp_path_fact
     assert contents(directory) == contents(fresh)
 
 
-def test_fewer_trials_are_refused(directory: Path, prepared: dict[str, bytes]) -> None:
+def test_resume_with_fewer_trials_is_refused(directory: Path, prepared: dict[str, bytes]) -> None:
     with pytest.raises(ConfigError, match=rf"trials: {directory} has 4 already, got 3\n  expected: 4 or more"):
         resume(config_with(trials=3), directory, sweep_directory=directory)
     assert contents(directory) == prepared
 
 
-def test_a_sampler_that_draws_other_trials_is_refused(tmp_path: Path) -> None:
+def test_resume_with_more_trials_of_latin_hypercube_is_refused(tmp_path: Path) -> None:
     sweep = {**SETTINGS["sweep"], "sampler": "latin_hypercube"}
     prepare(config_with(sweep=sweep), tmp_path / "data", sweep_directory=tmp_path)
     before = contents(tmp_path / "data")
@@ -110,7 +110,9 @@ def test_a_sampler_that_draws_other_trials_is_refused(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("length", [None, 0, 100])
-def test_a_plan_that_is_lost_is_made_again(directory: Path, prepared: dict[str, bytes], length: int | None) -> None:
+def test_a_missing_or_damaged_plan_is_made_again(
+    directory: Path, prepared: dict[str, bytes], length: int | None
+) -> None:
     plan = directory / "plan.parquet"
     plan.unlink() if length is None else plan.write_bytes(prepared["plan.parquet"][:length])
     resume(config_with(), directory, sweep_directory=directory)
@@ -118,7 +120,7 @@ def test_a_plan_that_is_lost_is_made_again(directory: Path, prepared: dict[str, 
 
 
 @pytest.mark.parametrize("length", [None, 0, 500, -400])
-def test_a_configuration_that_is_lost_is_put_back(
+def test_a_missing_or_damaged_configuration_is_restored_if_it_fits_the_plan(
     directory: Path, prepared: dict[str, bytes], length: int | None
 ) -> None:
     config = directory / "config.yaml"
@@ -129,14 +131,14 @@ def test_a_configuration_that_is_lost_is_put_back(
     assert contents(directory) == prepared
 
 
-def test_without_plan_and_configuration_nobody_knows_what_it_was(directory: Path) -> None:
+def test_a_dataset_with_damaged_plan_and_configuration_is_refused(directory: Path) -> None:
     for path in directory.iterdir():
         path.write_bytes(b"")
     with pytest.raises(DatasetError, match=r"plan\.parquet: is damaged: .*\n  try: throwcollect up CONFIG --resume"):
         resume(config_with(), directory, sweep_directory=directory)
 
 
-def test_a_directory_without_either_is_not_begun(directory: Path, tmp_path_factory: pytest.TempPathFactory) -> None:
+def test_an_empty_directory_is_not_a_begun_dataset(directory: Path, tmp_path_factory: pytest.TempPathFactory) -> None:
     assert is_begun(directory)
     assert not is_begun(tmp_path_factory.mktemp("empty"))
 
@@ -145,13 +147,13 @@ def test_a_dataset_without_metadata_is_not_finished(directory: Path) -> None:
     assert not has_all_trials(directory, resume(config_with(), directory, sweep_directory=directory))
 
 
-def test_what_was_finished_is_not_so_with_more_trials(directory: Path) -> None:
+def test_a_finished_dataset_is_unfinished_once_it_gets_more_trials(directory: Path) -> None:
     (directory / "metadata.yaml").write_text("whole")
     resume(config_with(trials=5), directory, sweep_directory=directory)
     assert not (directory / "metadata.yaml").exists()
 
 
-def test_a_plan_that_grows_may_be_asked_for_more_but_not_for_less(tmp_path: Path) -> None:
+def test_a_growing_plan_can_be_resumed_with_higher_but_not_lower_numbers(tmp_path: Path) -> None:
     few, more = (config_with(trials=trials, until={"landed": landed}) for trials, landed in ((70, 60), (80, 65)))
     directory = tmp_path / "data"
     begun_with = prepare(few, directory, sweep_directory=tmp_path)
@@ -176,7 +178,7 @@ def listed(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def test_a_dataset_has_its_list_beside_its_configuration(listed: Path) -> None:
+def test_a_dataset_keeps_a_copy_of_its_list_of_points(listed: Path) -> None:
     plan = prepare(Config.model_validate(LISTED), listed / "data", sweep_directory=listed)
     (listed / "lists" / "points.csv").unlink()
     own = load(listed / "data" / "config.yaml")
@@ -186,14 +188,14 @@ def test_a_dataset_has_its_list_beside_its_configuration(listed: Path) -> None:
     assert contents(listed / "again") == contents(listed / "data")
 
 
-def test_a_list_of_which_the_first_points_were_taken_goes_on_with_more(listed: Path) -> None:
+def test_resume_with_more_trials_takes_the_next_points_of_the_list(listed: Path) -> None:
     prepare(Config.model_validate({**LISTED, "trials": 2}), listed / "data", sweep_directory=listed)
     more = load(listed / "data" / "config.yaml").model_copy(update={"trials": 3})
     plan = resume(more, listed / "data", sweep_directory=listed / "data")
     assert [trial.values["task.duration_s"] for trial in plan.trials] == [1.0, 1.1, 1.2]
 
 
-def test_a_list_that_has_grown_is_taken_over(listed: Path) -> None:
+def test_resume_takes_points_that_were_added_to_the_list(listed: Path) -> None:
     prepare(Config.model_validate({**LISTED, "trials": 3}), listed / "data", sweep_directory=listed)
     with (listed / "lists" / "points.csv").open("a") as file:
         file.write("1.25,0.06\n")

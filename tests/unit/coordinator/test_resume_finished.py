@@ -1,4 +1,4 @@
-"""A finished dataset of which something is missing or damaged is gone on with, and ends as it was."""
+"""Resuming a finished dataset with missing or damaged files makes it what it was."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class Trials:
         self.results: list[ThrowResult] = [self.collection.result(episode) for episode in self.episodes]
 
     def run(self, directory: Path) -> set[int]:
-        """Have a coordinator run what is missing; the trials that were not run again."""
+        """Collect the missing trials; returns the trials that were kept."""
         kept: set[int] = set()
         writer = DatasetWriter.open(directory)
         writer.recover(lambda trial, _: kept.add(trial))
@@ -42,7 +42,7 @@ class Trials:
         return kept
 
     def go_on(self, directory: Path, *, check: bool = False) -> tuple[set[int] | None, list[str]]:
-        """Resume; the trials that were not run again, None if nothing was left to do; and the warnings."""
+        """Resume; returns the trials that were kept, or None if there was nothing to do, and the warnings."""
         told = Listener()
         plan = resume(self.plan.config, directory, sweep_directory=directory, check=check, onlooker=told)
         return None if has_all_trials(directory, plan) else self.run(directory), told.warnings
@@ -97,15 +97,15 @@ def flip_bit(path: Path) -> None:
     path.write_bytes(data)
 
 
-def test_a_finished_dataset_stays_as_it_is(trials: Trials, dataset: Path) -> None:
+def test_resuming_a_finished_dataset_changes_no_file(trials: Trials, dataset: Path) -> None:
     before = {path: path.stat().st_mtime_ns for path in dataset.rglob("*")}
     assert trials.go_on(dataset) == (None, [])
     assert trials.go_on(dataset, check=True) == (None, [])
     assert {path: path.stat().st_mtime_ns for path in dataset.rglob("*")} == before
 
 
-def test_the_configuration_of_an_earlier_version_stays_as_it_is(trials: Trials, promised: Path) -> None:
-    """It has fewer keys than it would have now; what says its size and hash is the manifest."""
+def test_resume_keeps_a_configuration_of_an_earlier_version(trials: Trials, promised: Path) -> None:
+    """It has fewer keys than a configuration has now, and the manifest has its size and hash."""
     path = promised / "config.yaml"
     earlier = path.read_text()[: path.read_text().index("cluster:")]
     path.write_text(earlier)
@@ -119,7 +119,7 @@ def test_the_configuration_of_an_earlier_version_stays_as_it_is(trials: Trials, 
     ("damage", "check", "kept"),
     [(delete, False, {0, 1}), (cut, False, {0, 1, 2, 3}), (flip_bit, True, {0, 1, 2})],
 )
-def test_a_damaged_recording_is_gone_on_with_to_the_same_bytes(
+def test_resume_restores_the_bytes_of_a_damaged_recording(
     trials: Trials, sound: Path, dataset: Path, damage: Callable[[Path], None], check: bool, kept: set[int]
 ) -> None:
     damage(dataset / SHARD)
@@ -131,19 +131,19 @@ def test_a_damaged_recording_is_gone_on_with_to_the_same_bytes(
 
 
 @pytest.mark.parametrize("name", ["throws.parquet", "plan.parquet"])
-def test_damaged_tables_are_written_again(trials: Trials, sound: Path, promised: Path, name: str) -> None:
+def test_resume_with_check_writes_damaged_tables_again(trials: Trials, sound: Path, promised: Path, name: str) -> None:
     flip_bit(promised / name)
     assert trials.go_on(promised, check=True)[0] == {*range(TRIALS)}
     assert contents(promised) == contents(sound)
 
 
-def test_a_damaged_manifest_counts_as_damage(trials: Trials, sound: Path, promised: Path) -> None:
+def test_resume_restores_a_dataset_whose_manifest_is_damaged(trials: Trials, sound: Path, promised: Path) -> None:
     (promised / "datapackage.json").write_text("{}")
     assert trials.go_on(promised)[0] == {*range(TRIALS)}
     assert contents(promised) == contents(sound)
 
 
-def test_what_cannot_be_made_again_is_said_and_nothing_is_changed(trials: Trials, promised: Path) -> None:
+def test_resume_without_a_file_that_cannot_be_made_again_is_an_error(trials: Trials, promised: Path) -> None:
     dataset = promised
     entries = [entry_of_file(dataset / name) for name in list_promised_names(dataset)]
     (dataset / "sources.parquet").write_bytes(b"from there")
@@ -156,7 +156,7 @@ def test_what_cannot_be_made_again_is_said_and_nothing_is_changed(trials: Trials
     assert contents(dataset) == before
 
 
-def test_a_configuration_that_was_changed_is_not_taken_for_the_plans(trials: Trials, dataset: Path) -> None:
+def test_resume_refuses_a_dataset_whose_configuration_was_changed(trials: Trials, dataset: Path) -> None:
     text = (dataset / "config.yaml").read_text()
     (dataset / "config.yaml").write_text(text.replace("seed: 0", "seed: 1"))
     before = contents(dataset)

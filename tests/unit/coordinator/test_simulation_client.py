@@ -1,4 +1,4 @@
-"""What the coordinator makes of a simulation's answers, over a real router."""
+"""How the coordinator sends leases to a simulation and handles its answers, over a real router."""
 
 import time
 from collections.abc import Callable, Iterator
@@ -53,7 +53,7 @@ class Bench:
         return [[lease.trial for lease in leases] for leases in self.asked]
 
     def settle(self) -> None:
-        """Let every answer that is under way arrive: those of a further call come after them."""
+        """Wait for all answers under way: the answer to one more call arrives after them."""
         done = self.asking.call_async(GetParameters.Request(names=[LEASES]))
         assert self.spin(done.done)
 
@@ -80,7 +80,7 @@ def bench(joined: None) -> Bench:
     return Bench()
 
 
-def test_trials_are_asked_for_in_their_order_and_signed(bench: Bench) -> None:
+def test_leases_are_sent_signed_and_in_the_given_order(bench: Bench) -> None:
     assert bench.client.ask([5, 2])
     assert bench.spin(lambda: not bench.client.unanswered)
     (leases,) = bench.asked
@@ -100,7 +100,7 @@ def test_a_simulation_may_live_in_the_root_namespace() -> None:
     assert bench.trials == [[5]]
 
 
-def test_nothing_is_asked_twice(bench: Bench) -> None:
+def test_a_simulation_is_not_sent_the_leases_that_it_has(bench: Bench) -> None:
     assert bench.client.ask([5, 2])
     assert not bench.client.ask([5, 2])
     first, second = bench.client._leases.values()
@@ -112,7 +112,7 @@ def test_nothing_is_asked_twice(bench: Bench) -> None:
     assert bench.asked[1][0] == second
 
 
-def test_trials_can_be_taken_from_it_again(bench: Bench) -> None:
+def test_asking_for_fewer_trials_takes_the_others_back(bench: Bench) -> None:
     bench.client.ask([5, 2])
     assert bench.client.ask([5])
     bench.settle()
@@ -120,20 +120,20 @@ def test_trials_can_be_taken_from_it_again(bench: Bench) -> None:
     assert bench.client.trials == (5,)
 
 
-def test_each_token_stands_for_its_trial_once(bench: Bench) -> None:
+def test_a_token_finishes_its_trial_only_once(bench: Bench) -> None:
     bench.client.ask([5, 2])
     tokens = [lease.token for lease in bench.client._leases.values()]
     assert [bench.client.finish(token) for token in (tokens[1], tokens[1], "x", tokens[0])] == [2, None, None, 5]
 
 
-def test_a_refusal_is_reported_with_the_reason(bench: Bench) -> None:
+def test_a_refusal_by_the_simulation_is_reported_with_its_reason(bench: Bench) -> None:
     bench.accepts = False
     bench.client.ask([0])
     assert bench.spin(lambda: bool(bench.refusals))
     assert bench.refusals == [("/sim_0", "leases: never")]
 
 
-def test_a_late_refusal_does_not_touch_what_was_asked_since(bench: Bench) -> None:
+def test_a_late_refusal_does_not_affect_leases_sent_since(bench: Bench) -> None:
     bench.accepts = False
     bench.client.ask([0])
     bench.client.ask([1])
@@ -143,7 +143,7 @@ def test_a_late_refusal_does_not_touch_what_was_asked_since(bench: Bench) -> Non
     assert len(bench.refusals) == 1
 
 
-def test_abandoned_trials_are_not_heard_of_again(bench: Bench) -> None:
+def test_answers_about_abandoned_trials_are_ignored(bench: Bench) -> None:
     bench.accepts = False
     bench.client.ask([0])
     (lease,) = bench.client._leases.values()
@@ -154,12 +154,12 @@ def test_abandoned_trials_are_not_heard_of_again(bench: Bench) -> None:
     assert bench.client.finish(lease.token) is None
 
 
-def test_what_has_no_answer_is_sent_again_with_new_leases(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_trials_without_an_answer_are_sent_again_with_new_leases(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
     bench.client.ask([5, 6])
     before = {lease.token for lease in bench.client._leases.values()}
     assert bench.client.remind() is None
     monkeypatch.setattr(bench.client, "_patience_s", 0.0)
-    # The simulation has not had a chance to answer yet.
+    # The simulation has not answered yet, as nothing was spun.
     assert bench.client.remind() == "2 trials"
     assert bench.spin(lambda: not bench.client.unanswered)
     assert bench.trials == [[5, 6], [5, 6]]
@@ -167,7 +167,7 @@ def test_what_has_no_answer_is_sent_again_with_new_leases(bench: Bench, monkeypa
     assert bench.client.remind() is None
 
 
-def test_nothing_is_missing_of_abandoned_trials(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_abandoned_trials_are_not_sent_again(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
     bench.client.ask([0])
     monkeypatch.setattr(bench.client, "_patience_s", 0.0)
     bench.client.abandon()

@@ -1,4 +1,4 @@
-"""Throws as a simulation would hand them over, without a simulation: joints on their trajectory, a ballistic ball."""
+"""Throws like those of a simulation, made without one: joints on their trajectory, a ball in ballistic flight."""
 
 from __future__ import annotations
 
@@ -96,7 +96,7 @@ def _product(turns: NDArray[np.float64], quaternion: NDArray[np.float64]) -> NDA
 
 
 class Collection:
-    """A plan and the throws that its trials yield."""
+    """A plan and the throws of its trials."""
 
     def __init__(self, settings: dict[str, Any] | None = None) -> None:
         self.config = Config.model_validate({**SETTINGS, **(settings or {})})
@@ -148,7 +148,7 @@ class Collection:
         return directory
 
     def refuse(self, trial: int, reason: str) -> None:
-        """Have the plan refuse one of its trials."""
+        """Make the plan refuse one of its trials."""
         trials = self.plan.trials
         reasons = trials.refused | {trial: reason}
         self.plan = replace(self.plan, trials=trials.refuse([reasons.get(number) for number in trials.numbers]))

@@ -1,4 +1,4 @@
-"""How files of a dataset are damaged in tests: one bit, one value, one line."""
+"""Helpers that damage a file of a dataset: one bit, one value, one line."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ SHARD = "quick_00001.mcap"
 
 
 FIRST = 3
-"""First trial of that shard."""
+"""The first trial of that shard."""
 
 
 def find_stored(path: Path, trial: int) -> StoredEpisode:

@@ -1,4 +1,4 @@
-"""Processes of tests that die in the middle of changing files, or leave what they would have left."""
+"""Simulated kills: a process dies while it changes files, or the files are copied as a kill would leave them."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ import pytest
 
 
 class Killed(BaseException):
-    """The process is gone: nothing that follows happens."""
+    """Stands for the end of the process: no later call has an effect."""
 
 
 class KilledAt:
     """Within this block the process dies in the n-th call that changes a file; a write then leaves half its bytes.
 
-    Files without a name are left out: whenever the process dies, nothing of them is left.
+    Writes to files without a name do not count: a kill leaves nothing of such files.
 
     Attributes:
-        died: Whether it came to that call.
+        died: Whether that call was reached.
     """
 
     NAMES = ("write", "replace", "unlink", "ftruncate", "fsync")
@@ -61,7 +61,7 @@ class KilledAt:
 class KilledEverywhere:
     """Within this block a directory is copied in each call that changes a file, as a kill in that call would leave it.
 
-    A write has written half its bytes then.
+    The copy in a write has half of its bytes.
 
     Attributes:
         left: Each copy, and the trials whose episodes had been appended by then.

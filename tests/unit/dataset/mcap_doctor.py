@@ -1,4 +1,4 @@
-"""Looks at every record of an MCAP file as `mcap doctor` does, with the `mcap` package and rosbags alone."""
+"""Checks every record of an MCAP file as `mcap doctor` does, with only the `mcap` package and rosbags."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class Placed(NamedTuple):
 
 
 def read(kind: type[Any], body: bytes) -> Any:
-    """The record of a body that holds its fields and nothing behind them."""
+    """The record in a body. There may be no bytes behind its fields."""
     stream = ReadDataStream(io.BytesIO(body))
     found = kind.read(stream, len(body)) if kind is records.Message else kind.read(stream)
     assert stream.count == len(body), f"{kind.__name__}: {len(body) - stream.count} bytes more than its fields"
@@ -54,7 +54,7 @@ def place_records(data: bytes, start: int, end: int) -> Iterator[Placed]:
 
 
 class Examination:
-    """What was found in a file, to be compared with what its summary says.
+    """What the records of a file say, compared with its summary.
 
     Raises:
         AssertionError: At the first thing that is wrong.
@@ -166,7 +166,7 @@ class Examination:
         )
 
     def _compare(self, summary: list[Placed], last: Placed) -> None:
-        """The summary section and the footer against what the file holds."""
+        """Compare the summary section and the footer with the records of the file."""
         footer = read(records.Footer, last.body)
         groups = {
             opcode: [record for record in summary if record.opcode == opcode]
@@ -193,7 +193,7 @@ class Examination:
         )
         offsets = groups.pop(Opcode.SUMMARY_OFFSET)
         told = [read(records.SummaryOffset, each.body) for each in offsets]
-        # Some writers also tell of groups that are empty.
+        # Some writers also list empty groups.
         assert [offset for offset in told if offset.group_length] == [
             records.SummaryOffset(opcode, group[0].offset, sum(record.length for record in group))
             for opcode, group in groups.items()

@@ -1,7 +1,7 @@
-"""Damages files in all the ways that disks, programs and people do; run as a module, it does so until told to stop.
+"""Damages files as disks, programs and people do; run as a module, it does so a given number of times.
 
 ``python -m tests.unit.dataset.mutations 20000`` damages the files of a small dataset that many times, within 4 GB of
-memory and 60 s each, and prints everything that comes out and is no error of ours.
+memory and 60 s each, and prints every exception that is not an error of throwcollect.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from throwcollect.sweep.plan import Plan
 KINDS = ("flip", "delete", "repeat", "insert", "cut", "length 32", "length 64", "copy", "zero")
 LENGTHS = (0, 1, 2**16, 2**31 - 1, 2**32 - 1, 2**40, 2**63 - 1, 2**63, 2**64 - 1)
 SETTINGS = {"trials": 2, "record": {"trials_per_shard": 1, "rate_hz": 50}}
-"""A dataset that is small enough to be read thousands of times."""
+"""A dataset small enough to be read thousands of times."""
 
 
 class Mutation(NamedTuple):
@@ -83,7 +83,7 @@ def mutate(data: bytes, mutations: Sequence[Mutation]) -> bytes:
 
 
 def fit_manifest(directory: Path) -> None:
-    """Write the manifest that the files call for, as somebody would who wants a change to go unnoticed."""
+    """Write a manifest that fits the files, so that it does not give a change away."""
     files = [directory / name for name in list_promised_names(directory) if (directory / name).is_file()]
     name, _ = read_named_manifest(directory)
     (directory / "datapackage.json").write_text(manifest_text(name, map(entry_of_file, files)))
@@ -94,14 +94,14 @@ def no_plan(config: object) -> Plan:
 
 
 def use(directory: Path) -> None:
-    """Read all that a user of the library reads."""
+    """Read every episode, as a user of the library does."""
     for episode in Dataset.open(directory).episodes():
         episode.samples()
         episode.check_records()
 
 
 def outcomes(directory: Path, scratch: Path, name: str) -> list[Callable[[], Any]]:
-    """Everything that reads a dataset of which a file is damaged."""
+    """All functions that read a dataset, to be called when this file of it is damaged."""
     calls: list[Callable[[], Any]] = [
         lambda: verify(directory),
         lambda: use(directory),
@@ -125,7 +125,7 @@ def _hang(*_: object) -> None:
 
 
 def main(count: int, seed: int) -> int:
-    """Damage files `count` times; returns how many times something else than an error of ours came out."""
+    """Damage files `count` times; returns how often an exception was not an error of throwcollect."""
     from tests.unit.dataset.conftest import Collection
 
     warnings.simplefilter("error")
@@ -146,7 +146,7 @@ def main(count: int, seed: int) -> int:
                     call()
                 except ThrowcollectError as error:
                     str(error)
-                except Exception:  # noqa: BLE001 - it is what is looked for
+                except Exception:  # noqa: BLE001 - any other exception is what this looks for
                     bad += 1
                     print(f"{number}: {name}: {mutations}", traceback.format_exc(), sep="\n", flush=True)
                 signal.alarm(0)

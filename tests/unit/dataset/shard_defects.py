@@ -1,4 +1,4 @@
-"""Defects of a shard that tests plant, and what has to be said of each."""
+"""Defects of a shard that tests plant, and the finding that each must give."""
 
 from __future__ import annotations
 
@@ -123,7 +123,7 @@ def leave_open_shard(directory: Path) -> None:
 
 
 def write_shard(path: Path, episodes: list[Episode]) -> None:
-    """A file of these episodes, in which everything fits."""
+    """Write a sound shard of these episodes."""
     config = load(path.parent / "config.yaml")
     with path.open("wb") as file:
         mcap = McapFile(file.write, Channels(config, full_description(config)), start_ns=episodes[0].chunk.start_ns)
@@ -323,7 +323,7 @@ SHARD_DEFECTS: dict[Callable[[Path], None], tuple[str, str, str]] = {
     leave_out_summary_record: (SHARD, "byte", "a metadata_index where a chunk_index should be"),
     add_shard: ("quick_00003.mcap", "", "no row of throws"),
 }
-"""File, place and problem that are to be named."""
+"""File, place and problem of the finding that each defect must give."""
 
 
 SHARD_CONSEQUENCES: dict[Callable[[Path], None], tuple[str, ...]] = {
@@ -336,4 +336,4 @@ SHARD_CONSEQUENCES: dict[Callable[[Path], None], tuple[str, ...]] = {
     change_sample_and_all_hashes: ("metadata.yaml",),
     swap_shards: ("quick_00000.mcap", "metadata.yaml"),
 }
-"""Other files that a defect contradicts."""
+"""Other files in which a defect gives findings too."""

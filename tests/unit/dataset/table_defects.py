@@ -1,4 +1,4 @@
-"""Defects of tables, plan, configuration and metadata that tests plant, and what has to be said of each."""
+"""Defects of tables, plan, configuration and metadata that tests plant, and the finding that each must give."""
 
 from __future__ import annotations
 
@@ -125,7 +125,7 @@ def change_config_value(directory: Path) -> None:
 
 
 def change_config_height(directory: Path) -> None:
-    """The recordings would be wrong by this configuration, but they are not."""
+    """With this configuration the recordings would look wrong, but they are sound."""
     replace_text(directory / "config.yaml", "base_height_m: 1.01927", "base_height_m: 1.1")
 
 
@@ -138,7 +138,7 @@ def change_bag_files(directory: Path) -> None:
 
 
 def change_bag_file_count(directory: Path) -> None:
-    """In one of the entries, not in the sum."""
+    """The count is wrong in one of the entries, not in the sum."""
     text = (directory / "metadata.yaml").read_text()
     entry = text.index("path: quick_00001.mcap")
     place = text.index("message_count: ", entry) + len("message_count: ")
@@ -188,7 +188,7 @@ TABLE_DEFECTS: dict[Callable[[Path], None], tuple[str, str, str]] = {
     change_bag_format: ("metadata.yaml", "throwcollect.format", "is '7'"),
     add_bag_key: ("metadata.yaml", "", "unknown keys: .*colour"),
 }
-"""File, place and problem that are to be named."""
+"""File, place and problem of the finding that each defect must give."""
 
 
 TABLE_CONSEQUENCES: dict[Callable[[Path], None], tuple[str, ...]] = {
@@ -198,4 +198,4 @@ TABLE_CONSEQUENCES: dict[Callable[[Path], None], tuple[str, ...]] = {
     change_trial_of_row: ("quick_00002.mcap",),
     remove_plan_trial: ("quick_00002.mcap", "plan.parquet"),
 }
-"""Other files that a defect contradicts."""
+"""Other files in which a defect gives findings too."""

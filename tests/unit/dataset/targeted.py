@@ -1,4 +1,4 @@
-"""Small collections whose trials have targets, as a list with columns of targets makes them."""
+"""Small collections whose trials have targets, from a list with target columns."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ WITHOUT_TARGETS = "task.duration_s\n0.9\n1.0\n1.1\n1.2\n"
 
 
 def plan_targeted(directory: Path, text: str = LIST, *, height_m: float = 0.0) -> Collection:
-    """The collection of a list, whose CSV file lies beside a directory; the landing plane is at a height."""
+    """The collection of a list, whose CSV file is written beside the directory."""
     path = directory.with_suffix(".csv")
     path.write_text(text)
     sweep, scene = {"sampler": "list", "file": str(path)}, {"landing_height_m": height_m}
@@ -32,7 +32,7 @@ def plan_targeted(directory: Path, text: str = LIST, *, height_m: float = 0.0) -
 
 
 def collect_targeted(directory: Path, text: str = LIST, *, height_m: float = 0.0, change: Change | None = None) -> Path:
-    """A finished dataset of a list."""
+    """Collect a list to a finished dataset."""
     collection = plan_targeted(directory, text, height_m=height_m)
     listed = read_points(directory.with_suffix(".csv"), collection.config)
     writer = DatasetWriter.create(directory, collection.plan, listed=listed)

@@ -1,4 +1,4 @@
-"""The directory is a rosbag2 bag for everybody else who reads one."""
+"""Other software can read a dataset as a rosbag2 bag."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ def test_every_message_decodes_to_what_was_recorded(full: Path, make_collection:
     assert ("world", "ball") in frames
     assert ("world", "base_link") in fixed
     assert len(frames) == 1 + len(TALOS.joints)
-    # Together they are one tree: each frame has one parent, and all hang from the world.
+    # All frames form one tree: each has one parent, and the root is the world.
     children = [child for _, child in frames | fixed]
     assert len(children) == len(set(children))
     assert {parent for parent, _ in frames | fixed} - set(children) == {"world"}
@@ -93,7 +93,7 @@ def test_latched_topics_are_repeated_at_the_start_of_each_file(full: Path) -> No
         assert list(summary.chunk_indexes[0].message_index_offsets) == [1, 2]
 
 
-def test_seeking_by_time_and_topic_needs_one_chunk(full: Path) -> None:
+def test_seeking_by_time_and_topic_finds_exactly_those_messages(full: Path) -> None:
     with (full / "quick_00000.mcap").open("rb") as file:
         reader = make_reader(file, validate_crcs=True)
         found = list(reader.iter_messages(["/ball/odometry"], starting_at=32_000_000_000, ending_before=32_100_000_000))
@@ -117,7 +117,7 @@ def test_chunk_indexes_point_at_the_message_indexes(full: Path) -> None:
             assert end == chunk.chunk_start_offset + chunk.chunk_length + chunk.message_index_length
 
 
-def test_files_follow_the_conventions_of_rosbag2s_mcap_plugin(full: Path) -> None:
+def test_recordings_follow_the_conventions_of_the_mcap_plugin_of_rosbag2(full: Path) -> None:
     for path in full.glob("*.mcap"):
         with path.open("rb") as file:
             reader = make_reader(file)
@@ -140,7 +140,7 @@ def test_files_follow_the_conventions_of_rosbag2s_mcap_plugin(full: Path) -> Non
         assert copy["message_count"] == summary.statistics.message_count
 
 
-def test_metadata_have_the_fields_of_version_9_in_rosbag2s_order(full: Path) -> None:
+def test_metadata_has_the_fields_of_version_9_in_the_order_of_rosbag2(full: Path) -> None:
     """As `rosbag2_storage/yaml.hpp` encodes BagMetadata."""
     document = YAML(typ="safe").load((full / "metadata.yaml").read_text())
     assert list(document) == ["rosbag2_bagfile_information"]
@@ -189,7 +189,7 @@ def test_metadata_have_the_fields_of_version_9_in_rosbag2s_order(full: Path) -> 
     assert all(isinstance(value, str) for value in bag["custom_data"].values())
 
 
-def test_rosbags_agrees_with_the_metadata(full: Path) -> None:
+def test_rosbags_reads_counts_times_and_qos_as_the_metadata_says(full: Path) -> None:
     with Reader(full) as reader:
         counts: dict[str, int] = {}
         stamps = []

@@ -1,4 +1,4 @@
-"""The configuration of a dataset is a file of it like any other: without it, the dataset is damaged."""
+"""A dataset whose configuration is missing or damaged is damaged, and errors say how to restore it."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def spoil(path: Path) -> None:
         (spoil, "trails: unknown key"),
     ],
 )
-def test_a_dataset_without_its_configuration_is_damaged(
+def test_a_missing_or_damaged_configuration_is_an_error_of_the_dataset(
     dataset: Path, damage: Callable[[Path], None], said: str, look: Callable[[Path], object]
 ) -> None:
     damage(dataset / "config.yaml")
@@ -57,7 +57,7 @@ def test_a_dataset_without_its_configuration_is_damaged(
         look(dataset)
 
 
-def test_the_configuration_comes_back_with_the_file_that_was_collected_with(dataset: Path, tmp_path: Path) -> None:
+def test_resuming_with_the_original_file_restores_a_missing_configuration(dataset: Path, tmp_path: Path) -> None:
     config = load(dataset / "config.yaml")
     (dataset / "config.yaml").unlink()
     with pytest.raises(DatasetError, match=r"\n  try: throwcollect up CONFIG --resume .*/dataset, with the conf"):
@@ -69,7 +69,7 @@ def test_the_configuration_comes_back_with_the_file_that_was_collected_with(data
     assert verify(dataset) == []
 
 
-def test_an_unfinished_dataset_without_its_configuration_is_damaged(collection: Any, tmp_path: Path) -> None:
+def test_an_unfinished_dataset_without_its_configuration_is_an_error(collection: Any, tmp_path: Path) -> None:
     create(tmp_path / "dataset", collection.plan)
     (tmp_path / "dataset" / "config.yaml").unlink()
     for look in (throwcollect.load, prepare_to_resume):
@@ -77,7 +77,7 @@ def test_an_unfinished_dataset_without_its_configuration_is_damaged(collection: 
             look(tmp_path / "dataset")
 
 
-def test_recordings_alone_are_a_dataset_that_lost_its_configuration(dataset: Path, tmp_path: Path) -> None:
+def test_resuming_a_directory_of_recordings_alone_asks_for_the_configuration(dataset: Path, tmp_path: Path) -> None:
     for name in ("config.yaml", "plan.parquet", "metadata.yaml"):
         (dataset / name).unlink()
     with pytest.raises(DatasetError, match=r"config\.yaml: no such file\n  try: copy the configuration .* to "):
@@ -88,10 +88,10 @@ def test_recordings_alone_are_a_dataset_that_lost_its_configuration(dataset: Pat
         prepare_to_resume(tmp_path / "other")
 
 
-def test_a_configuration_as_it_was_written_is_not_damaged_where_it_cannot_be_used(
+def test_a_configuration_that_needs_a_missing_package_is_not_damaged(
     dataset: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Another package may have brought the robot or the task, and may not be installed here."""
+    """The robot or the task may come from another package, which is not installed here."""
     from throwcollect.dataset import configuration
 
     def refuse(_: Path) -> None:
@@ -103,7 +103,7 @@ def test_a_configuration_as_it_was_written_is_not_damaged_where_it_cannot_be_use
         info(dataset)
 
 
-def test_a_derived_dataset_is_derived_again(dataset: Path) -> None:
+def test_a_derived_dataset_without_its_configuration_must_be_derived_again(dataset: Path) -> None:
     (dataset / "config.yaml").unlink()
     (dataset / "sources.parquet").touch()
     with pytest.raises(DatasetError, match=r"no such file\n  try: derive the dataset again"):

@@ -1,4 +1,4 @@
-"""Whatever reads a damaged episode says in which dataset and trial the damage is, and how to find the rest."""
+"""Every reader of a damaged episode names its dataset and trial, and the command that finds all damage."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ READERS: dict[str, Callable[[Path], object]] = {
 
 
 @pytest.mark.parametrize("reader", READERS)
-def test_damage_is_located(reader: str, dataset: Path) -> None:
+def test_readers_of_a_damaged_episode_name_the_dataset_and_the_trial(reader: str, dataset: Path) -> None:
     damage_chunk_contents(dataset)
     with pytest.raises(DatasetError, match=rf"^{dataset}: trial 4: chunk: ") as found:
         READERS[reader](dataset)

@@ -18,7 +18,7 @@ from throwcollect.dataset.provenance import HOST_VARIABLE, IMAGE_VARIABLE, Prove
 from throwcollect.dataset.reader import Dataset
 
 
-def test_the_card_has_the_header_that_hubs_read(dataset: Path) -> None:
+def test_the_data_card_has_the_header_that_hubs_of_datasets_read(dataset: Path) -> None:
     _, header, text = (dataset / "README.md").read_text().split("---\n", 2)
     fields = YAML(typ="safe").load(header)
     assert fields["task_categories"] == ["robotics"]
@@ -28,7 +28,7 @@ def test_the_card_has_the_header_that_hubs_read(dataset: Path) -> None:
     assert "| `task.duration_s` | " in text
 
 
-def test_the_card_says_how_the_collection_was_run(dataset: Path) -> None:
+def test_the_data_card_says_how_the_collection_was_run(dataset: Path) -> None:
     text = (dataset / "README.md").read_text()
     for fact in (
         f"| throwcollect | {throwcollect.__version__} |",
@@ -38,7 +38,7 @@ def test_the_card_says_how_the_collection_was_run(dataset: Path) -> None:
         assert fact in text
 
 
-def test_trials_without_an_episode_are_no_throws(dataset: Path) -> None:
+def test_the_data_card_counts_only_trials_with_an_episode_as_throws(dataset: Path) -> None:
     throws = pq.read_table(dataset / "throws.parquet")
     column = throws.schema.get_field_index("digest")
     fewer = throws.set_column(column, "digest", pa.array([None, None, *throws["digest"].to_pylist()[2:]]))
@@ -47,7 +47,7 @@ def test_trials_without_an_episode_are_no_throws(dataset: Path) -> None:
 
 
 @pytest.mark.parametrize(("told", "host"), [(None, socket.gethostname()), ("lab-7", "lab-7"), ("", None)])
-def test_a_container_knows_its_host_only_if_it_is_told(
+def test_provenance_takes_the_host_from_the_variable_or_else_this_machine(
     monkeypatch: pytest.MonkeyPatch, dataset: Path, told: str | None, host: str | None
 ) -> None:
     if told is None:
@@ -60,9 +60,7 @@ def test_a_container_knows_its_host_only_if_it_is_told(
     assert "| host |" not in card
 
 
-def test_provenance_says_which_sources_image_and_robot_there_were(
-    monkeypatch: pytest.MonkeyPatch, dataset: Path
-) -> None:
+def test_provenance_names_revision_image_and_robot_description(monkeypatch: pytest.MonkeyPatch, dataset: Path) -> None:
     read = read_provenance(dataset)
     assert read is not None
     recorded = Dataset.open(dataset).robot_description()
@@ -78,8 +76,8 @@ def test_provenance_says_which_sources_image_and_robot_there_were(
     assert Provenance.of_this_machine(simulations=1, wall_s=1.0, was_open=False, robot="").image == "sha256:12ab"
 
 
-def test_sources_that_lie_in_no_clone_have_no_revision(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_provenance_has_no_revision_outside_of_a_clone(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setattr(provenance, "__file__", str(tmp_path / "site-packages" / "throwcollect" / "dataset" / "x.py"))
-    # That of this clone is remembered.
+    # The revision of this clone is cached: call the function without its cache.
     monkeypatch.setattr(provenance, "_read_revision", provenance._read_revision.__wrapped__)
     assert Provenance.of_this_machine(simulations=1, wall_s=1.0, was_open=False, robot="").revision is None

@@ -5,7 +5,7 @@ import pytest
 from throwcollect.dataset.directory import DIRECTORY_VARIABLE, find_known_directory
 
 
-def test_a_directory_is_named_as_its_user_knows_it(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_directory_in_a_container_is_named_as_on_the_host(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv(DIRECTORY_VARIABLE, raising=False)
     assert find_known_directory(Path("/data")) == Path("/data")
     monkeypatch.setenv(DIRECTORY_VARIABLE, "/home/me/my data")

@@ -23,7 +23,7 @@ def rows(text: str) -> list[int]:
     return Expression(text, place="where").rows(TABLE)
 
 
-def test_conditions_are_python_on_columns() -> None:
+def test_a_condition_is_a_python_expression_over_columns() -> None:
     assert rows("outcome == 'landed' and landing_x_m > 1.5 and task.duration_s < 1.2") == [1]
     assert rows("task.duration_s <= 0.9 or task.duration_s >= 1.2") == [0, 3]
     assert rows("0.9 < task.duration_s < 1.2") == [1, 2]
@@ -36,7 +36,7 @@ def test_conditions_are_python_on_columns() -> None:
     assert rows("True") == [0, 1, 2, 3]
 
 
-def test_arithmetic_is_that_of_real_numbers() -> None:
+def test_an_expression_computes_with_real_numbers() -> None:
     assert rows("hypot(landing_x_m, landing_y_m) == 5") == [2]
     assert rows("(landing_x_m ** 2 + landing_y_m ** 2) ** 0.5 == 2.5") == [1]
     assert rows("sqrt(abs(landing_y_m)) == 2") == [2]
@@ -50,7 +50,7 @@ def test_arithmetic_is_that_of_real_numbers() -> None:
     assert Expression("2", place="cells").numbers(TABLE) == [2.0] * 4
 
 
-def test_what_is_null_fulfils_no_comparison() -> None:
+def test_a_null_value_fulfils_only_comparisons_with_none() -> None:
     assert rows("landing_x_m > 0") == [0, 1, 2]
     assert rows("not landing_x_m > 0") == []
     assert rows("landing_x_m > 0 or outcome == 'lost'") == [0, 1, 2, 3]
@@ -91,12 +91,12 @@ def test_what_is_null_fulfils_no_comparison() -> None:
         ("(trial + 1).real == 1", "should be the name of a column"),
     ],
 )
-def test_what_is_wrong_is_said_in_one_message(text: str, message: str) -> None:
+def test_a_wrong_expression_gives_one_short_message(text: str, message: str) -> None:
     with pytest.raises(ConfigError, match=f"^where: .*(?s:{message})") as caught:
         rows(text)
     assert max(map(len, str(caught.value).splitlines())) < 200
 
 
-def test_numbers_that_do_not_exist_are_no_errors() -> None:
+def test_the_square_root_of_a_negative_number_is_nan() -> None:
     found = Expression("sqrt(0 - trial)", place="cells").numbers(TABLE)
     assert [math.isnan(number) for number in found] == [False, True, True, True]

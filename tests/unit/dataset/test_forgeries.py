@@ -1,4 +1,4 @@
-"""Forgeries in which every hash, CRC, digest and row fits: physics, plan and configuration tell them all the same."""
+"""Forgeries whose hashes, CRCs, digests and rows all fit: only physics, plan and configuration contradict them."""
 
 from __future__ import annotations
 
@@ -35,9 +35,9 @@ from throwcollect.tasks.task import trajectory_of
 from throwcollect.tasks.throw.throw_result import ThrowOutcome, ThrowResult
 
 FORGED = 2
-"""The trial that is forged."""
+"""The forged trial."""
 FLIGHT = 150
-"""A sample of its flight."""
+"""A sample in its flight."""
 ELBOW, LOCKED = TALOS.joints.index("arm_right_4_joint"), TALOS.joints.index("head_1_joint")
 
 Forgery = Callable[[Samples, EpisodeHeader], tuple[Samples, EpisodeHeader]]
@@ -60,7 +60,7 @@ def in_header(**changes: Callable[[EpisodeHeader], Any]) -> Forgery:
 
 
 def cut(end_reason: str, rows: slice = slice(-5)) -> Forgery:
-    """Some samples are missing, and the trial is said to have ended there."""
+    """Removes some samples, with a header that says that the trial ended there."""
 
     def forge(samples: Samples, header: EpisodeHeader) -> tuple[Samples, EpisodeHeader]:
         goals = tuple(replace(goal, status=2) for goal in header.goals)
@@ -73,7 +73,7 @@ def cut(end_reason: str, rows: slice = slice(-5)) -> Forgery:
 
 
 def with_contact(body: str, begin_s: float, end_s: float | None, *, off_ns: int = 0) -> Forgery:
-    """One contact is invented."""
+    """Adds an invented contact."""
 
     def add(header: EpisodeHeader) -> tuple[Contact, ...]:
         begin, end = (None if s is None else header.start_ns + round(s * 1e9) + off_ns for s in (begin_s, end_s))
@@ -87,7 +87,7 @@ def with_goal(**changes: Any) -> Forgery:
 
 
 def end_contact_later(by_s: float) -> Forgery:
-    """The contact with the spoon ends later."""
+    """Makes the contact with the spoon end later."""
     return in_header(
         contacts=lambda header: tuple(
             replace(each, end_ns=each.end_ns + round(by_s * 1e9)) for each in header.contacts if each.end_ns
@@ -182,7 +182,7 @@ def problems(collection: Collection, forge: Change | None) -> Iterator[str]:
     return EpisodeCheck(collection.plan, {}).find_content_problems(collection.episode(FORGED, forge), channels)
 
 
-def test_verify_names_the_trial(collection: Collection, tmp_path: Path) -> None:
+def test_verify_names_the_trial_of_a_forged_episode(collection: Collection, tmp_path: Path) -> None:
     def change(samples: Samples, header: EpisodeHeader) -> tuple[Samples, EpisodeHeader]:
         return swap_trials(samples, header) if header.trial == FORGED else (samples, header)
 
@@ -191,7 +191,7 @@ def test_verify_names_the_trial(collection: Collection, tmp_path: Path) -> None:
 
 
 def forge_some(samples: Samples, header: EpisodeHeader) -> tuple[Samples, EpisodeHeader]:
-    """Forge some trials, each so that another step of the check finds it."""
+    """Forge some trials, each for another step of the check."""
     forgeries = {
         0: FORGERIES["infinite position"],
         2: FORGERIES["velocity in flight"],
@@ -202,7 +202,7 @@ def forge_some(samples: Samples, header: EpisodeHeader) -> tuple[Samples, Episod
     return forge(samples, header)
 
 
-def test_of_many_forged_episodes_each_is_reported_as_if_it_were_alone(tmp_path: Path) -> None:
+def test_many_forged_episodes_are_each_reported_as_if_alone(tmp_path: Path) -> None:
     collection = Collection({"record": {"trials_per_shard": 10}})
     alone = EpisodeCheck(collection.plan, {})
     channels = Channels(collection.config, full_description(collection.config))
@@ -216,7 +216,7 @@ def test_of_many_forged_episodes_each_is_reported_as_if_it_were_alone(tmp_path: 
     assert [(each.place, each.problem) for each in verify(path)] == expected
 
 
-def test_damage_between_forged_episodes_is_reported_between_their_problems(tmp_path: Path) -> None:
+def test_damage_between_forged_episodes_is_reported_in_order_of_the_file(tmp_path: Path) -> None:
     collection = Collection({"record": {"trials_per_shard": 10}})
     path = collection.collect(tmp_path / "dataset", change=forge_some) / "quick_00000.mcap"
     start = find_stored(path, 1).offset
@@ -227,7 +227,7 @@ def test_damage_between_forged_episodes_is_reported_between_their_problems(tmp_p
     assert sorted(report.digests) == [0, 2, 3, 4, 5, 6]
 
 
-def test_an_error_while_a_file_is_checked_is_reported_after_the_problems_found_before(
+def test_an_error_during_a_check_is_reported_after_the_problems_before_it(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     collection = Collection({"record": {"trials_per_shard": 10}})
@@ -246,7 +246,7 @@ def test_an_error_while_a_file_is_checked_is_reported_after_the_problems_found_b
 
 
 def draw_other_plan(plan: Plan, points: Points, *, seed: int | None = None) -> Plan:
-    """A plan of other points, or of the seeds of another configuration, in which digests and hashes fit."""
+    """A plan of other points, or with the seeds of another configuration, whose digests fit."""
     seeds = plan.config if seed is None else plan.config.model_copy(update={"seed": seed})
     drawn = make_trials(seeds, points).seeds
     return replace(plan, trials=Trials(points, drawn, trial_digests(plan.config, points, drawn)))
@@ -274,7 +274,7 @@ def test_a_plan_with_fewer_trials_is_found(collection: Collection, tmp_path: Pat
     assert finding.problem == "has 6 trials, the configuration draws 7"
 
 
-def test_refusals_that_are_invented_or_dropped_are_found(tmp_path: Path) -> None:
+def test_invented_dropped_and_changed_refusals_are_found(tmp_path: Path) -> None:
     collection = Collection(
         {"trials": 2, "sweep": {"sampler": "grid", "parameters": {"task.duration_s": {"values": [0.3, 1.0]}}}}
     )
@@ -292,7 +292,7 @@ def test_refusals_that_are_invented_or_dropped_are_found(tmp_path: Path) -> None
     assert found.problem.startswith("is refused as 'arm_right_4_joint moves at")
 
 
-def test_what_depends_on_results_is_not_judged_without_them(tmp_path: Path) -> None:
+def test_rounds_that_depend_on_results_are_not_checked_without_results(tmp_path: Path) -> None:
     config = Config.model_validate({**SETTINGS, "trials": None, "until": {"landed": 60}})
     points = draw_points(config, directory=tmp_path)
     plan = Plan(config, make_trials(config, points[:192]))
@@ -311,7 +311,7 @@ def test_what_depends_on_results_is_not_judged_without_them(tmp_path: Path) -> N
         (128, 10, "ends with trial 127, but more would follow from the results"),
     ],
 )
-def test_the_rounds_of_a_plan_that_grew_follow_from_the_results(
+def test_rounds_of_a_grown_plan_are_checked_against_the_results(
     tmp_path: Path, trials: int, landed: int, problem: str | None
 ) -> None:
     config = Config.model_validate({**SETTINGS, "trials": None, "until": {"landed": 60}})

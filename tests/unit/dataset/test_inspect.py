@@ -15,7 +15,7 @@ from throwcollect.episode.episode_message import header_to_json
 from throwcollect.errors import DatasetError
 
 
-def test_info_counts_what_is_there(collection: Any, tmp_path: Path) -> None:
+def test_info_counts_trials_episodes_outcomes_samples_and_messages(collection: Any, tmp_path: Path) -> None:
     collection.refuse(5, "too fast")
     directory = collection.collect(tmp_path / "dataset", [0, 1, 2, 3, 4, 6], lost=[2])
     found = info(directory)
@@ -36,12 +36,12 @@ def test_info_counts_what_is_there(collection: Any, tmp_path: Path) -> None:
     assert json.loads(json.dumps(asdict(found)))["outcomes"] == found.outcomes
 
 
-def test_info_of_a_dataset_in_which_no_ball_landed(collection: Any, tmp_path: Path) -> None:
+def test_info_of_a_dataset_with_only_lost_trials_has_no_landing(collection: Any, tmp_path: Path) -> None:
     found = info(collection.collect(tmp_path / "dataset", lost=range(7)))
     assert (found.episodes, found.shards, found.landing, found.outcomes) == (0, 0, None, {"lost": 7})
 
 
-def test_the_digest_is_that_of_all_episodes_in_order(collection: Any, dataset: Path) -> None:
+def test_the_digest_of_a_dataset_is_that_of_all_episodes_in_order(collection: Any, dataset: Path) -> None:
     expected = hashlib.sha256()
     for trial in range(7):
         episode = collection.episode(trial)
@@ -51,20 +51,20 @@ def test_the_digest_is_that_of_all_episodes_in_order(collection: Any, dataset: P
     assert digest(dataset) == info(dataset).digest == expected.hexdigest()
 
 
-def test_the_digest_does_not_depend_on_how_files_are_cut_and_packed(make_collection: Any, tmp_path: Path) -> None:
+def test_the_digest_of_a_dataset_does_not_depend_on_the_size_of_shards(make_collection: Any, tmp_path: Path) -> None:
     one = make_collection().collect(tmp_path / "one")
     other = make_collection({"record": {"trials_per_shard": 2}}).collect(tmp_path / "other")
     assert digest(one) == digest(other)
 
 
-def test_the_digest_of_changed_bytes_is_an_error(dataset: Path) -> None:
+def test_a_digest_that_differs_from_the_metadata_is_an_error(dataset: Path) -> None:
     path = dataset / "metadata.yaml"
     path.write_text(path.read_text().replace(info(dataset).digest, "0" * 64))
     with pytest.raises(DatasetError, match="digest"):
         digest(dataset)
 
 
-def test_an_unfinished_dataset_and_no_dataset_are_told_apart(collection: Any, tmp_path: Path) -> None:
+def test_info_distinguishes_an_unfinished_dataset_from_no_dataset(collection: Any, tmp_path: Path) -> None:
     with pytest.raises(DatasetError, match="holds no dataset"):
         info(tmp_path)
     create(tmp_path / "dataset", collection.plan)
@@ -72,7 +72,9 @@ def test_an_unfinished_dataset_and_no_dataset_are_told_apart(collection: Any, tm
         info(tmp_path / "dataset")
 
 
-def test_a_missing_recording_is_told_after_the_summary(dataset: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_info_prints_the_summary_before_it_reports_a_missing_recording(
+    dataset: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     missing = info(dataset).shards
     shard = next(iter(sorted(dataset.glob("*.mcap"))))
     shard.unlink()

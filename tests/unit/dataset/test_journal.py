@@ -26,7 +26,7 @@ def events_of(directory: Path) -> list[str]:
     return [entry.event for entry in read_journal(directory / "logs" / "journal.jsonl")]
 
 
-def test_events_are_read_back_in_order_with_their_times(tmp_path: Path) -> None:
+def test_journal_events_are_read_back_in_order_with_their_times(tmp_path: Path) -> None:
     with closing(Journal(tmp_path)) as journal:
         journal.note("lease", trial=3, simulation="sim_0")
         journal.note("commit", trial=3, outcome="landed", digest="00")
@@ -37,7 +37,9 @@ def test_events_are_read_back_in_order_with_their_times(tmp_path: Path) -> None:
     assert (lease["trial"], lease["simulation"]) == (3, "sim_0")
 
 
-def test_a_journal_that_cannot_be_written_is_not_held(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_journal_that_could_not_be_written_can_be_opened_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     def fail(*_: object) -> None:
         raise OSError(errno.ENOSPC, "No space left on device")
 
@@ -49,7 +51,7 @@ def test_a_journal_that_cannot_be_written_is_not_held(tmp_path: Path, monkeypatc
         pass
 
 
-def test_a_line_that_was_cut_off_does_not_spoil_the_next(tmp_path: Path) -> None:
+def test_an_incomplete_line_in_the_journal_does_not_spoil_the_next(tmp_path: Path) -> None:
     journal_of(tmp_path, line("opened", 1.0), '{"event": "comm')
     with closing(Journal(tmp_path)) as journal:
         journal.note("finished")
@@ -69,29 +71,29 @@ DAMAGED = {
 
 
 @pytest.mark.parametrize("damaged", DAMAGED.values(), ids=DAMAGED)
-def test_what_is_no_event_is_left_out(tmp_path: Path, damaged: str) -> None:
+def test_lines_of_the_journal_that_are_not_events_are_left_out(tmp_path: Path, damaged: str) -> None:
     journal_of(tmp_path, line("opened", 1.0), f"{damaged}\n", line("commit", 2.5))
     assert events_of(tmp_path) == ["opened", "commit"]
     assert (measure_collected_s(tmp_path), find_lost(tmp_path), was_open(tmp_path)) == (1.5, frozenset(), False)
 
 
-def test_a_collection_that_anybody_could_join_is_known_by_its_journal(tmp_path: Path) -> None:
+def test_the_journal_knows_whether_a_run_was_open_to_others(tmp_path: Path) -> None:
     assert not was_open(tmp_path)
     journal_of(tmp_path, line("opened", 1.0), line("exposed", 1.0), line("commit", 2.0))
     assert was_open(tmp_path)
 
 
-def test_pauses_between_processes_do_not_count_as_time_of_collecting(tmp_path: Path) -> None:
+def test_pauses_between_processes_do_not_count_as_collecting_time(tmp_path: Path) -> None:
     assert measure_collected_s(tmp_path) is None
     journal_of(tmp_path, line("opened", 10.0), line("commit", 12.5), line("opened", 1000.0), line("finished", 1004.0))
     assert measure_collected_s(tmp_path) == 6.5
 
 
-def test_the_time_that_the_data_card_has_is_the_one_that_is_told(tmp_path: Path) -> None:
+def test_the_collecting_time_is_the_one_that_the_finished_event_states(tmp_path: Path) -> None:
     with closing(Journal(tmp_path)) as journal:
         journal.note("finished", wall_s=journal.measure_collected_s() + 20.0)
     assert measure_collected_s(tmp_path) == pytest.approx(20.0, abs=0.5)
-    # Finishing takes a moment, which nobody counts, and another process goes on.
+    # The moment that finishing takes does not count; then another process goes on.
     journal_of(
         tmp_path,
         line("opened", 10.0),
@@ -102,7 +104,7 @@ def test_the_time_that_the_data_card_has_is_the_one_that_is_told(tmp_path: Path)
     assert measure_collected_s(tmp_path) == 5.5
 
 
-def test_trials_that_were_lost_once_are_found(tmp_path: Path) -> None:
+def test_the_journal_knows_which_trials_were_lost(tmp_path: Path) -> None:
     assert find_lost(tmp_path) == frozenset()
     with closing(Journal(tmp_path)) as journal:
         journal.note("lost", trial=3, reason="died")

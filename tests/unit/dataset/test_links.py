@@ -1,4 +1,4 @@
-"""A dataset may come from anybody: nothing that lies in it makes us read, change or remove what lies elsewhere."""
+"""A dataset may come from a stranger: links in it must not make us read, change or remove files elsewhere."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def sound(source: Collection, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def go_on(directory: Path, source: Collection) -> None:
-    """What `up --resume` does in its processes."""
+    """Resume as the processes of `up --resume` do."""
     resume(source.config, directory, sweep_directory=directory)
     writer = DatasetWriter.open(directory)
     try:
@@ -68,7 +68,7 @@ USES: dict[str, Callable[[Path, Collection, Path], object]] = {
 
 
 def lead_out(directory: Path, name: str, outside: Path) -> None:
-    """Have a name of the dataset lead to a file, or a directory, with the same contents outside."""
+    """Replace a file or directory of the dataset by a link to one with the same contents outside."""
     place = directory / name
     outside.mkdir(parents=True)
     target = outside / "target"
@@ -90,7 +90,7 @@ def contents(directory: Path) -> dict[str, bytes]:
 
 
 @pytest.mark.parametrize("use", USES)
-def test_links_in_the_place_of_files_that_are_written_are_not_followed(
+def test_links_in_the_place_of_temporary_files_are_not_followed(
     source: Collection, sound: Path, tmp_path: Path, use: str
 ) -> None:
     directory = Path(shutil.copytree(sound, tmp_path / "dataset"))
@@ -107,7 +107,7 @@ def test_links_in_the_place_of_files_that_are_written_are_not_followed(
 @pytest.mark.parametrize(
     ("use", "name"), [*(("resume", name) for name in REPLACED), *(("rebuild", name) for name in REPLACED[1:4])]
 )
-def test_a_link_in_the_place_of_a_file_that_can_be_made_again_is_replaced_by_it(
+def test_a_link_in_the_place_of_a_file_that_can_be_made_again_is_replaced(
     source: Collection, sound: Path, tmp_path: Path, use: str, name: str
 ) -> None:
     directory = Path(shutil.copytree(sound, tmp_path / "dataset"))
@@ -126,7 +126,7 @@ def test_a_link_in_the_place_of_a_file_that_can_be_made_again_is_replaced_by_it(
         *((use, name) for use in ("rebuild", "filter") for name in ("config.yaml", "plan.parquet", "quick_00000.mcap")),
     ],
 )
-def test_a_link_in_the_place_of_any_other_file_is_refused_in_one_message(
+def test_a_link_in_the_place_of_a_file_that_must_be_read_is_refused(
     source: Collection, sound: Path, tmp_path: Path, use: str, name: str
 ) -> None:
     directory = Path(shutil.copytree(sound, tmp_path / "dataset"))
@@ -138,7 +138,7 @@ def test_a_link_in_the_place_of_any_other_file_is_refused_in_one_message(
 
 
 @pytest.mark.parametrize("name", ["config.yaml", "plan.parquet", "quick_00000.mcap", "logs/journal.jsonl"])
-def test_a_pipe_in_the_place_of_a_file_makes_nobody_wait(
+def test_verify_and_resume_do_not_wait_for_a_pipe_in_the_place_of_a_file(
     source: Collection, sound: Path, tmp_path: Path, name: str
 ) -> None:
     directory = Path(shutil.copytree(sound, tmp_path / "dataset"))
@@ -150,7 +150,7 @@ def test_a_pipe_in_the_place_of_a_file_makes_nobody_wait(
             USES[use](directory, source, tmp_path / "output")
 
 
-def test_a_file_with_a_second_name_is_not_changed_in_its_place(source: Collection, sound: Path, tmp_path: Path) -> None:
+def test_a_file_with_a_second_hard_link_is_not_changed(source: Collection, sound: Path, tmp_path: Path) -> None:
     directory = Path(shutil.copytree(sound, tmp_path / "dataset"))
     shutil.move(directory / "quick_00001.mcap", tmp_path / "mine")
     os.link(tmp_path / "mine", directory / BEGUN)
@@ -160,7 +160,9 @@ def test_a_file_with_a_second_name_is_not_changed_in_its_place(source: Collectio
     assert (tmp_path / "mine").read_bytes() == before
 
 
-def test_a_directory_may_be_reached_through_a_link(source: Collection, sound: Path, tmp_path: Path) -> None:
+def test_a_dataset_can_be_resumed_through_a_link_to_its_directory(
+    source: Collection, sound: Path, tmp_path: Path
+) -> None:
     directory = Path(shutil.copytree(sound, tmp_path / "dataset"))
     (tmp_path / "named").symlink_to(directory)
     (directory / "quick_00001.mcap").unlink()

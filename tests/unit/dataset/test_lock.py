@@ -1,4 +1,4 @@
-"""Two processes never change one dataset, wherever the second of them runs."""
+"""Two processes never change one dataset at the same time."""
 
 from __future__ import annotations
 
@@ -45,7 +45,9 @@ def contents(directory: Path) -> dict[str, bytes]:
 
 
 @pytest.mark.parametrize("change", [go_on, rebuild])
-def test_nobody_changes_a_dataset_that_is_collected_into(begun: Path, change: Callable[[Path], object]) -> None:
+def test_a_dataset_that_is_being_collected_cannot_be_resumed_or_rebuilt(
+    begun: Path, change: Callable[[Path], object]
+) -> None:
     before = contents(begun)
     with closing(DatasetWriter.open(begun)) as writer:
         with pytest.raises(DatasetError, match=BUSY):
@@ -54,14 +56,14 @@ def test_nobody_changes_a_dataset_that_is_collected_into(begun: Path, change: Ca
         writer.recover()
 
 
-def test_nobody_changes_a_dataset_whose_coordinator_is_started_again(begun: Path) -> None:
+def test_a_dataset_cannot_be_resumed_while_its_coordinator_restarts(begun: Path) -> None:
     with hold_lock(begun, alone=False):
         DatasetWriter.open(begun).close()
         with pytest.raises(DatasetError, match=BUSY):
             go_on(begun)
 
 
-def test_nobody_begins_to_collect_into_a_dataset_that_is_prepared(begun: Path) -> None:
+def test_a_dataset_that_is_being_prepared_cannot_be_collected(begun: Path) -> None:
     with hold_lock(begun), pytest.raises(DatasetError, match=BUSY):
         DatasetWriter.open(begun)
     DatasetWriter.open(begun).close()
@@ -74,7 +76,7 @@ def test_two_collections_cannot_be_prepared_in_one_directory(tmp_path: Path) -> 
     assert list((tmp_path / "dataset").iterdir()) == []
 
 
-def test_another_name_of_the_directory_is_the_same_directory(begun: Path, tmp_path: Path) -> None:
+def test_a_link_to_a_locked_directory_is_locked_too(begun: Path, tmp_path: Path) -> None:
     (tmp_path / "link").symlink_to(begun)
     with (
         hold_lock(begun, alone=False),
@@ -84,7 +86,7 @@ def test_another_name_of_the_directory_is_the_same_directory(begun: Path, tmp_pa
         pass
 
 
-def test_who_has_just_been_killed_is_waited_for(begun: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_lock_waits_for_a_killed_process_to_end(begun: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("throwcollect.dataset.lock.PATIENCE_S", 60.0)
     code = "import fcntl, os, sys, time; fcntl.flock(os.open(sys.argv[1], 0), 1); print(flush=True); time.sleep(60)"
     with subprocess.Popen([sys.executable, "-c", code, str(begun)], stdout=subprocess.PIPE) as other:
@@ -95,13 +97,13 @@ def test_who_has_just_been_killed_is_waited_for(begun: Path, monkeypatch: pytest
             pass
 
 
-def test_nothing_is_left_of_a_lock(tmp_path: Path) -> None:
+def test_a_released_lock_leaves_no_file(tmp_path: Path) -> None:
     with hold_lock(tmp_path):
         pass
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_directory_that_is_not_there_cannot_be_locked(tmp_path: Path) -> None:
+def test_a_missing_directory_cannot_be_locked(tmp_path: Path) -> None:
     with (
         pytest.raises(DatasetError, match=r"gone: cannot be read: No such file"),
         hold_lock(tmp_path / "gone", alone=False),
@@ -110,14 +112,16 @@ def test_a_directory_that_is_not_there_cannot_be_locked(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("alone", [True, False])
-def test_a_lock_is_seen_as_long_as_it_is_held(begun: Path, alone: bool) -> None:
+def test_is_locked_is_true_only_while_a_lock_is_held(begun: Path, alone: bool) -> None:
     assert not is_locked(begun)
     with hold_lock(begun, alone=alone):
         assert is_locked(begun)
     assert not is_locked(begun)
 
 
-def test_where_there_are_no_locks_nothing_is_locked(begun: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_directory_counts_as_unlocked_on_a_file_system_without_locks(
+    begun: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     def refuse(*_: int) -> None:
         raise OSError(errno.ENOLCK, "No locks available")
 
@@ -126,8 +130,10 @@ def test_where_there_are_no_locks_nothing_is_locked(begun: Path, monkeypatch: py
     assert not is_locked(begun / "gone")
 
 
-def test_a_run_begins_although_somebody_looks_whether_it_has(begun: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    # On a busy machine, the other process may look for longer.
+def test_a_collection_begins_while_another_process_briefly_checks_the_lock(
+    begun: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # On a busy machine, the other process may hold the lock for longer.
     monkeypatch.setattr("throwcollect.dataset.lock._GLANCE_S", 30.0)
     code = "import fcntl, os, sys, time; fcntl.flock(os.open(sys.argv[1], 0), 2); print(flush=True); time.sleep(0.02)"
     with subprocess.Popen([sys.executable, "-c", code, str(begun)], stdout=subprocess.PIPE) as other:

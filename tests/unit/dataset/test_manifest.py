@@ -1,4 +1,4 @@
-"""The manifest covers every promised byte, and whoever writes a dataset writes it."""
+"""The manifest covers every promised byte, and every command that writes a dataset writes it."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ FLIPS_PER_CLASS = 100
 
 @pytest.fixture(scope="module")
 def derived(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A small dataset with every kind of file that there is."""
+    """A small dataset with every kind of file."""
     scratch = tmp_path_factory.mktemp("derived")
     filter_trials(Collection(SETTINGS).collect(scratch / "source"), scratch / "dataset", where="trial >= 0")
     return scratch / "dataset"
@@ -65,7 +65,7 @@ def flip_bit(data: bytes, byte: int, bit: int) -> bytes:
     return bytes(changed)
 
 
-def test_every_flipped_bit_is_seen(derived: Path, tmp_path: Path) -> None:
+def test_a_flipped_bit_in_any_file_is_found(derived: Path, tmp_path: Path) -> None:
     directory = Path(shutil.copytree(derived, tmp_path / "dataset"))
     assert verify(directory) == []
     source, flips, kinds = random.Random(0), 0, list(classes(directory))
@@ -84,8 +84,8 @@ def test_every_flipped_bit_is_seen(derived: Path, tmp_path: Path) -> None:
     assert verify(directory) == []
 
 
-def test_a_flip_in_the_footer_of_a_table_is_named_with_its_file(dataset: Path) -> None:
-    """What Parquet keeps beside the columns: no reader of them misses it."""
+def test_a_flipped_bit_in_the_footer_of_a_table_is_found_in_that_file(dataset: Path) -> None:
+    """Readers of the columns do not notice such a flip."""
     for name in ("plan.parquet", "throws.parquet"):
         path = dataset / name
         whole = path.read_bytes()
@@ -94,7 +94,7 @@ def test_a_flip_in_the_footer_of_a_table_is_named_with_its_file(dataset: Path) -
         path.write_bytes(whole)
 
 
-def test_it_has_every_promised_file_and_nothing_else(dataset: Path) -> None:
+def test_the_manifest_lists_the_promised_files_and_no_others(dataset: Path) -> None:
     entries = read_manifest(dataset)
     assert [entry.path for entry in entries] == sorted([*TABLES, *SHARDS])
     assert list(entries) == [entry_of_file(dataset / entry.path) for entry in entries]
@@ -103,14 +103,14 @@ def test_it_has_every_promised_file_and_nothing_else(dataset: Path) -> None:
     assert document["resources"][0]["hash"].startswith("sha256:")
 
 
-def test_whoever_makes_a_dataset_of_another_writes_it(dataset: Path, derived: Path, tmp_path: Path) -> None:
+def test_filter_and_repair_write_the_manifest_of_their_output(dataset: Path, derived: Path, tmp_path: Path) -> None:
     assert [entry.path for entry in read_manifest(derived)] == list_promised_names(derived)
     assert {"sources.parquet", "trials.parquet"} < set(list_promised_names(derived))
     repair(dataset, tmp_path / "repaired", remake=no_plan)
     assert (tmp_path / "repaired" / MANIFEST).read_bytes() == (dataset / MANIFEST).read_bytes()
 
 
-def test_one_of_before_is_told_and_written_by_rebuild(dataset: Path) -> None:
+def test_a_missing_manifest_is_reported_and_rebuild_writes_it(dataset: Path) -> None:
     written = (dataset / MANIFEST).read_bytes()
     (dataset / MANIFEST).unlink()
     (finding,) = verify(dataset)
@@ -122,7 +122,7 @@ def test_one_of_before_is_told_and_written_by_rebuild(dataset: Path) -> None:
     assert (dataset / MANIFEST).read_bytes() == written
 
 
-def test_rebuild_does_not_cover_a_file_that_is_none_of_the_dataset(dataset: Path) -> None:
+def test_rebuild_leaves_foreign_files_out_of_the_manifest(dataset: Path) -> None:
     written = (dataset / MANIFEST).read_bytes()
     (dataset / "other.mcap").write_bytes(b"")
     rebuild(dataset)
@@ -134,7 +134,7 @@ def find_resized(directory: Path) -> list[str]:
     return [finding.file for finding in find_changed_files(directory, read_manifest(directory), in_full=False)]
 
 
-def test_sizes_alone_tell_what_is_cut_missing_or_added(dataset: Path) -> None:
+def test_the_quick_check_finds_shortened_and_missing_files(dataset: Path) -> None:
     assert find_resized(dataset) == []
     os.truncate(dataset / SHARDS[0], 100)
     (dataset / SHARDS[1]).unlink()
@@ -154,7 +154,7 @@ def test_sizes_alone_tell_what_is_cut_missing_or_added(dataset: Path) -> None:
         "[" * 100_000,
     ],
 )
-def test_text_that_is_no_manifest_is_refused(dataset: Path, text: str) -> None:
+def test_a_malformed_manifest_is_refused(dataset: Path, text: str) -> None:
     (dataset / MANIFEST).write_text(text)
     with pytest.raises(DatasetError, match=MANIFEST):
         read_manifest(dataset)
@@ -173,7 +173,7 @@ def test_text_that_is_no_manifest_is_refused(dataset: Path, text: str) -> None:
         ("hash", "0" * 64),
     ],
 )
-def test_an_entry_that_no_dataset_has_is_refused(dataset: Path, key: str, value: Any) -> None:
+def test_a_manifest_entry_with_an_invalid_path_size_or_hash_is_refused(dataset: Path, key: str, value: Any) -> None:
     document = json.loads((dataset / MANIFEST).read_text())
     document["resources"][0][key] = value
     (dataset / MANIFEST).write_text(json.dumps(document, indent=2) + "\n")
@@ -181,7 +181,7 @@ def test_an_entry_that_no_dataset_has_is_refused(dataset: Path, key: str, value:
         read_manifest(dataset)
 
 
-def test_a_hash_that_runs_beside_the_writing_is_that_of_all_bytes_in_order() -> None:
+def test_a_running_hash_is_that_of_all_bytes_in_order() -> None:
     source = random.Random(0)
     parts = [source.randbytes(source.randrange(400_000)) for _ in range(20)]
     running = RunningHash()
@@ -190,7 +190,7 @@ def test_a_hash_that_runs_beside_the_writing_is_that_of_all_bytes_in_order() -> 
     assert running.hexdigest() == hashlib.sha256(b"".join(parts)).hexdigest()
 
 
-def test_links_are_not_followed(dataset: Path, tmp_path: Path) -> None:
+def test_a_recording_that_is_a_symbolic_link_is_reported(dataset: Path, tmp_path: Path) -> None:
     (dataset / SHARDS[0]).rename(tmp_path / SHARDS[0])
     (dataset / SHARDS[0]).symlink_to(tmp_path / SHARDS[0])
     assert find_resized(dataset) == [SHARDS[0]]

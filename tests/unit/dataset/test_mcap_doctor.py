@@ -1,4 +1,4 @@
-"""Every record of a dataset's files is what the MCAP specification says, seen with other people's code."""
+"""Every record of a recording follows the MCAP specification, as checked with code of other packages."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ def shard(collected: Path) -> Path:
     return collected / "quick_00002.mcap"
 
 
-def test_every_record_of_every_file_is_sound(collected: Path) -> None:
+def test_every_record_of_every_recording_is_sound(collected: Path) -> None:
     examined = [Examination(path) for path in sorted(collected.glob("*.mcap"))]
     assert [len(each.chunk_indexes) for each in examined] == [4, 4, 2]
 
 
-def test_every_record_is_sound_when_everything_is_recorded(make_collection: Any, tmp_path: Path) -> None:
+def test_every_record_is_sound_when_all_topics_are_recorded(make_collection: Any, tmp_path: Path) -> None:
     settings = {"trials": 1, "record": {"topics": ALL_TOPICS}}
     make_collection(settings).collect(tmp_path / "full")
     examined = Examination(tmp_path / "full" / "quick_00000.mcap")
@@ -62,7 +62,9 @@ def change(opcode: Opcode, offset: int, *, mend: bool = False) -> Callable[[byte
         pytest.param(change(Opcode.FOOTER, 16), id="summary CRC"),
     ],
 )
-def test_the_examination_finds_a_single_bit(shard: Path, tmp_path: Path, spoil: Callable[[bytearray], None]) -> None:
+def test_the_examination_finds_a_single_flipped_bit(
+    shard: Path, tmp_path: Path, spoil: Callable[[bytearray], None]
+) -> None:
     data = bytearray(shard.read_bytes())
     spoil(data)
     spoiled = tmp_path / "spoiled.mcap"

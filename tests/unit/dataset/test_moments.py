@@ -8,7 +8,7 @@ import pytest
 from throwcollect.dataset.moments import Moments
 
 
-def test_portions_have_the_moments_of_the_whole() -> None:
+def test_moments_of_portions_add_up_to_those_of_the_whole() -> None:
     rows = np.random.default_rng(0).normal(1e3, [1.0, 1e-3, 0.0], size=(1000, 3))
     moments = reduce(Moments.with_more, map(Moments.of, np.split(rows, [1, 5, 700])))
     assert moments.count == 1000

@@ -1,4 +1,4 @@
-"""What a dataset gives as arrays and tables of others, by names."""
+"""Columns, parameters and landings of a dataset as NumPy arrays and pandas tables."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def test_landings_are_nan_where_nothing_landed(with_gaps: Dataset) -> None:
     assert np.array_equal(landings.bounds, np.column_stack([np.nanmin(landings, axis=0), np.nanmax(landings, axis=0)]))
 
 
-def test_columns_are_arrays_whatever_is_missing(with_gaps: Dataset) -> None:
+def test_a_column_of_a_dataset_is_an_array_with_nan_for_missing_numbers(with_gaps: Dataset) -> None:
     assert with_gaps["outcome"].tolist() == with_gaps.throws["outcome"].to_pylist()
     assert with_gaps["reason"][0] is None
     assert np.isnan(with_gaps["samples"]).tolist() == [False, False, True, False, True, False, False]
@@ -63,7 +63,7 @@ def test_columns_are_arrays_whatever_is_missing(with_gaps: Dataset) -> None:
     assert with_gaps[0]["landing_x_m"] == with_gaps["landing_x_m"][0]
 
 
-def test_a_table_of_pandas_has_the_trials_as_its_index(with_gaps: Dataset) -> None:
+def test_a_dataset_as_a_pandas_table_has_the_trials_as_its_index(with_gaps: Dataset) -> None:
     frame = with_gaps.to_pandas()
     assert frame.index.name == "trial"
     assert frame.index.tolist() == list(range(7))
@@ -72,7 +72,7 @@ def test_a_table_of_pandas_has_the_trials_as_its_index(with_gaps: Dataset) -> No
     assert np.isnan(frame.loc[4, "landing_x_m"])
 
 
-def test_a_throw_is_a_table_of_pandas(loaded: Dataset) -> None:
+def test_a_throw_as_a_pandas_table_has_times_joints_and_ball(loaded: Dataset) -> None:
     throw = loaded[3]
     frame = throw.to_pandas()
     assert frame.index.name == "time_s"
@@ -85,7 +85,7 @@ def test_a_throw_is_a_table_of_pandas(loaded: Dataset) -> None:
     assert frame.shape == (len(throw.ball), 3 * len(throw.joints.names) + 13)
 
 
-def test_a_joint_is_had_by_its_name(loaded: Dataset) -> None:
+def test_a_joint_is_found_by_its_name(loaded: Dataset) -> None:
     joints = loaded[0].joints
     which = joints.names.index("torso_1_joint")
     assert np.array_equal(joints["torso_1_joint"].velocity, joints.velocity[:, which])
@@ -97,13 +97,13 @@ def test_a_joint_is_had_by_its_name(loaded: Dataset) -> None:
 @pytest.mark.parametrize(
     ("wrong", "near"), [("landing_x", "landing_x_m"), ("duration_s", "task.duration_s"), ("outcom", "outcome")]
 )
-def test_a_column_that_there_is_not_is_answered_with_those_like_it(loaded: Dataset, wrong: str, near: str) -> None:
+def test_an_unknown_column_is_an_error_that_names_similar_ones(loaded: Dataset, wrong: str, near: str) -> None:
     for look in (lambda: loaded[wrong], lambda: loaded[0][wrong]):
         with pytest.raises(ConfigError, match=f"^no column '{wrong}'\n  expected: .*{near}"):
             look()
 
 
-def test_what_people_try_is_answered_with_what_they_look_for(loaded: Dataset) -> None:
+def test_a_wrong_attribute_is_an_error_that_names_the_right_one(loaded: Dataset) -> None:
     for wrong, meant in {"df": "to_pandas()", "landing": "landings", "recorde": "recorded"}.items():
         with pytest.raises(AttributeError, match=f"^a Dataset has no '{wrong}'; try .{meant}".replace("()", r"\(\)")):
             getattr(loaded, wrong)
@@ -119,12 +119,12 @@ def test_what_people_try_is_answered_with_what_they_look_for(loaded: Dataset) ->
     assert pickle.loads(pickle.dumps(loaded))[0].trial == 0  # noqa: S301
 
 
-def test_a_task_in_which_nothing_lands_says_so(loaded: Dataset) -> None:
+def test_landings_are_an_error_for_a_task_in_which_nothing_lands(loaded: Dataset) -> None:
     without = Dataset(loaded.directory, loaded.plan, loaded.throws.drop_columns(["landing_z_m"]), {})
     with pytest.raises(ConfigError, match=r"^nothing lands in the task throw"):
         _ = without.landings
 
 
-def test_numbers_of_numpy_are_positions(loaded: Dataset) -> None:
+def test_a_number_of_numpy_is_a_position_in_a_dataset(loaded: Dataset) -> None:
     assert loaded[np.int64(-1)].trial == 6
     assert isinstance(loaded.to_pandas().mean(numeric_only=True), pd.Series)

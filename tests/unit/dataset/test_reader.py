@@ -44,13 +44,13 @@ def last_position(throw_dataset: Dataset, index: int) -> list[float]:
     return [float(each) for each in throw_dataset[index].ball.position[-1]]
 
 
-def test_importing_the_package_loads_nothing_heavy() -> None:
+def test_importing_the_package_loads_no_large_package() -> None:
     heavy = {"numpy", "pyarrow", "pydantic", "mcap", "rosbags"}
     code = f"import sys, throwcollect; print(sorted({heavy} & set(sys.modules)))"
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "[]\n"
 
 
-def test_throws_stand_beside_the_table(loaded: Dataset, collected: Path) -> None:
+def test_a_loaded_dataset_has_its_table_and_its_throws_by_position(loaded: Dataset, collected: Path) -> None:
     assert loaded.throws.equals(pq.read_table(collected / "throws.parquet"))
     assert len(loaded) == len(loaded.throws) == 7
     assert trials(loaded) == list(range(7))
@@ -60,13 +60,13 @@ def test_throws_stand_beside_the_table(loaded: Dataset, collected: Path) -> None
     assert loaded.config.name == "quick"
 
 
-def test_there_are_no_throws_beyond_the_last(loaded: Dataset) -> None:
+def test_a_position_beyond_the_last_throw_is_an_error(loaded: Dataset) -> None:
     for index in (7, -8):
         with pytest.raises(IndexError, match=f"no throw {index} of 7"):
             loaded[index]
 
 
-def test_trials_without_an_episode_have_a_row_and_say_why_they_have_no_more(with_gaps: Dataset) -> None:
+def test_a_trial_without_an_episode_has_a_row_and_says_why_it_has_no_samples(with_gaps: Dataset) -> None:
     assert len(with_gaps) == 7
     refused, lost = with_gaps[2], with_gaps[4]
     assert (refused.outcome, refused.reason, refused.recorded) == ("refused", "an elbow needs 30 Nm", False)
@@ -101,13 +101,13 @@ def test_trials_without_an_episode_have_a_row_and_say_why_they_have_no_more(with
         ([], []),
     ],
 )
-def test_selecting(loaded: Dataset, which: Any, found: list[int]) -> None:
+def test_select_takes_conditions_masks_and_numbers_of_trials(loaded: Dataset, which: Any, found: list[int]) -> None:
     some = loaded.select(which)
     assert trials(some) == found == some.throws["trial"].to_pylist()
     assert [last_position(some, number) for number in range(len(some))] == [last_position(loaded, n) for n in found]
 
 
-def test_selecting_from_a_selection_goes_by_trial_and_slices_by_position(loaded: Dataset) -> None:
+def test_select_goes_by_trial_and_a_slice_by_position(loaded: Dataset) -> None:
     some = loaded.select([6, 1, 4])
     assert trials(some.select([4])) == [4]
     assert trials(some[1:]) == [1, 4]
@@ -131,12 +131,12 @@ def test_selecting_from_a_selection_goes_by_trial_and_slices_by_position(loaded:
         ([2**64], "int too large"),
     ],
 )
-def test_what_selects_nothing_is_named(loaded: Dataset, which: Any, message: str) -> None:
+def test_a_selection_that_makes_no_sense_is_an_error(loaded: Dataset, which: Any, message: str) -> None:
     with pytest.raises(ConfigError, match=message):
         loaded.select(which)
 
 
-def test_it_says_what_it_is(with_gaps: Dataset) -> None:
+def test_the_repr_of_a_dataset_names_directory_outcomes_and_parameters(with_gaps: Dataset) -> None:
     text = repr(with_gaps)
     for part in (str(with_gaps.directory), "7 throws", "5 landed", "1 refused", "1 lost", "task.duration_s"):
         assert part in text
@@ -144,26 +144,26 @@ def test_it_says_what_it_is(with_gaps: Dataset) -> None:
 
 
 @pytest.mark.parametrize(("method", "processes"), [("fork", 3), ("spawn", 1)])
-def test_other_processes_read_it_too(loaded: Dataset, method: str, processes: int) -> None:
+def test_a_dataset_can_be_read_by_other_processes(loaded: Dataset, method: str, processes: int) -> None:
     expected = [last_position(loaded, number) for number in range(7)]
     with multiprocessing.get_context(method).Pool(processes) as pool:
         assert pool.starmap(last_position, [(loaded, number) for number in range(7)]) == expected
 
 
-def test_threads_share_it(loaded: Dataset) -> None:
+def test_a_dataset_can_be_read_by_many_threads(loaded: Dataset) -> None:
     expected = [last_position(loaded, number) for number in range(7)]
     with ThreadPoolExecutor(8) as pool:
         found = list(pool.map(lambda number: last_position(loaded, number % 7), range(70)))
     assert found == expected * 10
 
 
-def test_a_pickled_copy_is_the_same(loaded: Dataset) -> None:
+def test_a_pickled_selection_is_the_same_as_the_original(loaded: Dataset) -> None:
     copy = pickle.loads(pickle.dumps(loaded.select([2, 5])))  # noqa: S301
     assert copy.throws.equals(loaded.throws.take([2, 5]))
     assert last_position(copy, 1) == last_position(loaded, 5)
 
 
-def test_a_throw_travels_alone(loaded: Dataset) -> None:
+def test_a_pickled_throw_holds_no_samples_and_reads_them_again(loaded: Dataset) -> None:
     throw = loaded[5]
     position = throw.ball.position
     packed = pickle.dumps(throw)
@@ -174,7 +174,7 @@ def test_a_throw_travels_alone(loaded: Dataset) -> None:
     assert repr(copy) == repr(throw)
 
 
-def test_no_file_stays_open(loaded: Dataset) -> None:
+def test_no_recording_stays_open_after_reading(loaded: Dataset) -> None:
     throw = loaded[1]
     assert throw.ball.position.shape
     assert loaded.trajectories(threads=2)
@@ -193,14 +193,14 @@ def test_only_finished_datasets_are_opened(dataset: Path, tmp_path: Path, proble
             Dataset.open(tmp_path / "nowhere")
 
 
-def test_whoever_lacks_the_table_of_throws_hears_what_writes_it_anew(dataset: Path) -> None:
+def test_a_missing_table_of_throws_is_an_error_that_advises_rebuild(dataset: Path) -> None:
     (dataset / "throws.parquet").unlink()
     with pytest.raises(DatasetError, match=r"throws\.parquet: is missing") as caught:
         Dataset.open(dataset)
     assert caught.value.hint == f"throwcollect dataset rebuild {dataset}"
 
 
-def test_an_error_names_the_datasets_that_may_be_meant(dataset: Path, tmp_path: Path) -> None:
+def test_opening_a_directory_near_a_dataset_names_that_dataset(dataset: Path, tmp_path: Path) -> None:
     for wrong in (dataset.parent, dataset / "throws.parquet"):
         with pytest.raises(DatasetError, match="holds no dataset") as caught:
             Dataset.open(wrong)
@@ -220,7 +220,7 @@ def test_a_text_in_place_of_a_list_of_names_is_refused(loaded: Dataset) -> None:
         loaded.trajectories(["joints.position"], joints="arm_right_4_joint")
 
 
-def test_an_episode_comes_back_as_it_went_in(collection: Any, dataset: Path) -> None:
+def test_an_episode_is_read_back_as_it_was_written(collection: Any, dataset: Path) -> None:
     loaded = Dataset.open(dataset)
     for trial in (5, 0, 6):
         sent, stored = collection.episode(trial), loaded.episode(trial)
@@ -228,7 +228,7 @@ def test_an_episode_comes_back_as_it_went_in(collection: Any, dataset: Path) -> 
         assert np.array_equal(stored.samples().position, sent.samples().position)
 
 
-def test_iteration_is_in_order_and_skips_what_was_lost(collection: Any, tmp_path: Path) -> None:
+def test_episodes_come_in_order_of_trials_without_lost_ones(collection: Any, tmp_path: Path) -> None:
     dataset = Dataset.open(collection.collect(tmp_path / "dataset", [6, 3, 5, 0, 4, 1, 2], lost=[0, 4]))
     assert len(dataset.recorded) == 5
     assert [episode.header.trial for episode in dataset.episodes()] == [1, 2, 3, 5, 6]
@@ -236,7 +236,7 @@ def test_iteration_is_in_order_and_skips_what_was_lost(collection: Any, tmp_path
     assert dataset.config == collection.config
 
 
-def test_a_trial_without_episode_says_why(collection: Any, tmp_path: Path) -> None:
+def test_asking_for_the_episode_of_a_lost_trial_is_an_error_with_the_reason(collection: Any, tmp_path: Path) -> None:
     dataset = Dataset.open(collection.collect(tmp_path / "dataset", lost=[4]))
     with pytest.raises(DatasetError, match="trial 4 has no episode: lost: two simulations were lost"):
         dataset.episode(4)
@@ -252,20 +252,20 @@ def test_a_trial_without_episode_says_why(collection: Any, tmp_path: Path) -> No
         ("metadata.yaml", "is not finished"),
     ],
 )
-def test_a_missing_file_is_named(dataset: Path, name: str, message: str) -> None:
+def test_opening_a_dataset_names_the_missing_file(dataset: Path, name: str, message: str) -> None:
     (dataset / name).unlink()
     with pytest.raises(DatasetError, match=message):
         Dataset.open(dataset)
 
 
 @pytest.mark.parametrize("name", ["throws.parquet", "plan.parquet", "metadata.yaml"])
-def test_a_damaged_file_is_named(dataset: Path, name: str) -> None:
+def test_opening_a_dataset_names_the_damaged_file(dataset: Path, name: str) -> None:
     (dataset / name).write_bytes(b"\x89 nothing of the kind")
     with pytest.raises(DatasetError, match=name):
         Dataset.open(dataset)
 
 
-def test_a_damaged_table_of_throws_is_made_again_as_a_missing_one_is(dataset: Path) -> None:
+def test_a_damaged_table_of_throws_is_an_error_that_advises_rebuild(dataset: Path) -> None:
     (dataset / "throws.parquet").write_bytes(b"")
     with pytest.raises(DatasetError, match="is damaged") as caught:
         throwcollect.load(dataset)
@@ -286,20 +286,22 @@ def test_a_damaged_table_of_throws_is_made_again_as_a_missing_one_is(dataset: Pa
         ("samples", -1, "without samples"),
     ],
 )
-def test_a_table_that_cannot_be_worked_with_is_refused(dataset: Path, column: str, value: object, problem: str) -> None:
+def test_a_table_of_throws_with_impossible_values_is_refused(
+    dataset: Path, column: str, value: object, problem: str
+) -> None:
     change_table(dataset / "throws.parquet", column, 4, value)
     with pytest.raises(DatasetError, match=rf"throws\.parquet: .*{problem}") as caught:
         Dataset.open(dataset)
     assert caught.value.hint == f"throwcollect dataset rebuild {dataset}"
 
 
-def test_numbers_that_no_float_has_can_be_compared(dataset: Path) -> None:
+def test_integers_beyond_float_precision_can_be_compared(dataset: Path) -> None:
     change_table(dataset / "throws.parquet", "chunk_offset", 4, 2**62 + 1)
     assert [throw.trial for throw in Dataset.open(dataset).select("chunk_offset > 1e18")] == [4]
 
 
 @pytest.mark.parametrize("names", ["[1]", "7", "{}"])
-def test_names_of_recordings_that_are_none_are_not_looked_for(dataset: Path, names: str) -> None:
+def test_metadata_without_a_list_of_recordings_is_an_error(dataset: Path, names: str) -> None:
     text = (dataset / "metadata.yaml").read_text()
     begin = text.index("  relative_file_paths:")
     text = f"{text[:begin]}  relative_file_paths: {names}\n{text[text.index('  files:', begin) :]}"
@@ -309,7 +311,7 @@ def test_names_of_recordings_that_are_none_are_not_looked_for(dataset: Path, nam
 
 
 @pytest.mark.parametrize("count", ["2001-01-01", ".inf", "[1]", "many"])
-def test_numbers_of_messages_that_are_none_are_refused(dataset: Path, count: str) -> None:
+def test_metadata_with_an_invalid_number_of_messages_is_an_error(dataset: Path, count: str) -> None:
     before, topics = (dataset / "metadata.yaml").read_text().split("topics_with_message_count:")
     topics = re.sub(r"message_count: \d+", f"message_count: {count}", topics, count=1)
     (dataset / "metadata.yaml").write_text(f"{before}topics_with_message_count:{topics}")
@@ -317,7 +319,7 @@ def test_numbers_of_messages_that_are_none_are_refused(dataset: Path, count: str
         _ = Dataset.open(dataset).topics
 
 
-def test_a_missing_shard_is_named(dataset: Path) -> None:
+def test_reading_an_episode_names_the_missing_shard(dataset: Path) -> None:
     loaded = Dataset.open(dataset)
     (dataset / "quick_00001.mcap").unlink()
     with pytest.raises(DatasetError, match=r"quick_00001\.mcap: cannot be read"):
@@ -325,13 +327,13 @@ def test_a_missing_shard_is_named(dataset: Path) -> None:
 
 
 @pytest.mark.parametrize("size", [0, 5, 100])
-def test_a_file_that_is_no_mcap_is_refused(tmp_path: Path, size: int) -> None:
+def test_a_file_that_is_not_an_mcap_file_is_refused(tmp_path: Path, size: int) -> None:
     (tmp_path / "x.mcap").write_bytes(bytes(size))
     with pytest.raises(DatasetError, match="not an MCAP file"), open_mcap(tmp_path / "x.mcap"):
         pass
 
 
-def test_a_cut_within_a_record_is_an_error(dataset: Path, tmp_path: Path) -> None:
+def test_a_recording_cut_within_a_record_is_an_error(dataset: Path, tmp_path: Path) -> None:
     whole = (dataset / "quick_00002.mcap").read_bytes()
     with open_mcap(dataset / "quick_00002.mcap") as contents:
         ends = {record.end for record in contents.records()}

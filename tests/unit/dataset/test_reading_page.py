@@ -1,4 +1,4 @@
-"""What docs/reading.md shows is true."""
+"""The examples and names in docs/reading.md work."""
 
 import re
 import shutil
@@ -31,7 +31,7 @@ def block_with(text: str) -> str:
     return block
 
 
-def test_the_first_lines_run(collected: Path, tmp_path: Path) -> None:
+def test_the_first_example_of_the_page_on_reading_runs(collected: Path, tmp_path: Path) -> None:
     printed = run(block_with("throw.trial"), collected, tmp_path)
     assert "task.duration_s: double" in printed
     assert re.search(r"^6 \(\d+, 32\) \[", printed, flags=re.MULTILINE)
@@ -51,13 +51,13 @@ def test_the_example_of_the_page_on_functions_runs(collected: Path, tmp_path: Pa
     assert (tmp_path / "short-npz" / "throws.npz").is_file()
 
 
-def test_the_torch_example_runs_with_two_processes_that_load(collected: Path, tmp_path: Path) -> None:
+def test_the_torch_example_runs_with_two_loading_processes(collected: Path, tmp_path: Path) -> None:
     pytest.importorskip("torch")
     printed = run(block_with("num_workers=2"), collected, tmp_path)
     assert re.findall(r"torch\.Size\(\[(\d), 1\]\) torch\.Size\(\[\1, \d+, 3\]\)", printed) == ["4", "3"]
 
 
-def test_the_page_names_all_columns_and_nothing_that_is_not_there() -> None:
+def test_the_page_on_reading_names_all_columns_and_only_existing_attributes() -> None:
     for column in COLUMNS:
         assert f"`{column}`" in PAGE
     for owner, kind in (

@@ -1,4 +1,4 @@
-"""The files that follow from others come back byte for byte."""
+"""Rebuild restores files that follow from others byte for byte."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ DERIVED = ("throws.parquet", "datapackage.json", "metadata.yaml")
 
 @pytest.fixture(scope="module")
 def mixed(make_module_collection: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A dataset with a refused and two lost trials, one of them alone in its file."""
+    """A dataset with a refused and two lost trials; one of the lost ones is alone in its shard."""
     collection = make_module_collection()
     collection.refuse(1, "arm_right_1_joint: too fast")
     directory = tmp_path_factory.mktemp("mixed") / "dataset"
@@ -38,7 +38,7 @@ def spoiled(mixed: Path, tmp_path: Path) -> Path:
     return Path(shutil.copytree(mixed, tmp_path / "spoiled"))
 
 
-def test_derived_files_come_back_byte_for_byte(mixed: Path, spoiled: Path) -> None:
+def test_rebuild_restores_derived_files_byte_for_byte(mixed: Path, spoiled: Path) -> None:
     (spoiled / "metadata.yaml").unlink()
     (spoiled / "README.md").unlink()
     (spoiled / "provenance.json").unlink()
@@ -51,13 +51,13 @@ def test_derived_files_come_back_byte_for_byte(mixed: Path, spoiled: Path) -> No
     assert verify(spoiled) == []
 
 
-def test_the_data_card_comes_back_with_what_is_known_of_the_collection(mixed: Path, spoiled: Path) -> None:
+def test_rebuild_restores_the_data_card_from_the_provenance(mixed: Path, spoiled: Path) -> None:
     (spoiled / "README.md").unlink()
     rebuild(spoiled)
     assert (spoiled / "README.md").read_bytes() == (mixed / "README.md").read_bytes()
 
 
-def test_a_stale_table_is_made_right_and_the_data_card_stays(mixed: Path, spoiled: Path) -> None:
+def test_rebuild_corrects_a_stale_table_and_keeps_the_data_card(mixed: Path, spoiled: Path) -> None:
     table = pq.read_table(spoiled / "throws.parquet")
     values = table["landing_x_m"].to_pylist()
     index = table.schema.get_field_index("landing_x_m")
@@ -69,7 +69,7 @@ def test_a_stale_table_is_made_right_and_the_data_card_stays(mixed: Path, spoile
     assert (spoiled / "README.md").read_text() == "mine"
 
 
-def test_without_any_table_lost_trials_are_lost_without_their_reasons(mixed: Path, spoiled: Path) -> None:
+def test_rebuild_without_a_table_keeps_lost_trials_but_not_their_reasons(mixed: Path, spoiled: Path) -> None:
     for name in DERIVED:
         (spoiled / name).unlink()
     assert rebuild(spoiled).lost == (4, 6)
@@ -81,7 +81,7 @@ def test_without_any_table_lost_trials_are_lost_without_their_reasons(mixed: Pat
     assert verify(spoiled) == []
 
 
-def test_a_damaged_recording_is_refused_and_nothing_is_written(spoiled: Path) -> None:
+def test_rebuild_of_a_damaged_recording_is_refused_and_writes_nothing(spoiled: Path) -> None:
     data = bytearray((spoiled / "quick_00001.mcap").read_bytes())
     data[len(data) // 2] ^= 1
     (spoiled / "quick_00001.mcap").write_bytes(data)
@@ -91,7 +91,7 @@ def test_a_damaged_recording_is_refused_and_nothing_is_written(spoiled: Path) ->
     assert not (spoiled / "throws.parquet").exists()
 
 
-def test_a_configuration_that_lost_a_line_is_refused_though_it_says_the_same(spoiled: Path) -> None:
+def test_rebuild_refuses_a_configuration_that_differs_from_the_manifest(spoiled: Path) -> None:
     path = spoiled / "config.yaml"
     whole = path.read_text()
     path.write_text(whole.replace("  drag_coefficient: 0.0\n", ""))
@@ -101,12 +101,12 @@ def test_a_configuration_that_lost_a_line_is_refused_though_it_says_the_same(spo
     ):
         rebuild(spoiled)
     assert {each.name: each.read_bytes() for each in spoiled.iterdir() if each.is_file()} == before
-    # Without a manifest, it may be the file of an earlier version, which had fewer keys.
+    # Without a manifest, the file may come from an earlier version with fewer keys.
     (spoiled / "datapackage.json").unlink()
     assert rebuild(spoiled).written == DERIVED
 
 
-def test_a_plan_that_was_changed_is_refused(spoiled: Path) -> None:
+def test_rebuild_refuses_a_changed_plan(spoiled: Path) -> None:
     table = pq.read_table(spoiled / "plan.parquet")
     seeds = pa.array(range(7), pa.uint64())
     pq.write_table(table.set_column(2, table.schema.field(2), seeds), spoiled / "plan.parquet")
@@ -114,19 +114,19 @@ def test_a_plan_that_was_changed_is_refused(spoiled: Path) -> None:
         rebuild(spoiled)
 
 
-def test_a_plan_that_cannot_be_read_is_refused_with_a_way_out(spoiled: Path) -> None:
+def test_rebuild_without_a_plan_advises_repair(spoiled: Path) -> None:
     (spoiled / "plan.parquet").unlink()
     with pytest.raises(DatasetError, match=r"plan\.parquet: is missing\n  try: throwcollect dataset repair .* OUTPUT"):
         rebuild(spoiled)
 
 
-def test_a_missing_recording_is_refused(spoiled: Path) -> None:
+def test_rebuild_without_a_recording_advises_repair(spoiled: Path) -> None:
     (spoiled / "quick_00001.mcap").unlink()
     with pytest.raises(DatasetError, match=r"quick_00001\.mcap is missing\n  try: throwcollect dataset repair"):
         rebuild(spoiled)
 
 
-def test_recordings_under_each_others_names_are_refused(dataset: Path) -> None:
+def test_rebuild_refuses_recordings_whose_names_are_swapped(dataset: Path) -> None:
     first, second = dataset / "quick_00000.mcap", dataset / "quick_00001.mcap"
     one, other = first.read_bytes(), second.read_bytes()
     first.write_bytes(other)
@@ -135,13 +135,13 @@ def test_recordings_under_each_others_names_are_refused(dataset: Path) -> None:
         rebuild(dataset)
 
 
-def test_an_unfinished_collection_is_refused(spoiled: Path) -> None:
+def test_rebuild_of_an_unfinished_dataset_advises_resume(spoiled: Path) -> None:
     (spoiled / "quick_00002.mcap.part").write_bytes(b"")
     with pytest.raises(DatasetError, match=r"not collected to its end\n  try: throwcollect resume"):
         rebuild(spoiled)
 
 
-def test_a_directory_of_something_else_is_named_as_such(mixed: Path, tmp_path: Path) -> None:
+def test_rebuild_of_a_directory_without_a_dataset_says_so(mixed: Path, tmp_path: Path) -> None:
     (tmp_path / "notes.txt").write_text("none of it")
     for place in (tmp_path, tmp_path / "gone"):
         with pytest.raises(DatasetError, match=r": holds no dataset$"):

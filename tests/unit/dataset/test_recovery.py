@@ -1,4 +1,4 @@
-"""Whatever ends a collection, and wherever, the next one goes on and ends with the same files."""
+"""However a collection is interrupted, the next one goes on and ends with the same files."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ damages = st.lists(
 
 
 def abandon(writer: DatasetWriter) -> None:
-    """What the system does for a killed process."""
+    """Close the files, as the system does for a killed process."""
     with suppress(OSError):
         writer.close()
 
@@ -65,7 +65,7 @@ class Trials:
         writer.append(self.episodes[trial], self.results[trial])
 
     def go_on(self, directory: Path, order: list[int] | None = None) -> set[int]:
-        """Resume, run what is missing, and finish; the trials that needed not be run again."""
+        """Resume, run the missing trials, and finish; returns the trials that were kept."""
         there: dict[int, ThrowResult] = {}
         writer = DatasetWriter.open(directory)
         try:
@@ -94,10 +94,10 @@ def expected(trials: Trials, tmp_path_factory: pytest.TempPathFactory) -> dict[s
     return files_of(directory)
 
 
-def test_a_collection_killed_at_any_instant_goes_on_to_the_same_files(
+def test_a_collection_killed_at_any_instant_resumes_to_the_same_files(
     trials: Trials, expected: dict[str, bytes], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    # It is whole whenever a collection is killed, so it need not be read each time, which takes a third of all.
+    # The configuration is whole in every copy. Reading it each time would take a third of the time of this test.
     monkeypatch.setattr("throwcollect.dataset.writer.read_config", lambda _: trials.plan.config)
     directory, copies = tmp_path / "begun", tmp_path / "copies"
     create(directory, trials.plan)
@@ -113,7 +113,7 @@ def test_a_collection_killed_at_any_instant_goes_on_to_the_same_files(
     assert len(killed.left) > 40
     tried = 0
     for call, (left, appended) in enumerate(killed.left):
-        # Calls that only wait for the disk leave what there was before.
+        # A call that only waits for the disk leaves the same files as the next one.
         if left != killed.left[-1][0] and whole(left) == whole(killed.left[call + 1][0]):
             continue
         kept = trials.go_on(left)
@@ -123,7 +123,7 @@ def test_a_collection_killed_at_any_instant_goes_on_to_the_same_files(
     assert tried > 40
 
 
-def test_several_processes_keep_the_same_episodes(
+def test_recovery_by_several_processes_keeps_the_same_episodes(
     trials: Trials, expected: dict[str, bytes], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     directory = tmp_path / "dataset"
@@ -158,10 +158,10 @@ def test_several_processes_keep_the_same_episodes(
     suppress_health_check=[HealthCheck.function_scoped_fixture],
 )
 @given(data=st.data())
-def test_any_interleaving_of_episodes_crashes_and_power_cuts_ends_in_the_same_files(
+def test_resuming_after_any_crashes_and_power_cuts_gives_the_same_files(
     data: st.DataObject, trials: Trials, expected: dict[str, bytes], tmp_path: Path
 ) -> None:
-    """Power cuts leave files of any length; whoever resumes may be interrupted, too."""
+    """Power cuts leave files of any length; a resumed collection may be interrupted too."""
     directory = tmp_path / "dataset"
     shutil.rmtree(directory, ignore_errors=True)
     create(directory, trials.plan)
@@ -194,14 +194,14 @@ def test_any_interleaving_of_episodes_crashes_and_power_cuts_ends_in_the_same_fi
     damage=st.dictionaries(st.sampled_from(SHARDS), damages, min_size=1),
     unfinished=st.dictionaries(st.sampled_from(SHARDS), st.booleans()),
 )
-def test_any_damage_to_recordings_costs_trials_and_changes_no_file(
+def test_resuming_after_any_damage_to_recordings_gives_the_same_files(
     damage: dict[str, list[Mutation]],
     unfinished: dict[str, bool],
     trials: Trials,
     expected: dict[str, bytes],
     tmp_path: Path,
 ) -> None:
-    """Final files and those that are filled, damaged in any way: what stays is what would be collected again."""
+    """Finished and unfinished files are damaged in any way: episodes that are kept equal those collected again."""
     directory = tmp_path / "dataset"
     shutil.rmtree(directory, ignore_errors=True)
     create(directory, trials.plan)
@@ -215,7 +215,7 @@ def test_any_damage_to_recordings_costs_trials_and_changes_no_file(
     assert files_of(directory) == expected
 
 
-def test_a_finished_shard_with_a_flipped_bit_costs_one_episode(
+def test_a_flipped_bit_in_a_finished_shard_loses_only_one_episode(
     trials: Trials, expected: dict[str, bytes], tmp_path: Path
 ) -> None:
     directory = tmp_path / "dataset"
@@ -229,7 +229,7 @@ def test_a_finished_shard_with_a_flipped_bit_costs_one_episode(
     assert files_of(directory) == expected
 
 
-def test_what_a_crash_left_beside_a_finished_shard_is_removed(
+def test_remains_of_a_crash_beside_a_finished_shard_are_removed(
     trials: Trials, expected: dict[str, bytes], tmp_path: Path
 ) -> None:
     directory = tmp_path / "dataset"
@@ -242,7 +242,7 @@ def test_what_a_crash_left_beside_a_finished_shard_is_removed(
     assert files_of(directory) == expected
 
 
-def test_episodes_of_a_damaged_shard_and_of_an_unfinished_one_are_put_together(
+def test_recovery_joins_episodes_of_a_damaged_and_an_unfinished_shard(
     trials: Trials, expected: dict[str, bytes], tmp_path: Path
 ) -> None:
     directory = tmp_path / "dataset"
@@ -254,7 +254,7 @@ def test_episodes_of_a_damaged_shard_and_of_an_unfinished_one_are_put_together(
     trials.go_on(directory)
     (directory / "quick_00000.mcap.part").write_bytes(unfinished)
     shard = directory / "quick_00000.mcap"
-    # Neither holds all: one lacks trial 1, in the other trial 0 is damaged.
+    # Neither file has both trials: one lacks trial 1, in the other trial 0 is damaged.
     content = bytearray(shard.read_bytes())
     content[content.rindex(trials.episodes[0].chunk.data) + 1000] ^= 1
     shard.write_bytes(content)
@@ -262,7 +262,7 @@ def test_episodes_of_a_damaged_shard_and_of_an_unfinished_one_are_put_together(
     assert files_of(directory) == expected
 
 
-def test_episodes_that_are_not_of_this_plan_do_not_stay(trials: Trials, tmp_path: Path) -> None:
+def test_recovery_removes_episodes_of_another_plan(trials: Trials, tmp_path: Path) -> None:
     other = Trials(Collection({"trials": TRIALS, "record": {"trials_per_shard": 2}, "sim": {"max_trial_s": 30.0}}))
     create(tmp_path / "other", other.plan)
     other.go_on(tmp_path / "other")
@@ -274,7 +274,7 @@ def test_episodes_that_are_not_of_this_plan_do_not_stay(trials: Trials, tmp_path
     assert not list((tmp_path / "dataset").glob("*.mcap*"))
 
 
-def test_a_trial_that_was_lost_is_run_again(trials: Trials, expected: dict[str, bytes], tmp_path: Path) -> None:
+def test_a_lost_trial_is_run_again_on_resume(trials: Trials, expected: dict[str, bytes], tmp_path: Path) -> None:
     directory = tmp_path / "dataset"
     create(directory, trials.plan)
     writer = DatasetWriter.open(directory)
@@ -287,7 +287,7 @@ def test_a_trial_that_was_lost_is_run_again(trials: Trials, expected: dict[str, 
     assert files_of(directory) == expected
 
 
-def test_a_shard_that_may_still_get_trials_is_not_finished(
+def test_a_shard_is_not_finished_while_a_growing_plan_may_add_trials_to_it(
     trials: Trials, expected: dict[str, bytes], tmp_path: Path
 ) -> None:
     directory = tmp_path / "dataset"
@@ -307,7 +307,7 @@ def test_a_shard_that_may_still_get_trials_is_not_finished(
     assert files_of(directory) == expected
 
 
-def test_a_plan_killed_while_it_grows_leaves_nothing_beside_it(trials: Trials, tmp_path: Path) -> None:
+def test_a_kill_while_a_plan_grows_leaves_no_extra_files(trials: Trials, tmp_path: Path) -> None:
     first = replace(trials.plan, trials=trials.plan.trials[:1])
     call, died = 0, True
     while died:
@@ -325,7 +325,7 @@ def test_a_plan_killed_while_it_grows_leaves_nothing_beside_it(trials: Trials, t
     assert call > 2
 
 
-def test_a_plan_whose_rounds_are_taken_in_has_them_wherever_that_is_killed(trials: Trials, tmp_path: Path) -> None:
+def test_a_kill_while_rounds_are_joined_into_the_plan_loses_no_round(trials: Trials, tmp_path: Path) -> None:
     call, died = 0, True
     while died:
         directory = tmp_path / str(call)
@@ -344,7 +344,7 @@ def test_a_plan_whose_rounds_are_taken_in_has_them_wherever_that_is_killed(trial
     assert call > 4
 
 
-def test_what_earlier_versions_left_of_files_is_removed(trials: Trials, tmp_path: Path) -> None:
+def test_recovery_removes_unfinished_files_of_earlier_versions(trials: Trials, tmp_path: Path) -> None:
     create(tmp_path / "dataset", trials.plan)
     for name in ("plan.parquet.part", "config.yaml.new", "datapackage.json.new"):
         (tmp_path / "dataset" / name).write_bytes(b"half")
@@ -353,7 +353,7 @@ def test_what_earlier_versions_left_of_files_is_removed(trials: Trials, tmp_path
     assert {path.name for path in (tmp_path / "dataset").iterdir()} == {"config.yaml", "plan.parquet", "logs"}
 
 
-def test_closing_the_plan_finishes_what_is_complete(trials: Trials, tmp_path: Path) -> None:
+def test_closing_a_growing_plan_finishes_complete_shards(trials: Trials, tmp_path: Path) -> None:
     directory = tmp_path / "dataset"
     first = replace(trials.plan, trials=trials.plan.trials[:1])
     create(directory, first)

@@ -1,4 +1,4 @@
-"""A damaged dataset becomes a sound one, and what is lost is said."""
+"""Repair makes a sound dataset of a damaged one, and lists the lost trials."""
 
 from __future__ import annotations
 
@@ -92,7 +92,7 @@ def rename_to_part(directory: Path) -> None:
 @pytest.mark.parametrize(
     "damage", [cut_summary, damage_index, damage_latched_topics, swap_shards, delete_tables, rename_to_part]
 )
-def test_what_can_be_mended_is_as_if_nothing_had_happened(
+def test_repair_restores_the_original_files_if_no_episode_is_damaged(
     collected: Path, dataset: Path, output: Path, damage: Callable[[Path], None]
 ) -> None:
     damage(dataset)
@@ -101,9 +101,7 @@ def test_what_can_be_mended_is_as_if_nothing_had_happened(
     assert same_files(output, collected)
 
 
-def test_an_episode_that_is_damaged_is_lost_and_the_others_are_kept(
-    collection: Any, dataset: Path, output: Path, tmp_path: Path
-) -> None:
+def test_repair_loses_only_the_damaged_episode(collection: Any, dataset: Path, output: Path, tmp_path: Path) -> None:
     spoil(dataset / SHARD, chunk_of(dataset, 4) + 3000)
     before = {path.name: path.read_bytes() for path in dataset.iterdir()}
     repaired = repair(dataset, output, remake=never)
@@ -118,13 +116,13 @@ def test_an_episode_that_is_damaged_is_lost_and_the_others_are_kept(
     assert same_files(output, tmp_path / "same")
 
 
-def test_a_missing_file_costs_its_trials(dataset: Path, output: Path) -> None:
+def test_repair_loses_the_trials_of_a_missing_recording(dataset: Path, output: Path) -> None:
     (dataset / SHARD).unlink()
     assert [lost.trial for lost in repair(dataset, output, remake=never).lost] == [3, 4, 5]
     assert verify(output) == []
 
 
-def test_trials_that_were_lost_before_keep_their_reasons_and_do_not_count(
+def test_repair_keeps_trials_that_were_lost_before_and_does_not_count_them(
     collection: Any, tmp_path: Path, output: Path
 ) -> None:
     collection.refuse(6, "too fast")
@@ -133,7 +131,7 @@ def test_trials_that_were_lost_before_keep_their_reasons_and_do_not_count(
     assert same_files(output, dataset)
 
 
-def test_an_unfinished_collection_is_mended_too(collection: Any, tmp_path: Path, output: Path) -> None:
+def test_repair_finishes_an_unfinished_dataset(collection: Any, tmp_path: Path, output: Path) -> None:
     directory = tmp_path / "begun"
     writer = DatasetWriter.create(directory, collection.plan)
     collection.fill(writer, [5, 0, 2, 1, 3])
@@ -144,7 +142,7 @@ def test_an_unfinished_collection_is_mended_too(collection: Any, tmp_path: Path,
     assert verify(output) == []
 
 
-def test_the_first_of_several_episodes_of_a_trial_is_taken_and_that_is_said(dataset: Path, output: Path) -> None:
+def test_repair_takes_the_first_of_several_episodes_of_a_trial_and_says_so(dataset: Path, output: Path) -> None:
     (dataset / "quick_00003.mcap").write_bytes((dataset / SHARD).read_bytes())
     repaired = repair(dataset, output, remake=never)
     assert repaired.lost == ()
@@ -155,7 +153,7 @@ def test_the_first_of_several_episodes_of_a_trial_is_taken_and_that_is_said(data
     )
 
 
-def test_an_episode_that_contradicts_physics_is_lost(collection: Any, tmp_path: Path, output: Path) -> None:
+def test_repair_drops_an_episode_that_contradicts_physics(collection: Any, tmp_path: Path, output: Path) -> None:
     def early(samples: Any, header: Any) -> Any:
         shifted = samples.ball_position + (header.trial == 2) * 1e-3 * (samples.stamps_ns % 7 == 0)[:, None]
         return type(samples)(**{**vars(samples), "ball_position": shifted}), header
@@ -167,7 +165,9 @@ def test_an_episode_that_contradicts_physics_is_lost(collection: Any, tmp_path: 
     assert verify(output) == []
 
 
-def test_an_episode_of_no_trial_of_the_plan_is_left_out(make_collection: Any, dataset: Path, output: Path) -> None:
+def test_repair_leaves_out_an_episode_of_a_trial_that_is_not_in_the_plan(
+    make_collection: Any, dataset: Path, output: Path
+) -> None:
     more = make_collection({"trials": 9}).collect(dataset.parent / "more")
     (dataset / "quick_00002.mcap").write_bytes((more / "quick_00002.mcap").read_bytes())
     repaired = repair(dataset, output, remake=never)
@@ -177,11 +177,11 @@ def test_an_episode_of_no_trial_of_the_plan_is_left_out(make_collection: Any, da
 
 
 def scale_efforts(samples: Any, header: Any) -> Any:
-    """Efforts that nothing can tell from those that were."""
+    """Other efforts for trial 4, which only the digest of the table contradicts."""
     return replace(samples, effort=samples.effort * (1.01 if header.trial == 4 else 1.0)), header
 
 
-def test_the_episode_of_the_table_is_taken_wherever_it_lies(
+def test_repair_takes_the_episode_with_the_digest_of_the_table_from_any_file(
     make_collection: Any, collected: Path, dataset: Path, output: Path
 ) -> None:
     other = make_collection().collect(dataset.parent / "other", change=scale_efforts)
@@ -198,7 +198,7 @@ def test_the_episode_of_the_table_is_taken_wherever_it_lies(
     ]
 
 
-def test_an_episode_that_is_not_the_one_of_the_table_is_kept_with_a_remark(
+def test_repair_keeps_an_episode_that_differs_from_the_table_with_a_remark(
     make_collection: Any, dataset: Path, output: Path
 ) -> None:
     other = make_collection().collect(dataset.parent / "other", change=scale_efforts)
@@ -214,14 +214,16 @@ def test_an_episode_that_is_not_the_one_of_the_table_is_kept_with_a_remark(
     assert verify(output) == []
 
 
-def test_without_a_table_no_episode_differs_from_it(make_collection: Any, dataset: Path, output: Path) -> None:
+def test_repair_without_a_table_reports_no_differing_episode(make_collection: Any, dataset: Path, output: Path) -> None:
     other = make_collection().collect(dataset.parent / "other", change=scale_efforts)
     shutil.copy(other / SHARD, dataset / SHARD)
     (dataset / "throws.parquet").unlink()
     assert repair(dataset, output, remake=never).remarks == ()
 
 
-def test_the_plan_is_made_again_from_the_table_of_throws(collected: Path, dataset: Path, output: Path) -> None:
+def test_repair_makes_a_damaged_plan_again_from_the_table_of_throws(
+    collected: Path, dataset: Path, output: Path
+) -> None:
     spoil(dataset / "plan.parquet", 60)
     repaired = repair(dataset, output, remake=never)
     assert len(repaired.remarks) == 1
@@ -230,7 +232,7 @@ def test_the_plan_is_made_again_from_the_table_of_throws(collected: Path, datase
     assert same_files(output, collected)
 
 
-def test_a_plan_that_was_changed_is_made_again(collected: Path, dataset: Path, output: Path) -> None:
+def test_repair_makes_a_changed_plan_again(collected: Path, dataset: Path, output: Path) -> None:
     table = pq.read_table(dataset / "plan.parquet")
     values = table["task.duration_s"].to_pylist()
     changed = table.set_column(4, table.schema.field(4), [[*values[:5], 1.0, *values[6:]]])
@@ -243,7 +245,7 @@ def test_a_plan_that_was_changed_is_made_again(collected: Path, dataset: Path, o
     assert same_files(output, collected)
 
 
-def test_a_plan_that_is_made_again_still_refuses_trials(collection: Any, tmp_path: Path, output: Path) -> None:
+def test_a_plan_made_again_from_the_table_keeps_its_refusals(collection: Any, tmp_path: Path, output: Path) -> None:
     collection.refuse(6, "too fast")
     dataset = collection.collect(tmp_path / "dataset", range(6))
     kept = tmp_path / "kept.parquet"
@@ -252,7 +254,7 @@ def test_a_plan_that_is_made_again_still_refuses_trials(collection: Any, tmp_pat
     assert (output / "plan.parquet").read_bytes() == kept.read_bytes()
 
 
-def test_the_plan_is_drawn_again_if_the_table_is_damaged_too(collected: Path, dataset: Path, output: Path) -> None:
+def test_repair_draws_the_plan_again_if_plan_and_table_are_lost(collected: Path, dataset: Path, output: Path) -> None:
     spoil(dataset / "plan.parquet", 60)
     (dataset / "throws.parquet").unlink()
     repaired = repair(dataset, output, remake=make_plan)
@@ -260,7 +262,7 @@ def test_the_plan_is_drawn_again_if_the_table_is_damaged_too(collected: Path, da
     assert same_files(output, collected)
 
 
-def test_a_plan_that_cannot_be_had_is_said(dataset: Path, output: Path) -> None:
+def test_repair_without_any_source_of_the_plan_is_an_error(dataset: Path, output: Path) -> None:
     (dataset / "plan.parquet").unlink()
     (dataset / "throws.parquet").unlink()
     with pytest.raises(DatasetError, match=f"it cannot be drawn again either\n  evidence: {NO_PLAN}"):
@@ -268,26 +270,26 @@ def test_a_plan_that_cannot_be_had_is_said(dataset: Path, output: Path) -> None:
     assert not output.exists()
 
 
-def test_a_directory_of_something_else_is_not_told_to_get_a_configuration(tmp_path: Path, output: Path) -> None:
+def test_repair_of_a_directory_without_a_dataset_says_so(tmp_path: Path, output: Path) -> None:
     for place in (tmp_path, tmp_path / "gone"):
         with pytest.raises(DatasetError, match=r": holds no dataset$"):
             repair(place, output, remake=never)
 
 
-def test_a_configuration_that_cannot_be_had_is_said(dataset: Path, output: Path) -> None:
+def test_repair_without_a_usable_configuration_is_an_error(dataset: Path, output: Path) -> None:
     (dataset / "config.yaml").write_text("trials: many\n")
     with pytest.raises(DatasetError, match=r"nothing else holds the configuration[^$]*copy the YAML file"):
         repair(dataset, output, remake=never)
 
 
-def test_a_configuration_that_is_not_the_plans_is_said(dataset: Path, output: Path) -> None:
+def test_repair_refuses_a_configuration_that_does_not_fit_the_plan(dataset: Path, output: Path) -> None:
     text = (dataset / "config.yaml").read_text()
     (dataset / "config.yaml").write_text(text.replace("seed: 0", "seed: 1"))
     with pytest.raises(DatasetError, match="one of the two was changed"):
         repair(dataset, output, remake=never)
 
 
-def test_what_is_there_already_is_not_touched(dataset: Path, output: Path) -> None:
+def test_repair_refuses_a_used_output_directory_and_keeps_its_files(dataset: Path, output: Path) -> None:
     output.mkdir()
     (output / "mine").write_text("")
     with pytest.raises(ConfigError, match="new or empty"):
@@ -295,7 +297,7 @@ def test_what_is_there_already_is_not_touched(dataset: Path, output: Path) -> No
     assert [path.name for path in output.iterdir()] == ["mine"]
 
 
-def test_all_that_salvage_finds_is_kept(dataset: Path, output: Path) -> None:
+def test_repair_keeps_every_whole_episode_of_a_cut_recording(dataset: Path, output: Path) -> None:
     data = (dataset / SHARD).read_bytes()
     (dataset / SHARD).write_bytes(data[: len(data) * 2 // 3])
     found = [each.stored.episode.header.trial for each in scan_whole(dataset / SHARD)]

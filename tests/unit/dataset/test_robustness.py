@@ -1,4 +1,4 @@
-"""No damage makes a reader crash, hang, or take memory without bound: it reads, or it refuses with an error of ours."""
+"""No damage makes a reader crash, hang or fill the memory: it reads, or raises an error of throwcollect."""
 
 from __future__ import annotations
 
@@ -103,7 +103,9 @@ def test_a_table_with_any_damage_is_read_or_refused(
 @pytest.mark.filterwarnings("error")
 @settings(deadline=None, max_examples=8)
 @given(name=st.sampled_from(FILES), damage=mutations)
-def test_nothing_that_reads_a_damaged_dataset_fails_otherwise(small: Path, name: str, damage: list[Mutation]) -> None:
+def test_readers_of_a_damaged_dataset_raise_only_errors_of_throwcollect(
+    small: Path, name: str, damage: list[Mutation]
+) -> None:
     with tempfile.TemporaryDirectory() as scratch:
         directory = Path(shutil.copytree(small, Path(scratch) / "dataset"))
         (directory / name).write_bytes(mutate((small / name).read_bytes(), damage))
@@ -123,13 +125,13 @@ def test_nothing_that_reads_a_damaged_dataset_fails_otherwise(small: Path, name:
         "[" * 100_000,
     ],
 )
-def test_headers_with_numbers_beyond_all_clocks_are_refused(header: str) -> None:
+def test_episode_headers_with_impossible_numbers_are_refused(header: str) -> None:
     with pytest.raises(DatasetError, match=r"^episode header: "):
         header_from_json(header)
 
 
-def test_small_files_that_stand_for_huge_ones_are_refused_within_little_memory(small: Path, tmp_path: Path) -> None:
-    """In a process of its own that may take 3 GB."""
+def test_small_files_that_announce_huge_contents_need_little_memory(small: Path, tmp_path: Path) -> None:
+    """The readers run in a process that may take 3 GB."""
     for name, write in BOMBS.items():
         directory = Path(shutil.copytree(small, tmp_path / name))
         write(directory)
@@ -140,7 +142,7 @@ def test_small_files_that_stand_for_huge_ones_are_refused_within_little_memory(s
         check=False,
     )
     assert ran.stderr == ""
-    # Episodes are found by the table, so a wrong length before them does not matter.
+    # Episodes are found by their offsets in the table, so a wrong length before them does no harm.
     readable = {"record_length"}
     assert ran.stdout.split() == [f"{name}:{'read' if name in readable else 'refused'}" for name in BOMBS]
 

@@ -1,4 +1,4 @@
-"""Rows of the table of throws wait on the disk: how many there are has next to no effect on memory."""
+"""Rows of the table of throws are kept on the disk: many rows need little memory."""
 
 import gc
 import itertools
@@ -25,12 +25,12 @@ from throwcollect.tasks.throw.throw_result import ThrowOutcome, ThrowResult
 TRIALS = 2000
 PER_SHARD = 100
 MOST_BYTES = 60
-"""Memory that a trial whose shard is finished may take [bytes]; its row alone has 500 in the columns of a table."""
+"""Memory that a trial of a finished shard may take [bytes]; in a table in memory its row would take 500."""
 SCHEMA = pa.schema({"trial": pa.int64(), "reason": pa.string(), "speed": pa.float64(), "digest": pa.string()})
 
 
 class ShardWithoutFile:
-    """Stands for `OpenShard` and writes nothing."""
+    """Replaces `OpenShard` and writes no file."""
 
     def __init__(self, path: Path, _channels: object) -> None:
         self.path = path
@@ -72,7 +72,7 @@ def append(filled: writer.DatasetWriter, trial: int) -> None:
     filled.append(SimpleNamespace(header=header, digest=random.bytes(32).hex()), result)  # type: ignore[arg-type]
 
 
-def test_a_trial_whose_shard_is_finished_takes_next_to_no_memory(
+def test_a_trial_of_a_finished_shard_takes_little_memory(
     make_collection: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(writer, "OpenShard", ShardWithoutFile)
@@ -94,9 +94,9 @@ def test_a_trial_whose_shard_is_finished_takes_next_to_no_memory(
     filled.close()
 
 
-def test_the_table_is_that_of_rows_which_were_never_put_down(tmp_path: Path) -> None:
+def test_the_table_of_a_row_store_equals_a_table_made_in_memory(tmp_path: Path) -> None:
     store = RowStore(tmp_path, SCHEMA)
-    # Dictionaries of a column end in the middle of it, and its pages where those of shards do not.
+    # So many rows that a dictionary ends within a column, and pages end elsewhere than the pieces.
     pieces = [rows(first, 21_000) for first in range(0, 168_000, 21_000)]
     for number in (3, 0, 7, 1, 2, 6, 5, 4):
         store.put(number, pieces[number])
@@ -118,7 +118,7 @@ def test_a_table_is_encoded_in_small_pieces() -> None:
     assert max(sizes) < sum(sizes) / 5
 
 
-def test_digests_are_those_of_trials_with_an_episode(tmp_path: Path) -> None:
+def test_digests_hold_only_trials_with_an_episode(tmp_path: Path) -> None:
     store = RowStore(tmp_path, SCHEMA)
     for number, first in enumerate((0, 500)):
         store.put(number, rows(first, 500))
@@ -133,7 +133,7 @@ def test_digests_are_those_of_trials_with_an_episode(tmp_path: Path) -> None:
             found[trial]
 
 
-def test_a_disk_that_takes_no_rows_is_told_of(tmp_path: Path) -> None:
+def test_rows_that_cannot_be_written_are_an_error(tmp_path: Path) -> None:
     store = RowStore(tmp_path / "gone", SCHEMA)
     with pytest.raises(DatasetError, match=r"gone/throws\.parquet: cannot be written: No such file or directory"):
         store.put(0, rows(0, 5))

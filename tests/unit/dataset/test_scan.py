@@ -1,4 +1,4 @@
-"""Whole episodes are found in files that are damaged anywhere else."""
+"""A scan finds whole episodes in files that are damaged elsewhere."""
 
 from __future__ import annotations
 
@@ -41,7 +41,9 @@ def path(tmp_path: Path) -> Path:
     return tmp_path / "damaged.mcap.part"
 
 
-def test_all_episodes_of_a_sound_file_are_found_where_they_lie(collected: Path, runs: list[FoundEpisode]) -> None:
+def test_a_scan_finds_all_episodes_of_a_sound_recording_at_their_offsets(
+    collected: Path, runs: list[FoundEpisode]
+) -> None:
     assert [(each.stored.episode.header.trial, each.intact) for each in runs] == [(3, True), (4, True), (5, True)]
     assert [each.stored.offset for each in runs[1:]] == [each.stored.end for each in runs[:-1]]
     with open_mcap(collected / SHARD) as contents:
@@ -51,7 +53,7 @@ def test_all_episodes_of_a_sound_file_are_found_where_they_lie(collected: Path, 
 
 
 @pytest.mark.parametrize("wrong", [0, 1, 2])
-def test_any_damaged_chunk_costs_its_own_episode_alone(
+def test_a_damaged_chunk_loses_only_its_own_episode(
     path: Path, whole: bytes, runs: list[FoundEpisode], wrong: int
 ) -> None:
     data = bytearray(whole)
@@ -59,27 +61,27 @@ def test_any_damaged_chunk_costs_its_own_episode_alone(
     assert find_in(path, bytes(data)) == [(trial, True) for trial in (3, 4, 5) if trial != 3 + wrong]
 
 
-def test_lengths_that_lead_nowhere_are_not_followed(path: Path, whole: bytes, runs: list[FoundEpisode]) -> None:
+def test_a_wrong_length_of_a_chunk_loses_only_its_episode(path: Path, whole: bytes, runs: list[FoundEpisode]) -> None:
     for length in (0, 1, 2**32 - 1, 2**63, 2**64 - 1):
         data = bytearray(whole)
         struct.pack_into("<Q", data, runs[1].stored.offset + 1, length)
         assert find_in(path, bytes(data)) == [(3, True), (5, True)]
 
 
-def test_a_missing_or_an_inserted_stretch_hides_nothing_behind_it(
+def test_a_missing_or_inserted_stretch_hides_no_later_episode(
     path: Path, whole: bytes, runs: list[FoundEpisode]
 ) -> None:
     place = runs[1].stored.offset + 5000
     assert find_in(path, whole[:place] + whole[place + 512 :]) == [(3, True), (5, True)]
     assert find_in(path, whole[:place] + bytes(512) + whole[place:]) == [(3, True), (5, True)]
-    # So much is missing that the length of the chunk leads into the next one.
+    # So many bytes are missing that the length of the chunk leads into the next one.
     assert find_in(path, whole[:place] + whole[place + 20_000 :]) == [(3, True), (5, True)]
     assert find_in(path, whole[len(MAGIC) + 1000 :]) == [(3, True), (4, True), (5, True)]
-    # The end of an episode and the beginning of the next one are gone.
+    # The end of an episode and the start of the next one are missing.
     assert find_in(path, whole[: runs[1].stored.end - 50] + whole[runs[2].stored.offset + 50 :]) == [(3, True)]
 
 
-def test_an_episode_with_damaged_indexes_is_whole_but_not_intact(
+def test_an_episode_with_damaged_indexes_is_found_but_not_intact(
     path: Path, whole: bytes, runs: list[FoundEpisode]
 ) -> None:
     indexes = runs[1].stored.chunks[0].indexes
@@ -89,13 +91,13 @@ def test_an_episode_with_damaged_indexes_is_whole_but_not_intact(
         assert find_in(path, bytes(data)) == [(3, True), (4, False), (5, True)]
 
 
-def test_a_header_that_was_changed_is_not_believed(path: Path, whole: bytes, runs: list[FoundEpisode]) -> None:
+def test_an_episode_with_a_changed_header_is_not_found(path: Path, whole: bytes, runs: list[FoundEpisode]) -> None:
     facts = runs[1].stored.facts
     place = facts.offset + facts.data.index(b"landed")
     assert find_in(path, whole[:place] + b"rested" + whole[place + 6 :]) == [(3, True), (5, True)]
 
 
-def test_a_file_cut_anywhere_has_the_episodes_before_the_cut(
+def test_a_recording_cut_anywhere_has_the_episodes_before_the_cut(
     path: Path, whole: bytes, runs: list[FoundEpisode]
 ) -> None:
     ends = [run.stored.end for run in runs]
@@ -109,8 +111,8 @@ def test_a_file_of_noise_has_no_episode(path: Path) -> None:
     assert find_in(path, b"") == []
 
 
-def test_contents_that_are_announced_too_large_are_not_decompressed(path: Path, runs: list[FoundEpisode]) -> None:
-    """Zeros compress so well that a small file could fill any memory."""
+def test_a_chunk_that_announces_too_much_is_not_decompressed(path: Path, runs: list[FoundEpisode]) -> None:
+    """Zeros compress so well that a small file could fill the memory."""
     zeros = zstandard.ZstdCompressor(level=1).compress(bytes(50_000_000))
     bomb = Chunk(zeros, 50_000_000, 0, 0, 0)
     with pytest.raises(DatasetError, match="bytes of data announce 50000000"):
@@ -118,8 +120,10 @@ def test_contents_that_are_announced_too_large_are_not_decompressed(path: Path, 
     assert find_in(path, bomb.record() + runs[0].stored.facts.data) == []
 
 
-def test_chunks_within_chunks_do_not_take_forever(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Each header begins a chunk that reaches to the end of the file; they are given up after 64 times its size."""
+def test_a_scan_of_nested_chunks_gives_up_after_64_times_the_file_size(
+    path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Each header begins a chunk that reaches to the end of the file; the scan stops after 64 times its size."""
     header = Chunk(b"", 0, 0, 0, 0).record()
     count = 3000
     data = bytearray()
@@ -132,7 +136,7 @@ def test_chunks_within_chunks_do_not_take_forever(path: Path, monkeypatch: pytes
     assert 60 <= len(parsed) <= 70
 
 
-def test_samples_that_were_changed_are_not_believed_even_if_the_crc_was_made_to_fit(
+def test_an_episode_with_changed_samples_and_a_fitting_crc_is_not_found(
     path: Path, whole: bytes, runs: list[FoundEpisode]
 ) -> None:
     stored = runs[1].stored
@@ -146,7 +150,7 @@ def test_samples_that_were_changed_are_not_believed_even_if_the_crc_was_made_to_
     ]
 
 
-def test_what_is_no_file_is_named_and_a_missing_one_has_no_episodes(tmp_path: Path) -> None:
+def test_a_scan_of_a_directory_is_an_error_and_a_missing_file_has_no_episodes(tmp_path: Path) -> None:
     assert not list(scan_whole(tmp_path / "missing.mcap"))
     with pytest.raises(DatasetError, match="cannot be read: not a file"):
         list(scan_whole(tmp_path))

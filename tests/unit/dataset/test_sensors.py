@@ -1,4 +1,4 @@
-"""An episode with a second chunk, as of a camera: it goes through everything, and the first chunk keeps its digest."""
+"""Episodes with a second chunk, such as images of a camera: all commands keep it, and digests stay the same."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def image(stamp_ns: int, size: int) -> bytes:
 
 
 def add_images(episode: Episode, change: Callable[[list[records.Message]], None] = lambda _: None) -> Episode:
-    """The episode with images of varying size at the camera's rate, and now and then one of the other sensor."""
+    """The episode with images of varying size at the camera's rate, and a few of the other sensor."""
     start, end = episode.chunk.start_ns, episode.chunk.end_ns
     messages, counts = [], {CAMERA: 0, TOUCH: 0}
     for number, stamp in enumerate(range(start, end + 1, 1_000_000_000 // RATE_HZ)):
@@ -98,7 +98,7 @@ def flip(path: Path, place: int) -> None:
     path.write_bytes(data)
 
 
-def test_it_travels_in_the_message_of_its_episode(collection: Collection) -> None:
+def test_the_message_of_an_episode_carries_its_sensor_chunk(collection: Collection) -> None:
     signer = Signer(b"key of the run")
     sent = add_images(collection.episode(2))
     arrived = unpack(pack(Delivery(sent, "", ""), signer), signer).episode
@@ -106,7 +106,7 @@ def test_it_travels_in_the_message_of_its_episode(collection: Collection) -> Non
     assert arrived.digest == sent.digest == collection.episode(2).digest
 
 
-def test_the_digest_of_throws_and_dataset_is_that_without_it(dataset: Path, collected: Path) -> None:
+def test_sensors_do_not_change_the_digests_of_throws_and_dataset(dataset: Path, collected: Path) -> None:
     with_camera, without = Dataset.open(dataset), Dataset.open(collected)
     assert with_camera.throws["digest"].equals(without.throws["digest"])
     assert digest(dataset) == digest(collected) == with_camera.digest
@@ -115,7 +115,7 @@ def test_the_digest_of_throws_and_dataset_is_that_without_it(dataset: Path, coll
     assert np.array_equal(with_camera[4].ball.position, without[4].ball.position)
 
 
-def test_the_file_is_one_that_others_read(dataset: Path) -> None:
+def test_the_mcap_package_reads_the_images_of_a_sensor(dataset: Path) -> None:
     topics = ("/camera/image/compressed", "/touch/compressed")
     counts = dict.fromkeys(topics, 0)
     for path in sorted(dataset.glob("*.mcap")):
@@ -132,7 +132,7 @@ def test_the_file_is_one_that_others_read(dataset: Path) -> None:
     assert counts[topics[0]] > counts[topics[1]] > 0
 
 
-def test_a_sound_dataset_has_no_findings_and_rebuild_changes_nothing(dataset: Path) -> None:
+def test_a_dataset_with_sensors_has_no_findings_and_rebuild_keeps_it(dataset: Path) -> None:
     assert verify(dataset) == []
     before = {path.name: path.read_bytes() for path in dataset.iterdir()}
     rebuild(dataset)
@@ -140,7 +140,7 @@ def test_a_sound_dataset_has_no_findings_and_rebuild_changes_nothing(dataset: Pa
 
 
 @pytest.mark.parametrize(("begin", "problem"), [(60, "chunk: "), (9 + 24, "CRC differs")])
-def test_a_damaged_second_chunk_is_found_and_costs_its_episode(
+def test_a_damaged_sensor_chunk_is_found_and_loses_its_episode(
     dataset: Path, tmp_path: Path, begin: int, problem: str
 ) -> None:
     flip(dataset / SHARD, find_stored(dataset, 4).chunks[1].record.offset + begin)
@@ -150,7 +150,7 @@ def test_a_damaged_second_chunk_is_found_and_costs_its_episode(
     assert verify(tmp_path / "repaired") == []
 
 
-def test_damaged_indexes_of_a_second_chunk_are_mended(dataset: Path, tmp_path: Path) -> None:
+def test_repair_restores_damaged_indexes_of_a_sensor_chunk(dataset: Path, tmp_path: Path) -> None:
     whole = (dataset / SHARD).read_bytes()
     flip(dataset / SHARD, find_stored(dataset, 4).chunks[1].indexes[CAMERA].offset + 30)
     fit_manifest(dataset)
@@ -191,7 +191,7 @@ def of_joint_states(messages: list[records.Message]) -> None:
         (of_joint_states, "has the channels"),
     ],
 )
-def test_what_a_sensor_cannot_have_recorded_is_found(
+def test_messages_that_a_sensor_cannot_have_recorded_are_found(
     tmp_path: Path, change: Callable[[list[records.Message]], None], problem: str
 ) -> None:
     class Changed(Collection):
@@ -204,7 +204,7 @@ def test_what_a_sensor_cannot_have_recorded_is_found(
     assert any(problem in finding.problem for finding in findings), findings
 
 
-def test_a_collection_that_was_killed_goes_on(dataset: Path, tmp_path: Path) -> None:
+def test_a_killed_collection_with_sensors_resumes_to_the_same_files(dataset: Path, tmp_path: Path) -> None:
     collection, begun = Filmed(), tmp_path / "begun"
     create(begun, collection.plan)
     with closing(DatasetWriter.open(begun)) as writer:
@@ -222,7 +222,7 @@ def test_a_collection_that_was_killed_goes_on(dataset: Path, tmp_path: Path) -> 
         assert (begun / path.name).read_bytes() == path.read_bytes()
 
 
-def test_a_derived_dataset_has_it_in_its_new_slots_of_time(dataset: Path, tmp_path: Path) -> None:
+def test_a_derived_dataset_moves_sensor_messages_to_new_slots_of_time(dataset: Path, tmp_path: Path) -> None:
     sample(dataset, tmp_path / "some", count=3)
     assert verify(tmp_path / "some") == []
     some = Dataset.open(tmp_path / "some")
@@ -235,7 +235,9 @@ def test_a_derived_dataset_has_it_in_its_new_slots_of_time(dataset: Path, tmp_pa
         assert hashlib.sha256(moved.contents).hexdigest() == moved.records_sha256 != original.records_sha256
 
 
-def test_a_file_without_a_camera_says_nothing_of_one(collected: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_recording_without_sensors_has_no_metadata_of_sensors(
+    collected: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(declared, "SENSORS", [])
     with open_mcap(collected / SHARD) as contents:
         (facts, *_) = [record for record in contents.records() if EPISODE.encode() in record.data]

@@ -1,4 +1,4 @@
-"""Datasets whose trials have targets: what holds them, what notices a change, and what keeps them."""
+"""Datasets whose trials have targets: which files hold them, which checks find a change, which commands keep them."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def no_plan(config: object) -> Plan:
     raise AssertionError(config)
 
 
-def test_throws_have_their_targets_and_miss_them_by_the_distance(targeted: Path) -> None:
+def test_a_throw_has_its_target_and_its_miss_is_the_distance(targeted: Path) -> None:
     dataset = Dataset.open(targeted)
     assert dataset.plan.keys == ("task.duration_s",)
     names = dataset.throws.column_names
@@ -72,7 +72,7 @@ def test_throws_have_their_targets_and_miss_them_by_the_distance(targeted: Path)
     assert verify(targeted) == []
 
 
-def test_what_did_not_land_misses_nothing(tmp_path: Path) -> None:
+def test_a_throw_that_did_not_land_has_no_miss(tmp_path: Path) -> None:
     dataset = Dataset.open(collect_targeted(tmp_path / "data", change=hold_ball))
     assert {throw.outcome for throw in dataset} == {"not_released"}
     assert [throw.miss_m for throw in dataset] == [None] * 4
@@ -82,7 +82,7 @@ def test_what_did_not_land_misses_nothing(tmp_path: Path) -> None:
     assert "| `miss_m` | 3 | 0 | | | |" in (tmp_path / "data" / "README.md").read_text()
 
 
-def test_height_and_hit_angle_are_targets_too(tmp_path: Path) -> None:
+def test_targets_can_have_a_height_and_a_hit_angle(tmp_path: Path) -> None:
     columns = "scene.landing_height_m,target_x_m,target_y_m,target_z_m,target_hit_angle_rad\n"
     text = columns + "0.25,1.4,-0.1,0.25,1.2\n0.25,1.4,-0.1,0.5,\n0.25,1.4,-0.1,,1.2\n"
     dataset = Dataset.open(collect_targeted(tmp_path / "data", text))
@@ -99,7 +99,7 @@ def test_height_and_hit_angle_are_targets_too(tmp_path: Path) -> None:
     assert row["miss_m"] == pytest.approx(np.sqrt((row["landing_x_m"] - 1.4) ** 2 + row["landing_y_m"] ** 2 + 0.09))
 
 
-def test_a_task_says_what_its_targets_are_and_what_they_are_compared_with() -> None:
+def test_a_task_defines_the_columns_of_its_targets_and_misses() -> None:
     class Timed(ThrowConfig):
         target_columns = (
             TargetColumn("target_flight_s", "flight_time_s", "miss_s", "flight", "Time [s].", required=True),
@@ -112,7 +112,7 @@ def test_a_task_says_what_its_targets_are_and_what_they_are_compared_with() -> N
     assert misses.measure({}, {"flight_time_s": 0.5}) == {"miss_s": None}
 
 
-def test_no_episode_depends_on_its_target_and_the_digest_of_the_dataset_does(targeted: Path, tmp_path: Path) -> None:
+def test_targets_change_the_digest_of_the_dataset_but_no_episode(targeted: Path, tmp_path: Path) -> None:
     plain = collect_targeted(tmp_path / "plain", WITHOUT_TARGETS)
     other = collect_targeted(tmp_path / "other", LIST.replace("1.6", "1.61"))
     shards = [sorted(path.glob("*.mcap")) for path in (targeted, plain, other)]
@@ -172,13 +172,13 @@ def test_a_changed_target_is_found(targeted: Path, tmp_path: Path, forge: Callab
     assert any(each.startswith(finding) for each in found), found
 
 
-def test_a_damaged_plan_says_nothing_of_the_digest(targeted: Path, tmp_path: Path) -> None:
+def test_a_damaged_plan_is_not_reported_as_a_wrong_digest(targeted: Path, tmp_path: Path) -> None:
     directory = Path(shutil.copytree(targeted, tmp_path / "data"))
     (directory / "plan.parquet").write_bytes(b"PAR1")
     assert not [each for each in verify(directory) if "digest" in each.place]
 
 
-def test_what_is_made_again_has_the_targets(targeted: Path, tmp_path: Path) -> None:
+def test_rebuilt_files_have_the_targets(targeted: Path, tmp_path: Path) -> None:
     directory = Path(shutil.copytree(targeted, tmp_path / "data"))
     for name in ("throws.parquet", "metadata.yaml", "datapackage.json"):
         (directory / name).unlink()
@@ -199,7 +199,7 @@ def test_a_repaired_dataset_has_the_targets_and_the_list(targeted: Path, tmp_pat
         assert (tmp_path / "repaired" / name).read_bytes() == (targeted / name).read_bytes(), name
 
 
-def test_an_interrupted_collection_goes_on_with_its_targets(targeted: Path, tmp_path: Path) -> None:
+def test_a_resumed_collection_keeps_its_targets(targeted: Path, tmp_path: Path) -> None:
     collection = plan_targeted(tmp_path / "data")
     shutil.copy(targeted / "trials.parquet", tmp_path / "trials.parquet")
     writer = DatasetWriter.create(tmp_path / "data", collection.plan)
@@ -215,7 +215,7 @@ def test_an_interrupted_collection_goes_on_with_its_targets(targeted: Path, tmp_
         assert (tmp_path / "data" / name).read_bytes() == (targeted / name).read_bytes(), name
 
 
-def test_merged_throws_keep_the_targets_that_they_have(targeted: Path, tmp_path: Path) -> None:
+def test_merged_throws_keep_their_targets(targeted: Path, tmp_path: Path) -> None:
     Collection().collect(tmp_path / "plain")
     merge([tmp_path / "plain", targeted], tmp_path / "both")
     merged = Dataset.open(tmp_path / "both")
@@ -233,7 +233,7 @@ def test_merged_throws_keep_the_targets_that_they_have(targeted: Path, tmp_path:
     assert [throw.target for throw in Dataset.open(tmp_path / "none")] == [{}] * 7
 
 
-def test_info_and_card_tell_how_targets_were_missed(targeted: Path) -> None:
+def test_info_and_the_data_card_summarize_the_misses(targeted: Path) -> None:
     misses = sorted(throw.miss_m for throw in Dataset.open(targeted) if throw.miss_m is not None)
     found = info(targeted).misses["miss_m"]
     assert (found.targets, found.measured) == (3, 3)
@@ -244,7 +244,7 @@ def test_info_and_card_tell_how_targets_were_missed(targeted: Path) -> None:
     assert f"| `miss_m` | 3 | 3 | {misses[1]:.4g} |" in (targeted / "README.md").read_text()
 
 
-def test_a_plan_with_targets_of_no_task_is_damaged(targeted: Path, tmp_path: Path) -> None:
+def test_a_plan_with_targets_that_the_task_lacks_is_reported(targeted: Path, tmp_path: Path) -> None:
     directory = Path(shutil.copytree(targeted, tmp_path / "data"))
     table = pq.read_table(directory / "plan.parquet")
     names = [name.replace("target_y_m", "target_w_m") for name in table.column_names]
@@ -255,7 +255,7 @@ def test_a_plan_with_targets_of_no_task_is_damaged(targeted: Path, tmp_path: Pat
     assert any(sentence in each for each in found), found
 
 
-def test_a_list_that_goes_on_has_the_targets_that_it_had(targeted: Path, tmp_path: Path) -> None:
+def test_a_longer_list_is_refused_if_earlier_targets_differ(targeted: Path, tmp_path: Path) -> None:
     from throwcollect.coordinator.resume import _extend
 
     old = Dataset.open(targeted).plan

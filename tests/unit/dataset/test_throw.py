@@ -46,7 +46,7 @@ def rotate(quaternion: Any, vector: Any) -> np.ndarray:
     return np.array(matrix) @ [vector.x, vector.y, vector.z]
 
 
-def test_it_is_what_rosbags_reads_message_by_message(tumbled: Path) -> None:
+def test_a_throw_has_the_numbers_that_rosbags_reads_from_each_message(tumbled: Path) -> None:
     throw = throwcollect.load(tumbled)[4]
     window = {"start": int(throw.ball.stamps_ns[0]), "stop": int(throw.ball.stamps_ns[-1]) + 1}
     ball, joints = throw.ball, throw.joints
@@ -74,7 +74,7 @@ def test_it_is_what_rosbags_reads_message_by_message(tumbled: Path) -> None:
     assert len(ball) == throw.row["samples"]
 
 
-def test_it_is_what_the_judge_saw(tumbled: Path) -> None:
+def test_a_throw_has_the_samples_of_its_episode_in_arrays_of_its_own(tumbled: Path) -> None:
     samples = Dataset.open(tumbled).episode(2).samples()
     throw = throwcollect.load(tumbled)[2]
     pairs = [
@@ -91,19 +91,19 @@ def test_it_is_what_the_judge_saw(tumbled: Path) -> None:
     for found, expected in pairs:
         assert np.array_equal(found, expected)
         assert (found.dtype, found.flags.c_contiguous, found.flags.aligned) == (expected.dtype, True, True)
-        found[0] = 7  # an array of the caller's own
+        found[0] = 7  # the array belongs to the caller
     assert np.array_equal(throwcollect.load(tumbled)[2].joints.position, samples.position)
     assert throw.joints.names == TALOS.joints
 
 
-def test_times_count_from_the_start_of_the_trial(loaded: Dataset) -> None:
+def test_times_of_a_throw_count_from_the_start_of_the_trial(loaded: Dataset) -> None:
     ball = loaded[5].ball
     assert ball.time_s[0] == 0
     assert np.allclose(ball.time_s, np.arange(len(ball)) / loaded.config.record.rate_hz, rtol=0, atol=1e-12)
     assert np.array_equal(loaded[5].joints.time_s, ball.time_s)
 
 
-def test_events_are_those_of_the_table(loaded: Dataset) -> None:
+def test_events_of_a_throw_are_those_of_the_table(loaded: Dataset) -> None:
     throw = loaded[1]
     for name in ("release", "apex", "landing"):
         event = getattr(throw.events, name)
@@ -115,7 +115,7 @@ def test_events_are_those_of_the_table(loaded: Dataset) -> None:
     assert repr(throw.events).startswith("Events(release at 0.400 s, apex at ")
 
 
-def test_only_what_is_asked_for_is_read(loaded: Dataset, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_throw_reads_samples_only_when_they_are_asked_for(loaded: Dataset, monkeypatch: pytest.MonkeyPatch) -> None:
     read, decompress = [], Chunk.decompress
     monkeypatch.setattr(Chunk, "decompress", lambda chunk: read.append(chunk.start_ns) or decompress(chunk))
     throws = list(loaded)
@@ -129,13 +129,13 @@ def test_only_what_is_asked_for_is_read(loaded: Dataset, monkeypatch: pytest.Mon
     assert read == [loaded.config.trial_start_ns(1)]
 
 
-def test_it_says_what_it_is(loaded: Dataset) -> None:
+def test_the_repr_of_ball_and_joints_names_samples_and_kind(loaded: Dataset) -> None:
     throw = loaded[0]
     assert f"{throw.row['samples']} samples" in repr(throw.ball)
     assert repr(throw.joints).startswith("Joints(")
 
 
-def test_a_damaged_episode_is_named(dataset: Path) -> None:
+def test_reading_a_damaged_throw_names_its_place_in_the_recording(dataset: Path) -> None:
     loaded = throwcollect.load(dataset)
     path = dataset / loaded[4].row["shard"]
     contents = bytearray(path.read_bytes())

@@ -27,7 +27,7 @@ def not_finite(samples: Samples, header: EpisodeHeader) -> tuple[Samples, Episod
     return replace(samples, effort=samples.effort * float("nan")), header
 
 
-def test_results_come_back_from_the_table(collection: Collection) -> None:
+def test_results_read_back_equal_from_the_table_of_throws(collection: Collection) -> None:
     table = ThrowsTable.of(collection.plan)
     outcomes = set()
     for change in (None, hold_ball, not_finite):
@@ -39,7 +39,7 @@ def test_results_come_back_from_the_table(collection: Collection) -> None:
     assert outcomes == {ThrowOutcome.LANDED, ThrowOutcome.NOT_RELEASED, ThrowOutcome.TRACKING_FAILED}
 
 
-def test_a_swept_key_has_a_unit_and_a_name_without_dots() -> None:
+def test_the_column_of_a_swept_key_has_a_unit_and_an_alias_without_dots() -> None:
     swept = {
         "task.end.arm_right_4_joint": {"min": -0.7, "max": -0.4},
         "task.duration_s": {"min": 0.9, "max": 1.1},
@@ -58,7 +58,7 @@ def test_a_swept_key_has_a_unit_and_a_name_without_dots() -> None:
 
 
 @pytest.mark.parametrize("column", ["digest", "trial", "landing_x_m"])
-def test_a_task_whose_results_have_a_column_of_the_table_is_refused(
+def test_a_task_with_a_result_named_like_another_column_is_refused(
     column: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     results = make_dataclass(
@@ -69,13 +69,13 @@ def test_a_task_whose_results_have_a_column_of_the_table_is_refused(
         ThrowsTable((), Config())
 
 
-def test_a_task_without_an_outcome_that_it_needs_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_task_that_lacks_a_required_outcome_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(ThrowTask, "outcomes", Outcome("Few", {"LOST": "lost", "LIMIT_VIOLATED": "limit_violated"}))
     with pytest.raises(ConfigError, match="outcomes of the task throw lack landed, tracking_failed"):
         ThrowsTable((), Config())
 
 
-def test_a_table_of_an_earlier_version_is_read_and_verified_and_merged(collection: Collection, tmp_path: Path) -> None:
+def test_a_table_of_throws_of_an_earlier_version_can_be_read_and_merged(collection: Collection, tmp_path: Path) -> None:
     directory = collection.collect(tmp_path / "dataset")
     earlier = pq.read_table(directory / "throws.parquet").drop_columns(sorted(ThrowsTable.of(collection.plan).later))
     (directory / "throws.parquet").unlink()
@@ -93,11 +93,11 @@ def test_a_table_of_an_earlier_version_is_read_and_verified_and_merged(collectio
         read_throws(directory, collection.plan)
 
 
-def test_rows_are_found_by_trial_a_piece_at_a_time(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_rows_by_trial_finds_rows_across_pieces_of_the_table(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(throws_table, "_ROWS_A_PIECE", 2)
     table = pa.table({"trial": [4, None, 0, 2, 4], "outcome": ["a", "b", "c", "d", "e"]})
     rows = RowsByTrial(table)
-    # Of two rows of a trial, the later one counts.
+    # If a trial has two rows, the later one counts.
     expected = {4: "e", 0: "c", 2: "d"}
     assert list(rows) == list(expected)
     for trial in (2, 4, 0, 0, 4, 2):

@@ -26,7 +26,7 @@ def column_of(throw: Any, name: str) -> np.ndarray:
 
 
 @pytest.mark.parametrize("threads", [None, 1, 3])
-def test_they_are_the_throws_one_after_the_other(loaded: Dataset, threads: int | None) -> None:
+def test_trajectories_hold_the_samples_of_the_throws_one_after_the_other(loaded: Dataset, threads: int | None) -> None:
     many = loaded.select(list(range(7)) * 6)  # more than are read at once
     found = many.trajectories(threads=threads)
     assert tuple(found.columns) == COLUMNS
@@ -46,13 +46,13 @@ def test_they_are_the_throws_one_after_the_other(loaded: Dataset, threads: int |
 
 
 @pytest.mark.parametrize("name", COLUMNS)
-def test_a_column_does_not_depend_on_the_others(loaded: Dataset, name: str) -> None:
+def test_a_column_of_trajectories_does_not_depend_on_the_others(loaded: Dataset, name: str) -> None:
     alone = loaded.trajectories([name])
     assert list(alone.columns) == [name]
     assert np.array_equal(alone[name], loaded.trajectories()[name])
 
 
-def test_large_arrays_are_no_different(loaded: Dataset, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_large_arrays_of_trajectories_equal_small_ones(loaded: Dataset, monkeypatch: pytest.MonkeyPatch) -> None:
     small = loaded.trajectories()
     monkeypatch.setattr("throwcollect.dataset.trajectory_columns._LARGE_BYTES", 1)
     large = loaded.trajectories()
@@ -61,7 +61,7 @@ def test_large_arrays_are_no_different(loaded: Dataset, monkeypatch: pytest.Monk
         assert large[name].flags.writeable
 
 
-def test_columns_of_chosen_joints(loaded: Dataset) -> None:
+def test_trajectories_of_chosen_joints_hold_only_their_columns(loaded: Dataset) -> None:
     every = loaded.trajectories()
     for joints in (loaded.moving_joints, ("leg_left_1_joint",), ()):
         some = loaded.trajectories(["joints.position", "joints.effort", "ball.position"], joints=joints)
@@ -73,7 +73,7 @@ def test_columns_of_chosen_joints(loaded: Dataset) -> None:
     assert set(loaded.moving_joints) == {"torso_1_joint", *(f"arm_right_{n}_joint" for n in (1, 2, 4, 7))}
 
 
-def test_trials_without_an_episode_have_no_samples(collection: Any, tmp_path: Path) -> None:
+def test_trajectories_of_trials_without_an_episode_have_no_samples(collection: Any, tmp_path: Path) -> None:
     collection.refuse(0, "too fast")
     dataset = throwcollect.load(collection.collect(tmp_path / "dataset", range(1, 7), lost=[6]))
     found = dataset.trajectories(["ball.position", "stamps_ns"])
@@ -86,7 +86,7 @@ def test_trials_without_an_episode_have_no_samples(collection: Any, tmp_path: Pa
     assert len(dataset.select([]).trajectories()) == 0
 
 
-def test_padding_gives_one_shape(loaded: Dataset) -> None:
+def test_padded_trajectories_have_one_shape(loaded: Dataset) -> None:
     found = loaded.trajectories(["time_s", "ball.position"])
     assert len(set(found.lengths)) > 1
     for name, rest in (("time_s", ()), ("ball.position", (3,))):
@@ -98,14 +98,14 @@ def test_padding_gives_one_shape(loaded: Dataset) -> None:
     assert found.padded("time_s", fill=-1).min() == -1
 
 
-def test_it_says_what_it_is(loaded: Dataset) -> None:
+def test_the_repr_of_trajectories_names_their_size_and_columns(loaded: Dataset) -> None:
     found = loaded.trajectories(["time_s", "ball.position"])
     samples = sum(loaded.throws["samples"].to_pylist())
     size = samples * (8 + 3 * 8) / 1e6
     assert repr(found) == f"Trajectories(7 throws, {samples} samples, {size:.1f} MB: time_s, ball.position)"
 
 
-def test_what_is_not_there_is_named(loaded: Dataset) -> None:
+def test_unknown_columns_joints_and_positions_of_trajectories_are_errors(loaded: Dataset) -> None:
     with pytest.raises(ConfigError, match=r"no column 'ball\.colour'"):
         loaded.trajectories(["ball.colour"])
     with pytest.raises(ConfigError, match="Talos has no joint 'elbow'"):
@@ -118,7 +118,7 @@ def test_what_is_not_there_is_named(loaded: Dataset) -> None:
 
 
 @pytest.mark.parametrize(("threads", "told"), [(-1, "-1"), (0, "0"), ("2", "'2'"), (1.5, r"1\.5")])
-def test_a_number_of_threads_is_one(loaded: Dataset, threads: Any, told: str) -> None:
+def test_a_number_of_threads_below_1_or_not_whole_is_refused(loaded: Dataset, threads: Any, told: str) -> None:
     with pytest.raises(ConfigError, match=f"^threads: got {told}\n  expected: .*1 or more"):
         loaded.trajectories(threads=threads)
 
@@ -130,7 +130,7 @@ def with_column(dataset: Dataset, name: str, values: list[Any]) -> Dataset:
 
 
 @pytest.mark.parametrize("threads", [1, 2])
-def test_a_row_that_leads_to_another_trial_is_an_error(loaded: Dataset, threads: int) -> None:
+def test_trajectories_refuse_a_row_with_the_offset_of_another_trial(loaded: Dataset, threads: int) -> None:
     offsets = loaded.throws["chunk_offset"].to_pylist()
     wrong = with_column(loaded, "chunk_offset", [offsets[1], offsets[0], *offsets[2:]])
     with pytest.raises(DatasetError, match=r"quick_00000\.mcap: byte \d+: starts at \d+ ns(.|\n)*expected: trial 0 at"):
@@ -138,20 +138,20 @@ def test_a_row_that_leads_to_another_trial_is_an_error(loaded: Dataset, threads:
 
 
 @pytest.mark.parametrize(("change", "message"), [(3, "chunk: "), (10**9, "chunk: ")])
-def test_a_row_that_leads_nowhere_is_an_error(loaded: Dataset, change: int, message: str) -> None:
+def test_trajectories_refuse_a_row_with_an_offset_that_is_no_chunk(loaded: Dataset, change: int, message: str) -> None:
     offsets = loaded.throws["chunk_offset"].to_pylist()
     with pytest.raises(DatasetError, match=message):
         with_column(loaded, "chunk_offset", [offset + change for offset in offsets]).trajectories()
 
 
-def test_a_wrong_number_of_samples_is_an_error(loaded: Dataset) -> None:
+def test_trajectories_refuse_a_row_with_a_wrong_number_of_samples(loaded: Dataset) -> None:
     samples = loaded.throws["samples"].to_pylist()
     for change in (1, -1):
         with pytest.raises(DatasetError, match="are not the records of"):
             with_column(loaded, "samples", [each + change for each in samples]).trajectories()
 
 
-def test_a_flipped_bit_is_an_error(dataset: Path) -> None:
+def test_trajectories_refuse_a_recording_with_a_flipped_bit(dataset: Path) -> None:
     loaded = throwcollect.load(dataset)
     path, start = dataset / "quick_00002.mcap", loaded[6].row["chunk_offset"]
     whole = path.read_bytes()
@@ -164,7 +164,9 @@ def test_a_flipped_bit_is_an_error(dataset: Path) -> None:
 
 
 @pytest.mark.parametrize("topics", [["clock"], ["clock", "tf", "controller_state"]])
-def test_more_topics_change_nothing(make_collection: Any, loaded: Dataset, tmp_path: Path, topics: list[str]) -> None:
+def test_further_recorded_topics_do_not_change_trajectories(
+    make_collection: Any, loaded: Dataset, tmp_path: Path, topics: list[str]
+) -> None:
     record = {"trials_per_shard": 3, "topics": ["joint_states", "ball/odometry", *topics]}
     more = throwcollect.load(make_collection({"record": record}).collect(tmp_path / "dataset"))
     found, expected = more.trajectories(), loaded.trajectories()

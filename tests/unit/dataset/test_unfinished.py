@@ -1,4 +1,4 @@
-"""Datasets that are still collected, or were interrupted, are read with what they hold so far."""
+"""A dataset that is still being collected, or was interrupted, can be read with its episodes so far."""
 
 from __future__ import annotations
 
@@ -25,9 +25,11 @@ def begin(collection: Any, directory: Path, trials: list[int]) -> Path:
     return directory
 
 
-def test_rows_are_the_trials_that_have_ended(collection: Any, collected: Path, tmp_path: Path) -> None:
+def test_an_unfinished_dataset_has_rows_of_the_trials_that_have_ended(
+    collection: Any, collected: Path, tmp_path: Path
+) -> None:
     collection.refuse(5, "an elbow needs 30 Nm")
-    # The first shard is finished, the second has one of its three, the third none.
+    # The first shard is finished, the second has one of its three episodes, the third has none.
     directory = begin(collection, tmp_path / "dataset", [2, 0, 1, 4])
     with pytest.warns(
         throwcollect.UnfinishedDatasetWarning, match=r"is not finished: it has 5 of 7 trials so far"
@@ -48,7 +50,7 @@ def test_rows_are_the_trials_that_have_ended(collection: Any, collected: Path, t
         _ = dataset.digest
 
 
-def test_what_is_being_collected_is_waited_for_and_not_resumed(collection: Any, tmp_path: Path) -> None:
+def test_a_dataset_that_is_being_collected_advises_wait_and_not_resume(collection: Any, tmp_path: Path) -> None:
     directory = tmp_path / "dataset"
     create(directory, collection.plan)
     with pytest.raises(DatasetError, match=r"is not finished: it has no metadata\.yaml\n  try: throwcollect resume /"):
@@ -67,7 +69,7 @@ def test_what_is_being_collected_is_waited_for_and_not_resumed(collection: Any, 
                 read(directory)
 
 
-def test_what_was_written_last_may_be_cut_off(collection: Any, tmp_path: Path) -> None:
+def test_an_incomplete_last_episode_of_an_unfinished_dataset_is_left_out(collection: Any, tmp_path: Path) -> None:
     directory = begin(collection, tmp_path / "dataset", [0, 1])
     part = directory / "quick_00000.mcap.part"
     part.write_bytes(part.read_bytes()[:-100])
@@ -75,9 +77,7 @@ def test_what_was_written_last_may_be_cut_off(collection: Any, tmp_path: Path) -
         assert [throw.trial for throw in throwcollect.load(directory)] == [0]
 
 
-def test_what_lies_in_a_finished_and_an_unfinished_file_of_a_shard_is_all_found(
-    collection: Any, tmp_path: Path
-) -> None:
+def test_episodes_of_finished_and_unfinished_files_of_a_shard_are_all_found(collection: Any, tmp_path: Path) -> None:
     directory = begin(collection, tmp_path / "dataset", [3])
     other = begin(collection, tmp_path / "other", [4])
     (other / "quick_00001.mcap.part").rename(directory / "quick_00001.mcap")
@@ -85,7 +85,7 @@ def test_what_lies_in_a_finished_and_an_unfinished_file_of_a_shard_is_all_found(
         assert [throw.trial for throw in throwcollect.load(directory).recorded] == [3, 4]
 
 
-def test_a_shard_that_is_finished_while_the_dataset_is_loaded_is_not_left_out(
+def test_a_shard_that_finishes_while_the_dataset_is_loaded_is_included(
     collection: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     create(tmp_path / "dataset", collection.plan)
@@ -104,7 +104,7 @@ def test_a_shard_that_is_finished_while_the_dataset_is_loaded_is_not_left_out(
         assert all(len(throw.ball) for throw in dataset)
 
 
-def test_nothing_yet_is_no_throw(collection: Any, tmp_path: Path) -> None:
+def test_an_unfinished_dataset_without_episodes_has_no_throws(collection: Any, tmp_path: Path) -> None:
     create(tmp_path / "dataset", collection.plan)
     with pytest.warns(throwcollect.UnfinishedDatasetWarning, match="it has 0 of 7 trials"):
         assert len(throwcollect.load(tmp_path / "dataset")) == 0

@@ -1,4 +1,4 @@
-"""Each defect that is planted is found, and named with its file and place."""
+"""Verify finds each planted defect, and names its file and place."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def test_a_sound_dataset_has_no_findings(dataset: Path) -> None:
     assert verify(dataset) == []
 
 
-def test_several_processes_find_the_same(dataset: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_verify_with_several_processes_gives_the_same_findings(dataset: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     started = []
 
     class Pool(ProcessPoolExecutor):
@@ -84,14 +84,14 @@ def test_a_planted_defect_is_found_and_named(dataset: Path, plant: Callable[[Pat
     assert json.loads(json.dumps([asdict(finding) for finding in findings]))
 
 
-def test_what_is_sound_beside_a_defect_is_not_accused(dataset: Path) -> None:
+def test_a_single_defect_gives_a_single_finding(dataset: Path) -> None:
     change_landing(dataset)
     fit_manifest(dataset)
     (finding,) = verify(dataset)
     assert str(finding).startswith("quick_00000.mcap: trial 2: throws.parquet has landing_x_m = 1.25")
 
 
-def test_a_damaged_table_does_not_keep_the_rest_from_being_checked(dataset: Path) -> None:
+def test_damaged_tables_do_not_keep_other_files_from_being_checked(dataset: Path) -> None:
     for plant in (damage_chunk_contents, zero_sector, break_bag_yaml, damage_table, change_plan_seed, delete_card):
         plant(dataset)
     (dataset / "quick_00000.mcap").write_bytes((dataset / "quick_00000.mcap").read_bytes()[:-9])
@@ -116,7 +116,7 @@ def test_recordings_are_checked_even_without_plan_and_configuration(dataset: Pat
     assert not any(file in ("quick_00000.mcap", "quick_00002.mcap", "metadata.yaml") for file, _ in found)
 
 
-def test_a_damaged_stretch_is_told_with_its_end_and_hides_nothing_behind_it(dataset: Path) -> None:
+def test_a_damaged_stretch_is_reported_with_its_end_and_hides_no_later_defect(dataset: Path) -> None:
     zero_sector(dataset)
     second, third = (pq.read_table(dataset / "throws.parquet")["chunk_offset"].to_pylist()[trial] for trial in (4, 5))
     flip(dataset / SHARD, third + 2000)
@@ -126,8 +126,8 @@ def test_a_damaged_stretch_is_told_with_its_end_and_hides_nothing_behind_it(data
     assert findings[0].problem.endswith(f"the next episode is at byte {third}")
 
 
-def test_a_changed_sample_is_found_even_if_all_checksums_are_made_to_fit(dataset: Path) -> None:
-    """Somebody rewrites one number of a chunk, its CRC and its size: the hash still says so."""
+def test_a_changed_sample_is_found_although_its_crc_fits(dataset: Path) -> None:
+    """One number of a chunk is changed, with its CRC and size: the SHA-256 still differs."""
     path = dataset / SHARD
     episode = find_stored(path, 4)
     contents = bytearray(episode.episode.chunk.decompress())
@@ -143,7 +143,7 @@ def test_a_changed_sample_is_found_even_if_all_checksums_are_made_to_fit(dataset
 
 
 def kick_ball(samples: Samples, header: EpisodeHeader) -> tuple[Samples, EpisodeHeader]:
-    """In the middle of the flight the ball gains a micrometre per second, and nothing touches it."""
+    """In the middle of the flight the ball gains a micrometre per second without a contact."""
     if header.trial != 2:
         return samples, header
     half = (len(samples) + 100) // 2
@@ -161,7 +161,7 @@ def leave_out_a_sample(samples: Samples, header: EpisodeHeader) -> tuple[Samples
 
 
 def late(samples: Samples, header: EpisodeHeader) -> tuple[Samples, EpisodeHeader]:
-    """The trial ran in another slot of time; its contacts with it."""
+    """The trial and its contacts are 1 ns late in their slot of time."""
     if header.trial != 2:
         return samples, header
     contacts = tuple(
@@ -196,20 +196,20 @@ def test_an_episode_that_contradicts_physics_or_its_header_is_found(
 def test_latched_topics_of_another_robot_are_found(
     make_collection: Any, collection: Any, tmp_path: Path, dataset: Path
 ) -> None:
-    """A shard recorded with another height of the base: only its static transforms tell."""
+    """A shard recorded with another height of the base: only its static transforms differ."""
     other = make_collection({"robot": {"base_height_m": 1.1}}).collect(tmp_path / "other")
     (dataset / SHARD).write_bytes((other / SHARD).read_bytes())
     assert any("/tf_static does not fit" in str(finding) for finding in verify(dataset))
 
 
-def test_a_file_cut_anywhere_is_reported_and_never_raises(dataset: Path) -> None:
+def test_a_recording_cut_anywhere_is_reported_without_an_exception(dataset: Path) -> None:
     whole = (dataset / "quick_00002.mcap").read_bytes()
     for size in (0, 8, 17, 40, 5000, len(whole) // 2, len(whole) - 30, len(whole) - 1):
         (dataset / "quick_00002.mcap").write_bytes(whole[:size])
         assert any(finding.file == "quick_00002.mcap" for finding in verify(dataset)), size
 
 
-def test_random_damage_is_always_found_and_never_raises(make_collection: Any, tmp_path: Path) -> None:
+def test_random_damage_is_always_reported_without_an_exception(make_collection: Any, tmp_path: Path) -> None:
     path = make_collection({"trials": 1}).collect(tmp_path / "dataset") / "quick_00000.mcap"
     whole = path.read_bytes()
     random = np.random.default_rng(0)
@@ -219,7 +219,7 @@ def test_random_damage_is_always_found_and_never_raises(make_collection: Any, tm
         path.write_bytes(whole)
 
 
-def test_huge_announced_sizes_are_refused_without_being_believed(dataset: Path) -> None:
+def test_a_chunk_that_announces_a_huge_size_is_reported(dataset: Path) -> None:
     path = dataset / SHARD
     chunk = find_stored(path, 4).chunks[0].record
     data = bytearray(path.read_bytes())
@@ -228,13 +228,13 @@ def test_huge_announced_sizes_are_refused_without_being_believed(dataset: Path) 
     assert any("as announced" in str(finding) for finding in verify(dataset))
 
 
-def test_a_list_in_place_of_a_files_name_is_told_beside_a_file_that_cannot_be_read(dataset: Path) -> None:
+def test_a_list_as_file_name_in_metadata_is_reported_beside_a_damaged_file(dataset: Path) -> None:
     (dataset / "quick_00000.mcap").write_bytes(b"")
     replace_text(dataset / "metadata.yaml", "path: quick_00001.mcap", "path: [1]")
     assert ("metadata.yaml", "files: quick_00001.mcap") in {(each.file, each.place) for each in verify(dataset)}
 
 
-def test_only_a_finished_dataset_is_verified(collection: Any, tmp_path: Path) -> None:
+def test_verify_of_an_unfinished_dataset_is_an_error(collection: Any, tmp_path: Path) -> None:
     create(tmp_path / "dataset", collection.plan)
     with pytest.raises(DatasetError, match="is not finished"):
         verify(tmp_path / "dataset")

@@ -28,7 +28,7 @@ def files_of(directory: Path) -> dict[str, bytes]:
 
 @contextmanager
 def file_size_limit(size: int) -> Iterator[None]:
-    """No file may grow beyond a size: the nearest thing to a full disk that needs no root."""
+    """No file may grow beyond a size: like a full disk, but without being root."""
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
     try:
@@ -38,20 +38,22 @@ def file_size_limit(size: int) -> Iterator[None]:
 
 
 @pytest.mark.parametrize("order", [(6, 5, 4, 3, 2, 1, 0), (3, 0, 6, 1, 4, 2, 5), (2, 5, 1, 4, 0, 3, 6)])
-def test_files_do_not_depend_on_the_order_of_arrival(collection: Any, tmp_path: Path, order: tuple[int, ...]) -> None:
+def test_files_do_not_depend_on_the_order_in_which_episodes_arrive(
+    collection: Any, tmp_path: Path, order: tuple[int, ...]
+) -> None:
     expected = files_of(collection.collect(tmp_path / "in_order", lost=[4]))
     shuffled = files_of(collection.collect(tmp_path / "shuffled", order, lost=[4]))
     assert expected.keys() == shuffled.keys()
     assert {name for name in expected if expected[name] != shuffled[name]} <= MAY_DIFFER
 
 
-def test_nothing_under_run_changes_a_file(make_collection: Any, tmp_path: Path) -> None:
+def test_keys_under_run_do_not_change_the_files(make_collection: Any, tmp_path: Path) -> None:
     one = files_of(make_collection({"run": {"simulations": 1}}).collect(tmp_path / "one"))
     other = files_of(make_collection({"run": {"simulations": 9, "retries": 0}}).collect(tmp_path / "other"))
     assert {name for name in one if one[name] != other[name]} <= MAY_DIFFER
 
 
-def test_a_shard_is_beside_its_name_until_its_last_trial_is_in(collection: Any, tmp_path: Path) -> None:
+def test_a_shard_has_a_temporary_name_until_its_last_trial_is_in(collection: Any, tmp_path: Path) -> None:
     directory = tmp_path / "dataset"
     writer = DatasetWriter.create(directory, collection.plan)
     collection.fill(writer, [1, 2])
@@ -63,9 +65,7 @@ def test_a_shard_is_beside_its_name_until_its_last_trial_is_in(collection: Any, 
     writer.close()
 
 
-def test_a_shard_whose_first_episode_had_no_room_leaves_nothing_if_all_its_trials_are_lost(
-    collection: Any, tmp_path: Path
-) -> None:
+def test_a_shard_without_any_episode_leaves_no_file(collection: Any, tmp_path: Path) -> None:
     directory = tmp_path / "dataset"
     writer = DatasetWriter.create(directory, collection.plan)
     with file_size_limit(0), pytest.raises(DatasetError, match="cannot be written"):
@@ -78,7 +78,7 @@ def test_a_shard_whose_first_episode_had_no_room_leaves_nothing_if_all_its_trial
 
 
 def test_an_open_shard_holds_each_episode_as_soon_as_it_is_appended(collection: Any, tmp_path: Path) -> None:
-    """What `kill -9` leaves behind are whole records: every chunk is followed by the metadata that name its trial."""
+    """`kill -9` leaves whole records: every chunk is followed by the metadata that name its trial."""
     from mcap.records import Chunk, Metadata
     from mcap.stream_reader import StreamReader
 
@@ -107,7 +107,7 @@ def test_a_lost_trial_has_a_row_but_no_episode(collection: Any, tmp_path: Path) 
     assert verify(directory) == []
 
 
-def test_a_refused_trial_is_not_waited_for(collection: Any, tmp_path: Path) -> None:
+def test_a_dataset_is_finished_without_its_refused_trials(collection: Any, tmp_path: Path) -> None:
     collection.refuse(0, "too fast")
     collection.refuse(6, "too far")
     directory = collection.collect(tmp_path / "dataset", range(1, 6))
@@ -121,7 +121,7 @@ def test_a_refused_trial_is_not_waited_for(collection: Any, tmp_path: Path) -> N
     assert verify(directory) == []
 
 
-def test_rows_say_what_the_throw_did_with_units_and_descriptions(collection: Any, dataset: Path) -> None:
+def test_rows_hold_the_results_of_throws_and_columns_have_descriptions(collection: Any, dataset: Path) -> None:
     table = pq.read_table(dataset / "throws.parquet")
     result = collection.result(collection.episode(2))
     row = table.to_pylist()[2]
@@ -141,24 +141,24 @@ def test_rows_say_what_the_throw_did_with_units_and_descriptions(collection: Any
     assert all(field.metadata[b"description"].endswith(b".") for field in table.schema)
 
 
-def test_the_configuration_that_is_kept_loads_to_the_same_plan(collection: Any, dataset: Path) -> None:
+def test_the_configuration_in_the_dataset_loads_back_equal(collection: Any, dataset: Path) -> None:
     assert load(dataset / "config.yaml") == collection.config
 
 
-def test_a_directory_that_holds_files_is_refused(collection: Any, tmp_path: Path) -> None:
+def test_a_dataset_cannot_be_created_in_a_directory_with_files(collection: Any, tmp_path: Path) -> None:
     (tmp_path / "notes.txt").write_text("mine")
     with pytest.raises(ConfigError, match=r"holds notes\.txt"):
         create(tmp_path, collection.plan)
     assert files_of(tmp_path) == {"notes.txt": b"mine"}
 
 
-def test_a_path_below_a_file_is_refused(collection: Any, tmp_path: Path) -> None:
+def test_a_dataset_cannot_be_created_below_a_file(collection: Any, tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(ConfigError, match="cannot be used as directory of a dataset"):
         create(tmp_path / "file" / "dataset", collection.plan)
 
 
-def test_a_directory_that_cannot_be_written_leaves_nothing_behind(collection: Any, tmp_path: Path) -> None:
+def test_a_dataset_that_cannot_be_written_leaves_no_directory(collection: Any, tmp_path: Path) -> None:
     with (
         file_size_limit(2000),
         pytest.raises(DatasetError, match=r"plan\.parquet.*cannot be written|cannot be written"),
@@ -167,7 +167,7 @@ def test_a_directory_that_cannot_be_written_leaves_nothing_behind(collection: An
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_full_disk_is_one_error_and_costs_one_episode(collection: Any, tmp_path: Path) -> None:
+def test_an_episode_that_does_not_fit_on_the_disk_leaves_the_shard_as_it_was(collection: Any, tmp_path: Path) -> None:
     writer = DatasetWriter.create(tmp_path / "dataset", collection.plan)
     collection.fill(writer, [0])
     part = tmp_path / "dataset" / "quick_00000.mcap.part"
@@ -175,13 +175,13 @@ def test_a_full_disk_is_one_error_and_costs_one_episode(collection: Any, tmp_pat
     with file_size_limit(size + 1000), pytest.raises(DatasetError, match=r"quick_00000\.mcap\.part: cannot be written"):
         collection.fill(writer, [1])
     assert part.stat().st_size == size
-    # When there is space again, nothing of the failure is left.
+    # When there is space again, the failure has no effect.
     collection.fill(writer, range(1, 7))
     writer.finish(wall_s=1.0)
     assert verify(tmp_path / "dataset") == []
 
 
-def test_a_disk_that_is_full_from_the_start_leaves_an_empty_shard(collection: Any, tmp_path: Path) -> None:
+def test_collecting_can_go_on_after_the_first_episode_did_not_fit_on_the_disk(collection: Any, tmp_path: Path) -> None:
     writer = DatasetWriter.create(tmp_path / "dataset", collection.plan)
     with file_size_limit(5000), pytest.raises(DatasetError, match="cannot be written: File too large"):
         collection.fill(writer, [0])
@@ -190,12 +190,12 @@ def test_a_disk_that_is_full_from_the_start_leaves_an_empty_shard(collection: An
     assert verify(tmp_path / "dataset") == []
 
 
-def test_a_disk_that_is_full_at_the_end_leaves_the_episodes(collection: Any, tmp_path: Path) -> None:
+def test_a_shard_that_cannot_be_finished_on_a_full_disk_stays_unfinished(collection: Any, tmp_path: Path) -> None:
     directory = tmp_path / "dataset"
     writer = DatasetWriter.create(directory, collection.plan)
     collection.fill(writer, [0, 1])
     finished = collection.collect(tmp_path / "elsewhere") / "quick_00000.mcap"
-    # The finished file is larger than the open one, by its summary.
+    # The finished file is larger than the open one by its summary.
     with (
         file_size_limit(finished.stat().st_size - 100),
         pytest.raises(DatasetError, match=r"quick_00000\.mcap: cannot be written"),
@@ -205,7 +205,7 @@ def test_a_disk_that_is_full_at_the_end_leaves_the_episodes(collection: Any, tmp
     writer.close()
 
 
-def test_an_episode_is_taken_once_and_only_if_it_is_waited_for(collection: Any, tmp_path: Path) -> None:
+def test_the_writer_refuses_second_refused_and_unknown_episodes(collection: Any, tmp_path: Path) -> None:
     collection.refuse(3, "too fast")
     writer = DatasetWriter.create(tmp_path / "dataset", collection.plan)
     collection.fill(writer, [0])
@@ -221,7 +221,7 @@ def test_an_episode_is_taken_once_and_only_if_it_is_waited_for(collection: Any, 
     writer.close()
 
 
-def test_a_damaged_episode_is_not_written(collection: Any, tmp_path: Path) -> None:
+def test_the_writer_refuses_a_damaged_episode(collection: Any, tmp_path: Path) -> None:
     writer = DatasetWriter.create(tmp_path / "dataset", collection.plan)
     whole = collection.episode(0)
     chunk = whole.chunk
@@ -242,7 +242,7 @@ def test_a_dataset_with_missing_trials_is_not_finished(collection: Any, tmp_path
     writer.close()
 
 
-def test_another_process_can_fill_what_was_created(collection: Any, tmp_path: Path) -> None:
+def test_a_dataset_that_was_created_can_be_filled_by_another_writer(collection: Any, tmp_path: Path) -> None:
     create(tmp_path / "dataset", collection.plan)
     writer = DatasetWriter.open(tmp_path / "dataset")
     assert writer.plan == collection.plan
@@ -251,6 +251,6 @@ def test_another_process_can_fill_what_was_created(collection: Any, tmp_path: Pa
     assert verify(tmp_path / "dataset") == []
 
 
-def test_what_was_not_created_cannot_be_opened(tmp_path: Path) -> None:
+def test_a_writer_cannot_open_a_directory_without_a_dataset(tmp_path: Path) -> None:
     with pytest.raises(DatasetError, match=r"holds no config\.yaml"):
         DatasetWriter.open(tmp_path)

@@ -23,7 +23,7 @@ def source(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return collection.collect(tmp_path_factory.mktemp("cli") / "source", [0, 1, 3, 4, 5, 6], lost=[4])
 
 
-def test_what_was_left_out_is_said(source: Path, tmp_path: Path) -> None:
+def test_commands_say_how_many_trials_without_an_episode_were_left_out(source: Path, tmp_path: Path) -> None:
     text = run("filter", source, tmp_path / "a", "--where", "trial < 6")
     assert re.fullmatch(
         rf"{tmp_path}/a: 4 of 7 trials\n  digest  [0-9a-f]{{64}}\n"
@@ -54,7 +54,7 @@ def test_a_split_says_how_many_trials_and_cells_each_part_has(source: Path, tmp_
     assert found["without_episode"] == {"lost": 1, "refused": 1}
 
 
-def test_statistics_are_tables_or_json(source: Path) -> None:
+def test_stats_prints_a_table_or_json_with_the_same_numbers(source: Path) -> None:
     text = run("stats", source)
     assert text.startswith("7 trials: 5 landed, 1 lost, 1 refused\n\nthrows ")
     found = json.loads(run("stats", source, "--json"))

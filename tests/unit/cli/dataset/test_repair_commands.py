@@ -33,7 +33,7 @@ def run(monkeypatch: pytest.MonkeyPatch) -> Run:
 
     def run(*arguments: str | Path) -> int:
         monkeypatch.setattr(sys, "argv", ["throwcollect", *map(str, arguments)])
-        # Otherwise it would stay so for the tests that follow.
+        # `main` sets handlers of signals, which would stay for the tests that follow.
         monkeypatch.setattr(signal, "signal", lambda *_: None)
         with pytest.raises(SystemExit) as ended:
             main()
@@ -77,8 +77,10 @@ def test_rebuild_says_what_it_wrote(run: Run, source: Path, capsys: pytest.Captu
     }
 
 
-def test_rebuild_says_what_is_judged_otherwise(run: Run, source: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """As in a dataset of before an outcome was known."""
+def test_rebuild_lists_throws_that_are_judged_otherwise_than_before(
+    run: Run, source: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """As in a dataset that is older than one of the outcomes."""
     table = pq.read_table(source / "throws.parquet")
     card, metadata = (source / "README.md").read_text(), (source / "metadata.yaml").read_bytes()
 
@@ -144,7 +146,7 @@ def test_repair_lists_what_is_lost_and_ends_with_5(
     assert run("dataset", "verify", output) == 0
 
 
-def test_repair_that_keeps_another_episode_than_the_tables_ends_with_5(
+def test_repair_ends_with_5_if_a_kept_episode_differs_from_the_table(
     run: Run, source: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     def scale_efforts(samples: Samples, header: EpisodeHeader) -> tuple[Samples, EpisodeHeader]:

@@ -19,7 +19,7 @@ DIFFERENT = Comparison(5, "aa", "bb", ("samples: 300 stored, 301 now", "effort: 
 
 @pytest.fixture
 def chosen(monkeypatch: pytest.MonkeyPatch) -> list[int]:
-    """Trials that are replayed; trial 5 comes out otherwise, trial 3 has no episode."""
+    """The trials that are replayed; the replay of trial 5 differs, trial 3 has no episode."""
     trials: list[int] = []
     shards = ["a.mcap" if trial != 3 else None for trial in range(20)]
     throws = pa.table({"trial": range(20), "shard": shards})
@@ -40,13 +40,15 @@ def chosen(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     return trials
 
 
-def test_throws_that_come_out_again_are_counted(chosen: list[int], capsys: pytest.CaptureFixture[str]) -> None:
+def test_replay_counts_the_throws_that_are_the_same_again(
+    chosen: list[int], capsys: pytest.CaptureFixture[str]
+) -> None:
     replay_dataset(Path("data"), [4, 7, 4], everything=False, sample=None, json=False)
     assert chosen == [4, 7]
     assert capsys.readouterr().out == "data: 2 throws replayed, the same bit for bit\n"
 
 
-def test_a_throw_that_comes_out_otherwise_is_an_error_with_its_differences(
+def test_a_throw_that_replays_otherwise_is_an_error_and_its_differences_are_printed(
     chosen: list[int], capsys: pytest.CaptureFixture[str]
 ) -> None:
     with pytest.raises(DatasetError, match="data: 1 of 2 throws came out differently"):
@@ -55,12 +57,12 @@ def test_a_throw_that_comes_out_otherwise_is_an_error_with_its_differences(
 
 
 @pytest.mark.usefixtures("chosen")
-def test_a_trial_that_there_is_not_is_a_wrong_request() -> None:
+def test_replaying_a_trial_that_does_not_exist_is_refused() -> None:
     with pytest.raises(ConfigError, match="data: no trial 20\n  expected: 0 to 19"):
         replay_dataset(Path("data"), [20], everything=False, sample=None, json=False)
 
 
-def test_programs_get_every_comparison(chosen: list[int], capsys: pytest.CaptureFixture[str]) -> None:
+def test_replay_with_json_prints_every_comparison(chosen: list[int], capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(DatasetError, match="1 of 19 throws"):
         replay_dataset(Path("data"), [], everything=True, sample=None, json=True)
     found = json.loads(capsys.readouterr().out)
@@ -68,7 +70,7 @@ def test_programs_get_every_comparison(chosen: list[int], capsys: pytest.Capture
     assert found[4]["differences"] == list(DIFFERENT.differences)
 
 
-def test_a_sample_is_always_the_same(chosen: list[int]) -> None:
+def test_replay_draws_the_same_sample_each_time(chosen: list[int]) -> None:
     for _ in range(2):
         replay_dataset(Path("data"), [], everything=True, sample=4, json=True)
     assert len(set(chosen)) == 4
@@ -83,7 +85,7 @@ def test_a_sample_is_always_the_same(chosen: list[int]) -> None:
         ([1], False, 3, "--sample: should be given with --all"),
     ],
 )
-def test_it_must_be_clear_which_throws_are_meant(
+def test_replay_refuses_options_that_leave_unclear_which_throws_are_meant(
     trials: list[int], everything: bool, sample: int | None, message: str
 ) -> None:
     with pytest.raises(ConfigError, match=message):

@@ -20,7 +20,7 @@ def source(tmp_path: Path) -> Path:
 
 @pytest.fixture
 def replays(monkeypatch: pytest.MonkeyPatch) -> list[int]:
-    """Trials that are replayed; trial 1 comes out otherwise."""
+    """The trials that are replayed; the replay of trial 1 differs."""
     trials: list[int] = []
 
     def replay(_: Path, wanted: Sequence[int]) -> Iterator[Comparison]:
@@ -31,14 +31,16 @@ def replays(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     return trials
 
 
-def test_what_only_a_replay_tells_is_said_with_the_command(source: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_verify_of_a_sound_dataset_names_the_command_that_replays_it(
+    source: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     verify_dataset(source, replay=None, json=False)
     first, second = capsys.readouterr().out.splitlines()
     assert first == f"{source}: nothing wrong"
     assert f"throwcollect dataset verify '{source}' --replay 100" in second
 
 
-def test_where_nothing_can_be_simulated_no_command_is_named_but_what_is_missing(
+def test_without_an_engine_verify_names_the_missing_package_and_no_replay_command(
     source: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("throwcollect.extras.is_installed", lambda package: package != "pybullet")
@@ -48,7 +50,7 @@ def test_where_nothing_can_be_simulated_no_command_is_named_but_what_is_missing(
     assert "--replay" not in second
 
 
-def test_a_throw_that_comes_out_otherwise_is_a_finding(
+def test_a_throw_that_replays_otherwise_is_a_finding_of_verify(
     source: Path, replays: list[int], capsys: pytest.CaptureFixture[str]
 ) -> None:
     with pytest.raises(DatasetError, match="1 finding"):
@@ -59,7 +61,7 @@ def test_a_throw_that_comes_out_otherwise_is_a_finding(
     ]
 
 
-def test_the_seed_chooses_what_is_replayed(source: Path, replays: list[int]) -> None:
+def test_verify_replays_the_same_throws_each_time(source: Path, replays: list[int]) -> None:
     for _ in range(2):
         with suppress(DatasetError):
             verify_dataset(source, replay=2, json=False)
@@ -67,7 +69,7 @@ def test_the_seed_chooses_what_is_replayed(source: Path, replays: list[int]) -> 
     assert replays[:2] == replays[2:]
 
 
-def test_a_dataset_that_cannot_be_opened_is_still_told_about(
+def test_verify_reports_a_dataset_that_cannot_be_opened_for_a_replay(
     source: Path, replays: list[int], capsys: pytest.CaptureFixture[str]
 ) -> None:
     (source / "throws.parquet").unlink()

@@ -1,4 +1,4 @@
-"""The command that makes throws ready for viewers, as `docs/viewing.md` shows it."""
+"""`dataset view`, which prepares throws for viewers, does what `docs/viewing.md` shows."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from throwcollect.errors import ConfigError
 PAGE = Path(__file__).parents[4] / "docs" / "viewing.md"
 
 
-def test_trials_are_numbers_and_ranges_in_the_order_given() -> None:
+def test_view_takes_trials_as_numbers_and_ranges_in_the_given_order() -> None:
     assert read_trials("7-9, 3,5-5") == [7, 8, 9, 3, 5]
 
 
@@ -34,12 +34,14 @@ def test_trials_are_numbers_and_ranges_in_the_order_given() -> None:
         ("3,1-4", "'3,1-4' names a trial twice"),
     ],
 )
-def test_anything_else_is_refused(text: str, message: str) -> None:
+def test_view_refuses_malformed_lists_of_trials(text: str, message: str) -> None:
     with pytest.raises(ConfigError, match=f"--trials: {re.escape(message)}"):
         read_trials(text)
 
 
-def test_the_page_says_what_the_command_writes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_page_on_viewing_lists_the_files_and_topics_that_view_writes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     page = PAGE.read_text(encoding="utf-8")
     (command,) = re.findall(r"^throwcollect (dataset view .*)$", page, re.MULTILINE)
     monkeypatch.chdir(tmp_path)
@@ -59,7 +61,7 @@ def test_the_page_says_what_the_command_writes(tmp_path: Path, monkeypatch: pyte
     assert topics == set(re.findall(r"name: (/.*)", recorded))
 
 
-def test_the_command_says_what_to_do_next(tmp_path: Path) -> None:
+def test_view_prints_the_command_that_opens_the_recording(tmp_path: Path) -> None:
     Collection({"trials": 1}).collect(tmp_path / "quick")
     output = tmp_path / "my view"
     result = CliRunner().invoke(app, ["dataset", "view", str(tmp_path / "quick"), str(output)], catch_exceptions=False)

@@ -146,7 +146,7 @@ def start(*arguments: str) -> subprocess.Popen[str]:
     )
 
 
-def test_nodes_topics_services_and_actions_are_listed_without_what_is_hidden(say: Callable[..., Said]) -> None:
+def test_lists_of_nodes_topics_services_and_actions_leave_out_hidden_names(say: Callable[..., Said]) -> None:
     assert say("node", "list") == (0, "/robot/driver\n", "")
     assert say("action", "list", "-t") == (0, f"{FOLLOW} [{FJT.TYPE}]\n", "")
     topics = say("topic", "list", "-t").out.splitlines()
@@ -158,7 +158,7 @@ def test_nodes_topics_services_and_actions_are_listed_without_what_is_hidden(say
     assert all(service.startswith("/robot/") for service in services)
 
 
-def test_a_node_is_told_with_all_that_it_has(say: Callable[..., Said]) -> None:
+def test_node_info_lists_topics_services_and_actions_of_the_node(say: Callable[..., Said]) -> None:
     lines = say("node", "info", "robot/driver").out.splitlines()
     assert lines[0] == "/robot/driver"
     sections = [line.strip(" :") for line in lines if line.startswith("  ") and not line.startswith("    ")]
@@ -169,7 +169,7 @@ def test_a_node_is_told_with_all_that_it_has(say: Callable[..., Said]) -> None:
     assert lines[lines.index("  Action Servers:") + 1] == f"    {FOLLOW}: {FJT.TYPE}"
 
 
-def test_a_topic_is_told_with_its_publishers(say: Callable[..., Said]) -> None:
+def test_topic_info_shows_the_type_and_the_publishers(say: Callable[..., Said]) -> None:
     assert say("topic", "info", "robot/states").out == (
         "Type: sensor_msgs/msg/JointState\nPublisher count: 1\nSubscription count: 0\n"
     )
@@ -178,14 +178,14 @@ def test_a_topic_is_told_with_its_publishers(say: Callable[..., Said]) -> None:
     assert "  Durability: TRANSIENT_LOCAL" in lines
 
 
-def test_a_latched_message_is_echoed_to_who_comes_late_and_cut_off_unless_wanted_in_full(
+def test_topic_echo_shows_a_latched_message_and_shortens_it_unless_asked_for_all(
     say: Callable[..., Said],
 ) -> None:
     assert say("topic", "echo", "/robot/description", "--once").out == f"data: {'x' * 128}...\n---\n"
     assert say("topic", "echo", "/robot/description", "--once", "-f").out == f"data: {'x' * 200}\n---\n"
 
 
-def test_a_message_or_one_of_its_fields_is_echoed_as_yaml(say: Callable[..., Said]) -> None:
+def test_topic_echo_prints_a_message_or_one_of_its_fields_as_yaml(say: Callable[..., Said]) -> None:
     text = say("topic", "echo", "/robot/states", "sensor_msgs/JointState", "--once").out.removesuffix("---\n")
     assert YAML(typ="safe").load(text) == {
         "header": {"stamp": {"sec": 0, "nanosec": 0}, "frame_id": ""},
@@ -200,7 +200,7 @@ def test_a_message_or_one_of_its_fields_is_echoed_as_yaml(say: Callable[..., Sai
     assert say("topic", "echo", "/robot/states", "--once", "--field", "position").out == "- 1.5\n---\n"
 
 
-def test_a_service_is_called_with_values_in_yaml(say: Callable[..., Said]) -> None:
+def test_service_call_takes_its_values_as_yaml(say: Callable[..., Said]) -> None:
     said = say("service", "call", "/robot/switch", "std_srvs/SetBool", "{data: true}")
     assert said.code == 0
     assert said.out == (
@@ -224,7 +224,7 @@ def test_parameters_are_listed_read_and_set(say: Callable[..., Said]) -> None:
     assert say("param", "set", "/robot/driver", "limit", "-1").err.endswith("value: -1\n"), "a number, and no option"
 
 
-def test_a_goal_is_sent_and_its_result_told(say: Callable[..., Said]) -> None:
+def test_action_send_prints_feedback_and_result_of_a_goal(say: Callable[..., Said]) -> None:
     goal = "{trajectory: {joint_names: [succeed], points: [{positions: [1, 2], time_from_start: {sec: 1}}]}}"
     said = say("action", "send", FOLLOW, FJT.TYPE, goal, "-f")
     assert said.code == 0, said.err
@@ -234,7 +234,7 @@ def test_a_goal_is_sent_and_its_result_told(say: Callable[..., Said]) -> None:
     assert said.out.endswith("Goal finished with status: SUCCEEDED\n")
 
 
-def test_a_goal_that_is_not_reached_is_exit_code_1_and_a_rejected_one_2(say: Callable[..., Said]) -> None:
+def test_an_aborted_goal_ends_with_exit_code_1_and_a_rejected_goal_with_2(say: Callable[..., Said]) -> None:
     said = say("action", "send_goal", FOLLOW, FJT.TYPE, "{trajectory: {joint_names: [abort]}}")
     assert (said.code, said.err) == (1, f"throwcollect: {FOLLOW}: the goal was not reached: ABORTED\n")
     said = say("action", "send", FOLLOW, FJT.TYPE, "{}")
@@ -280,7 +280,7 @@ def test_a_goal_that_is_not_reached_is_exit_code_1_and_a_rejected_one_2(say: Cal
         ("topic list --run nobody-1234", "no run 'nobody-1234'"),
     ],
 )
-def test_a_wrong_request_is_one_clear_message_and_exit_code_2(
+def test_a_wrong_argument_gives_one_clear_message_and_exit_code_2(
     arguments: str, message: str, say: Callable[..., Said], monkeypatch: pytest.MonkeyPatch, tmp_path: Any
 ) -> None:
     monkeypatch.setenv("THROWCOLLECT_STATE", str(tmp_path))
@@ -288,12 +288,14 @@ def test_a_wrong_request_is_one_clear_message_and_exit_code_2(
     said = say(*words)
     assert (said.code, said.out) == (2, "")
     assert message in said.err
-    # The robot, which logs here too, may have been faster.
+    # The robot logs to the same stream, maybe before the command.
     assert "\nthrowcollect: " in f"\n{said.err}"
     assert "internal error" not in said.err
 
 
-def test_without_a_router_there_is_one_clear_message(say: Callable[..., Said], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_a_router_commands_say_that_there_is_no_session(
+    say: Callable[..., Said], monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr("rclzenoh.session._PATIENCE_S", 0.1)
     monkeypatch.setenv(OVERRIDE_VARIABLE, 'connect/endpoints=["tcp/127.0.0.1:9"]')
     said = say("node", "list")
@@ -302,7 +304,7 @@ def test_without_a_router_there_is_one_clear_message(say: Callable[..., Said], m
     assert "--run RUN" in said.err
 
 
-def test_a_run_is_joined_by_its_name_or_directory(
+def test_commands_join_a_run_by_its_name_or_directory(
     endpoint: str, say: Callable[..., Said], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.setenv("THROWCOLLECT_STATE", str(tmp_path))
@@ -342,7 +344,7 @@ def test_a_run_is_joined_by_its_name_or_directory(
     assert "its launcher died" in say("node", "list", "--run", run.run).err
 
 
-def test_a_run_on_fast_dds_is_joined_by_a_profile_that_its_owner_alone_can_read(
+def test_env_for_a_run_on_fast_dds_writes_a_profile_that_only_its_owner_can_read(
     say: Callable[..., Said], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.setenv("THROWCOLLECT_STATE", str(tmp_path))
@@ -379,7 +381,7 @@ def test_a_run_on_fast_dds_is_joined_by_a_profile_that_its_owner_alone_can_read(
     run.close()
 
 
-def test_leaving_an_echo_by_ctrl_c_is_quiet(endpoint: str) -> None:
+def test_ctrl_c_ends_topic_echo_without_a_message(endpoint: str) -> None:
     process = start("topic", "echo", "/robot/states", "--field", "name")
     assert process.stdout is not None
     assert process.stdout.readline() == "- a\n"
@@ -388,7 +390,7 @@ def test_leaving_an_echo_by_ctrl_c_is_quiet(endpoint: str) -> None:
     assert (process.returncode, err) == (130, "")
 
 
-def test_the_rate_of_a_topic_is_told_every_second(endpoint: str) -> None:
+def test_topic_hz_prints_the_rate_of_a_topic_until_ctrl_c(endpoint: str) -> None:
     process = start("topic", "hz", "/robot/states")
     assert process.stdout is not None
     words = (process.stdout.readline() + process.stdout.readline()).split()
@@ -400,12 +402,12 @@ def test_the_rate_of_a_topic_is_told_every_second(endpoint: str) -> None:
 
 
 @pytest.mark.parametrize(("joints", "line"), [("wait", "Goal accepted"), ("wait, late", "Sending goal")])
-def test_ctrl_c_cancels_the_goal(endpoint: str, joints: str, line: str) -> None:
+def test_ctrl_c_cancels_the_goal_of_action_send(endpoint: str, joints: str, line: str) -> None:
     process = start("action", "send", FOLLOW, FJT.TYPE, f"{{trajectory: {{joint_names: [{joints}]}}}}")
     assert process.stdout is not None
     while not process.stdout.readline().startswith(line):
         assert process.poll() is None
-    # Until the goal has left; it is accepted later.
+    # Until the goal is sent; "late" goals are accepted after the signal.
     time.sleep(0.2)
     process.send_signal(signal.SIGINT)
     out, err = process.communicate(timeout=10)
@@ -416,12 +418,10 @@ def test_ctrl_c_cancels_the_goal(endpoint: str, joints: str, line: str) -> None:
 @pytest.mark.parametrize(
     "command", [("echo", "/robot/states"), ("echo", "/robot/description"), ("hz", "/robot/states")], ids=" ".join
 )
-def test_a_reader_that_leaves_early_is_no_error_even_if_nothing_more_comes(
-    endpoint: str, command: tuple[str, str]
-) -> None:
+def test_topic_commands_end_without_an_error_when_their_reader_leaves(endpoint: str, command: tuple[str, str]) -> None:
     process = start("topic", *command)
     assert process.stdout is not None
-    # The description has two lines: after these, nothing is written that could tell the command of its reader's end.
+    # The description has two lines: after these, no failed write could show the command that its reader left.
     for _ in range(2):
         process.stdout.readline()
     process.stdout.close()
@@ -435,7 +435,7 @@ def test_a_reader_that_leaves_early_is_no_error_even_if_nothing_more_comes(
         process.stderr.close()
 
 
-def test_a_service_that_goes_away_before_it_answers_is_told() -> None:
+def test_service_call_fails_if_the_service_dies_before_it_answers() -> None:
     server = (
         "from throwcollect import ros\n"
         "ros.init(); node = ros.Node('n')\n"
