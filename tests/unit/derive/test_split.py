@@ -120,7 +120,9 @@ def test_cells_can_be_defined_by_any_expression(some: Path) -> None:
         ("train=0.999999,test=0.000001", "test would get none of the 12 trials"),
     ],
 )
-def test_wrong_fractions_are_explained(some: Path, tmp_path: Path, fractions: str, message: str) -> None:
+def test_a_split_by_wrong_fractions_is_refused_with_a_reason(
+    some: Path, tmp_path: Path, fractions: str, message: str
+) -> None:
     with pytest.raises(ConfigError, match=f"^fractions: .*{message}"):
         split(some, tmp_path / "parts", fractions=fractions)
     assert not list(tmp_path.iterdir())
@@ -138,7 +140,7 @@ def test_wrong_fractions_are_explained(some: Path, tmp_path: Path, fractions: st
         ("outcome=1", "should be a number, is text"),
     ],
 )
-def test_wrong_cells_are_explained(some: Path, tmp_path: Path, axis: str, message: str) -> None:
+def test_a_split_by_wrong_cells_is_refused_with_a_reason(some: Path, tmp_path: Path, axis: str, message: str) -> None:
     with pytest.raises(ConfigError, match=f"^cells: {message}"):
         split(some, tmp_path / "parts", fractions=HALVES, cells=[axis])
 
@@ -176,6 +178,8 @@ def test_shares_can_be_given_as_a_mapping(some: Path) -> None:
         ({"train": 0.4, "test": 0.5}, r"should add up to 1, add up to 0\.9"),
     ],
 )
-def test_wrong_mappings_of_shares_are_explained(some: Path, tmp_path: Path, fractions: object, message: str) -> None:
+def test_a_split_by_a_wrong_mapping_of_shares_is_refused_with_a_reason(
+    some: Path, tmp_path: Path, fractions: object, message: str
+) -> None:
     with pytest.raises(ConfigError, match=f"^fractions: {message}"):
         split(some, tmp_path / "parts", fractions=fractions)

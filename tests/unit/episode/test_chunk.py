@@ -91,7 +91,7 @@ def test_messages_made_topic_by_topic_have_the_bytes_of_the_chunk(
         assert np.array_equal(recorded[topic].encode(Recording(samples, targets)), table.messages(channel))
 
 
-def test_without_set_points_no_controller_state_can_be_made(full: ChunkEncoder, make_samples: Any) -> None:
+def test_encoding_controller_states_without_set_points_is_an_error(full: ChunkEncoder, make_samples: Any) -> None:
     with pytest.raises(KeyError, match="arm_right_controller"):
         full.encode(make_samples(5))
 

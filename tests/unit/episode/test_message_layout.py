@@ -147,6 +147,6 @@ def test_a_layout_does_not_describe_messages_with_other_constant_bytes() -> None
 @pytest.mark.parametrize(
     ("path", "message"), [("nonsense", "no numbers at 'nonsense'"), ("header", "do not lie side by side")]
 )
-def test_paths_that_are_not_numbers_side_by_side_are_refused(path: str, message: str) -> None:
+def test_paths_to_fields_that_are_no_adjacent_numbers_are_refused(path: str, message: str) -> None:
     with pytest.raises(ValueError, match=message):
         MessageLayout(get_message("sensor_msgs/msg/JointState")(), [path])

@@ -66,7 +66,7 @@ def test_the_card_of_a_hub_dataset_names_its_data_in_the_header(to: str, exporte
         (60, "They lie between those of the 250 Hz record: positions of joints and ball on the cubic"),
     ],
 )
-def test_the_card_says_how_the_rate_came_about(rate_hz: int | None, text: str, exported: Export) -> None:
+def test_the_card_explains_the_rate_of_the_samples(rate_hz: int | None, text: str, exported: Export) -> None:
     assert text in (exported("npz", rate_hz) / "README.md").read_text(encoding="utf-8")
 
 
