@@ -27,13 +27,13 @@ def api_error(explanation: str) -> APIError:
         (requests.ConnectionError(ReadTimeoutError(None, "/", "Read timed out.")), "no answer in time"),
     ],
 )
-def test_an_error_of_the_engine_becomes_a_worker_error_in_plain_words(error: Exception, words: str) -> None:
+def test_an_error_of_the_docker_engine_is_raised_in_plain_words(error: Exception, words: str) -> None:
     assert in_words(error) == words
     with pytest.raises(WorkerError, match=f"^sim_0: {words}$"), engine_errors("sim_0"):
         raise error
 
 
-def test_errors_that_are_not_of_the_engine_pass_unchanged() -> None:
+def test_errors_that_are_not_of_the_docker_engine_pass_unchanged() -> None:
     with pytest.raises(KeyError, match="a mistake"), engine_errors("sim_0"):
         raise KeyError("a mistake")
 

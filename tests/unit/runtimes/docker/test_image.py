@@ -232,7 +232,7 @@ def test_a_missing_image_other_than_the_default_is_pulled(said: list[str]) -> No
     assert said == ["image lab/throws:2 is not here; pulling it"]
 
 
-def test_an_image_that_cannot_be_pulled_is_a_worker_error(said: list[str]) -> None:
+def test_a_named_image_that_cannot_be_pulled_is_an_error(said: list[str]) -> None:
     with pytest.raises(WorkerError, match="lab/throws:2 is not here and cannot be pulled: no such host"):
         ensure(Engine(), "lab/throws:2", say=said.append)
 
