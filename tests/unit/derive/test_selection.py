@@ -36,13 +36,13 @@ def test_a_filtered_dataset_has_the_trials_that_fulfil_the_condition(collected: 
     assert after.throws.select(measured) == odd.select(measured)
 
 
-def test_the_plan_is_the_one_that_its_configuration_gives(collected: Path, tmp_path: Path) -> None:
+def test_the_plan_of_a_filtered_dataset_can_be_drawn_from_its_configuration(collected: Path, tmp_path: Path) -> None:
     filter_trials(collected, tmp_path / "some", where="trial > 3")
     config = load(tmp_path / "some" / "config.yaml")
     assert make_plan(config, directory=tmp_path / "some") == Dataset.open(tmp_path / "some").plan
 
 
-def test_all_trials_of_a_dataset_give_its_recordings_byte_for_byte(collected: Path, tmp_path: Path) -> None:
+def test_a_filter_that_keeps_all_trials_copies_the_shards_byte_for_byte(collected: Path, tmp_path: Path) -> None:
     filter_trials(collected, tmp_path / "all", where="True")
     names = {path.name for path in (tmp_path / "all").iterdir()} - {"sources.parquet", "trials.parquet"}
     assert names == {path.name for path in collected.iterdir()}
@@ -50,7 +50,7 @@ def test_all_trials_of_a_dataset_give_its_recordings_byte_for_byte(collected: Pa
         assert (tmp_path / "all" / name).read_bytes() == (collected / name).read_bytes(), name
 
 
-def test_trials_without_an_episode_are_left_out_and_counted(collection: Collection, tmp_path: Path) -> None:
+def test_a_filter_leaves_out_and_counts_trials_without_an_episode(collection: Collection, tmp_path: Path) -> None:
     collection.refuse(2, "too fast")
     collection.collect(tmp_path / "source", [0, 1, 3, 4, 5, 6], lost=[4])
     found = filter_trials(tmp_path / "source", tmp_path / "some", where="trial < 6")
@@ -61,7 +61,7 @@ def test_trials_without_an_episode_are_left_out_and_counted(collection: Collecti
     assert not (tmp_path / "none").exists()
 
 
-def test_a_sample_is_random_but_for_its_seed_and_stays_in_order(collected: Path, tmp_path: Path) -> None:
+def test_a_random_sample_of_trials_depends_on_the_seed_and_stays_in_order(collected: Path, tmp_path: Path) -> None:
     chosen = {}
     for name, count, seed in (("a", 4, 1), ("c", 4, 2), ("d", 2, 1)):
         sample(collected, tmp_path / name, count=count, seed=seed)
@@ -75,7 +75,7 @@ def test_a_sample_is_random_but_for_its_seed_and_stays_in_order(collected: Path,
             sample(collected, tmp_path / "e", count=count)
 
 
-def test_a_merged_dataset_sweeps_what_any_sweeps_and_what_they_differ_in(
+def test_a_merged_dataset_sweeps_the_keys_that_any_source_sweeps_or_that_differ(
     collected: Path, make_collection: type[Collection], tmp_path: Path
 ) -> None:
     other = make_collection(
@@ -102,13 +102,13 @@ def test_a_merged_dataset_sweeps_what_any_sweeps_and_what_they_differ_in(
     assert (merged.config.name, merged.config.seed, merged.config.record) == (first.name, first.seed, first.record)
     card = (tmp_path / "all" / "README.md").read_text()
     assert f"| other | {tmp_path / 'other'} | 2 | 2 | {digest(tmp_path / 'other')} |" in card
-    # What was derived can be derived from.
+    # A derived dataset can be the source of another one.
     filter_trials(tmp_path / "all", tmp_path / "light", where="ball.mass_kg < 0.04")
     assert verify(tmp_path / "light") == []
     assert [number for _, number in sources(tmp_path / "light")] == [7, 8]
 
 
-def test_datasets_of_other_physics_do_not_go_together(
+def test_datasets_with_different_physics_cannot_be_merged(
     collected: Path, make_collection: type[Collection], tmp_path: Path
 ) -> None:
     tool, topics = {"mass_kg": 0.2}, ["joint_states", "ball/odometry", "clock"]
@@ -126,7 +126,7 @@ def test_datasets_of_other_physics_do_not_go_together(
     assert not (tmp_path / "all").exists()
 
 
-def test_of_datasets_of_two_engines_the_command_that_compares_is_told(
+def test_merging_datasets_of_two_engines_fails_with_a_hint_how_to_compare_them(
     collected: Path, make_collection: type[Collection], tmp_path: Path
 ) -> None:
     make_collection({"trials": 1, "sim": {"engine": "mujoco"}}).collect(tmp_path / "other")
@@ -136,7 +136,7 @@ def test_of_datasets_of_two_engines_the_command_that_compares_is_told(
     assert caught.value.hint == f"{compare} tells by how much throws of the two engines differ"
 
 
-def test_a_dataset_is_never_overwritten(collected: Path, tmp_path: Path) -> None:
+def test_filter_and_merge_never_overwrite_a_directory_or_file(collected: Path, tmp_path: Path) -> None:
     (tmp_path / "mine").write_text("mine")
     with pytest.raises(ConfigError, match="mine: exists"):
         filter_trials(collected, tmp_path / "mine", where="True")
@@ -145,7 +145,7 @@ def test_a_dataset_is_never_overwritten(collected: Path, tmp_path: Path) -> None
     assert [path.name for path in tmp_path.iterdir()] == ["mine"]
 
 
-def test_a_damaged_episode_is_not_given_a_new_digest(dataset: Path, tmp_path: Path) -> None:
+def test_filtering_a_damaged_episode_is_refused(dataset: Path, tmp_path: Path) -> None:
     shard = sorted(dataset.glob("*.mcap"))[1]
     contents = bytearray(shard.read_bytes())
     contents[len(contents) // 2] ^= 1
@@ -155,7 +155,7 @@ def test_a_damaged_episode_is_not_given_a_new_digest(dataset: Path, tmp_path: Pa
     assert {path.name for path in tmp_path.iterdir()} == {"dataset"}
 
 
-def test_an_episode_that_is_not_the_one_of_the_table_is_refused(
+def test_filtering_an_episode_that_differs_from_its_digest_in_the_table_is_refused(
     dataset: Path, collection: Collection, tmp_path: Path
 ) -> None:
     def shorter(samples: Samples, header: EpisodeHeader) -> tuple[Samples, EpisodeHeader]:
@@ -167,7 +167,9 @@ def test_an_episode_that_is_not_the_one_of_the_table_is_refused(
         filter_trials(dataset, tmp_path / "some", where="trial == 0")
 
 
-def test_a_list_that_is_not_the_one_of_the_plan_is_found(collected: Path, tmp_path: Path) -> None:
+def test_verify_reports_a_list_of_trials_that_differs_from_the_plan_or_is_missing(
+    collected: Path, tmp_path: Path
+) -> None:
     filter_trials(collected, tmp_path / "some", where="trial > 3")
     path = tmp_path / "some" / "trials.parquet"
     table = pq.read_table(path)
@@ -181,7 +183,7 @@ def test_a_list_that_is_not_the_one_of_the_plan_is_found(collected: Path, tmp_pa
     assert list(map(str, verify(tmp_path / "some"))) == ["trials.parquet: is missing"]
 
 
-def test_what_is_no_list_of_datasets_is_not_merged(collected: Path, tmp_path: Path) -> None:
+def test_merge_refuses_a_single_path_and_an_empty_list(collected: Path, tmp_path: Path) -> None:
     for one, kind in ((str(collected), "a text"), (collected, "no list")):
         with pytest.raises(ConfigError, match=f"^directories: .* is {kind}\n  expected: a list of directories"):
             merge(one, tmp_path / "new")
@@ -201,7 +203,9 @@ def test_what_is_no_list_of_datasets_is_not_merged(collected: Path, tmp_path: Pa
         (lambda *paths: sample(*paths, count=2, seed=-1), "seed: got -1\n  expected: 0 or more"),
     ],
 )
-def test_what_is_of_another_kind_is_told_by_its_name(collected: Path, tmp_path: Path, ask, message: str) -> None:
+def test_an_argument_of_the_wrong_type_or_range_is_named_in_the_error(
+    collected: Path, tmp_path: Path, ask, message: str
+) -> None:
     with pytest.raises(ConfigError, match=f"^{message}"):
         ask(collected, tmp_path / "new")
     assert list(tmp_path.iterdir()) == []

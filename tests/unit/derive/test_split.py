@@ -47,7 +47,7 @@ def some(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return directory
 
 
-def test_parts_are_datasets_that_share_no_cell(some: Path, tmp_path: Path) -> None:
+def test_the_parts_of_a_split_are_datasets_that_share_no_cell(some: Path, tmp_path: Path) -> None:
     found = split(some, tmp_path / "parts", fractions=HALVES, cells=WIDE, seed=1)
     held, trials = {}, []
     for name, part in found.parts.items():
@@ -66,14 +66,16 @@ def test_parts_are_datasets_that_share_no_cell(some: Path, tmp_path: Path) -> No
     assert sorted(trials) == list(range(12))
 
 
-def test_the_name_of_a_part_is_whole_however_long(some: Path, tmp_path: Path) -> None:
+def test_the_dataset_name_is_shortened_but_the_part_name_never(some: Path, tmp_path: Path) -> None:
     first, second, third = "a" * 62, "b" * 63, "c" * 64
     split(some, tmp_path / "parts", fractions=f"{first}=1/3,{second}=1/3,{third}=1/3", cells=["trial=1"])
     names = [Dataset.open(tmp_path / "parts" / part).config.name for part in (first, second, third)]
     assert names == [f"q-{first}", second, third]
 
 
-def test_more_trials_move_nothing_from_one_part_to_another(some: Path, collected: Path, tmp_path: Path) -> None:
+def test_adding_trials_moves_no_trial_from_one_part_of_a_split_to_another(
+    some: Path, collected: Path, tmp_path: Path
+) -> None:
     merge([collected, some], tmp_path / "more")
     shift = len(Dataset.open(collected))
     for seed in range(6):
@@ -82,15 +84,15 @@ def test_more_trials_move_nothing_from_one_part_to_another(some: Path, collected
         assert before == [number for number in after if number >= 0]
 
 
-def test_a_new_part_takes_from_the_one_that_shrinks_alone(some: Path) -> None:
+def test_adding_a_part_takes_trials_only_from_the_part_that_shrinks(some: Path) -> None:
     assert train(some, seed=2, fractions="train=1/2,val=1/4,test=1/4") == train(some, seed=2)
 
 
-def test_the_seed_decides(some: Path) -> None:
+def test_the_seed_decides_which_part_a_trial_belongs_to(some: Path) -> None:
     assert train(some, seed=1) == train(some, seed=1) != train(some, seed=2)
 
 
-def test_cells_may_be_of_any_expression(some: Path) -> None:
+def test_cells_can_be_defined_by_any_expression(some: Path) -> None:
     axes = ["hypot(landing_x_m, landing_y_m)=0.3", "hit_angle_rad=0.2"]
     found = assign(source(Dataset.open(some)), fractions=HALVES, cells=axes, seed=1)
     rows = Dataset.open(some).throws.to_pylist()
@@ -118,7 +120,9 @@ def test_cells_may_be_of_any_expression(some: Path) -> None:
         ("train=0.999999,test=0.000001", "test would get none of the 12 trials"),
     ],
 )
-def test_wrong_fractions_are_explained(some: Path, tmp_path: Path, fractions: str, message: str) -> None:
+def test_a_split_by_wrong_fractions_is_refused_with_a_reason(
+    some: Path, tmp_path: Path, fractions: str, message: str
+) -> None:
     with pytest.raises(ConfigError, match=f"^fractions: .*{message}"):
         split(some, tmp_path / "parts", fractions=fractions)
     assert not list(tmp_path.iterdir())
@@ -136,23 +140,25 @@ def test_wrong_fractions_are_explained(some: Path, tmp_path: Path, fractions: st
         ("outcome=1", "should be a number, is text"),
     ],
 )
-def test_wrong_cells_are_explained(some: Path, tmp_path: Path, axis: str, message: str) -> None:
+def test_a_split_by_wrong_cells_is_refused_with_a_reason(some: Path, tmp_path: Path, axis: str, message: str) -> None:
     with pytest.raises(ConfigError, match=f"^cells: {message}"):
         split(some, tmp_path / "parts", fractions=HALVES, cells=[axis])
 
 
-def test_one_axis_is_no_list_of_axes(some: Path, tmp_path: Path) -> None:
+def test_a_single_text_instead_of_a_list_of_cell_axes_is_refused(some: Path, tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match=r"^cells: 'trial=1' is a text\n .*: \['trial=1'\]"):
         split(some, tmp_path / "parts", fractions=HALVES, cells="trial=1")
 
 
 @pytest.mark.parametrize(("seed", "told"), [(-1, "-1"), (1.5, r"1\.5"), ("1", "'1'"), (None, "None")])
-def test_a_seed_is_a_whole_number(some: Path, tmp_path: Path, seed: Any, told: str) -> None:
+def test_a_seed_that_is_no_whole_number_or_negative_is_refused(
+    some: Path, tmp_path: Path, seed: Any, told: str
+) -> None:
     with pytest.raises(ConfigError, match=f"^seed: got {told}\n  expected: .*0 or more"):
         split(some, tmp_path / "parts", fractions=HALVES, seed=seed)
 
 
-def test_shares_may_be_a_mapping(some: Path) -> None:
+def test_shares_can_be_given_as_a_mapping(some: Path) -> None:
     assert train(some, seed=1, fractions={"train": 0.8, "test": 0.2}) == train(
         some, seed=1, fractions="train=0.8,test=0.2"
     )
@@ -172,6 +178,8 @@ def test_shares_may_be_a_mapping(some: Path) -> None:
         ({"train": 0.4, "test": 0.5}, r"should add up to 1, add up to 0\.9"),
     ],
 )
-def test_wrong_mappings_of_shares_are_explained(some: Path, tmp_path: Path, fractions: object, message: str) -> None:
+def test_a_split_by_a_wrong_mapping_of_shares_is_refused_with_a_reason(
+    some: Path, tmp_path: Path, fractions: object, message: str
+) -> None:
     with pytest.raises(ConfigError, match=f"^fractions: {message}"):
         split(some, tmp_path / "parts", fractions=fractions)

@@ -14,7 +14,7 @@ from throwcollect.errors import DatasetError
 from throwcollect.robots.talos import TALOS
 
 
-def test_signals_are_those_of_all_samples_together(collected: Path) -> None:
+def test_statistics_of_signals_cover_the_samples_of_all_episodes(collected: Path) -> None:
     found = statistics(collected)
     samples = [episode.samples() for episode in Dataset.open(collected).episodes()]
     assert (found.episodes, found.samples) == (7, sum(map(len, samples)))
@@ -31,11 +31,11 @@ def test_signals_are_those_of_all_samples_together(collected: Path) -> None:
             assert (signal.min, signal.max) == (column.min(), column.max())
             assert signal.mean == pytest.approx(column.mean(), rel=1e-12, abs=1e-12)
             assert signal.std == pytest.approx(column.std(), rel=1e-9, abs=1e-12)
-    # Who normalises divides by it, or not at all.
+    # A program that normalises recognises a constant signal by a deviation of exactly 0.
     assert found.signals["position_rad"]["leg_left_4_joint"].std == 0
 
 
-def test_a_damaged_episode_is_named(collected: Path, tmp_path: Path) -> None:
+def test_statistics_name_the_trial_of_a_damaged_episode(collected: Path, tmp_path: Path) -> None:
     directory = Path(shutil.copytree(collected, tmp_path / "damaged"))
     row = Dataset.open(directory).throws.slice(3, 1).to_pylist()[0]
     shard = directory / row["shard"]
@@ -46,7 +46,7 @@ def test_a_damaged_episode_is_named(collected: Path, tmp_path: Path) -> None:
         statistics(directory)
 
 
-def test_columns_are_those_of_the_rows_that_have_a_number(collection: Collection, tmp_path: Path) -> None:
+def test_statistics_of_columns_leave_out_empty_cells(collection: Collection, tmp_path: Path) -> None:
     collection.collect(tmp_path / "dataset", lost=[2, 3])
     found = statistics(tmp_path / "dataset")
     landings = [x for x in Dataset.open(tmp_path / "dataset").throws["landing_x_m"].to_pylist() if x is not None]
@@ -61,7 +61,7 @@ def test_columns_are_those_of_the_rows_that_have_a_number(collection: Collection
     assert not {"trial", "chunk_offset", "outcome", "digest"} & set(found.columns)
 
 
-def test_samples_that_are_not_finite_are_left_out(collection: Collection, tmp_path: Path) -> None:
+def test_statistics_count_and_leave_out_samples_that_are_not_finite(collection: Collection, tmp_path: Path) -> None:
     def spoil_efforts(samples: Samples, header: EpisodeHeader) -> tuple[Samples, EpisodeHeader]:
         if header.trial != 1:
             return samples, header
@@ -75,7 +75,7 @@ def test_samples_that_are_not_finite_are_left_out(collection: Collection, tmp_pa
     json.dumps(found.as_dict(), allow_nan=False)
 
 
-def test_without_episodes_there_are_no_signals(collection: Collection, tmp_path: Path) -> None:
+def test_statistics_of_a_dataset_without_episodes_have_no_signals(collection: Collection, tmp_path: Path) -> None:
     collection.collect(tmp_path / "dataset", lost=range(7))
     found = statistics(tmp_path / "dataset")
     assert (found.episodes, found.samples, found.signals) == (0, 0, {})

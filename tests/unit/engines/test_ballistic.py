@@ -1,4 +1,4 @@
-"""Where the engine without contacts has arm and ball."""
+"""The engine `ballistic`, which has no contacts: where arm and ball are."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def planar(kind: str = "revolute") -> Scene:
     return Scene(PLANAR.format(kind=kind), ("elbow", "shoulder"), 1.0, tool, ground_is_solid=False, ball_radius_m=0.02)
 
 
-def test_a_planar_arm_is_where_trigonometry_has_it() -> None:
+def test_the_path_of_the_tool_of_a_planar_arm_agrees_with_trigonometry() -> None:
     place, turn = ToolPath(planar()).along(np.array([[0.3, 0.2], [-0.5, math.pi / 2]]))
     for row, (elbow, shoulder) in enumerate([(0.3, 0.2), (-0.5, math.pi / 2)]):
         angle = shoulder + 0.5 + elbow
@@ -43,12 +43,12 @@ def test_a_planar_arm_is_where_trigonometry_has_it() -> None:
         assert turn[row][:, 0] == pytest.approx((math.cos(angle), math.sin(angle), 0.0), abs=1e-12)
 
 
-def test_joints_that_slide_are_refused_by_name() -> None:
+def test_a_prismatic_joint_is_refused_by_name() -> None:
     with pytest.raises(ConfigError, match="joint elbow: the engine ballistic knows no prismatic joints"):
         ToolPath(planar("prismatic"))
 
 
-def test_the_ball_goes_with_the_spoon_and_leaves_it_while_the_spoon_brakes() -> None:
+def test_the_ball_stays_in_the_spoon_until_the_spoon_brakes() -> None:
     config = Config.model_validate({"sim": {"engine": "ballistic"}})
     world = World(config)
     start = np.array([start_posture(config)[joint] for joint in world.moving])
@@ -70,7 +70,7 @@ def test_the_ball_goes_with_the_spoon_and_leaves_it_while_the_spoon_brakes() -> 
     assert not samples.effort.any()
 
 
-def test_a_throw_needs_no_bullet() -> None:
+def test_a_throw_with_the_engine_ballistic_needs_no_bullet() -> None:
     code = """
 import sys
 sys.modules["pybullet"] = None  # whoever imports it fails

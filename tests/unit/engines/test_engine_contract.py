@@ -1,4 +1,4 @@
-"""What every physics engine of the table has to keep to."""
+"""The contract that every physics engine has to fulfil."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ STRIDE = 2
 
 @dataclass
 class Watcher(Observer):
-    """Notes what it sees, and stops the steps at one sample if it is told to."""
+    """Records touches and samples, and stops the steps at the sample of the step `last`."""
 
     last: int | None = None
     touches: list[tuple[int, frozenset[str]]] = field(default_factory=list)
@@ -53,7 +53,7 @@ class Watcher(Observer):
 
 
 def swing(steps: int, *, duration_s: float = 1.0, first: int = 0) -> Steps:
-    """Minimum-jerk motion from the start to the end of the task, from one of its steps on."""
+    """Minimum-jerk motion from the start to the end of the task; begins at the step `first` of it."""
     x = np.minimum(np.arange(first, first + steps + 1) / PHYSICS.hz / duration_s, 1.0) ** 1.2
     targets = START + (10 * x**3 - 15 * x**4 + 6 * x**5)[:, np.newaxis] * (END - START)
     return Steps(targets, np.diff(targets, axis=0) * PHYSICS.hz, STRIDE - first % STRIDE, STRIDE)
@@ -78,7 +78,7 @@ def begin(engine: Engine) -> State:
 @pytest.fixture(params=names_of("engines"))
 def name(request: pytest.FixtureRequest) -> str:
     if request.param in PACKAGES:
-        # No Python has wheels of all of them.
+        # No version of Python has wheels of all engines.
         pytest.importorskip(PACKAGES[request.param].module)
     return str(request.param)
 
@@ -108,7 +108,7 @@ def test_the_ball_rests_in_the_tool_of_the_still_robot(engine: Engine) -> None:
     assert ball_of(engine.state.sample).position == pytest.approx(ball.position, abs=1e-4)
 
 
-def test_a_world_that_can_be_forked_goes_on_with_the_same_bits(engine: Engine) -> None:
+def test_a_forked_world_and_its_parent_simulate_the_same_throw(engine: Engine) -> None:
     if not engine.can_be_forked:
         pytest.skip("says that its worlds cannot be forked")
     reader, writer = os.pipe()
@@ -127,7 +127,7 @@ def test_a_world_that_can_be_forked_goes_on_with_the_same_bits(engine: Engine) -
     assert found == hashlib.sha256(repr(watch_throw(engine)).encode()).digest()
 
 
-def test_the_names_of_links_have_no_effect(engine: Engine) -> None:
+def test_renaming_the_root_link_does_not_change_a_throw(engine: Engine) -> None:
     usual = watch_throw(engine)
     root = re.search(r'<link name="([^"]+)"', SCENE.urdf)
     assert root is not None
@@ -140,7 +140,7 @@ def test_the_names_of_links_have_no_effect(engine: Engine) -> None:
     assert watch_throw(engine) == usual
 
 
-def test_what_follows_from_a_state_does_not_depend_on_what_was_before(name: str, engine: Engine) -> None:
+def test_a_throw_from_a_restored_state_does_not_depend_on_what_ran_before(name: str, engine: Engine) -> None:
     settled = begin(engine)
     first = watch_throw(engine)
     engine.reset(settled)
@@ -161,7 +161,7 @@ def test_what_follows_from_a_state_does_not_depend_on_what_was_before(name: str,
     fresh.close()
 
 
-def test_single_steps_are_the_same_as_many_at_once(engine: Engine) -> None:
+def test_single_steps_give_the_same_samples_as_many_at_once(engine: Engine) -> None:
     at_once, one_by_one = watch_throw(engine), Watcher()
     begin(engine)
     for number in range(600):
@@ -171,14 +171,14 @@ def test_single_steps_are_the_same_as_many_at_once(engine: Engine) -> None:
     assert one_by_one.touches == at_once.touches
 
 
-def test_samples_are_those_of_the_steps_that_are_asked_for(engine: Engine) -> None:
+def test_samples_are_taken_at_the_first_step_and_then_at_every_stride(engine: Engine) -> None:
     seen = Watcher()
     steps = replace(swing(20), first_sample=3, stride=4)
     engine.run(steps, seen)
     assert [number for number, _ in seen.samples] == [3, 7, 11, 15, 19]
 
 
-def test_an_observer_can_stop_the_steps_and_have_them_go_on(engine: Engine) -> None:
+def test_steps_that_an_observer_stops_can_be_continued(engine: Engine) -> None:
     whole = watch_throw(engine)
     begin(engine)
     seen = Watcher(last=400)
@@ -189,7 +189,7 @@ def test_an_observer_can_stop_the_steps_and_have_them_go_on(engine: Engine) -> N
     assert (seen.samples, seen.touches) == (whole.samples, whole.touches)
 
 
-def test_joints_are_where_they_are_wanted_at_the_end_of_each_step(engine: Engine) -> None:
+def test_joints_reach_their_commanded_positions_at_each_sample(engine: Engine) -> None:
     steps = swing(600)
     seen = Watcher()
     engine.run(steps, seen)
@@ -197,7 +197,7 @@ def test_joints_are_where_they_are_wanted_at_the_end_of_each_step(engine: Engine
         assert sample[: len(MOVING)] == pytest.approx(steps.targets[number], abs=1e-3)
 
 
-def test_a_throw_leaves_the_tool_and_each_touch_differs_from_the_one_before(engine: Engine) -> None:
+def test_a_thrown_ball_leaves_the_tool_and_only_changes_of_touch_are_reported(engine: Engine) -> None:
     seen = watch_throw(engine)
     assert engine.state.touching == frozenset()
     assert seen.touches[-1][1] == frozenset()
@@ -211,7 +211,7 @@ def test_a_throw_leaves_the_tool_and_each_touch_differs_from_the_one_before(engi
     assert height < 1.5
 
 
-def test_a_free_ball_takes_gravity_first_and_then_moves(engine: Engine) -> None:
+def test_a_free_ball_gets_its_velocity_from_gravity_before_it_moves(engine: Engine) -> None:
     engine.place_ball(BodyState((3.0, 0.0, 2.0), linear_velocity=(1.0, -0.5, 2.0)))
     seen = Watcher()
     engine.run(still(engine, 100), seen)
@@ -224,7 +224,7 @@ def test_a_free_ball_takes_gravity_first_and_then_moves(engine: Engine) -> None:
     assert ball.linear_velocity == pytest.approx((1.0, -0.5, 2.0 - PHYSICS.gravity_mps2 * n * dt), abs=1e-12)
 
 
-def test_drag_brakes_by_the_square_of_the_speed(engine: Engine) -> None:
+def test_drag_slows_the_ball_by_the_square_of_its_speed(engine: Engine) -> None:
     speed, drag_kgpm = 4.0, 0.01
     engine.place_ball(BodyState((3.0, 0.0, 2.0), linear_velocity=(speed, 0.0, 0.0)))
     engine.run(still(engine, 1, drag_kgpm=drag_kgpm), Observer())
@@ -232,7 +232,7 @@ def test_drag_brakes_by_the_square_of_the_speed(engine: Engine) -> None:
     assert ball_of(engine.state.sample).linear_velocity[0] == pytest.approx(speed - lost, rel=1e-9)
 
 
-def test_solid_ground_stops_the_ball_and_other_ground_does_not(engine: Engine) -> None:
+def test_only_solid_ground_stops_the_ball(engine: Engine) -> None:
     low = BodyState((2.0, 0.0, 0.2), linear_velocity=(0.0, 0.0, -2.0))
     engine.place_ball(low)
     engine.run(still(engine, 100), Observer())
@@ -247,7 +247,7 @@ def test_solid_ground_stops_the_ball_and_other_ground_does_not(engine: Engine) -
     assert ball_of(engine.state.sample).position[2] < -0.2
 
 
-def test_the_ball_is_where_it_is_put(engine: Engine) -> None:
+def test_a_placed_ball_has_exactly_the_given_state(engine: Engine) -> None:
     put = BodyState((1.0, 2.0, 3.0), (0.0, 0.6, 0.0, 0.8), (0.1, 0.2, 0.3))
     engine.place_ball(put)
     assert ball_of(engine.state.sample) == put
@@ -255,7 +255,7 @@ def test_the_ball_is_where_it_is_put(engine: Engine) -> None:
     assert all(low < at < high for low, at, high in zip(lowest, put.position, highest, strict=True))
 
 
-def test_bodies_come_and_go_where_an_engine_takes_any(engine: Engine) -> None:
+def test_bodies_can_be_added_and_removed_if_the_engine_supports_bodies(engine: Engine) -> None:
     assert engine.is_as_loaded
     if engine.bodies is None:
         return

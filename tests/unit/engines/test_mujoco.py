@@ -1,4 +1,4 @@
-"""What MuJoCo does besides keeping to the contract: contacts, motors, and what does not depend on chance."""
+"""What MuJoCo does beyond the contract of engines: contacts, motors, reproducible results."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def each_alone() -> list[Watcher]:
     return [alone(number) for number in range(len(TRIALS))]
 
 
-def test_the_order_of_trials_does_not_matter_whatever_varies(each_alone: list[Watcher]) -> None:
+def test_the_order_of_trials_does_not_change_them(each_alone: list[Watcher]) -> None:
     engine = MujocoEngine()
     forwards = [trial(engine, *each) for each in TRIALS]
     backwards = [trial(engine, *each) for each in reversed(TRIALS)]
@@ -78,12 +78,12 @@ def test_the_order_of_trials_does_not_matter_whatever_varies(each_alone: list[Wa
     assert len({repr(seen.samples[-1]) for seen in forwards}) == len(TRIALS)
 
 
-def test_worlds_of_several_threads_leave_each_other_alone(each_alone: list[Watcher]) -> None:
+def test_worlds_in_several_threads_do_not_affect_each_other(each_alone: list[Watcher]) -> None:
     with ThreadPoolExecutor(4) as pool:
         assert list(pool.map(alone, range(len(TRIALS)))) == each_alone
 
 
-def test_steps_may_be_cut_anywhere(engine: MujocoEngine) -> None:
+def test_steps_in_several_calls_give_the_same_samples_as_in_one(engine: MujocoEngine) -> None:
     whole = Watcher()
     engine.run(swing(600), whole)
     begin(engine)
@@ -95,21 +95,21 @@ def test_steps_may_be_cut_anywhere(engine: MujocoEngine) -> None:
     assert cut.touches == whole.touches
 
 
-def test_the_ball_stays_in_the_tool_until_it_leaves_it_for_good(engine: MujocoEngine) -> None:
-    # With contacts as MuJoCo has them, it hops some 15 times before.
+def test_the_ball_leaves_the_tool_only_once(engine: MujocoEngine) -> None:
+    # With the default contacts of MuJoCo, the ball hops some 15 times before it leaves.
     seen = Watcher()
     engine.run(swing(600), seen)
     assert [bodies for _, bodies in seen.touches] == [frozenset()]
 
 
-def test_motors_follow_as_those_of_bullet_and_carry_the_ball(engine: MujocoEngine) -> None:
+def test_motors_follow_their_targets_closely_while_they_carry_the_ball(engine: MujocoEngine) -> None:
     steps, seen = swing(600), Watcher()
     engine.run(steps, seen)
     errors = [np.abs(np.array(sample[: len(MOVING)]) - steps.targets[number]).max() for number, sample in seen.samples]
     assert max(errors) < 2e-5
 
 
-def test_motors_that_are_too_weak_give_what_they_have(engine: MujocoEngine) -> None:
+def test_motors_that_are_too_weak_give_no_more_than_their_largest_effort(engine: MujocoEngine) -> None:
     weak = tuple(0.5 * effort for effort in PHYSICS.efforts)
     seen = trial(engine, SCENE, replace(PHYSICS, efforts=weak))
     shares = [np.abs(sample[2 * len(MOVING) : 3 * len(MOVING)]) / weak for _, sample in seen.samples]
@@ -129,7 +129,7 @@ def test_a_ball_bounces_off_the_ground_by_its_restitution(
     assert min(ball_of(sample).position[2] for _, sample in seen.samples) > SCENE.ball_radius_m - 1e-3
 
 
-def test_friction_is_the_product_of_both_and_the_same_in_all_directions(engine: MujocoEngine) -> None:
+def test_friction_is_the_product_of_ball_and_surface_and_equal_in_all_directions(engine: MujocoEngine) -> None:
     for angle in (0.0, 0.4, np.pi / 4):
         engine.place_ball(
             BodyState((2.0, 0.0, SCENE.ball_radius_m), linear_velocity=(2 * np.cos(angle), 2 * np.sin(angle), 0.0))
@@ -140,13 +140,13 @@ def test_friction_is_the_product_of_both_and_the_same_in_all_directions(engine: 
         assert lost == pytest.approx(friction * PHYSICS.gravity_mps2 * 50 / PHYSICS.hz, rel=0.01)
 
 
-def test_a_ball_of_another_size_is_as_if_it_had_been_compiled() -> None:
+def test_a_resized_ball_gives_the_same_model_as_one_compiled_at_that_size() -> None:
     spec, _ = make_spec(SCENE)
     resized = spec.compile()
     resize_ball(resized, 0.04)
     spec, _ = make_spec(replace(SCENE, ball_radius_m=0.04))
     compiled = spec.compile()
-    # They are worked out from the inertia, which is set with the mass.
+    # These arrays are computed from the inertia, which is set with the mass.
     derived = ("inertia", "inertia0", "invweight0", "M0", "acc0", "stat")
     arrays = [name for name in dir(compiled) if isinstance(getattr(compiled, name), np.ndarray)]
     assert len(arrays) > 300
@@ -155,7 +155,7 @@ def test_a_ball_of_another_size_is_as_if_it_had_been_compiled() -> None:
             np.testing.assert_array_equal(getattr(resized, name), getattr(compiled, name), err_msg=name)
 
 
-def test_a_world_that_diverges_tells_it_by_its_numbers_and_leaves_nothing_behind(
+def test_a_diverging_world_has_numbers_that_are_not_finite_and_can_begin_again(
     engine: MujocoEngine, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
@@ -171,7 +171,7 @@ def test_a_world_that_diverges_tells_it_by_its_numbers_and_leaves_nothing_behind
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_body_that_mujoco_does_not_take_is_refused_and_the_world_goes_on(
+def test_a_body_that_mujoco_cannot_load_is_refused_without_harm_to_the_world(
     engine: MujocoEngine,
 ) -> None:
     flat = np.zeros((4, 3, 3), np.float32)
@@ -185,7 +185,7 @@ def test_a_body_that_mujoco_does_not_take_is_refused_and_the_world_goes_on(
     assert engine.state.touching == before.touching
 
 
-def test_a_mesh_that_would_be_filled_in_is_refused(engine: MujocoEngine) -> None:
+def test_a_body_without_mass_that_has_a_mesh_is_refused(engine: MujocoEngine) -> None:
     mesh = box(mass=0).replace('<box size="0.2 0.2 0.2"/>', '<mesh filename="bucket.stl"/>')
     bucket = read_model(mesh, lambda _: np.zeros((4, 3, 3), np.float32))
     with pytest.raises(RequestError, match="fill in the mesh of a body that is attached to the world"):
@@ -201,12 +201,12 @@ def test_a_link_of_a_body_may_have_any_name(engine: MujocoEngine) -> None:
 
 
 @pytest.mark.parametrize("restitution", [0.0, 0.5])
-def test_bodies_that_merely_touch_change_nothing_elsewhere(engine: MujocoEngine, restitution: float) -> None:
+def test_bodies_that_merely_touch_the_ground_do_not_change_a_throw(engine: MujocoEngine, restitution: float) -> None:
     bouncy = replace(PHYSICS, ball_restitution=restitution)
     without = trial(engine, SCENE, bouncy)
     engine.load(SCENE)
     engine.configure(bouncy)
-    # Their lower faces are on the ground, to the last bit.
+    # The lower faces of the crates are exactly at the height of the ground.
     for number in range(3):
         engine.bodies.add(f"crate{number}", read_model(box(mass=1), _no_mesh), BodyState((5.0, number, 0.1)))
     engine.rest(START.tolist(), SEAT)
@@ -219,7 +219,7 @@ def test_bodies_that_merely_touch_change_nothing_elsewhere(engine: MujocoEngine,
         assert sample == pytest.approx(other, abs=1e-4)
 
 
-def test_bodies_stay_where_they_are_while_others_come_and_go(engine: MujocoEngine) -> None:
+def test_a_body_stays_where_it_is_while_others_are_added_and_removed(engine: MujocoEngine) -> None:
     engine.bodies.add("one", read_model(box(), _no_mesh), BodyState((3.0, 0.0, 2.0)))
     engine.run(still(engine, 50), Observer())
     fallen = engine.bodies.state("one")
@@ -232,7 +232,7 @@ def test_bodies_stay_where_they_are_while_others_come_and_go(engine: MujocoEngin
     assert engine.bodies.state("one") == fallen
 
 
-def test_a_description_that_mujoco_does_not_take_is_refused() -> None:
+def test_a_robot_description_that_mujoco_cannot_load_is_refused() -> None:
     broken = MujocoEngine()
     with pytest.raises(ConfigError, match="MuJoCo cannot"):
         broken.load(replace(SCENE, urdf=SCENE.urdf.replace('type="revolute"', 'type="elastic"')))

@@ -27,12 +27,12 @@ def test_a_channel_has_the_same_number_in_every_dataset() -> None:
     assert list(many.values()) == sorted(many.values())
 
 
-def test_controller_states_are_those_of_the_moving_joints() -> None:
+def test_controller_states_are_recorded_only_for_controllers_that_move_joints() -> None:
     recorded = channels(ALL, end={"head_1_joint": 0.1}, start={"head_1_joint": 0.0}).recorded
     assert [each.topic for each in recorded if "controller" in each.topic] == ["/head_controller/controller_state"]
 
 
-def test_latched_messages_are_the_description_and_the_fixed_frames() -> None:
+def test_the_latched_messages_hold_the_description_and_the_fixed_frames() -> None:
     description, static = channels(ALL).encode_latched_messages(3_000_000_005).values()
     assert deserialize(description, get_message("std_msgs/msg/String")).data == URDF
     transforms = deserialize(static, get_message("tf2_msgs/msg/TFMessage")).transforms
@@ -49,6 +49,6 @@ def test_the_text_of_a_qos_is_its_profile_in_yaml() -> None:
     )
 
 
-def test_what_is_not_a_robot_is_refused() -> None:
+def test_a_text_that_is_no_urdf_is_refused() -> None:
     with pytest.raises(ConfigError, match="not a URDF"):
         Channels(Config(), "nothing")

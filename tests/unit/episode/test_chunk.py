@@ -28,7 +28,7 @@ from throwcollect.robots.talos import TALOS
 
 URDF = full_description(Config())
 COUNT_OF_NAMES = 31 + 4 + 8 + 8
-"""Where the first row of a chunk has it: behind the record's header, CDR encapsulation, stamp and empty frame."""
+"""Offset of the number of joint names in a chunk: behind record header, CDR encapsulation, stamp and empty frame."""
 ALL = ["joint_states", "ball/odometry", "controller_state", "tf", "clock"]
 
 
@@ -91,13 +91,13 @@ def test_messages_made_topic_by_topic_have_the_bytes_of_the_chunk(
         assert np.array_equal(recorded[topic].encode(Recording(samples, targets)), table.messages(channel))
 
 
-def test_without_set_points_no_controller_state_can_be_made(full: ChunkEncoder, make_samples: Any) -> None:
+def test_encoding_controller_states_without_set_points_is_an_error(full: ChunkEncoder, make_samples: Any) -> None:
     with pytest.raises(KeyError, match="arm_right_controller"):
         full.encode(make_samples(5))
 
 
 @pytest.mark.parametrize("count", [1, 2, 500])
-def test_samples_survive(encoder: ChunkEncoder, make_samples: Any, count: int) -> None:
+def test_samples_can_be_read_back_from_a_chunk(encoder: ChunkEncoder, make_samples: Any, count: int) -> None:
     samples = make_samples(count)
     read = MessageTable(encoder.encode(samples).decompress(), count).samples
     for field in fields(Samples):
@@ -112,7 +112,7 @@ def test_equal_samples_give_equal_chunks(make_samples: Any) -> None:
     assert chunk == encoders[1].encode(make_samples(30))
 
 
-def test_the_record_is_the_one_that_the_mcap_library_reads(encoder: ChunkEncoder, make_samples: Any) -> None:
+def test_the_mcap_library_can_read_the_record_of_a_chunk(encoder: ChunkEncoder, make_samples: Any) -> None:
     chunk = encoder.encode(make_samples(20))
     read = McapChunk.read(ReadDataStream(io.BytesIO(chunk.record()[9:])))
     assert (read.compression, read.data, read.uncompressed_size) == ("zstd", chunk.data, len(chunk.decompress()))
@@ -132,7 +132,9 @@ def test_message_indexes_point_at_the_messages(encoder: ChunkEncoder, make_sampl
 
 
 @pytest.mark.parametrize("at", [0, 5, 40, 45, 49, 52, -1])
-def test_a_record_that_is_not_such_a_chunk_is_refused(encoder: ChunkEncoder, make_samples: Any, at: int) -> None:
+def test_a_chunk_record_with_a_changed_or_missing_byte_is_refused(
+    encoder: ChunkEncoder, make_samples: Any, at: int
+) -> None:
     record = bytearray(encoder.encode(make_samples(20)).record())
     if at == -1:
         del record[-1]
@@ -142,7 +144,7 @@ def test_a_record_that_is_not_such_a_chunk_is_refused(encoder: ChunkEncoder, mak
         Chunk.parse(bytes(record)).decompress()
 
 
-def test_damage_is_refused_before_it_is_believed(encoder: ChunkEncoder, make_samples: Any) -> None:
+def test_a_chunk_whose_data_or_crc_is_wrong_is_not_decompressed(encoder: ChunkEncoder, make_samples: Any) -> None:
     chunk = encoder.encode(make_samples(20))
     bomb = zstandard.ZstdCompressor().compress(bytes(50_000_000))
     for data, message in [
@@ -157,7 +159,7 @@ def test_damage_is_refused_before_it_is_believed(encoder: ChunkEncoder, make_sam
         replace(chunk, crc=chunk.crc ^ 1).decompress()
 
 
-def test_records_that_are_no_table_are_refused(encoder: ChunkEncoder, make_samples: Any) -> None:
+def test_records_that_do_not_fit_the_number_of_samples_are_refused(encoder: ChunkEncoder, make_samples: Any) -> None:
     contents = encoder.encode(make_samples(20)).decompress()
     row = len(contents) // 20
     changed = bytearray(contents)
@@ -176,7 +178,9 @@ def test_records_that_are_no_table_are_refused(encoder: ChunkEncoder, make_sampl
             MessageTable(broken, count)
 
 
-def test_records_of_other_topics_hold_no_samples(encoder: ChunkEncoder, make_samples: Any) -> None:
+def test_records_without_the_expected_topics_or_layout_hold_no_samples(
+    encoder: ChunkEncoder, make_samples: Any
+) -> None:
     contents = encoder.encode(make_samples(2)).decompress()
     size = 9 + struct.unpack_from("<Q", contents, 1)[0]
     with pytest.raises(DatasetError, match="no messages of /ball/odometry"):
@@ -192,7 +196,7 @@ def test_records_of_other_topics_hold_no_samples(encoder: ChunkEncoder, make_sam
             _ = MessageTable(counted, 1).samples
 
 
-def test_samples_have_the_joints_that_the_recording_names(
+def test_samples_for_joints_other_than_the_recorded_ones_are_refused(
     encoder: ChunkEncoder, header: EpisodeHeader, make_samples: Any
 ) -> None:
     contents = encoder.encode(make_samples(50)).decompress()
@@ -206,7 +210,7 @@ def test_samples_have_the_joints_that_the_recording_names(
         renamed.samples(("shoulder_joint", "elbow_joint"))
 
 
-def test_times_are_compared_with_stamps(encoder: ChunkEncoder, make_samples: Any) -> None:
+def test_a_changed_time_of_a_record_no_longer_fits_the_stamps(encoder: ChunkEncoder, make_samples: Any) -> None:
     samples = make_samples(5)
     contents = bytearray(encoder.encode(samples).decompress())
     assert MessageTable(bytes(contents), 5).are_timed_by(samples.stamps_ns)
@@ -216,7 +220,7 @@ def test_times_are_compared_with_stamps(encoder: ChunkEncoder, make_samples: Any
 
 @pytest.mark.parametrize("place", [11, 15, 23], ids=["sequence", "log time", "publish time"])
 @pytest.mark.parametrize("channel", [JOINT_STATES_ID, BALL_ODOMETRY_ID])
-def test_each_part_of_a_header_is_compared_with_stamps(
+def test_every_changed_part_of_a_record_header_no_longer_fits_the_stamps(
     encoder: ChunkEncoder, make_samples: Any, place: int, channel: int
 ) -> None:
     samples = make_samples(5)
@@ -225,7 +229,9 @@ def test_each_part_of_a_header_is_compared_with_stamps(
     assert not MessageTable(bytes(contents), 5).are_timed_by(samples.stamps_ns)
 
 
-def test_a_stamp_before_time_0_is_not_the_time_of_a_record(encoder: ChunkEncoder, make_samples: Any) -> None:
+def test_a_negative_stamp_does_not_fit_a_record_time_with_the_same_bits(
+    encoder: ChunkEncoder, make_samples: Any
+) -> None:
     contents = bytearray(encoder.encode(make_samples(1)).decompress())
     table = MessageTable(contents, 1)
     for channel in table.columns:

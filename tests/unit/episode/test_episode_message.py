@@ -52,7 +52,7 @@ def test_an_episode_arrives_as_it_was_sent(sent: Episode, make_samples: Any) -> 
     assert episode.samples().ball_position.tolist() == make_samples(50).ball_position.tolist()
 
 
-def test_the_message_is_a_stock_one_that_names_its_parts(sent: Episode) -> None:
+def test_the_message_of_an_episode_is_a_standard_array_that_names_its_parts(sent: Episode) -> None:
     message = deserialize(pack(Delivery(sent, RESULT, CONDITIONS), SIGNER), get_message("std_msgs/msg/UInt8MultiArray"))
     sizes = {part.label: part.size for part in message.layout.dim}
     assert list(sizes) == ["header", "result", "conditions", "hashes", "chunk", "signature"]
@@ -67,7 +67,7 @@ def test_the_message_is_a_stock_one_that_names_its_parts(sent: Episode) -> None:
     assert SIGNER.has_signed(parts.pop("signature").decode(), *parts.values())
 
 
-def test_the_digest_covers_header_and_messages_but_not_their_packing(
+def test_the_digest_covers_header_and_records_but_not_their_compression(
     encoder: ChunkEncoder, header: EpisodeHeader, sent: Episode, make_samples: Any
 ) -> None:
     records = hashlib.sha256(sent.chunk.decompress()).digest()
@@ -85,19 +85,19 @@ def test_the_digest_covers_header_and_messages_but_not_their_packing(
     assert len({sent.digest, *(other.digest for other in others)}) == 5
 
 
-def test_a_hash_that_is_not_that_of_the_records_is_found(sent: Episode) -> None:
+def test_a_hash_that_is_not_that_of_the_records_is_an_error(sent: Episode) -> None:
     sent.check_records()
     with pytest.raises(DatasetError, match="SHA-256 of its records is"):
         Episode(sent.header, RecordedChunk(sent.chunk, "0" * 64)).check_records()
 
 
 @pytest.mark.parametrize("sha256", ["", "0" * 63, "0" * 65, "G" * 64, "\xff" * 64, "A" * 64])
-def test_what_is_no_hash_is_refused(sent: Episode, sha256: str) -> None:
+def test_a_malformed_hash_is_refused(sent: Episode, sha256: str) -> None:
     with pytest.raises(DatasetError, match="64 hexadecimal digits"):
         make_episode(sent.header_json, [sha256], [sent.chunk])
 
 
-def test_the_header_is_one_text(header: EpisodeHeader) -> None:
+def test_a_header_survives_json_unchanged(header: EpisodeHeader) -> None:
     text = header_to_json(header)
     assert text.startswith('{"trial":7,"start_ns":10000000000,"end_reason":"landed","contacts":[{"body":"spoon",')
     assert header_to_json(header_from_json(text)) == text
@@ -119,14 +119,14 @@ def test_the_header_is_one_text(header: EpisodeHeader) -> None:
         ("}", ""),
     ],
 )
-def test_a_wrong_header_is_refused(header: EpisodeHeader, old: str, new: str) -> None:
+def test_a_header_with_a_wrong_or_missing_value_is_refused(header: EpisodeHeader, old: str, new: str) -> None:
     text = header_to_json(header)
     assert old in text
     with pytest.raises(DatasetError, match="episode header: "):
         header_from_json(text.replace(old, new, 1))
 
 
-def test_more_samples_than_there_are_is_an_error(sent: Episode) -> None:
+def test_a_header_that_claims_more_samples_than_recorded_is_an_error(sent: Episode) -> None:
     claim = Episode(replace(sent.header, samples=51), sent.state)
     with pytest.raises(DatasetError, match="are not the records of 51 samples"):
         unpack(pack(Delivery(claim, "", ""), SIGNER), SIGNER).episode.samples()
@@ -138,7 +138,7 @@ def test_a_message_that_is_cut_off_is_refused(sent: Episode, length: int) -> Non
         unpack(pack(Delivery(sent, "", ""), SIGNER)[:length], SIGNER)
 
 
-def test_padding_is_left_alone(sent: Episode) -> None:
+def test_padding_after_a_message_is_ignored(sent: Episode) -> None:
     assert unpack(pack(Delivery(sent, "", ""), SIGNER) + bytes(3), SIGNER).episode.chunk == sent.chunk
 
 
@@ -157,8 +157,8 @@ def whole(encoder: ChunkEncoder, header: EpisodeHeader, make_samples: Any) -> by
 
 @settings(max_examples=300)
 @given(data=st.data())
-def test_garbage_is_refused_with_one_kind_of_error(whole: bytes, data: st.DataObject) -> None:
-    """A changed byte or a changed stretch: a DatasetError, or nothing was changed but padding."""
+def test_a_randomly_changed_message_is_refused_with_a_dataset_error(whole: bytes, data: st.DataObject) -> None:
+    """A changed byte or stretch gives a DatasetError, unless only padding was changed."""
     message = bytearray(whole)
     if data.draw(st.booleans()):
         message[data.draw(st.integers(0, len(message) - 1))] ^= data.draw(st.integers(1, 255))
@@ -181,7 +181,7 @@ def test_a_refusal_arrives_as_it_was_sent() -> None:
         unpack(pack(refusal, Signer(b"another")), SIGNER)
 
 
-def test_each_chunk_comes_with_a_hash(sent: Episode) -> None:
+def test_a_message_with_a_chunk_without_hash_is_refused(sent: Episode) -> None:
     message = pack(Delivery(sent, "", ""), SIGNER)
     without = Episode(sent.header, RecordedChunk(sent.chunk, ""))
     without.state.__dict__["records_sha256"] = ""
@@ -190,13 +190,13 @@ def test_each_chunk_comes_with_a_hash(sent: Episode) -> None:
     assert unpack(message, SIGNER).episode.digest == sent.digest
 
 
-def test_what_another_key_has_signed_is_refused(sent: Episode) -> None:
+def test_an_episode_signed_with_another_key_is_refused(sent: Episode) -> None:
     with pytest.raises(DatasetError, match="episode: is not signed with the key of this run"):
         unpack(pack(Delivery(sent, RESULT, CONDITIONS), Signer(b"another")), SIGNER)
 
 
 @pytest.mark.parametrize("part", [b'"trial":7', RESULT.encode(), CONDITIONS.encode()])
-def test_every_part_is_signed(sent: Episode, part: bytes) -> None:
+def test_a_change_in_any_part_of_a_message_breaks_its_signature(sent: Episode, part: bytes) -> None:
     message = pack(Delivery(sent, RESULT, CONDITIONS), SIGNER)
     assert message.count(part) == 1
     with pytest.raises(DatasetError, match="signed"):

@@ -50,7 +50,7 @@ def test_the_robot_stands_at_the_height_of_its_base() -> None:
     assert (root.parent, root.child, root.translation) == ("world", "base_link", (0.0, 0.0, 1.25))
 
 
-def test_one_angle_alone_gives_the_same_bits_as_all() -> None:
+def test_the_rotation_at_one_angle_equals_that_computed_with_many() -> None:
     frame = read_frames(URDF, base_height=1.0).moving[3]
     angles = np.random.default_rng(1).uniform(-7, 7, size=(500, 3))[:, 1]
     alone = np.concatenate([frame.rotation_at(angles[row : row + 1]) for row in range(len(angles))])
@@ -74,6 +74,6 @@ LINKS = "<link name='a'/><link name='b'/>"
         ),
     ],
 )
-def test_what_is_not_a_description_is_refused(urdf: str, message: str) -> None:
+def test_an_unreadable_robot_description_is_refused(urdf: str, message: str) -> None:
     with pytest.raises(ConfigError, match=message):
         read_frames(urdf, base_height=1.0)

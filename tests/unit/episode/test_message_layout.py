@@ -46,7 +46,7 @@ def make_header(stamp_ns: int, frame: str) -> Any:
 
 
 @pytest.mark.parametrize("count", [1, 500])
-def test_joint_states_are_the_bytes_that_rosbags_writes(count: int) -> None:
+def test_joint_states_have_the_bytes_that_rosbags_writes(count: int) -> None:
     topic = joint_states(TALOS.joints)
     columns = [wild((count, 32), seed=seed) for seed in range(3)]
     stamps = np.random.default_rng(3).integers(0, 2**31 * 10**9, size=count)
@@ -64,7 +64,7 @@ def test_joint_states_are_the_bytes_that_rosbags_writes(count: int) -> None:
 
 
 @given(st.integers(0, 2**31 - 1), st.integers(0, 999_999_999), st.lists(st.floats(), min_size=13, max_size=13))
-def test_odometry_is_the_bytes_that_rosbags_writes(sec: int, nanosec: int, numbers: list[float]) -> None:
+def test_odometry_has_the_bytes_that_rosbags_writes(sec: int, nanosec: int, numbers: list[float]) -> None:
     layout = ball_odometry().layout
     message = np.frombuffer(bytearray(layout.template), layout.dtype)
     message["header.stamp.sec"], message["header.stamp.nanosec"] = sec, nanosec
@@ -98,7 +98,7 @@ def test_controller_states_can_be_read_by_rosbags(controller: str, make_samples:
         assert STORE.serialize_cdr(state, STATE) == message
 
 
-def test_a_transform_of_no_frame_is_that_of_the_ball(make_samples: Any) -> None:
+def test_transforms_without_moving_frames_hold_only_the_ball(make_samples: Any) -> None:
     topic, samples = transforms((), TALOS.joints), make_samples(2)
     for row, message in enumerate(messages_of(topic, samples)):
         (ball,) = STORE.deserialize_cdr(message, topic.type_name).transforms
@@ -107,7 +107,7 @@ def test_a_transform_of_no_frame_is_that_of_the_ball(make_samples: Any) -> None:
         assert ball.transform.rotation.w == samples.ball_orientation_xyzw[row, 3]
 
 
-def test_every_kind_of_field_is_found() -> None:
+def test_fields_after_fields_of_every_kind_are_found() -> None:
     """Strings of odd lengths, bounded and fixed arrays, nested sequences and small integers shift what follows."""
     message = get_message("rcl_interfaces/msg/ParameterEvent")(
         node="/sim",
@@ -134,7 +134,7 @@ def test_every_kind_of_field_is_found() -> None:
     assert [p.name for p in read.new_parameters] == ["a", "bcd"]
 
 
-def test_messages_that_differ_elsewhere_are_recognised() -> None:
+def test_a_layout_does_not_describe_messages_with_other_constant_bytes() -> None:
     layout = joint_states(TALOS.joints).layout
     rows = np.tile(np.frombuffer(layout.template, np.uint8), (3, 1))
     rows.view(layout.dtype)["position"] = 1.5
@@ -147,6 +147,6 @@ def test_messages_that_differ_elsewhere_are_recognised() -> None:
 @pytest.mark.parametrize(
     ("path", "message"), [("nonsense", "no numbers at 'nonsense'"), ("header", "do not lie side by side")]
 )
-def test_paths_that_are_not_numbers_side_by_side_are_refused(path: str, message: str) -> None:
+def test_paths_to_fields_that_are_no_adjacent_numbers_are_refused(path: str, message: str) -> None:
     with pytest.raises(ValueError, match=message):
         MessageLayout(get_message("sensor_msgs/msg/JointState")(), [path])

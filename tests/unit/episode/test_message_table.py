@@ -1,4 +1,4 @@
-"""Messages of a sensor: of any size, one after the other. `test_chunk` has the tables of samples."""
+"""Lists of messages of sensors, which may differ in size. `test_chunk` tests the tables of samples."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def contents() -> bytes:
     )
 
 
-def test_they_are_found_one_after_the_other(contents: bytes) -> None:
+def test_messages_of_different_sizes_are_listed_one_after_the_other(contents: bytes) -> None:
     messages = MessageList(contents)
     assert len(messages) == 3
     assert messages.channels == (100, 101)
@@ -38,7 +38,7 @@ def test_they_are_found_one_after_the_other(contents: bytes) -> None:
     assert [count_indexed(messages.message_index(channel)) for channel in messages.channels] == [2, 1]
 
 
-def test_moved_messages_differ_in_times_and_stamps_alone(contents: bytes) -> None:
+def test_moving_messages_changes_only_their_times_and_stamps(contents: bytes) -> None:
     moved = bytearray(contents)
     MessageList(moved).move(LATE_NS)
     after, before = MessageList(moved), MessageList(contents)
@@ -48,7 +48,7 @@ def test_moved_messages_differ_in_times_and_stamps_alone(contents: bytes) -> Non
     assert moved == contents
 
 
-def test_what_are_no_such_messages_is_refused(contents: bytes) -> None:
+def test_bytes_that_are_no_messages_with_a_header_are_refused(contents: bytes) -> None:
     short = encode_records(Message(100, 5, b"\0\1\0\0abc", 5, 0))
     for broken, problem in [
         (b"", "holds no messages"),

@@ -17,7 +17,7 @@ EVERYTHING = ["joint_states", "ball/odometry", "controller_state", "tf", "clock"
 
 
 def record_as(collection: Collection, *, as_trial: int) -> Episode:
-    """Trial 4 as it is recorded in the slot of another one."""
+    """Trial 4 as it would be recorded under the number `as_trial`."""
     samples, header = throw(collection.config, 4)
     by_ns = collection.config.trial_start_ns(as_trial) - header.start_ns
     contacts = tuple(
@@ -47,7 +47,7 @@ def restamper(collection: Collection) -> Restamper:
 
 
 @pytest.mark.parametrize("number", [0, 4, 9_999_999])
-def test_an_episode_under_another_number_is_what_would_have_been_recorded_there(
+def test_an_episode_restamped_to_another_trial_equals_one_recorded_as_that_trial(
     number: int, collection: Collection, restamper: Restamper
 ) -> None:
     moved, expected = (
@@ -61,22 +61,20 @@ def test_an_episode_under_another_number_is_what_would_have_been_recorded_there(
     assert np.array_equal(moved.samples().stamps_ns, expected.samples().stamps_ns)
 
 
-def test_the_episode_itself_stays_as_it_is(collection: Collection, restamper: Restamper) -> None:
+def test_restamping_does_not_change_the_original_episode(collection: Collection, restamper: Restamper) -> None:
     episode, untouched = record_as(collection, as_trial=4), record_as(collection, as_trial=4)
     restamper.restamp(episode, 0)
     assert episode.state.contents == untouched.state.contents
     assert episode.header == untouched.header
 
 
-def test_an_episode_whose_records_are_not_what_was_hashed_is_refused(
-    collection: Collection, restamper: Restamper
-) -> None:
+def test_restamping_an_episode_with_a_wrong_hash_is_refused(collection: Collection, restamper: Restamper) -> None:
     episode = record_as(collection, as_trial=4)
     forged = Episode(episode.header, RecordedChunk(episode.chunk, "0" * 64))
     with pytest.raises(DatasetError, match="SHA-256 of its records"):
         restamper.restamp(forged, 0)
 
 
-def test_an_episode_of_other_topics_is_refused(restamper: Restamper) -> None:
+def test_restamping_an_episode_of_other_topics_is_refused(restamper: Restamper) -> None:
     with pytest.raises(DatasetError, match="has the channels"):
         restamper.restamp(Collection().episode(4), 0)

@@ -15,7 +15,7 @@ def rows_of(topic: Topic, samples: Samples) -> Any:
     return topic.encode(Recording(samples, {})).view(topic.layout.dtype)[:, 0]
 
 
-def test_the_twist_is_in_the_frame_of_the_ball(make_samples: Any) -> None:
+def test_the_recorded_twist_is_in_the_frame_of_the_ball(make_samples: Any) -> None:
     """nav_msgs/Odometry: the twist is in the frame child_frame_id."""
     samples = make_samples(40)
     rows = rows_of(ball_odometry(), samples)
@@ -24,7 +24,7 @@ def test_the_twist_is_in_the_frame_of_the_ball(make_samples: Any) -> None:
     assert np.allclose(to_world.apply(rows["twist.twist.angular"]), samples.ball_angular_velocity, atol=1e-14)
 
 
-def test_samples_survive_the_messages(make_samples: Any) -> None:
+def test_samples_can_be_read_back_from_their_messages(make_samples: Any) -> None:
     samples = make_samples(100)
     read = read_samples(rows_of(joint_states(TALOS.joints), samples), rows_of(ball_odometry(), samples))
     for field in fields(Samples):

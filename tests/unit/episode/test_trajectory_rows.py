@@ -20,7 +20,7 @@ def contents(make_samples: Any) -> bytes:
     return ChunkEncoder(Channels(config, full_description(config)), level=1).encode(make_samples(20)).decompress()
 
 
-def test_every_column_lies_where_it_was_written(contents: bytes, make_samples: Any) -> None:
+def test_the_columns_of_a_trajectory_hold_the_recorded_samples(contents: bytes, make_samples: Any) -> None:
     samples = make_samples(20)
     rows = trajectory_rows(contents, 20, TALOS.joints)
     for name, expected in {
@@ -38,7 +38,7 @@ def test_every_column_lies_where_it_was_written(contents: bytes, make_samples: A
     assert np.array_equal(stamps, samples.stamps_ns)
 
 
-def test_stamps_use_all_their_bits() -> None:
+def test_the_largest_seconds_and_nanoseconds_are_converted_exactly() -> None:
     pairs = [(0, 0), (1, 999_999_999), (2**31 - 1, 999_999_999), (5, 2**31 + 1)]
     stamps = np.array(pairs, [("sec", "<i4"), ("nanosec", "<u4")]).view(np.int64).ravel().copy()
     to_nanoseconds(stamps)
@@ -46,7 +46,7 @@ def test_stamps_use_all_their_bits() -> None:
 
 
 @pytest.mark.parametrize("samples", [0, -1, 3, 40, 21])
-def test_another_number_of_samples_is_refused(contents: bytes, samples: int) -> None:
+def test_a_number_of_samples_other_than_the_recorded_one_is_refused(contents: bytes, samples: int) -> None:
     with pytest.raises(
         DatasetError, match=f"are not the records of {samples} samples|not one message per channel and sample"
     ):
@@ -54,12 +54,12 @@ def test_another_number_of_samples_is_refused(contents: bytes, samples: int) -> 
 
 
 @pytest.mark.parametrize("joints", [TALOS.joints[:-1], TALOS.joints[::-1], ("shoulder_joint", "elbow_joint")])
-def test_other_joints_are_refused(contents: bytes, joints: tuple[str, ...]) -> None:
+def test_joints_other_than_the_recorded_ones_are_refused(contents: bytes, joints: tuple[str, ...]) -> None:
     with pytest.raises(DatasetError, match="messages of /joint_states have another layout"):
         trajectory_rows(contents, 20, joints)
 
 
-def test_another_layout_is_refused(contents: bytes) -> None:
+def test_a_changed_constant_byte_of_the_messages_is_refused(contents: bytes) -> None:
     rows = trajectory_rows(contents, 20, TALOS.joints)
     varying = {
         place
@@ -76,5 +76,5 @@ def test_another_layout_is_refused(contents: bytes) -> None:
         except DatasetError:
             refused += 1
             assert position not in varying
-    # What else varies: number and two times of each of two records, and the stamp of the odometry.
+    # These bytes vary too and are not checked: number and two times of each of two records, stamp of the odometry.
     assert refused == width - len(varying) - 2 * (4 + 8 + 8) - 8

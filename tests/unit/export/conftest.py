@@ -1,4 +1,4 @@
-"""A small collection with everything that exporters meet, and its throws as they should come out."""
+"""A small dataset with every case that exporters must handle, and its throws as they should be exported."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from throwcollect.robots.talos import TALOS
 from throwcollect.tasks.task import task_of
 
 FORMATS = ("parquet", "npz", "lerobot", "hdf5", "mat")
-"""Our own; the packages of `tests/plugins` have another one."""
+"""The formats of this project; a package in `tests/plugins` adds another one."""
 SETTINGS: dict[str, Any] = {
     "trials": 6,
     "record": {"trials_per_shard": 3},
@@ -58,7 +58,7 @@ def source(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="session")
 def exported(source: Path, tmp_path_factory: pytest.TempPathFactory) -> Export:
-    """Exports once what is asked for."""
+    """Exports the dataset to a format at a rate, only once for all tests."""
     made: dict[tuple[str, int | None], Path] = {}
 
     def make(to: str, rate_hz: int | None = None) -> Path:

@@ -1,4 +1,4 @@
-"""docs/exporting.md is true, and the command does what it says."""
+"""The commands and examples of docs/exporting.md work."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ IMPORTED = re.compile(r"^(?:import|from) (\w+)", re.MULTILINE)
 
 @pytest.fixture(scope="module")
 def place(source: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A directory in which the commands of the page were given."""
+    """A directory in which the commands of the page have been run."""
     place = tmp_path_factory.mktemp("page")
     shutil.copytree(source, place / "datasets" / "quickstart")
     with pytest.MonkeyPatch.context() as patch:
@@ -54,12 +54,14 @@ def run(code: str, directory: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.parametrize("code", EXAMPLES, ids=lambda code: IMPORTED.findall(code)[-1])
-def test_examples_run(code: str, place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_python_examples_of_the_page_run(code: str, place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     run(code, place, monkeypatch)
 
 
 @pytest.mark.parametrize("command", COMMANDS, ids=lambda command: command[5])
-def test_the_example_of_the_card_runs(command: list[str], place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_python_example_of_every_exported_card_runs(
+    command: list[str], place: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     directory = place / command[3]
     code = re.findall(r"```python\n(.*?)```", (directory / "README.md").read_text(encoding="utf-8"), re.DOTALL)
     assert len(code) == (command[5] != "mat")
@@ -67,7 +69,7 @@ def test_the_example_of_the_card_runs(command: list[str], place: Path, monkeypat
         run(each, directory, monkeypatch)
 
 
-def test_programs_get_json(source: Path, tmp_path: Path) -> None:
+def test_export_with_json_prints_a_summary_as_json(source: Path, tmp_path: Path) -> None:
     arguments = ["dataset", "export", str(source), str(tmp_path / "out"), "--to", "npz", "--rate", "25", "--json"]
     result = CliRunner().invoke(app, arguments, catch_exceptions=False)
     told = json.loads(result.output)

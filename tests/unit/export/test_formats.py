@@ -1,4 +1,4 @@
-"""What holds for every format: cards, rates, outputs that are left alone, and messages."""
+"""What holds for every format: cards, rates, refused outputs, and messages."""
 
 from __future__ import annotations
 
@@ -66,12 +66,12 @@ def test_the_card_of_a_hub_dataset_names_its_data_in_the_header(to: str, exporte
         (60, "They lie between those of the 250 Hz record: positions of joints and ball on the cubic"),
     ],
 )
-def test_the_card_says_how_the_rate_came_about(rate_hz: int | None, text: str, exported: Export) -> None:
+def test_the_card_explains_the_rate_of_the_samples(rate_hz: int | None, text: str, exported: Export) -> None:
     assert text in (exported("npz", rate_hz) / "README.md").read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize("to", FORMATS)
-def test_exporting_twice_gives_the_same_numbers_of_everything(
+def test_the_summary_of_an_export_has_the_right_counts_and_size(
     to: str, exported: Export, source: Path, tmp_path: Path
 ) -> None:
     found = export(source, tmp_path / "again", to=to)
@@ -82,7 +82,7 @@ def test_exporting_twice_gives_the_same_numbers_of_everything(
 
 
 @pytest.mark.parametrize("to", FORMATS)
-def test_nothing_is_left_of_an_export_that_fails(to: str, source: Path, tmp_path: Path) -> None:
+def test_an_export_of_a_damaged_dataset_leaves_no_files(to: str, source: Path, tmp_path: Path) -> None:
     broken = Path(shutil.copytree(source, tmp_path / "in" / "dataset"))
     last = sorted(broken.glob("*.mcap"))[-1]
     contents = bytearray(last.read_bytes())
@@ -95,7 +95,9 @@ def test_nothing_is_left_of_an_export_that_fails(to: str, source: Path, tmp_path
 
 
 @pytest.mark.parametrize("to", FORMATS)
-def test_what_cannot_be_written_to_the_end_leaves_one_message(to: str, source: Path, tmp_path: Path) -> None:
+def test_an_export_beyond_the_file_size_limit_is_an_error_and_leaves_no_files(
+    to: str, source: Path, tmp_path: Path
+) -> None:
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (50_000, hard))
     try:
@@ -106,7 +108,7 @@ def test_what_cannot_be_written_to_the_end_leaves_one_message(to: str, source: P
     assert list(tmp_path.iterdir()) == []
 
 
-def test_an_output_that_holds_something_is_left_alone(source: Path, tmp_path: Path) -> None:
+def test_an_output_directory_that_is_not_empty_is_refused(source: Path, tmp_path: Path) -> None:
     (tmp_path / "mine.txt").write_text("precious")
     with pytest.raises(ConfigError, match="exists"):
         export(source, tmp_path, to="npz")
@@ -115,32 +117,32 @@ def test_an_output_that_holds_something_is_left_alone(source: Path, tmp_path: Pa
     assert [path.name for path in tmp_path.iterdir()] == ["mine.txt"]
 
 
-def test_an_empty_output_is_used(source: Path, tmp_path: Path) -> None:
+def test_an_empty_output_directory_is_accepted(source: Path, tmp_path: Path) -> None:
     (tmp_path / "empty").mkdir()
     export(source, tmp_path / "empty", to="npz")
     assert (tmp_path / "empty" / "throws.npz").exists()
 
 
-def test_an_output_that_cannot_be_written_is_named(source: Path, tmp_path: Path) -> None:
+def test_an_output_that_cannot_be_written_is_named_in_the_error(source: Path, tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     with pytest.raises(DatasetError, match="file/export: cannot be written: Not a directory"):
         export(source, tmp_path / "file" / "export", to="npz")
 
 
-def test_an_unknown_format_is_answered_with_those_there_are(source: Path, tmp_path: Path) -> None:
+def test_an_unknown_format_is_refused_with_a_list_of_the_formats(source: Path, tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match="unknown format 'docx'\n  expected: one of parquet, npz, lerobot, hdf5, mat"):
         export(source, tmp_path / "out", to="docx")
 
 
 @pytest.mark.parametrize("rate_hz", [0, -5, 251])
-def test_a_rate_above_the_recorded_one_is_refused(rate_hz: int, source: Path, tmp_path: Path) -> None:
+def test_a_rate_below_1_or_above_the_recorded_one_is_refused(rate_hz: int, source: Path, tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match=f"^rate_hz: {rate_hz} samples per second\n  expected: 1 to 250"):
         export(source, tmp_path / "out", to="npz", rate_hz=rate_hz)
     assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize("rate_hz", ["50", 50.5])
-def test_a_rate_is_a_whole_number(rate_hz: object, source: Path, tmp_path: Path) -> None:
+def test_a_rate_that_is_no_whole_number_is_refused(rate_hz: object, source: Path, tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match=f"^rate_hz: {rate_hz!r} samples.*\n  expected: a whole number, 1 to 250"):
         export(source, tmp_path / "out", to="npz", rate_hz=rate_hz)
 
@@ -153,7 +155,7 @@ def test_a_dataset_without_episodes_cannot_be_exported(to: str, make_collection:
     assert not (tmp_path / "out").exists()
 
 
-def test_without_h5py_the_message_says_what_to_install(
+def test_export_to_hdf5_without_h5py_says_what_to_install(
     source: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, "h5py", None)
@@ -183,7 +185,7 @@ def test_without_h5py_the_message_says_what_to_install(
         ("command_acceleration_radps2", "rad/s^2"),
     ],
 )
-def test_units_follow_from_names(column: str, unit: str) -> None:
+def test_the_unit_of_a_column_follows_from_its_name(column: str, unit: str) -> None:
     assert unit_of(column) == unit
 
 
@@ -199,7 +201,7 @@ def with_csv(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 
 
 @pytest.mark.usefixtures("with_csv")
-def test_a_format_of_another_package_is_exported_to_as_ours_are(source: Path, tmp_path: Path) -> None:
+def test_an_export_can_use_a_format_of_another_package(source: Path, tmp_path: Path) -> None:
     done = CliRunner().invoke(app, ["dataset", "export", str(source), str(tmp_path / "text"), "--to", "csv"])
     assert (done.exit_code, done.stderr) == (0, "")
     assert "4 throws of 6 trials" in done.stdout
@@ -212,7 +214,7 @@ def test_a_format_of_another_package_is_exported_to_as_ours_are(source: Path, tm
 
 @pytest.mark.usefixtures("with_csv")
 @pytest.mark.parametrize("function", ["write_csv", "tabulate_signals"])
-def test_a_format_of_another_package_that_fails_is_named(
+def test_an_error_in_a_format_of_another_package_names_the_package(
     function: str, source: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def fail(*_: object, **__: object) -> None:

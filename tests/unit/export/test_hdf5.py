@@ -16,7 +16,9 @@ BESIDE = {"time_s", "command_velocity_radps", "command_acceleration_radps2"}
 
 
 @pytest.mark.parametrize(("rate_hz", "step"), [(None, 1), (50, 5)])
-def test_throws_lie_as_robomimic_reads_them(rate_hz: int | None, step: int, exported: Export, source: Path) -> None:
+def test_throws_are_arranged_as_robomimic_expects_them(
+    rate_hz: int | None, step: int, exported: Export, source: Path
+) -> None:
     with h5py.File(exported("hdf5", rate_hz) / "throws.hdf5") as file:
         data = file["data"]
         assert set(data) == {f"demo_{trial}" for trial in WITH_EPISODE}
@@ -36,7 +38,7 @@ def test_throws_lie_as_robomimic_reads_them(rate_hz: int | None, step: int, expo
             assert np.array_equal(group["rewards"], last * (trial != HELD))
 
 
-def test_datasets_tell_their_units_and_components(exported: Export, source: Path) -> None:
+def test_datasets_in_the_hdf5_file_state_their_units_and_components(exported: Export, source: Path) -> None:
     with h5py.File(exported("hdf5") / "throws.hdf5") as file:
         actions = file["data/demo_0/actions"].attrs
         assert (actions["unit"], list(actions["components"])) == (
@@ -48,7 +50,7 @@ def test_datasets_tell_their_units_and_components(exported: Export, source: Path
         assert Config.model_validate_json(file.attrs["config"]) == Dataset.open(source).config
 
 
-def test_the_table_has_all_trials(exported: Export, source: Path) -> None:
+def test_the_exported_table_has_all_trials(exported: Export, source: Path) -> None:
     with h5py.File(exported("hdf5") / "throws.hdf5") as file:
         for name, values in table_of(source).items():
             column = file["throws"][name]

@@ -1,4 +1,4 @@
-"""The files of a LeRobot dataset against its format, written out; and the library itself, where it is installed."""
+"""The exported files have the LeRobot format, and the lerobot library reads them where it is installed."""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ def values_of(column: pa.ChunkedArray) -> np.ndarray:
     return np.array(column.to_pylist())
 
 
-def test_info_is_as_the_format_has_it(exported: Export, source: Path) -> None:
+def test_the_info_file_has_the_contents_that_the_lerobot_format_prescribes(exported: Export, source: Path) -> None:
     described = {
         name: {"dtype": "float32", "shape": [len(names)], "names": names} for name, names in FLOATS.items()
     } | {name: {"dtype": kind, "shape": [1], "names": None} for name, kind in SCALARS.items()}
@@ -108,7 +108,9 @@ def test_info_is_as_the_format_has_it(exported: Export, source: Path) -> None:
 
 
 @pytest.mark.parametrize(("rate_hz", "step"), [(None, 1), (50, 5)])
-def test_frames_are_those_of_the_dataset(rate_hz: int | None, step: int, exported: Export, source: Path) -> None:
+def test_exported_frames_equal_the_samples_of_the_dataset(
+    rate_hz: int | None, step: int, exported: Export, source: Path
+) -> None:
     table = pq.read_table(exported("lerobot", rate_hz) / "data" / "chunk-000" / "file-000.parquet")
     types = {name: pa.list_(pa.float32(), len(names)) for name, names in FLOATS.items()}
     types |= {name: SCALAR_TYPES[kind] for name, kind in SCALARS.items()}
@@ -117,13 +119,13 @@ def test_frames_are_those_of_the_dataset(rate_hz: int | None, step: int, exporte
         assert np.array_equal(values_of(table[name]), values), name
 
 
-def test_an_episode_is_a_row_group(exported: Export) -> None:
+def test_every_episode_is_one_row_group(exported: Export) -> None:
     with pq.ParquetFile(exported("lerobot") / "data" / "chunk-000" / "file-000.parquet") as file:
         groups = [file.read_row_group(number)["episode_index"].to_pylist() for number in range(file.num_row_groups)]
     assert [set(group) for group in groups] == [{0}, {1}, {2}, {3}]
 
 
-def test_episodes_say_where_they_lie_and_what_came_of_them(exported: Export, source: Path) -> None:
+def test_the_episode_table_has_the_place_and_the_results_of_every_episode(exported: Export, source: Path) -> None:
     table = pq.read_table(exported("lerobot") / "meta" / "episodes" / "chunk-000" / "file-000.parquet")
     frames, throws = frames_of(source), table_of(source)
     places = ["episode_index", "tasks", "length", "data/chunk_index", "data/file_index", "dataset_from_index"]
@@ -179,14 +181,14 @@ def statistics_of(values: np.ndarray, *, method: Any) -> dict[str, Any]:
     }
 
 
-def test_the_task_is_the_index_of_its_table(exported: Export) -> None:
+def test_the_task_text_is_the_index_of_the_task_table(exported: Export) -> None:
     path = exported("lerobot") / "meta" / "tasks.parquet"
     assert pq.read_table(path).to_pydict() == {"task_index": [0], "task": ["Throw the ball."]}
     frame = pytest.importorskip("pandas").read_parquet(path)
     assert (frame.index.name, frame.iloc[0].name, list(frame.columns)) == ("task", "Throw the ball.", ["task_index"])
 
 
-def test_the_table_has_trials_without_episode_too(exported: Export, source: Path) -> None:
+def test_the_exported_table_also_has_trials_without_an_episode(exported: Export, source: Path) -> None:
     table = pq.read_table(exported("lerobot") / "throws.parquet")
     found = table.to_pydict()
     assert found.pop("episode_index") == [0, None, 1, 2, 3, None]
@@ -195,7 +197,7 @@ def test_the_table_has_trials_without_episode_too(exported: Export, source: Path
     assert table.schema.field("landing_x_m").metadata[b"unit"] == b"m"
 
 
-def test_files_are_limited_in_size_and_directories_in_files(
+def test_data_files_and_directories_are_split_at_their_limits(
     source: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, exported: Export
 ) -> None:
     monkeypatch.setattr(parquet_series, "MEGABYTES_PER_FILE", 0)
@@ -220,7 +222,7 @@ def test_files_are_limited_in_size_and_directories_in_files(
 
 
 @pytest.mark.parametrize(("rate_hz", "step"), [(250, 1), (50, 5)])
-def test_the_library_reads_it(
+def test_the_lerobot_library_reads_the_export(
     rate_hz: int, step: int, exported: Export, source: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("HF_HUB_OFFLINE", "1")

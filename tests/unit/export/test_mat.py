@@ -43,7 +43,7 @@ def open_recordings(directory: Path) -> dict[int, Any]:
 
 
 def motion(dmp: Any, times: np.ndarray) -> np.ndarray:
-    """The motion of a DMP by its equations, integrated by another hand."""
+    """The motion of a DMP by its equations, integrated independently of the exporter."""
     a_z, a_x, tau = (float(dmp[name][0, 0]) for name in ("a_z", "a_x", "tau"))
     count = dmp["w"].shape[1]
 
@@ -60,7 +60,7 @@ def motion(dmp: Any, times: np.ndarray) -> np.ndarray:
 
 
 @pytest.mark.parametrize(("rate_hz", "step"), [(None, 1), (50, 5)])
-def test_measured_series_are_those_of_the_dataset(
+def test_measured_series_equal_the_samples_of_the_dataset(
     rate_hz: int | None, step: int, exported: Export, source: Path
 ) -> None:
     found = open_recordings(exported("mat", rate_hz))
@@ -74,7 +74,7 @@ def test_measured_series_are_those_of_the_dataset(
     assert not found
 
 
-def test_the_path_is_the_commanded_motion_from_rest_to_rest(exported: Export, source: Path) -> None:
+def test_the_exported_path_is_the_commanded_motion_up_to_rest(exported: Export, source: Path) -> None:
     found = open_recordings(exported("mat"))
     for trial, signals in throws_of(source):
         throws, number = found[trial]
@@ -90,7 +90,7 @@ def test_the_path_is_the_commanded_motion_from_rest_to_rest(exported: Export, so
         assert throws["robot_data"][0, 0]["dt"][0, 0] == 1 / 250
 
 
-def test_targets_are_what_the_throws_achieved(exported: Export, source: Path) -> None:
+def test_the_exported_targets_are_where_the_throws_landed(exported: Export, source: Path) -> None:
     found, table = open_recordings(exported("mat")), table_of(source)
     for trial, (throws, number) in found.items():
         distance, height, angle = throws["targets"][number]
@@ -119,7 +119,7 @@ def test_a_fitted_dmp_moves_as_commanded_up_to_its_error(exported: Export) -> No
         assert dmp["error"].max() < 3e-4
 
 
-def test_a_dmp_of_the_configuration_comes_as_it_is(make_collection: Any, tmp_path: Path) -> None:
+def test_a_dmp_of_the_configuration_is_exported_with_its_own_weights(make_collection: Any, tmp_path: Path) -> None:
     dataset = make_collection(OF_A_DMP).collect(tmp_path / "dataset")
     export(dataset, tmp_path / "out", to="mat")
     swept = table_of(dataset)["task.trajectory.weights.arm_right_4_joint.5"]
@@ -134,7 +134,7 @@ def test_a_dmp_of_the_configuration_comes_as_it_is(make_collection: Any, tmp_pat
         assert dmp["error"].max() < 2e-3
 
 
-def test_the_table_has_all_trials_with_units(exported: Export, source: Path) -> None:
+def test_the_exported_table_has_all_trials_with_units(exported: Export, source: Path) -> None:
     contents = loadmat(exported("mat") / "throws.mat")
     throws, units = contents["throws"][0, 0], contents["units"][0, 0]
     assert contents["digest_of_dataset"][0] == info(source).digest
@@ -151,7 +151,7 @@ def test_the_table_has_all_trials_with_units(exported: Export, source: Path) -> 
     assert units["task_end_arm_right_4_joint"][0] == "rad"
 
 
-def test_what_is_too_large_for_the_format_is_refused(
+def test_a_recording_too_large_for_the_mat_format_is_refused(
     source: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(mat, "_LARGEST", 100_000)
@@ -162,7 +162,7 @@ def test_what_is_too_large_for_the_format_is_refused(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_column_whose_name_is_too_long_for_the_format_is_named(source: Path, tmp_path: Path) -> None:
+def test_a_column_whose_name_is_too_long_for_the_mat_format_is_named(source: Path, tmp_path: Path) -> None:
     whole = ExportSource.open(source)
     key = f"task.end.{'j' * 55}"
     longer = replace(whole, table=whole.table.append_column(key, whole.table["landing_x_m"]))

@@ -11,7 +11,9 @@ from throwcollect.robots.talos import TALOS
 
 
 @pytest.mark.parametrize(("rate_hz", "step"), [(None, 1), (50, 5)])
-def test_arrays_are_those_of_the_dataset(rate_hz: int | None, step: int, exported: Export, source: Path) -> None:
+def test_exported_arrays_equal_the_samples_of_the_dataset(
+    rate_hz: int | None, step: int, exported: Export, source: Path
+) -> None:
     archives = [np.load(path) for path in sorted((exported("npz", rate_hz) / "trajectories").iterdir())]
     assert [archive["trial"].tolist() for archive in archives] == [[0, 2], [3, 4]]
     expected = dict(throws_of(source, step))
@@ -27,7 +29,7 @@ def test_arrays_are_those_of_the_dataset(rate_hz: int | None, step: int, exporte
         assert {len(archive[name]) for name in expected[0]} == {offsets[-1]}
 
 
-def test_the_table_has_all_trials(exported: Export, source: Path) -> None:
+def test_the_exported_table_has_all_trials(exported: Export, source: Path) -> None:
     throws = np.load(exported("npz") / "throws.npz")
     for name, values in table_of(source).items():
         kind = throws[name].dtype.kind

@@ -28,7 +28,9 @@ COLUMNS = {
 
 
 @pytest.mark.parametrize(("rate_hz", "step"), [(None, 1), (50, 5)])
-def test_samples_are_those_of_the_dataset(rate_hz: int | None, step: int, exported: Export, source: Path) -> None:
+def test_exported_samples_equal_those_of_the_dataset(
+    rate_hz: int | None, step: int, exported: Export, source: Path
+) -> None:
     samples = pq.read_table(exported("parquet", rate_hz) / "trajectories")
     assert samples.column_names == ["trial", *(name for names in COLUMNS.values() for name in names)]
     trials = samples["trial"].to_numpy()
@@ -43,7 +45,7 @@ def test_samples_are_those_of_the_dataset(rate_hz: int | None, step: int, export
     assert list(dict.fromkeys(trials.tolist())) == WITH_EPISODE
 
 
-def test_the_table_has_all_trials_with_units(exported: Export, source: Path) -> None:
+def test_the_exported_table_has_all_trials_with_units(exported: Export, source: Path) -> None:
     table = pq.read_table(exported("parquet") / "throws.parquet")
     assert table.to_pydict() == table_of(source)
     field = table.schema.field("landing_vz_mps")
@@ -53,7 +55,7 @@ def test_the_table_has_all_trials_with_units(exported: Export, source: Path) -> 
 
 
 @pytest.mark.parametrize(("rows", "groups"), [(1, [[0], [2], [3], [4]]), (400, [[0, 2], [3, 4]])])
-def test_no_throw_is_divided(
+def test_a_throw_is_never_divided_between_row_groups(
     rows: int, groups: list[list[int]], source: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(parquet, "_ROWS_PER_GROUP", rows)

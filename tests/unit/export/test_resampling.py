@@ -25,7 +25,7 @@ def polynomial(rate_hz: int, count: int) -> Samples:
     )
 
 
-def test_a_rate_that_divides_takes_every_nth_sample_as_it_is() -> None:
+def test_a_rate_that_divides_the_recorded_one_takes_every_nth_sample_unchanged() -> None:
     recorded = polynomial(250, 101)
     for rate_hz, step in ((250, 1), (125, 2), (50, 5), (25, 10), (1, 250)):
         given = resample(recorded, recorded_hz=250, rate_hz=rate_hz)
@@ -35,7 +35,7 @@ def test_a_rate_that_divides_takes_every_nth_sample_as_it_is() -> None:
 
 
 @pytest.mark.parametrize("rate_hz", [240, 100, 60, 30, 7])
-def test_between_samples_positions_are_cubic_and_the_rest_is_linear(rate_hz: int) -> None:
+def test_resampling_interpolates_positions_by_cubics_and_the_rest_linearly(rate_hz: int) -> None:
     given = resample(polynomial(250, 101), recorded_hz=250, rate_hz=rate_hz)
     count = len(given)
     assert (count - 1) / rate_hz <= 100 / 250 < count / rate_hz
@@ -50,7 +50,7 @@ def test_between_samples_positions_are_cubic_and_the_rest_is_linear(rate_hz: int
         )
 
 
-def test_orientations_stay_unit_quaternions_although_their_sign_flips() -> None:
+def test_resampled_orientations_stay_unit_quaternions_when_signs_flip() -> None:
     recorded = polynomial(250, 101)
     recorded.ball_orientation_xyzw[40:70] *= -1
     given = resample(recorded, recorded_hz=250, rate_hz=240)
@@ -60,6 +60,6 @@ def test_orientations_stay_unit_quaternions_although_their_sign_flips() -> None:
 
 
 @pytest.mark.parametrize("rate_hz", [240, 100, 1])
-def test_one_sample_stays_one(rate_hz: int) -> None:
+def test_a_single_sample_is_resampled_to_a_single_sample(rate_hz: int) -> None:
     given = resample(polynomial(250, 1), recorded_hz=250, rate_hz=rate_hz)
     assert {len(column) for column in vars(given).values()} == {1}

@@ -1,4 +1,4 @@
-"""Exports of throws with targets: what a policy that is conditioned on them finds."""
+"""Exports of throws with targets."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def test_every_format_says_whether_all_throws_have_targets(
         assert "| `miss_m` | m | Distance of where the trial ended from its target, in x, y [m]. |" in card
 
 
-def test_tables_have_targets_and_misses(partly: Path, tmp_path: Path) -> None:
+def test_exported_tables_have_targets_and_misses(partly: Path, tmp_path: Path) -> None:
     export(partly, tmp_path / "parquet", to="parquet")
     export(partly, tmp_path / "npz", to="npz")
     table = pq.read_table(tmp_path / "parquet" / "throws.parquet")
@@ -60,7 +60,7 @@ def test_tables_have_targets_and_misses(partly: Path, tmp_path: Path) -> None:
         assert "target_x_m" not in archive
 
 
-def test_every_sample_has_the_target_of_its_throw(targeted: Path, tmp_path: Path) -> None:
+def test_every_exported_sample_has_the_target_of_its_throw(targeted: Path, tmp_path: Path) -> None:
     export(targeted, tmp_path / "parquet", to="parquet")
     samples = pq.read_table(tmp_path / "parquet" / "trajectories").to_pandas()
     assert samples.groupby("trial")[["target_x_m", "target_y_m"]].agg(["min", "max"]).to_numpy().tolist() == [
@@ -80,7 +80,7 @@ def test_every_sample_has_the_target_of_its_throw(targeted: Path, tmp_path: Path
     assert throws["wanted_names"].tolist() == ["target_x_m", "target_y_m"]
 
 
-def test_lerobot_has_the_goal_in_the_state_of_the_environment_and_in_words(targeted: Path, tmp_path: Path) -> None:
+def test_lerobot_has_the_target_in_the_environment_state_and_in_the_task_text(targeted: Path, tmp_path: Path) -> None:
     export(targeted, tmp_path / "lerobot", to="lerobot")
     described = json.loads((tmp_path / "lerobot" / "meta" / "info.json").read_text())
     assert described["features"]["observation.environment_state"]["names"][6:] == ["target.x", "target.y"]
@@ -96,7 +96,7 @@ def test_lerobot_has_the_goal_in_the_state_of_the_environment_and_in_words(targe
         assert set(rows["task_index"]) == {number}
 
 
-def test_throws_at_one_target_are_one_task(tmp_path: Path) -> None:
+def test_throws_at_the_same_target_are_one_lerobot_task(tmp_path: Path) -> None:
     text = "task.duration_s,target_x_m,target_y_m,target_hit_angle_rad\n1,1.4,0,1.25\n1.1,1.4,0,1.25\n"
     source = collect_targeted(tmp_path / "data", text)
     export(source, tmp_path / "lerobot", to="lerobot")
@@ -107,7 +107,7 @@ def test_throws_at_one_target_are_one_task(tmp_path: Path) -> None:
     assert names[6:] == ["target.x", "target.y", "target.hit_angle"]
 
 
-def test_throws_without_a_target_are_one_task(partly: Path, tmp_path: Path) -> None:
+def test_lerobot_has_a_task_without_target_if_any_throw_has_none(partly: Path, tmp_path: Path) -> None:
     export(partly, tmp_path / "lerobot", to="lerobot")
     tasks = pq.read_table(tmp_path / "lerobot" / "meta" / "tasks.parquet").to_pandas()
     assert list(tasks.index) == ["Throw the ball."]

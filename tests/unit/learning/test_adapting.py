@@ -41,7 +41,7 @@ def heavy_drag(values):
     return land(values, 0.8)
 
 
-def test_one_throw_says_how_far_all_end_elsewhere() -> None:
+def test_a_single_throw_reveals_the_offset_of_all_landings() -> None:
     learned = learn()
     found = elsewhere(learned, 1, land_shifted)
     assert found.method is Method.OFFSET
@@ -49,7 +49,7 @@ def test_one_throw_says_how_far_all_end_elsewhere() -> None:
     assert off(learned, found, land_shifted) < 0.005 < found.before[0]
 
 
-def test_some_throws_say_which_parameters_are_shifted() -> None:
+def test_eight_throws_reveal_a_bias_of_the_parameters() -> None:
     learned = learn()
     found = elsewhere(learned, 8, land_biased)
     half = np.array([0.2, 0.4, 0.3])
@@ -60,7 +60,7 @@ def test_some_throws_say_which_parameters_are_shifted() -> None:
     assert len(found.deviations) == len(KEYS) + 2
 
 
-def test_latents_that_count_are_found() -> None:
+def test_adapting_finds_the_value_of_a_latent_that_matters() -> None:
     learned = learn_with_drag()
     found = elsewhere(learned, 4, heavy_drag, latents_count=True)
     assert found.method is Method.LATENT
@@ -68,27 +68,27 @@ def test_latents_that_count_are_found() -> None:
     assert off(learned, found, heavy_drag) < 0.01
 
 
-def test_a_latent_stays_inside_of_what_was_collected() -> None:
+def test_adapting_keeps_a_latent_within_its_collected_range() -> None:
     found = elsewhere(learn_with_drag(), 4, lambda values: land(values, 1.6), latents_count=True, method=Method.LATENT)
     assert found.correction.latents.tolist() == [1.0]
 
 
 @pytest.mark.parametrize(("count", "most_m"), [(1, 0.02), (3, 0.008), (5, 0.008), (10, 0.008)])
-def test_where_nothing_differs_little_gets_worse(count: int, most_m: float) -> None:
+def test_adapting_to_an_unchanged_world_hardly_worsens_predictions(count: int, most_m: float) -> None:
     learned = learn()
     for seed in range(5):
         found = elsewhere(learned, count, land, noise_m=0.005, seed=seed)
         assert off(learned, found, land) < most_m
 
 
-def test_throws_that_speak_for_no_difference_leave_the_map_alone() -> None:
+def test_adapting_to_a_throw_that_agrees_leaves_the_map_unchanged() -> None:
     learned = learn()
     found = elsewhere(learned, 1, land, noise_m=0.001)
     assert found.method is Method.NONE
     assert found.correction is learned.correction
 
 
-def test_with_scatter_more_throws_say_more() -> None:
+def test_adapting_to_scattered_throws_gets_better_with_more_throws() -> None:
     learned = learn()
     errors = [
         np.median(
@@ -102,24 +102,24 @@ def test_with_scatter_more_throws_say_more() -> None:
     assert errors[1] < errors[0] < off(learned, elsewhere(learned, 3, land_biased, method=Method.NONE), land_biased)
 
 
-def test_of_many_throws_each_is_predicted_by_a_map_of_most_others() -> None:
+def test_adapting_to_many_throws_reduces_their_errors_and_lists_every_one() -> None:
     found = elsewhere(learn(), 60, land_biased)
     assert len(found.after) == 60
     assert np.median(found.after) < 0.004 < np.median(found.before)
 
 
-def test_what_is_wanted_is_done_even_if_it_does_not_help() -> None:
+def test_a_requested_method_is_used_even_if_the_world_is_unchanged() -> None:
     assert elsewhere(learn(), 5, land, method=Method.OFFSET).method is Method.OFFSET
 
 
 @pytest.mark.parametrize("count", [1, 3, 5, 10])
-def test_scatter_is_not_taken_for_a_difference(count: int) -> None:
+def test_scatter_is_hardly_ever_mistaken_for_a_different_world(count: int) -> None:
     found = [elsewhere(learn(), count, land, noise_m=0.02, seed=seed).method for seed in range(12)]
     assert found.count(Method.NONE) >= 11
 
 
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")
-def test_places_beyond_all_that_a_bias_explains_are_named() -> None:
+def test_places_too_far_away_for_any_bias_are_refused() -> None:
     learned = learn()
     values = learned.scale(KeyRole.PARAMETER, draw(1, 8))
     with pytest.raises(ConfigError, match="the throws ended too far from where the model has them"):
@@ -134,7 +134,7 @@ def test_places_beyond_all_that_a_bias_explains_are_named() -> None:
         )
 
 
-def test_a_world_may_be_a_metre_away_however_close_together_all_throws_ended() -> None:
+def test_places_are_refused_only_if_more_than_a_metre_from_learned_ones() -> None:
     close = replace(learn(), outputs=np.full((800, 2), [1.4, -0.2]))
     refuse_far_places(close, np.array([[1.4, -0.2], [1.4, 0.7], [0.5, -0.2]]))
     with pytest.raises(FarThrowError) as caught:

@@ -21,7 +21,7 @@ def targets() -> np.ndarray:
 
 
 @pytest.mark.parametrize(("kind", "off_m"), [(Kind.LOCAL, 0.002), (Kind.POLYNOMIAL, 0.005)])
-def test_throws_end_at_their_targets(kind: Kind, off_m: float, targets: np.ndarray) -> None:
+def test_aimed_throws_end_at_their_targets(kind: Kind, off_m: float, targets: np.ndarray) -> None:
     found, _, off = throw(learn(kind=kind), targets)
     assert found.reachable.all()
     assert np.linalg.norm(found.predicted - targets, axis=1).max() < 1e-3
@@ -30,7 +30,7 @@ def test_throws_end_at_their_targets(kind: Kind, off_m: float, targets: np.ndarr
 
 
 @pytest.mark.parametrize("choice", Choice)
-def test_where_a_throw_ends_does_not_depend_on_the_other_targets(choice: Choice, targets: np.ndarray) -> None:
+def test_the_aim_for_a_target_does_not_depend_on_the_other_targets(choice: Choice, targets: np.ndarray) -> None:
     learned = learn(60)
     far = np.concatenate([targets, targets * 3])
     together, _, _ = throw(learned, far, choice)
@@ -40,7 +40,7 @@ def test_where_a_throw_ends_does_not_depend_on_the_other_targets(choice: Choice,
             np.testing.assert_array_equal(getattr(together, name)[number], getattr(alone, name)[0])
 
 
-def test_each_target_has_a_context_of_its_own(targets: np.ndarray) -> None:
+def test_every_target_is_aimed_at_in_its_own_context(targets: np.ndarray) -> None:
     learned = learn_with_drag(role=KeyRole.CONTEXT)
     context = np.linspace(-1.0, 1.0, len(targets))[:, np.newaxis]
     together = aim(learned, targets, context)
@@ -50,13 +50,13 @@ def test_each_target_has_a_context_of_its_own(targets: np.ndarray) -> None:
         np.testing.assert_array_equal(together.nearest_place[number], alone.nearest_place[0])
 
 
-def test_parameters_stay_inside_of_their_ranges(targets: np.ndarray) -> None:
+def test_aimed_parameters_stay_within_their_ranges(targets: np.ndarray) -> None:
     learned = learn(60)
     far = np.concatenate([targets, targets * 3])
     assert np.abs(throw(learned, far)[0].parameters).max() <= 1.0
 
 
-def test_what_no_throw_came_near_to_is_out_of_reach() -> None:
+def test_a_target_that_no_throw_came_near_is_out_of_reach() -> None:
     learned = learn()
     found = aim(learned, np.array([[9.0, 0.0], [1.3, -0.2]]), np.zeros((2, 0)))
     assert found.reachable.tolist() == [False, True]
@@ -65,7 +65,7 @@ def test_what_no_throw_came_near_to_is_out_of_reach() -> None:
     assert np.linalg.norm(nearest - [9.0, 0.0]) == np.linalg.norm(learned.outputs - [9.0, 0.0], axis=1).min()
 
 
-def test_of_several_ways_the_wanted_one_is_taken(targets: np.ndarray) -> None:
+def test_aiming_takes_the_way_of_least_effort_or_sensitivity_if_chosen(targets: np.ndarray) -> None:
     learned = learn()
     by = {choice: throw(learned, targets, choice) for choice in Choice}
     assert all(off.max() < 0.01 for _, _, off in by.values())
@@ -78,7 +78,7 @@ def test_of_several_ways_the_wanted_one_is_taken(targets: np.ndarray) -> None:
     assert sensitivities[Choice.LEAST_SENSITIVE] < 0.98 * sensitivities[Choice.NEAREST]
 
 
-def test_in_another_world_aiming_makes_up_for_what_differs(targets: np.ndarray) -> None:
+def test_aiming_compensates_for_a_known_bias_and_offset(targets: np.ndarray) -> None:
     learned = learn()
     shifted = learned.correct(Correction(np.array([0.1, -0.2, 0.05]), np.zeros(0), np.array([0.03, -0.02])))
     found = aim(shifted, targets, np.zeros((len(targets), 0)))

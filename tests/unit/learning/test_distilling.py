@@ -27,29 +27,29 @@ def off(learned: LearnedMap, shift=(0.0, 0.0)) -> np.ndarray:
     return np.linalg.norm(land(values) + shift - targets, axis=1)
 
 
-def test_one_polynomial_hits_nearly_as_well() -> None:
+def test_a_distilled_polynomial_hits_targets_within_a_centimetre() -> None:
     errors = off(learn())
     assert np.median(errors) < 0.002
     assert errors.max() < 0.01
 
 
-def test_of_an_adapted_map_the_adapted_way_is_distilled() -> None:
+def test_distilling_an_adapted_map_keeps_its_correction() -> None:
     learned = learn()
     assert np.median(off(learned.correct(replace(learned.correction, offset=SHIFT)), SHIFT)) < 0.002
 
 
-def test_few_throws_give_a_polynomial_of_few_terms() -> None:
+def test_fewer_throws_give_a_distilled_polynomial_of_lower_degree() -> None:
     distilled = distil(learn(30))
     assert distilled.polynomial.degree == 4
     assert distil(learn(20)).polynomial.degree == 3
 
 
-def test_parameters_stay_inside_of_their_ranges() -> None:
+def test_distilled_parameters_stay_within_their_ranges() -> None:
     found = distil(learn()).aim(np.array([[9.0, 0.0], [-3.0, 4.0]]), np.zeros((2, 0)))
     assert np.abs(found).max() == 1.0
 
 
-def test_the_file_is_the_same_bytes_each_time_and_gives_what_the_map_gives(tmp_path: Path) -> None:
+def test_the_onnx_file_is_reproducible_and_agrees_with_the_distilled_map(tmp_path: Path) -> None:
     dataset = make_dataset(tmp_path / "data", 150)
     for name in ("one", "two"):
         fit(dataset, given=[KEYS[2]]).distil().save(tmp_path / name)
@@ -71,7 +71,7 @@ def test_the_file_is_the_same_bytes_each_time_and_gives_what_the_map_gives(tmp_p
     assert json.loads(said.stdout) == pytest.approx(dict(zip(model.parameters, wanted, strict=True)), abs=1e-5)
 
 
-def test_adapting_a_distilled_model_distils_again(tmp_path: Path) -> None:
+def test_adapting_a_distilled_model_distils_it_again(tmp_path: Path) -> None:
     model = fit(make_dataset(tmp_path / "data", 120)).distil()
     point = dict(zip(KEYS, draw(1, 8)[0].tolist(), strict=True))
     adapted = model.adapt([point], [(land(draw(1, 8)) + SHIFT)[0]], method="offset")
@@ -85,14 +85,14 @@ def test_adapting_a_distilled_model_distils_again(tmp_path: Path) -> None:
         load_model(path)
 
 
-def test_without_the_package_one_sentence_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_distilling_without_onnx_says_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("throwcollect.extras.is_installed", lambda package: package != "onnx")
     with pytest.raises(MissingExtraError, match="this needs onnx, which is not installed") as caught:
         fit(make_dataset(tmp_path / "data", 120)).distil()
     assert caught.value.hint == "pip install 'throwcollect[onnx]'"
 
 
-def test_a_target_that_is_the_same_in_all_throws_is_named() -> None:
+def test_distilling_refuses_a_target_that_is_the_same_in_all_throws() -> None:
     learned = learn(30)
     ends = np.column_stack([learned.outputs[:, 0], np.full(30, 0.2)])
     with pytest.raises(ConfigError, match=r"landing_y_m has the value 0\.2 in all throws"):

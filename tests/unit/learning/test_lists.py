@@ -1,4 +1,4 @@
-"""Lists in CSV files: each number is that of its column, what may mean something else is refused, files are whole."""
+"""Lists in CSV files: columns are found by name, ambiguous rows are refused, files are written as a whole."""
 
 import resource
 from collections.abc import Iterator
@@ -23,7 +23,7 @@ AIM = Aim(END, {"task.duration_s": 1.1}, END, True, END)
 
 @contextmanager
 def small_disk(most_bytes: int) -> Iterator[None]:
-    """No file of this process may become longer."""
+    """Within the block, this process cannot write a longer file."""
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (most_bytes, hard))
     try:
@@ -37,7 +37,7 @@ def table(tmp_path: Path) -> Path:
     return tmp_path / "table.csv"
 
 
-def test_columns_may_stand_in_any_order_among_others(table: Path) -> None:
+def test_a_list_may_have_its_columns_in_any_order_among_others(table: Path) -> None:
     table.write_text("note, landing_y_m, landing_x_m, note\na, -0.29, 1.63, b\n\n, 2, 1,\n")
     assert read_table(table, TARGETS) == [
         Row(f"{table}:2", dict(zip(TARGETS, (1.63, -0.29), strict=True))),
@@ -55,7 +55,7 @@ def test_columns_may_stand_in_any_order_among_others(table: Path) -> None:
         (f"\n{HEADER}\n1,\n", ":3: landing_y_m: ''"),
     ],
 )
-def test_a_row_that_may_mean_something_else_is_told_with_its_line(table: Path, text: str, message: str) -> None:
+def test_an_ambiguous_row_of_a_list_is_refused_with_its_line(table: Path, text: str, message: str) -> None:
     table.write_text(text)
     with pytest.raises(ConfigError) as caught:
         read_table(table, TARGETS)
@@ -63,21 +63,21 @@ def test_a_row_that_may_mean_something_else_is_told_with_its_line(table: Path, t
     assert caught.value.expected
 
 
-def test_a_target_that_is_too_large_is_told_with_its_line(table: Path) -> None:
+def test_a_target_that_is_too_large_is_refused_with_its_line(table: Path) -> None:
     table.write_text(f"{HEADER}\n1,0\n1,-2e6\n")
     with pytest.raises(ConfigError, match=f"{table}:3: landing_y_m: -2e\\+06\n  expected: a number of at most 1e\\+06"):
         read_targets(table, TARGETS, Config().task)
 
 
 @pytest.mark.parametrize("name", ["aims.parquet", "aims.txt", "aims"])
-def test_a_list_is_not_written_under_the_name_of_another_format(tmp_path: Path, name: str) -> None:
+def test_a_list_is_only_written_to_a_name_with_csv(tmp_path: Path, name: str) -> None:
     with pytest.raises(ConfigError) as caught:
         write_aims(tmp_path / name, [AIM], TARGETS, Config().task)
     assert caught.value.expected == "a name with .csv"
     assert not (tmp_path / name).exists()
 
 
-def test_a_list_that_cannot_be_written_leaves_the_one_that_was_there(table: Path) -> None:
+def test_a_failed_write_of_a_list_leaves_the_previous_file(table: Path) -> None:
     table.write_text("earlier")
     with small_disk(10), pytest.raises(DatasetError, match="cannot be written: File too large") as caught:
         write_aims(table, [AIM], TARGETS, Config().task)

@@ -39,13 +39,13 @@ def change(dataset: Dataset, column: str, values: object) -> Dataset:
     return replace(dataset, throws=dataset.throws.set_column(at, field, pa.array(values, field.type)))
 
 
-def test_keys_have_the_role_that_they_play(model: Model) -> None:
+def test_keys_of_the_task_become_parameters_and_those_of_the_world_latents(model: Model) -> None:
     assert sorted(model.parameters) == sorted(KEYS)
     assert (model.given, model.latents, model.targets) == ((), (DRAG.key,), TARGETS)
     assert model.file.trained_on.throws == COUNT
 
 
-def test_a_model_shows_in_a_line_what_it_is(dataset: Dataset, model: Model) -> None:
+def test_the_repr_of_a_model_is_one_line_with_its_targets_and_keys(dataset: Dataset, model: Model) -> None:
     assert (
         repr(model)
         == f"Model('{dataset.config.name}', local, {COUNT} throws: {', '.join(TARGETS)} -> {', '.join(KEYS)})"
@@ -56,18 +56,18 @@ def test_a_model_shows_in_a_line_what_it_is(dataset: Dataset, model: Model) -> N
         assert len(repr(part)) < 1500 > len(str(part))
 
 
-def test_throws_that_all_end_close_together_are_learned_from(dataset: Dataset) -> None:
+def test_a_model_can_be_learned_from_throws_that_end_close_together(dataset: Dataset) -> None:
     near = dataset
     for number, column in enumerate(TARGETS):
         near = change(near, column, [1.0 + 1e-5 * ((7 * k + number) % COUNT) for k in range(COUNT)])
     assert fit(near).targets == TARGETS
 
 
-def test_for_no_targets_there_are_no_aims(model: Model) -> None:
+def test_aiming_at_no_targets_gives_no_aims(model: Model) -> None:
     assert model.aim([]) == []
 
 
-def test_roles_can_be_chosen(dataset: Dataset) -> None:
+def test_parameters_and_context_keys_of_a_model_can_be_chosen(dataset: Dataset) -> None:
     model = fit(dataset, parameters=KEYS[:2], given=KEYS[2:])
     assert (sorted(model.parameters), model.given, model.latents) == (sorted(KEYS[:2]), KEYS[2:], (DRAG.key,))
     (aim,) = model.aim([(1.2, -0.2, 0.0)])
@@ -75,7 +75,9 @@ def test_roles_can_be_chosen(dataset: Dataset) -> None:
     assert not model.aim([(1.2, -0.2, 3.0)])[0].reachable
 
 
-def test_a_model_is_the_same_bytes_each_time_and_after_reading(dataset: Dataset, model: Model, tmp_path: Path) -> None:
+def test_the_files_of_a_model_are_the_same_when_fitted_or_loaded_again(
+    dataset: Dataset, model: Model, tmp_path: Path
+) -> None:
     for name, each in (("one", model), ("two", fit(dataset))):
         each.save(tmp_path / name)
     load_model(tmp_path / "one").save(tmp_path / "three")
@@ -87,7 +89,7 @@ def test_a_model_is_the_same_bytes_each_time_and_after_reading(dataset: Dataset,
     assert load_model(tmp_path / "one").predict(point).tolist() == model.predict(point).tolist()
 
 
-def test_the_program_of_the_card_hits_with_the_file_alone(dataset: Dataset, tmp_path: Path) -> None:
+def test_the_program_of_the_card_aims_with_nothing_but_the_model_files(dataset: Dataset, tmp_path: Path) -> None:
     fit(dataset, kind="polynomial").save(tmp_path / "model")
     assert PROGRAM.rstrip() in (tmp_path / "model" / "README.md").read_text()
     script = f"target = [1.2, -0.2]\n{PROGRAM}\nprint(json.dumps(parameters))"
@@ -99,7 +101,7 @@ def test_the_program_of_the_card_hits_with_the_file_alone(dataset: Dataset, tmp_
     assert land(values, 0.0)[0] == pytest.approx([1.2, -0.2], abs=0.03)
 
 
-def test_adapting_is_kept_in_the_file_and_in_the_card(model: Model, tmp_path: Path) -> None:
+def test_a_saved_adapted_model_keeps_its_adaptation_in_file_and_card(model: Model, tmp_path: Path) -> None:
     points = [dict(zip(KEYS, row, strict=True)) for row in draw(4, 8).tolist()]
     adapted = model.adapt(points, land(draw(4, 8), 0.9).tolist(), method="latent")
     (found,) = (each for each in adapted.file.adaptation.found if each.name == DRAG.key)
@@ -110,7 +112,7 @@ def test_adapting_is_kept_in_the_file_and_in_the_card(model: Model, tmp_path: Pa
     assert f"| `{DRAG.key}` |" in (tmp_path / "real" / "README.md").read_text().split("## Adapted")[1]
 
 
-def test_a_score_is_put_into_the_model_and_its_card(model: Model, tmp_path: Path) -> None:
+def test_a_score_is_stored_in_the_model_and_shown_in_its_card(model: Model, tmp_path: Path) -> None:
     errors = Errors(throws=2, missed=1, median=0.0012, share90=None, largest=None)
     angles = MissStatistics(unit="rad", median=0.01, share90=0.02, largest=None)
     score = Score(
@@ -151,12 +153,14 @@ def test_a_score_is_put_into_the_model_and_its_card(model: Model, tmp_path: Path
         ({"where": "trial >="}, "^where: cannot be understood"),
     ],
 )
-def test_what_cannot_be_learned_is_refused(dataset: Dataset, options: dict[str, object], message: str) -> None:
+def test_fit_refuses_wrong_options_and_too_few_throws(
+    dataset: Dataset, options: dict[str, object], message: str
+) -> None:
     with pytest.raises(ConfigError, match=message.replace("(", r"\(")):
         fit(dataset, **options)
 
 
-def test_throws_that_did_not_land_are_left_out(dataset: Dataset) -> None:
+def test_fit_leaves_out_throws_that_did_not_land(dataset: Dataset) -> None:
     found = fit(change(dataset, "outcome", ["self_hit"] * 20 + ["landed"] * (COUNT - 20)))
     assert (found.file.trained_on.throws, found.file.trained_on.ignored) == (COUNT - 20, 20)
     assert found.trials[0] == 20
@@ -171,26 +175,26 @@ def test_a_constant_parameter_is_left_out_or_refused_by_name(dataset: Dataset) -
         fit(constant, given=KEYS[2:3])
 
 
-def test_numbers_that_are_not_finite_are_named(dataset: Dataset) -> None:
+def test_fit_names_the_trial_of_a_number_that_is_not_finite(dataset: Dataset) -> None:
     values = dataset.throws[TARGETS[0]].to_pylist()
     with pytest.raises(DatasetError, match="landing_x_m of trial 3 is nan"):
         fit(change(dataset, TARGETS[0], [*values[:3], float("nan"), *values[4:]]))
 
 
-def test_too_many_parameters_are_refused(dataset: Dataset, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_fit_refuses_too_many_parameters(dataset: Dataset, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("throwcollect.learning.fitting.MOST_PARAMETERS", 2)
     with pytest.raises(ConfigError, match="3 parameters: "):
         fit(dataset)
 
 
 @pytest.mark.parametrize("target", [(1.0,), (1.0, 2.0, 3.0), (float("nan"), 0.0)])
-def test_a_target_that_is_none_is_refused(model: Model, target: tuple[float, ...]) -> None:
+def test_a_target_with_a_wrong_count_of_numbers_or_nan_is_refused(model: Model, target: tuple[float, ...]) -> None:
     with pytest.raises(ConfigError) as caught:
         model.aim([target])
     assert caught.value.expected == "finite numbers of at most 1e+06: landing_x_m, landing_y_m"
 
 
-def test_a_target_is_refused_before_numbers_overflow(model: Model) -> None:
+def test_only_targets_beyond_a_million_are_refused(model: Model) -> None:
     (far,) = model.aim([(1e6, -1e6)])
     assert not far.reachable
     assert np.isfinite([*far.parameters.values(), *far.predicted]).all()
@@ -200,7 +204,7 @@ def test_a_target_is_refused_before_numbers_overflow(model: Model) -> None:
         assert caught.value.expected == "finite numbers of at most 1e+06: landing_x_m, landing_y_m"
 
 
-def test_points_without_all_parameters_are_refused(model: Model) -> None:
+def test_points_with_missing_unknown_or_infinite_values_are_refused(model: Model) -> None:
     with pytest.raises(ConfigError, match=r"throw 0: task\.duration_s is missing"):
         model.predict([{KEYS[1]: 0.0, KEYS[2]: 0.0}])
     with pytest.raises(ConfigError, match="is no key of this model"):
@@ -210,12 +214,12 @@ def test_points_without_all_parameters_are_refused(model: Model) -> None:
 
 
 @pytest.mark.parametrize("argument", ["targets", "parameters", "given"])
-def test_one_name_is_no_list_of_names(dataset: Dataset, argument: str) -> None:
+def test_a_single_text_instead_of_a_list_of_names_is_refused(dataset: Dataset, argument: str) -> None:
     with pytest.raises(ConfigError, match=rf"^{argument}: 'task\.duration_s' is a text\n .* \['task\.duration_s'\]"):
         fit(dataset, **{argument: "task.duration_s"})
 
 
-def test_one_throw_is_no_list_of_throws(model: Model) -> None:
+def test_a_single_throw_instead_of_a_list_of_throws_is_refused(model: Model) -> None:
     point, place = dict.fromkeys(KEYS, 0.0), (1.2, -0.1)
     for ask in (model.predict, lambda points: model.adapt(points, [place])):
         with pytest.raises(ConfigError, match=r"^points: .* is a mapping\n  expected: a list of mappings"):
@@ -231,19 +235,19 @@ def test_one_throw_is_no_list_of_throws(model: Model) -> None:
 
 
 @pytest.mark.parametrize("argument", ["targets", "seed", "seeds", "processes", "scatter"])
-def test_a_score_takes_numbers_alone(model: Model, argument: str) -> None:
+def test_an_argument_of_a_score_that_is_no_number_is_refused(model: Model, argument: str) -> None:
     with pytest.raises(ConfigError, match=f"^{argument}: got 'a'"):
         model.score(None, **{argument: "a"})
 
 
-def test_what_is_no_number_is_shown(model: Model) -> None:
+def test_a_value_that_is_no_number_is_shown_in_the_error(model: Model) -> None:
     with pytest.raises(ConfigError, match="got 'a', 1"):
         model.aim([("a", 1)])
     with pytest.raises(ConfigError, match=f"throw 0: {KEYS[1]} is 'a'"):
         model.predict([dict.fromkeys(KEYS, 0.0) | {KEYS[1]: "a"}])
 
 
-def test_adapting_wants_a_place_for_each_throw(model: Model) -> None:
+def test_adapting_refuses_missing_places_and_wrong_options(model: Model) -> None:
     point = dict.fromkeys(KEYS, 0.0)
     with pytest.raises(ConfigError, match="1 throws and 0 places"):
         model.adapt([point], [])
@@ -255,7 +259,7 @@ def test_adapting_wants_a_place_for_each_throw(model: Model) -> None:
         model.adapt([point], [(1.0, 0.0)], scatter=1e200)
 
 
-def test_adapting_refuses_throws_of_which_the_model_knows_nothing(model: Model, dataset: Dataset) -> None:
+def test_adapting_refuses_throws_far_outside_of_the_learned_ranges(model: Model, dataset: Dataset) -> None:
     points = [dict(zip(KEYS, row, strict=True)) for row in draw(2, 8).tolist()]
     points[1][KEYS[1]] = 45.0
     with pytest.raises(ConfigError, match=f"throw 1: {KEYS[1]} is 45\\n  expected: about .* to .*, the range"):
@@ -291,7 +295,9 @@ def test_adapting_refuses_places_in_another_unit(model: Model, factor: float) ->
         ("points.parquet", None, "is missing"),
     ],
 )
-def test_a_damaged_model_is_told_in_words(model: Model, tmp_path: Path, file: str, change, message: str) -> None:
+def test_loading_a_damaged_model_is_an_error_that_names_the_file(
+    model: Model, tmp_path: Path, file: str, change, message: str
+) -> None:
     model.save(tmp_path / "model")
     path = tmp_path / "model" / file
     if change is None:
@@ -304,7 +310,7 @@ def test_a_damaged_model_is_told_in_words(model: Model, tmp_path: Path, file: st
 
 
 @pytest.mark.parametrize("targets", [["landing_x_m", "effort_peak_share"], [KEYS[0]]])
-def test_a_target_that_has_a_column_already_is_read_as_it_was_saved(
+def test_a_target_that_is_also_an_effort_or_key_column_survives_saving(
     dataset: Dataset, tmp_path: Path, targets: list[str]
 ) -> None:
     model = fit(dataset, targets=targets)
@@ -314,7 +320,7 @@ def test_a_target_that_has_a_column_already_is_read_as_it_was_saved(
     assert np.array_equal(again.learned.outputs, model.learned.outputs)
 
 
-def test_where_no_model_is_it_is_told_how_to_make_one(dataset: Dataset, tmp_path: Path) -> None:
+def test_loading_from_a_directory_without_a_model_says_how_to_make_one(dataset: Dataset, tmp_path: Path) -> None:
     for directory, meant in (
         (tmp_path, "DATASET"),
         (tmp_path / "no", "DATASET"),

@@ -16,14 +16,14 @@ def inputs():
     return np.random.default_rng(0).random((80, 2)) * 2 - 1
 
 
-def test_a_cubic_is_found_again(inputs):
+def test_fitting_samples_of_a_cubic_finds_the_cubic(inputs):
     found = fit_polynomial(inputs, cubic(inputs), 3)
     assert found.degree == 3
     elsewhere = np.random.default_rng(1).random((20, 2)) * 2 - 1
     assert found.predict(elsewhere) == pytest.approx(cubic(elsewhere), abs=1e-5)
 
 
-def test_slopes_are_those_of_small_differences(inputs):
+def test_slopes_agree_with_finite_differences(inputs):
     found = fit_polynomial(inputs, cubic(inputs), 4)
     slopes = found.slopes(inputs, slice(None))
     assert slopes.shape == (80, 2, 2)
@@ -34,7 +34,7 @@ def test_slopes_are_those_of_small_differences(inputs):
         assert slopes[:, :, column] == pytest.approx(difference, abs=1e-7)
 
 
-def test_the_degree_is_the_one_that_predicts_best(inputs):
+def test_cross_validation_chooses_the_degree_that_predicts_best(inputs):
     noise = 0.01 * np.random.default_rng(2).standard_normal((80, 2))
     found = cross_validate(inputs, cubic(inputs) + noise, np.arange(80) % 5)
     assert found.degree == 3
@@ -46,19 +46,19 @@ def test_a_degree_with_too_many_terms_for_the_samples_is_not_tried(inputs):
     assert list(cross_validate(few, cubic(few), np.arange(12) % 5).errors) == [1, 2]
 
 
-def test_samples_are_predicted_by_others_alone(inputs):
+def test_cross_validation_predicts_a_sample_only_from_others(inputs):
     outputs = cubic(inputs)
     outputs[0] += 5.0
     found = cross_validate(inputs, outputs, np.arange(80) % 5)
     assert found.errors[3][0] == pytest.approx(5 * np.sqrt(2), rel=0.2)
 
 
-def test_terms_are_all_those_up_to_the_degree():
+def test_the_exponents_cover_all_terms_up_to_the_degree():
     assert list_exponents(5, 3).shape == (56, 5)
     assert list_exponents(2, 1).tolist() == [[0, 0], [1, 0], [0, 1]]
 
 
-def test_minor_inputs_are_alone_in_high_terms():
+def test_minor_inputs_are_at_most_linear_in_terms_of_high_degree():
     rows = list_exponents(3, 3, minor=2)
     assert [0, 1, 1] in rows.tolist()
     high = rows[rows.sum(axis=1) > 2]

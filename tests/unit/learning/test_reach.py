@@ -1,4 +1,4 @@
-"""Why a target is out of reach is told apart."""
+"""The explanations why a target is out of reach."""
 
 import numpy as np
 import pytest
@@ -22,7 +22,9 @@ OUTSIDE = f"{DRAG.key} was 0 to 1 in all throws"
         (1.5, 1.4, 1.4, OUTSIDE),
     ],
 )
-def test_each_reason_is_told_when_it_holds(drag: float, predicted_x: float, nearest_x: float, reason: str) -> None:
+def test_the_explanation_gives_every_reason_why_a_target_is_out_of_reach(
+    drag: float, predicted_x: float, nearest_x: float, reason: str
+) -> None:
     predicted, nearest = np.array([predicted_x, -0.2]), np.array([nearest_x, -0.2])
     aim = Aim(np.array([1.4, -0.2, drag]), dict.fromkeys(KEYS, 0.0), predicted, False, nearest)
     assert explain_reach(learn_with_drag(role=KeyRole.CONTEXT), aim) == (

@@ -21,7 +21,7 @@ SHIFT = np.array([0.1, 0.12])
 
 
 class World:
-    """Throws as `land` says, somewhere else; refuses fast throws and loses some others."""
+    """Throws that end as `land` says, plus a shift; refuses fast throws and loses some others."""
 
     def __init__(self, shift: Any = (0.0, 0.0), *, refused_below_s: float = 0.0, lost_below_s: float = 0.0) -> None:
         self.config = Config()
@@ -48,7 +48,7 @@ def score(world: World, other: World | None = None, *, seed: int = 0, scatter: f
     return score_model(learn(), world, seed=seed, world=other, scatter=scatter, **options)
 
 
-def test_more_throws_hit_better() -> None:
+def test_a_model_of_more_throws_hits_better() -> None:
     world = World()
     found = score(world)
     assert [each.trained_on for each in found.trained] == [30, 100, 300, 800]
@@ -73,7 +73,7 @@ def test_throws_that_are_refused_or_do_not_land_are_counted_as_missed() -> None:
     assert errors.throws == 25
 
 
-def test_in_another_world_a_few_throws_close_the_gap() -> None:
+def test_adapting_to_another_world_by_a_few_throws_reduces_misses() -> None:
     found = score(World(), World(SHIFT))
     assert [each.real_throws for each in found.adapted] == [0, 1, 3, 5, 10]
     before, *after = (each.errors.median for each in found.adapted)
@@ -83,7 +83,7 @@ def test_in_another_world_a_few_throws_close_the_gap() -> None:
     assert len(found.adapted_throws) == found.adapted[0].errors.throws
 
 
-def test_in_the_world_of_the_dataset_a_model_is_scored_as_if_it_had_not_been_adapted() -> None:
+def test_scoring_in_the_world_of_the_dataset_ignores_an_earlier_adaptation() -> None:
     learned = learn()
     shifted = learned.correct(replace(learned.correction, offset=SHIFT))
     options = {
@@ -100,37 +100,37 @@ def test_in_the_world_of_the_dataset_a_model_is_scored_as_if_it_had_not_been_ada
     assert found.adapted[0].errors.median < 0.01
 
 
-def test_scatter_costs_something() -> None:
+def test_scatter_increases_misses_after_adapting() -> None:
     exact, scattered = (score(World(), World(SHIFT), scatter=scatter).adapted[1] for scatter in (0.0, 0.03))
     assert exact.errors.median < scattered.errors.median
 
 
-def test_where_nothing_can_be_reached_there_is_nothing_to_tell() -> None:
+def test_a_world_in_which_no_target_can_be_reached_has_no_adapted_scores() -> None:
     assert score(World(), World((5.0, 0.0))).adapted == []
 
 
-def test_targets_lie_between_throws_that_are_near_each_other() -> None:
+def test_drawn_targets_lie_near_landings_but_spread_more_evenly() -> None:
     landings = learn().outputs
     targets = draw_targets(landings, 200, 3)
     away = np.array([np.linalg.norm(landings - target, axis=1).min() for target in targets])
     assert away.max() < 0.05
     assert (targets != landings[:200]).all()
-    # Crowded cells get no more of them than others.
+    # Cells with many landings get no more targets than others.
     share = (np.linalg.norm(targets - np.median(landings, axis=0), axis=1) > 0.4).mean()
     assert share > (np.linalg.norm(landings - np.median(landings, axis=0), axis=1) > 0.4).mean()
 
 
-def test_the_first_throws_elsewhere_are_spread() -> None:
+def test_targets_are_ordered_so_that_the_first_ones_are_far_apart() -> None:
     targets = np.array([[0.5, 0.0], [0.0, 0.0], [0.1, 0.0], [1.0, 0.0], [0.4, 0.6]])
     assert spread_first(targets).tolist() == targets[[0, 4, 1, 3, 2]].tolist()
 
 
-def test_errors_are_summed_up_in_order() -> None:
+def test_error_statistics_that_fall_on_a_missed_throw_are_empty() -> None:
     found = Errors.of(np.array([[0.3], [-0.1], [np.nan], [0.2]]), ["landing_x_m"])
     assert (found.throws, found.missed, found.median, found.share90, found.largest) == (4, 1, 0.2, None, None)
 
 
-def test_metres_and_radians_are_not_added() -> None:
+def test_errors_in_metres_and_radians_are_summarised_separately() -> None:
     away = np.array([[0.5, 0.03, 0.04], [0.1, 0.0, 0.01], [-0.2, 0.3, 0.4]])
     found = Errors.of(away, ["hit_angle_rad", "landing_x_m", "landing_y_m"])
     lengths, angles = found.by_unit
@@ -141,7 +141,7 @@ def test_metres_and_radians_are_not_added() -> None:
     assert tell_misses(Errors.of(away[:, :1], ["landing_time_s"]))[2] == "0.5 s"
 
 
-def test_the_distilled_map_throws_at_the_same_targets() -> None:
+def test_a_distilled_map_is_scored_at_the_same_targets() -> None:
     learned, world = learn(), World()
     options = {"count": 25, "seed": 0, "scatter": 0.0, "error": 0.002, "latents_count": False, "processes": 1}
     found = score_model(learned, world, world=None, distilled=distil(learned), **options)
@@ -152,7 +152,7 @@ def test_the_distilled_map_throws_at_the_same_targets() -> None:
     assert pool_scores([found, found]).distilled.throws == 50
 
 
-def test_scores_of_several_seeds_become_medians() -> None:
+def test_pooled_scores_of_several_seeds_are_medians() -> None:
     some = [score(World(), World(SHIFT), seed=seed) for seed in range(3)]
     found = pool_scores(some)
     assert (found.seeds, found.targets, len(found.throws)) == (3, 25, 75)

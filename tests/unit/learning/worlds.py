@@ -66,7 +66,7 @@ def learn_with_drag(count: int = 600, role: KeyRole = KeyRole.LATENT) -> Learned
 
 
 def make_dataset(directory: Path, count: int) -> Dataset:
-    """A dataset whose table tells of throws in worlds that differ in the ball's drag; its recordings do not matter."""
+    """A dataset whose table has throws in worlds that differ in the ball's drag; the recordings do not fit it."""
     ends = zip(KEYS, LOW.tolist(), HIGH.tolist(), strict=True)
     sweep = {key: {"min": low, "max": high} for key, low, high in ends} | {DRAG.key: {"min": 0.0, "max": 1.0}}
     found = Dataset.open(Collection({"sweep": {"sampler": "uniform", "parameters": sweep}}).collect(directory))

@@ -1,4 +1,4 @@
-"""Small collections, as the tests of `dataset` have them."""
+"""The fixtures of the tests of `dataset`: small collections."""
 
 from tests.unit.dataset.conftest import collected, collection, dataset, make_collection
 

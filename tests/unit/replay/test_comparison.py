@@ -35,11 +35,11 @@ def episode(samples: Samples = SAMPLES, header: EpisodeHeader = HEADER) -> Episo
     return Episode(header, RecordedChunk(ENCODER.encode(samples)))
 
 
-def test_the_same_throw_has_no_differences() -> None:
+def test_an_episode_has_no_differences_from_itself() -> None:
     assert compare(episode(), episode()).differences == ()
 
 
-def test_the_last_bit_is_a_difference_with_its_time_and_size() -> None:
+def test_a_difference_in_the_last_bit_is_reported_with_its_time_and_size() -> None:
     position = SAMPLES.ball_position.copy()
     position[3, 1] = np.nextafter(1.0, 2.0)
     found = compare(episode(), episode(replace(SAMPLES, ball_position=position)))
@@ -47,13 +47,13 @@ def test_the_last_bit_is_a_difference_with_its_time_and_size() -> None:
     assert found.stored != found.again
 
 
-def test_other_contacts_and_a_shorter_throw_are_told() -> None:
+def test_different_contacts_and_fewer_samples_are_reported() -> None:
     header = replace(HEADER, contacts=(), samples=3)
     found = compare(episode(), episode(SAMPLES[:3], header))
     assert [text.split(":")[0] for text in found.differences] == ["contacts", "samples"]
 
 
-def test_a_damaged_throw_is_not_compared() -> None:
+def test_comparing_a_damaged_episode_is_an_error() -> None:
     whole = episode()
     damaged = Episode(HEADER, RecordedChunk(whole.chunk, "0" * 64))
     with pytest.raises(DatasetError, match="SHA-256 of its records is"):

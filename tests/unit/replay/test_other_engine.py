@@ -1,4 +1,4 @@
-"""How much columns differ by another engine, and which engines can be asked for."""
+"""How much columns differ if another engine simulates the throws, and which engines can be chosen."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from throwcollect.replay.other_engine import Deviation, Distribution, distributi
 from throwcollect.report.throw.deviations import check_picture, write_deviations
 
 
-def test_a_distribution_has_what_both_throws_have() -> None:
+def test_a_distribution_covers_only_values_that_both_throws_have() -> None:
     found = distributions(
         [
             Deviation(0, "landed", "landed", {"landing_x_m": 0.003, "apex_z_m": 0.0}),
@@ -28,7 +28,9 @@ def test_a_distribution_has_what_both_throws_have() -> None:
     ]
 
 
-def test_the_engine_is_another_one_that_is_there(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_replaying_with_the_same_or_an_unknown_engine_is_refused(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
     from throwcollect.config.schema import Config
 
     class Stored:
@@ -42,7 +44,7 @@ def test_the_engine_is_another_one_that_is_there(monkeypatch: pytest.MonkeyPatch
     assert "expected: mujoco, ballistic" in str(refused.value)
 
 
-def test_a_picture_that_cannot_be_written_is_no_defect_of_ours(tmp_path: Path) -> None:
+def test_a_picture_that_cannot_be_written_is_refused_with_the_reason(tmp_path: Path) -> None:
     for name in ("apart.txt", "apart.svg", "apart.jpg", "apart"):
         with pytest.raises(ConfigError, match=rf"{name}: should end with \.png"):
             check_picture(tmp_path / name)
@@ -56,6 +58,6 @@ def test_a_picture_that_cannot_be_written_is_no_defect_of_ours(tmp_path: Path) -
         write_deviations([[0.001, -0.002], [0.0, 0.003]], "mujoco", tmp_path / "missing" / "apart.png")
 
 
-def test_a_picture_of_landings_is_written(tmp_path: Path) -> None:
+def test_a_picture_of_deviations_is_written_as_png(tmp_path: Path) -> None:
     write_deviations([[0.001, -0.002], [0.0, 0.003]], "mujoco", tmp_path / "apart.png")
     assert (tmp_path / "apart.png").read_bytes().startswith(b"\x89PNG")

@@ -1,4 +1,4 @@
-"""The world of a replayer is freed with it: a process can have a few physics engines at a time."""
+"""The world of a replayer is closed with it, because a process can have only a few physics engines at a time."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def closed(monkeypatch: pytest.MonkeyPatch) -> list[World]:
     return worlds
 
 
-def test_a_world_is_freed_once(closed: list[World]) -> None:
+def test_closing_and_deleting_a_replayer_closes_its_world_once(closed: list[World]) -> None:
     replayer = Replayer(Config.model_validate({"sim": {"engine": "ballistic"}}))
     replayer.close()
     assert len(closed) == 1
@@ -28,7 +28,7 @@ def test_a_world_is_freed_once(closed: list[World]) -> None:
     assert len(closed) == 1
 
 
-def test_throws_that_this_process_simulates_leave_no_world(dataset: Path, closed: list[World]) -> None:
+def test_replaying_throws_closes_the_world_afterwards(dataset: Path, closed: list[World]) -> None:
     (comparison,) = replay_throws(dataset, [4])
     assert comparison.trial == 4
     assert len(closed) == 1

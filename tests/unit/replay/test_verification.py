@@ -1,4 +1,4 @@
-"""What a check of a dataset may be asked for."""
+"""The arguments of the check of a dataset."""
 
 from __future__ import annotations
 
@@ -18,6 +18,6 @@ from throwcollect.replay.verification import verify_dataset
         ({"processes": 0}, "processes: got 0\n  expected: 1 or more"),
     ],
 )
-def test_numbers_of_throws_and_processes_are_checked(dataset: Path, arguments, message: str) -> None:
+def test_verify_refuses_wrong_numbers_of_throws_and_processes(dataset: Path, arguments, message: str) -> None:
     with pytest.raises(ConfigError, match=f"^{message}$"):
         verify_dataset(dataset, **arguments)

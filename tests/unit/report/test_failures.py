@@ -3,7 +3,7 @@ from __future__ import annotations
 from throwcollect.report.failures import FailureGroup, group_failures
 
 
-def test_reasons_that_differ_in_numbers_are_one() -> None:
+def test_failures_whose_reasons_differ_only_in_numbers_are_one_group() -> None:
     rows = [
         (0, "landed", None),
         (1, "refused", "arm_right_4_joint needs 12.5 Nm at 0.3 s"),

@@ -45,13 +45,13 @@ def score() -> Score:
     )
 
 
-def test_a_model_that_nobody_has_thrown_with_says_how_to(dataset: Dataset, model: Path) -> None:
+def test_a_model_without_a_score_is_shown_with_the_command_that_scores_it(dataset: Dataset, model: Path) -> None:
     section = show_model(model, dataset)
     assert not list(section.panels)
     assert f"throwcollect score {model}" in section.text
 
 
-def test_misses_are_arrows_from_their_targets(dataset: Dataset, model: Path) -> None:
+def test_misses_are_drawn_as_arrows_from_their_targets(dataset: Dataset, model: Path) -> None:
     write_score(model, score())
     panels = {panel.key: panel.figure for panel in show_model(model, dataset).panels}
     assert list(panels) == ["targets", "training", "adapting", "elsewhere"]
@@ -67,7 +67,7 @@ def test_misses_are_arrows_from_their_targets(dataset: Dataset, model: Path) -> 
     assert arrows.x[2] is None
 
 
-def test_curves_show_centimetres_over_numbers_of_throws(dataset: Dataset, model: Path) -> None:
+def test_curves_of_misses_over_numbers_of_throws_are_in_centimetres(dataset: Dataset, model: Path) -> None:
     write_score(model, score())
     section = show_model(model, dataset)
     panels = {panel.key: panel.figure for panel in section.panels}
@@ -78,7 +78,7 @@ def test_curves_show_centimetres_over_numbers_of_throws(dataset: Dataset, model:
     assert table.rows[-1] == ("in the other world after 5 throws (bias)", "0.10 cm", "0.20 cm", "-", "3", "1")
 
 
-def test_each_unit_has_curves_of_its_own_and_the_distilled_map_a_row(dataset: Dataset, model: Path) -> None:
+def test_every_unit_has_its_own_curves_and_the_distilled_map_has_a_row(dataset: Dataset, model: Path) -> None:
     angles = MissStatistics(unit="rad", median=0.01, share90=0.02, largest=0.02)
     found = score()
     mixed = found.trained[-1].errors.model_copy(update={"others": [angles]})
@@ -94,14 +94,14 @@ def test_each_unit_has_curves_of_its_own_and_the_distilled_map_a_row(dataset: Da
     assert table.rows[-1] == ("model.onnx of these", "0.10 cm, 0.57°", "0.20 cm, 1.15°", "-, 1.15°", "3", "1")
 
 
-def test_its_pictures_can_be_printed(dataset: Dataset, model: Path, tmp_path: Path) -> None:
+def test_the_section_of_a_model_is_written_as_pictures(dataset: Dataset, model: Path, tmp_path: Path) -> None:
     write_score(model, score())
     written = write_pictures([show_model(model, dataset)], tmp_path)
     assert [path.name for path in written] == ["targets.png", "training.png", "adapting.png"]
     assert all(path.stat().st_size > 5000 for path in written)
 
 
-def test_a_model_of_another_dataset_is_refused(dataset: Dataset, model: Path) -> None:
+def test_showing_a_model_of_another_dataset_is_refused(dataset: Dataset, model: Path) -> None:
     text = (model / "model.json").read_text()
     (model / "model.json").write_text(text.replace(dataset.digest, "0" * 64))
     with pytest.raises(ConfigError, match="was learned from quick, digest 0000000000"):

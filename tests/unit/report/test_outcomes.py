@@ -5,7 +5,7 @@ from throwcollect.report.outcomes import Outcomes, style_of
 from throwcollect.tasks.throw.throw_result import ThrowOutcome
 
 
-def test_outcomes_come_in_one_order_and_unknown_ones_last() -> None:
+def test_outcomes_have_a_fixed_order_with_unknown_ones_last() -> None:
     found = Outcomes.of(["lost", "landed", "odd", "self_hit", "landed"])
     assert found.names == ("landed", "self_hit", "lost", "odd")
     assert found.codes.tolist() == [2, 0, 3, 1, 0]
@@ -14,13 +14,13 @@ def test_outcomes_come_in_one_order_and_unknown_ones_last() -> None:
     assert found.are("recaught").tolist() == [False] * 5
 
 
-def test_every_outcome_is_drawn_in_a_way_of_its_own() -> None:
+def test_every_outcome_has_its_own_colour_and_symbol() -> None:
     styles = [style_of(name) for name in (*(outcome.value for outcome in ThrowOutcome), REFUSED, "unheard of")]
     for part in ("colour", "symbol"):
         assert len({getattr(style, part) for style in styles}) == len(styles)
 
 
-def test_failures_of_another_task_are_told_apart() -> None:
+def test_outcomes_of_another_task_have_different_styles() -> None:
     found = Outcomes.of(["swung", "stuck", "slipped", "lost", "stuck"], success="swung")
     assert found.names == ("swung", "lost", "slipped", "stuck")
     assert len({(found.style_of(name).colour, found.style_of(name).symbol) for name in found.names}) == 4

@@ -57,9 +57,7 @@ def test_a_page_has_every_section_and_a_drawing_place_for_every_plot(text: str) 
             assert re.search(r"\[.+\]$|^flights$|^throws$|^share of trials$", axis["title"]["text"]), axis
 
 
-def test_the_median_direction_at_release_is_above_or_below_the_horizontal_without_a_sign(
-    text: str, collected: Path
-) -> None:
+def test_the_median_direction_at_release_is_shown_without_a_sign(text: str, collected: Path) -> None:
     elevations = [
         each for each in Dataset.open(collected).throws["release_elevation_rad"].to_pylist() if each is not None
     ]
@@ -67,7 +65,7 @@ def test_the_median_direction_at_release_is_above_or_below_the_horizontal_withou
     assert re.search(rf"the median direction \d+\.\d° {side} the horizontal", " ".join(text.split()))
 
 
-def test_a_page_needs_nothing_from_elsewhere(text: str) -> None:
+def test_a_page_loads_nothing_from_other_addresses(text: str) -> None:
     page = Page(text)
     assert not [attributes for tag, attributes in page.elements if "src" in attributes]
     assert [attributes["href"] for attributes in page.find_elements("link")] == ["data:,"]
@@ -77,7 +75,7 @@ def test_a_page_needs_nothing_from_elsewhere(text: str) -> None:
     assert len(text) < 7_000_000
 
 
-def test_what_a_dataset_says_is_never_markup(collection: Any, tmp_path: Path) -> None:
+def test_text_of_a_dataset_is_never_interpreted_as_markup(collection: Any, tmp_path: Path) -> None:
     hostile = "</script><script>alert('$x')</script> & <b>"
     collection.refuse(4, hostile)
     directory = collection.collect(tmp_path / "dataset", [0, 1, 2, 3, 5, 6])
@@ -92,10 +90,10 @@ def test_what_a_dataset_says_is_never_markup(collection: Any, tmp_path: Path) ->
 
 
 @pytest.mark.parametrize("text", [None, "", "{}", '{"finished": 1e400}', "[" * 100_000, "\xff"])
-def test_a_dataset_that_does_not_say_how_it_was_collected_is_reported_all_the_same(
+def test_the_report_of_a_dataset_without_readable_provenance_says_so(
     make_collection: Any, tmp_path: Path, text: str | None
 ) -> None:
-    """Those of earlier versions have no such file."""
+    """Datasets of earlier versions have no provenance.json."""
     # Without a throw, there is little to draw.
     directory = make_collection({"trials": 1}).collect(tmp_path / "dataset", lost=[0])
     (directory / PROVENANCE).unlink()
@@ -107,7 +105,7 @@ def test_a_dataset_that_does_not_say_how_it_was_collected_is_reported_all_the_sa
     assert "finished on" not in words
 
 
-def test_what_a_report_says_does_not_end_the_script_or_the_attribute_that_holds_it() -> None:
+def test_hostile_text_of_a_report_is_escaped_in_scripts_and_attributes() -> None:
     hostile = """a"></div>'</script ><b>"""
     figure = go.Figure(layout_title=hostile, layout_height=100).add_scatter(x=[1], y=[2])
     table = Table(rows=((hostile, hostile),))
@@ -125,7 +123,7 @@ def test_what_a_report_says_does_not_end_the_script_or_the_attribute_that_holds_
     assert {tag for tag, said in page.texts if said == hostile} == {"h1", "h2", "h3", "p", "a", "th", "td"}
 
 
-def test_eight_keys_are_drawn_in_pairs_and_more_are_named(make_collection: Any, tmp_path: Path) -> None:
+def test_only_the_first_eight_swept_keys_are_drawn_in_pairs(make_collection: Any, tmp_path: Path) -> None:
     keys = [f"task.{end}.{joint}" for end in ("start", "end") for joint in ("torso_1_joint", "arm_right_4_joint")]
     keys += ["task.duration_s", "ball.mass_kg", "ball.friction", "ball.restitution", "scene.gravity_mps2"]
     parameters = {key: {"min": 0.2, "max": 0.9} for key in keys}

@@ -43,14 +43,14 @@ def centre(mask: np.ndarray) -> tuple[float, float]:
     return rows.mean() / len(mask), columns.mean() / len(mask[0])
 
 
-def test_points_are_where_their_axes_say(tmp_path: Path) -> None:
+def test_points_are_painted_where_their_axes_say(tmp_path: Path) -> None:
     figure = scatter([10.0], [1.0]).update_xaxes(type="log", range=[0, 2]).update_yaxes(range=[0, 10])
     down, across = centre(find_red_pixels([figure], tmp_path / "log.png"))
     assert across == pytest.approx(0.5, abs=0.1)  # 10 is half-way between 1 and 100
     assert down > 0.7  # 1 is near the lower end
 
 
-def test_an_axis_begins_at_zero_where_the_figure_wants_that(tmp_path: Path) -> None:
+def test_an_axis_begins_at_zero_if_the_figure_asks_for_it(tmp_path: Path) -> None:
     figure = scatter([8.0, 10.0], [1.0, 1.0])
     _, before = centre(find_red_pixels([figure], tmp_path / "before.png"))
     _, after = centre(find_red_pixels([figure.update_xaxes(rangemode="tozero")], tmp_path / "after.png"))
@@ -58,14 +58,14 @@ def test_an_axis_begins_at_zero_where_the_figure_wants_that(tmp_path: Path) -> N
     assert after > 0.8
 
 
-def test_a_scale_anchor_makes_a_circle_of_a_circle(tmp_path: Path) -> None:
+def test_a_circle_is_painted_round_if_its_axes_share_a_scale(tmp_path: Path) -> None:
     angles = np.linspace(0, 2 * np.pi, 100)
     figure = scatter(np.cos(angles).tolist(), np.sin(angles).tolist(), "lines").update_yaxes(scaleanchor="x")
     rows, columns = np.nonzero(find_red_pixels([figure], tmp_path / "circle.png"))
     assert np.ptp(rows) == pytest.approx(np.ptp(columns), abs=3)
 
 
-def test_figures_of_one_picture_stand_below_one_another(tmp_path: Path) -> None:
+def test_figures_of_one_picture_are_stacked_with_aligned_axes(tmp_path: Path) -> None:
     figures = [scatter([1.0, 2.0], [0.0, 0.0], "lines"), scatter([1.0, 2.0], [0.0, 0.0], "lines")]
     rows, columns = np.nonzero(find_red_pixels(figures, tmp_path / "stack.png"))
     first, second = rows[rows < rows.mean()], rows[rows > rows.mean()]
@@ -74,7 +74,7 @@ def test_figures_of_one_picture_stand_below_one_another(tmp_path: Path) -> None:
     assert ends[0] == ends[1]
 
 
-def test_subplots_go_where_their_domains_are(tmp_path: Path) -> None:
+def test_subplots_are_painted_in_their_domains(tmp_path: Path) -> None:
     red, grey = "#ff0000", "#888888"
     figure = go.Figure(layout_height=400)
     for number, (left, bottom) in enumerate([(0, 0.5), (0.5, 0.5), (0, 0), (0.5, 0)], start=1):
@@ -103,6 +103,6 @@ def test_every_outcome_has_a_marker_of_its_own() -> None:
     assert len({MARKERS[style_of(name).symbol] for name in names}) == len(names)
 
 
-def test_a_trace_that_the_painter_does_not_know_is_an_error(tmp_path: Path) -> None:
+def test_painting_a_trace_of_an_unknown_type_is_an_error(tmp_path: Path) -> None:
     with pytest.raises(KeyError, match="violin"):
         paint([Panel("panel", "title", go.Figure(go.Violin(y=[1, 2])).update_layout(height=400))], tmp_path / "a.png")

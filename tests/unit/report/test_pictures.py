@@ -1,4 +1,4 @@
-"""The pictures of a report, as somebody sees them on a page."""
+"""The pictures of a report in the size in which they are printed."""
 
 from __future__ import annotations
 

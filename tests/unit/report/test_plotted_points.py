@@ -5,7 +5,7 @@ import numpy as np
 from throwcollect.report.plotted_points import choose_points
 
 
-def test_a_choice_of_points_is_the_same_each_time_and_no_lattice() -> None:
+def test_the_chosen_points_are_reproducible_and_irregularly_spaced() -> None:
     assert choose_points(10, 20).tolist() == list(range(10))
     chosen = choose_points(100_000, 1000)
     assert np.array_equal(chosen, choose_points(100_000, 1000))

@@ -17,13 +17,13 @@ def parameters_of(directory: Path) -> tuple[SweptKey, ...]:
     return read_parameters(dataset.config, dataset.throws, outcomes)
 
 
-def test_values_are_those_of_the_trials(collection: Any, tmp_path: Path) -> None:
+def test_the_values_of_a_swept_key_are_those_of_the_trials(collection: Any, tmp_path: Path) -> None:
     (parameter,) = parameters_of(collection.collect(tmp_path / "dataset", lost=[2]))
     assert (parameter.key, parameter.unit, parameter.counts.sum(axis=0).tolist()) == ("task.duration_s", "s", [6, 1])
     assert parameter.values.tolist() == [trial.values["task.duration_s"] for trial in collection.plan.trials]
 
 
-def test_few_distinct_values_get_a_bin_each(make_collection: Any, tmp_path: Path) -> None:
+def test_few_distinct_values_of_a_key_get_a_bin_each(make_collection: Any, tmp_path: Path) -> None:
     parameters = {
         "task.duration_s": {"values": [0.8, 1.0]},
         "ball.mass_kg": {"min": 0.01, "max": 0.1, "scale": "log"},

@@ -46,7 +46,7 @@ def test_the_section_shows_targets_misses_and_their_spread(tmp_path: Path) -> No
     assert {path.name for path in write_pictures((section,), tmp_path)} == {"targets_and_misses.png", "miss_m.png"}
 
 
-def test_there_is_no_section_without_targets_and_one_without_misses(tmp_path: Path) -> None:
+def test_a_dataset_without_targets_has_no_section_but_one_without_misses_has(tmp_path: Path) -> None:
     assert show_targets(Dataset.open(Collection().collect(tmp_path / "plain"))) == ()
     (section,) = show_targets(Dataset.open(collect_targeted(tmp_path / "held", change=hold_ball)))
     assert section.text == "3 of 4 throws should end at a target. None of them ended anywhere."
@@ -54,7 +54,7 @@ def test_there_is_no_section_without_targets_and_one_without_misses(tmp_path: Pa
     assert [trace.name for trace in above.figure.data] == ["throws of the dataset", "targets where no throw landed"]
 
 
-def test_the_map_names_trials_as_their_task_does() -> None:
+def test_the_map_of_misses_uses_the_words_of_the_task() -> None:
     class UntilReached(UntilConfig):
         reached: Wanted
 
@@ -70,7 +70,7 @@ def test_the_map_names_trials_as_their_task_does() -> None:
 @pytest.mark.parametrize(
     ("miss", "times"), [(0.4, 1), (0.01, 10), (0.0049, 100), (3e-5, 10_000), (1e-9, 10_000), (0, 1)]
 )
-def test_misses_are_drawn_as_long_as_the_distance_of_the_targets_allows(miss: float, times: int) -> None:
+def test_misses_are_magnified_as_far_as_the_distance_of_targets_allows(miss: float, times: int) -> None:
     targets = np.array([[1.0, 0.0], [1.5, 0.2]])
     assert choose_scale(targets, targets + np.array([miss, 0.0])) == times
     assert choose_scale(targets[:0], targets[:0]) == 1
@@ -78,12 +78,12 @@ def test_misses_are_drawn_as_long_as_the_distance_of_the_targets_allows(miss: fl
     assert choose_scale(np.eye(2, 3), np.eye(2, 3) + third) == choose_scale(np.eye(2), np.eye(2) + third[:2])
 
 
-def test_the_title_of_the_map_tells_how_long_misses_are_drawn() -> None:
+def test_the_title_of_the_map_says_how_much_misses_are_magnified() -> None:
     assert title_misses("Targets", 1000) == "Targets, and misses drawn 1,000 times as long"
     assert title_misses("Targets", 1) == "Targets and misses"
 
 
-def test_a_miss_that_two_decimals_would_make_nothing_is_told_by_its_digits(tmp_path: Path) -> None:
+def test_a_miss_too_small_for_two_decimals_is_shown_with_more(tmp_path: Path) -> None:
     landed = [throw.row for throw in Dataset.open(collect_targeted(tmp_path / "first"))]
     lines = [
         f"{0.9 + 0.1 * n:.1f},{row['landing_y_m']!r},{row['landing_x_m'] + 3e-5!r}" for n, row in enumerate(landed)

@@ -46,7 +46,7 @@ def together(collected: Path, tmp_path_factory: pytest.TempPathFactory) -> Writt
     ],
     ids=["a single throw", "no landing", "all refused but one"],
 )
-def test_datasets_with_little_in_them(
+def test_the_report_of_a_dataset_with_few_throws_has_every_section(
     make_collection: Any,
     tmp_path: Path,
     settings: dict[str, Any],
@@ -68,14 +68,14 @@ def test_datasets_with_little_in_them(
         assert image.imread(picture)[..., :3].min() < 0.9, picture.name
 
 
-def test_an_unfinished_dataset_is_refused_and_nothing_written(dataset: Path, tmp_path: Path) -> None:
+def test_a_report_of_an_unfinished_dataset_is_refused_and_writes_nothing(dataset: Path, tmp_path: Path) -> None:
     (dataset / METADATA).unlink()
     with pytest.raises(DatasetError, match=r"not finished|unfinished"):
         write_report(dataset, tmp_path / "page.html", pictures=tmp_path / "pictures")
     assert [path.name for path in tmp_path.iterdir()] == ["dataset"]
 
 
-def test_what_is_there_is_never_overwritten(collected: Path, tmp_path: Path) -> None:
+def test_a_report_never_overwrites_existing_files(collected: Path, tmp_path: Path) -> None:
     page, pictures = tmp_path / "page.html", tmp_path / "pictures"
     page.write_text("mine")
     with pytest.raises(ConfigError, match=r"page\.html: exists"):
@@ -88,12 +88,12 @@ def test_what_is_there_is_never_overwritten(collected: Path, tmp_path: Path) -> 
     assert not (tmp_path / "other.html").exists()
 
 
-def test_the_page_may_lie_among_the_pictures(together: Written) -> None:
+def test_the_page_can_be_written_into_the_directory_of_the_pictures(together: Written) -> None:
     assert set(together.page.parent.iterdir()) == {together.page, *together.pictures}
     assert len(together.pictures) == 9
 
 
-def test_without_plotly_the_message_says_how_to_get_it(
+def test_a_report_without_plotly_says_what_to_install(
     collected: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, "plotly", None)
@@ -102,7 +102,7 @@ def test_without_plotly_the_message_says_how_to_get_it(
     assert raised.value.hint == "pip install 'throwcollect[report]'"
 
 
-def test_the_command_writes_beside_the_dataset_and_says_what(dataset: Path, tmp_path: Path) -> None:
+def test_the_report_command_writes_beside_the_dataset_and_prints_what(dataset: Path, tmp_path: Path) -> None:
     printed = CliRunner().invoke(dataset_app, ["report", str(dataset), "--json"])
     assert printed.exit_code == 0, printed.output
     found = json.loads(printed.output)
@@ -114,7 +114,7 @@ def test_the_command_writes_beside_the_dataset_and_says_what(dataset: Path, tmp_
     assert (tmp_path / "named.html").read_bytes() == (tmp_path / "dataset.html").read_bytes()
 
 
-def test_the_documented_command_gives_the_same_report_again_with_or_without_a_display(
+def test_the_documented_command_gives_the_same_report_with_an_unusable_display(
     collected: Path, together: Written, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     text = (Path(__file__).parents[3] / "docs" / "report.md").read_text(encoding="utf-8")

@@ -51,21 +51,21 @@ def collision_shapes(urdf, posture):
     )
 
 
-def test_the_same_configuration_gives_the_same_bytes():
+def test_the_same_configuration_gives_the_same_descriptions():
     assert physics_description(CONFIG) == physics_description(Config())
     assert full_description(CONFIG) == full_description(Config())
 
 
-def test_descriptions_of_many_tools_are_told_apart():
+def test_descriptions_with_different_tools_differ():
     lengths = [0.1 + 0.01 * number for number in range(12)]
     configs = [Config.model_validate({"tool": {"handle_length_m": length}}) for length in lengths]
     described = [full_description(config) for config in configs]
     assert len(set(described)) == len(configs)
-    # Those that were remembered, and those that were not.
+    # Some of these come from the cache, the others are made again.
     assert [full_description(config) for config in configs] == described
 
 
-def test_what_is_read_once_for_all_descriptions_stays_as_it_was():
+def test_making_a_description_does_not_change_the_cached_source():
     description._read_whole.cache_clear()
     source, model = description._read_whole(TALOS)
     before = ElementTree.tostring(source), model.copy()
@@ -73,27 +73,27 @@ def test_what_is_read_once_for_all_descriptions_stays_as_it_was():
     assert (ElementTree.tostring(source), model) == before
 
 
-def test_by_default_what_the_task_does_not_move_is_locked():
+def test_by_default_joints_that_the_task_does_not_move_are_locked():
     made = physics_description(CONFIG)
     assert made.moving == tuple(joint for joint in JOINTS if joint in MOVED)
     assert set(made.locked) == set(JOINTS) - set(MOVED)
     assert set(pinocchio.buildModelFromXML(made.urdf).names[1:]) == set(MOVED)
 
 
-def test_nothing_is_locked_on_demand():
+def test_no_joint_is_locked_if_locked_is_none():
     made = physics_description(with_robot(locked="none"))
     assert made.moving == JOINTS
     assert made.locked == {}
     assert set(pinocchio.buildModelFromXML(made.urdf).names[1:]) == set(JOINTS)
 
 
-def test_a_list_locks_just_these():
+def test_a_list_of_locked_joints_locks_exactly_these():
     made = physics_description(with_robot(locked=["head_1_joint", "leg_left_4_joint"]))
     assert list(made.locked) == ["leg_left_4_joint", "head_1_joint"]
     assert len(made.moving) == 30
 
 
-def test_the_task_decides_a_joints_start_before_the_posture_and_half_sitting():
+def test_the_start_of_a_joint_comes_from_the_task_else_posture_else_rest():
     posture = start_posture(with_robot(posture={"arm_right_4_joint": -1.0, "head_1_joint": 0.3}))
     assert posture["arm_right_4_joint"] == CONFIG.task.start["arm_right_4_joint"]
     assert posture["head_1_joint"] == 0.3
@@ -102,7 +102,7 @@ def test_the_task_decides_a_joints_start_before_the_posture_and_half_sitting():
 
 
 @pytest.mark.parametrize("text", ["<robot", "<robot name='talos'><link name='base_link'/></robot>"])
-def test_files_that_cannot_be_used_are_named(text, tmp_path, monkeypatch):
+def test_a_robot_description_that_cannot_be_used_is_named(text, tmp_path, monkeypatch):
     path = tmp_path / "broken.urdf"
     path.write_text(text, encoding="utf-8")
     broken = replace(TALOS, share=lambda: tmp_path, urdf=path.name, srdf=str(TALOS.srdf_path))
@@ -132,7 +132,7 @@ def test_the_right_gripper_has_no_collision_shapes(make):
 
 
 @pytest.mark.parametrize("locked", ["auto", "none", ["head_1_joint"]])
-def test_merging_keeps_the_dynamics_of_the_moving_joints(locked):
+def test_merging_locked_links_keeps_the_dynamics_of_the_moving_joints(locked):
     config = with_robot(locked=locked)
     made = physics_description(config)
     merged = pinocchio.buildModelFromXML(made.urdf)
@@ -157,7 +157,7 @@ def test_merging_keeps_the_dynamics_of_the_moving_joints(locked):
             assert torques[0][joint] == pytest.approx(torques[1][joint], abs=1e-9)
 
 
-def test_merging_keeps_every_collision_shape_in_its_place():
+def test_merging_locked_links_keeps_every_collision_shape_in_its_place():
     posture = start_posture(CONFIG)
     assert collision_shapes(physics_description(CONFIG).urdf, posture) == collision_shapes(
         full_description(CONFIG), posture
@@ -171,7 +171,9 @@ def test_merging_keeps_every_collision_shape_in_its_place():
         ('name="elbow_joint" type="revolute"', 'name="elbow_joint" type="prismatic"', "elbow_joint is prismatic"),
     ],
 )
-def test_a_description_that_would_be_misunderstood_is_refused(old: str, new: str, said: str, tmp_path: Path) -> None:
+def test_a_description_with_an_ambiguous_or_prismatic_joint_is_refused(
+    old: str, new: str, said: str, tmp_path: Path
+) -> None:
     urdf = (PLUGINS / "planar_arm" / "planar_arm.urdf").read_text()
     assert old in urdf
     (tmp_path / "arm.urdf").write_text(urdf.replace(old, new))

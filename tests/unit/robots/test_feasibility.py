@@ -65,7 +65,7 @@ def shares(config):
     return efforts[:, columns].max(), (np.abs(motion[1]) / joint_limits(TALOS).velocity).max()
 
 
-def test_default_throw_needs_the_effort_and_speed_that_the_physics_showed(reason):
+def test_default_throw_needs_the_effort_and_speed_measured_in_the_physics(reason):
     assert reason(Config()) is None
     # Measured in the physics: 0.86 and 0.69.
     assert shares(Config()) == pytest.approx((0.86, 0.69), abs=0.01)
@@ -96,7 +96,7 @@ def test_held_posture_beyond_its_limit_is_refused(reason):
     assert reason(throw(robot={"posture": {"head_1_joint": 1.0}})).startswith("head_1_joint is at 1 rad at 0.000 s")
 
 
-def test_joint_may_start_at_the_very_end_of_its_range(reason):
+def test_joint_may_end_exactly_at_its_limit(reason):
     limit = float(joint_limits(TALOS).upper[JOINTS.index("arm_right_7_joint")])
     assert reason(throw({"arm_right_7_joint": limit}, duration_s=1.2)) is None
 
@@ -114,7 +114,7 @@ def test_speed_above_its_limit_is_refused(reason):
         {"scene": {"gravity_mps2": 15.0}},
     ],
 )
-def test_masses_gravity_and_effort_scale_of_the_trial_count(reason, change):
+def test_feasibility_depends_on_masses_gravity_and_effort_scale(reason, change):
     assert "Nm at" in reason(throw(**change))
     assert reason(Config()) is None
 
@@ -124,7 +124,7 @@ def test_stronger_robot_can_do_the_long_throw(reason):
 
 
 def test_effort_of_held_joints_is_limited_only_where_they_are_simulated(reason):
-    """An arm that carries too much is no matter as long as it is rigid and only the torso moves."""
+    """An overloaded arm does not matter as long as it is rigid and only the torso moves."""
     task = {"start": TASK.start, "end": {"torso_1_joint": 0.1}}
     assert reason(Config(task=task, tool={"mass_kg": 2.0})) is None
     assert reason(Config(task=task, tool={"mass_kg": 2.0}, robot={"locked": "none"})).startswith("arm_right_")
@@ -167,7 +167,7 @@ def test_damping_and_inertia_show_in_the_torque():
     assert faster - rest > 1.0
 
 
-def test_arm_against_the_head_is_refused(reason):
+def test_throw_that_brings_the_arm_against_the_head_is_refused(reason):
     config = throw(
         {"arm_right_2_joint": -2.15, "arm_right_3_joint": 1.95, "arm_right_5_joint": 2.33, "arm_right_6_joint": -1.19},
         duration_s=6.0,
@@ -176,7 +176,7 @@ def test_arm_against_the_head_is_refused(reason):
     assert reason(config) == "arm_right_5_link and head_2_link overlap at 1.510 s; they must stay 2 mm apart"
 
 
-def test_spoon_against_the_leg_is_refused_until_it_is_short_enough(reason):
+def test_a_spoon_with_a_long_handle_hits_the_leg_and_one_with_a_short_does_not(reason):
     start = {joint: angle for joint, angle in TALOS.rest_posture.items() if joint.startswith("arm_right_")}
     task = {"start": start, "end": {**start, "arm_right_1_joint": 0.7, "arm_right_6_joint": 1.0}, "duration_s": 6.0}
     refusal = reason(Config(task=task))
@@ -211,18 +211,18 @@ def test_start_posture_that_does_not_hold_the_ball_is_refused(reason):
     assert "task.start does not hold" in reason(Config(task={"start": half_sitting_arm, "end": {"torso_1_joint": 0.3}}))
 
 
-def test_handle_may_reach_into_the_hand(reason):
+def test_handle_of_the_spoon_may_reach_into_the_hand(reason):
     assert reason(throw(tool={"mount_offset_m": 0.0})) is None
 
 
-def test_links_that_are_held_into_each_other_are_refused(reason):
+def test_posture_in_which_held_links_overlap_is_refused(reason):
     posture = {"arm_left_1_joint": 0.0, "arm_left_2_joint": 0.0, "arm_left_3_joint": 0.0, "arm_left_4_joint": 0.0}
     assert "leg_left_3_link" in reason(
         throw(robot={"posture": posture | {f"leg_left_{n}_joint": 0.0 for n in range(1, 7)}})
     )
 
 
-def test_broad_phase_finds_what_all_distances_find():
+def test_clearance_check_agrees_with_the_distances_of_all_pairs():
     """Every pair's distance, one by one, is the reference for the pruned check."""
     model = pinocchio.buildModelFromUrdf(str(TALOS.urdf_path))
     clearance = Clearance(TALOS, model, tool_of(Config().tool))
@@ -247,7 +247,7 @@ def test_broad_phase_finds_what_all_distances_find():
 
 
 class Unknowing:
-    """Knows no posture to be clear, so that all links are looked at in each."""
+    """Takes no posture for clear, so that all links are checked in every posture."""
 
     def find_unknown(self, postures):
         return np.ones(len(postures), bool)
@@ -255,8 +255,8 @@ class Unknowing:
     look_at_first = find_unknown
 
 
-def test_postures_near_clear_ones_are_clear():
-    """Of 6,000 postures on motions of an arm, many of them into something, those that are looked at closely decide."""
+def test_skipping_postures_near_clear_ones_misses_no_approach():
+    """6,000 postures, many of which collide: the result is that of a check of all links in every posture."""
     model = joint_model(TALOS)
     quick, thorough = (Clearance(TALOS, model, tool_of(Config().tool)) for _ in range(2))
     thorough._clear = [Unknowing()]
@@ -276,7 +276,7 @@ def test_postures_near_clear_ones_are_clear():
     assert 0.3 < np.mean([approach is None for approach in approaches]) < 0.9
 
 
-def test_the_shapes_of_a_robot_are_read_once_and_have_no_tool(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_meshes_of_a_robot_are_read_once_for_all_tools(monkeypatch: pytest.MonkeyPatch) -> None:
     model = joint_model(TALOS)
     tools = tool_of(Config().tool), tool_of(Config(tool={"handle_length_m": 0.05}).tool)
     before = Clearance(TALOS, model, tools[0])
@@ -288,7 +288,7 @@ def test_the_shapes_of_a_robot_are_read_once_and_have_no_tool(monkeypatch: pytes
     assert [*before.geometry.collisionPairs] == [*again.geometry.collisionPairs]
 
 
-def test_torques_of_free_joints_are_those_of_the_whole_robot():
+def test_dynamics_of_only_the_free_joints_give_the_same_refusals():
     feasibility, whole = Feasibility(Config()), Feasibility(Config())
     whole._dynamics_of_free_joints = lambda _: whole._dynamics
     draw = np.random.default_rng(3)
@@ -345,7 +345,7 @@ def talos(tmp_path, monkeypatch):
         ("srdf", None, None, "cannot be read as robot description"),
     ],
 )
-def test_a_description_that_lacks_something_is_named(talos, file, text, instead, message):
+def test_a_description_with_a_missing_or_wrong_part_is_refused_by_name(talos, file, text, instead, message):
     path = talos.urdf_path if file == "urdf" else talos.srdf_path
     if text is None:
         path.unlink()
@@ -357,7 +357,7 @@ def test_a_description_that_lacks_something_is_named(talos, file, text, instead,
         Feasibility(Config())
 
 
-def test_a_limit_of_0_hides_no_violation_of_another_one(talos):
+def test_a_limit_of_zero_does_not_hide_a_violation_of_another_limit(talos):
     text = talos.urdf_path.read_text()
     joint = re.search(r'<joint name="gripper_left_joint".*?</joint>', text, flags=re.DOTALL)[0]
     still = re.sub(r'(effort|velocity)="[^"]*"', r'\1="0.0"', joint)

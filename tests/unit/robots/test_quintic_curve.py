@@ -17,7 +17,7 @@ def rest_to_rest(start=1.1, end=2.1, duration=1.0):
 @pytest.mark.parametrize(
     ("time", "value"), [(0.01, 1.100010), (0.25, 1.203516), (0.5, 1.6), (0.75, 1.996484), (1.0, 2.1)]
 )
-def test_rest_to_rest_is_the_curve_that_controllers_follow(time, value):
+def test_a_motion_from_rest_to_rest_has_the_positions_of_a_quintic(time, value):
     assert sample_quintic(rest_to_rest(), np.array([time]))[0][0, 0] == pytest.approx(value, abs=5e-7)
 
 
@@ -35,19 +35,19 @@ def test_polynomials_of_degree_five_are_reproduced(coefficients, spans):
         assert np.abs(sampled[:, 0] - path.deriv(order)(times)).max() < 1e-11 * scale
 
 
-def test_ends_are_held_outside_the_trajectory():
+def test_the_ends_of_a_trajectory_are_held_before_and_after_it():
     positions, velocities, _ = sample_quintic(rest_to_rest(), np.array([-0.5, 1.0, 1.5]))
     assert positions[:, 0] == pytest.approx([1.1, 2.1, 2.1], abs=1e-14)
     assert velocities[:, 0] == pytest.approx(0, abs=1e-13)
 
 
-def test_single_point_is_no_curve():
+def test_sampling_a_trajectory_of_a_single_point_is_refused():
     point = JointTrajectory(("j",), np.zeros(1), *(np.zeros((1, 1)),) * 3)
     with pytest.raises(ValueError, match="at least two points, got 1"):
         sample_quintic(point, np.zeros(1))
 
 
-def test_positions_alone_are_those_of_the_whole_sample():
+def test_sampling_only_positions_gives_the_same_positions():
     trajectory = rest_to_rest(duration=0.7)
     times = np.linspace(-0.1, 0.9, 33)
     assert (sample_positions(trajectory, times) == sample_quintic(trajectory, times)[0]).all()

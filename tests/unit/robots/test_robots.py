@@ -35,7 +35,7 @@ def test_every_joint_has_one_controller(robot: Robot) -> None:
 
 
 @of_every_robot
-def test_names_of_controllers_in_the_graph_are_told_apart(robot: Robot) -> None:
+def test_controllers_have_different_names_in_the_ros_graph(robot: Robot) -> None:
     for naming in ("ros1", "ros2"):
         assert len({robot.graph_name(controller, naming) for controller in robot.controllers}) == len(robot.controllers)
 
@@ -58,7 +58,7 @@ def test_the_description_has_the_joints_and_the_hand(robot: Robot) -> None:
     assert model.existBodyName(robot.hand)
 
 
-def test_a_robot_without_collision_shapes_meets_nothing(tmp_path: Path) -> None:
+def test_a_robot_without_collision_shapes_never_comes_too_close_to_itself(tmp_path: Path) -> None:
     text = re.sub("<collision>.*?</collision>", "", PLANAR_ARM.urdf_path.read_text(), flags=re.DOTALL)
     (tmp_path / "arm.urdf").write_text(text)
     arm = replace(PLANAR_ARM, share=lambda: tmp_path, urdf="arm.urdf", srdf=str(PLANAR_ARM.srdf_path))

@@ -8,7 +8,7 @@ from throwcollect.robots.talos import TALOS
 from throwcollect.robots.tool_motion import ToolMotion
 
 
-def test_velocity_is_the_change_of_place():
+def test_the_velocity_of_the_tool_agrees_with_finite_differences():
     draw, limits, spoon = (
         np.random.default_rng(3),
         joint_limits(TALOS),
@@ -20,7 +20,7 @@ def test_velocity_is_the_change_of_place():
         assert spoon.velocity(position, velocity) == pytest.approx((after - before) / 2e-6, abs=1e-7)
 
 
-def test_place_has_the_height_of_the_base():
+def test_the_tool_rises_with_the_height_of_the_base():
     posture = np.array(list(start_posture(Config()).values()))
     low, high = (ToolMotion(Config(robot={"base_height_m": height})).place(posture) for height in (0.6, 1.1))
     assert high - low == pytest.approx([0, 0, 0.5])

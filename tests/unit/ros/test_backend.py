@@ -1,4 +1,4 @@
-"""Which backend nodes run on, and that both offer the same."""
+"""Which backend nodes run on; both backends offer the same names."""
 
 import ast
 import os
@@ -30,14 +30,14 @@ def _fresh():
     _choose_installed.cache_clear()
 
 
-def test_the_embedded_backend_can_be_asked_for(monkeypatch):
+def test_the_environment_can_ask_for_the_embedded_backend(monkeypatch):
     monkeypatch.setenv(VARIABLE, "embedded")
     assert not uses_rclpy()
 
 
 @pytest.fixture
 def ros(monkeypatch, tmp_path):
-    """As much of an installation of ROS 2 as is looked at, with Fast DDS; nothing of it can be imported."""
+    """The files of a ROS 2 with Fast DDS that the check for rclpy looks for; none of them can be imported."""
     for package in ("rclpy", *PACKAGES):
         (tmp_path / package).mkdir()
         (tmp_path / package / "__init__.py").write_text("raise AssertionError")
@@ -49,7 +49,7 @@ def ros(monkeypatch, tmp_path):
     index.mkdir(parents=True)
     for name in ("rmw_fastrtps_cpp", "rmw_implementation"):
         (index / name).touch()
-    # Whatever ROS there is beside it.
+    # Only this installation is found, even if the machine has another ROS 2.
     monkeypatch.setattr(
         "throwcollect.ros_installation.find_spec", lambda name: PathFinder.find_spec(name, [str(tmp_path)])
     )
@@ -60,7 +60,7 @@ def ros(monkeypatch, tmp_path):
     return tmp_path
 
 
-def test_rclpy_is_taken_where_it_and_all_interfaces_are_found(ros, monkeypatch):
+def test_rclpy_is_used_if_it_and_all_interfaces_are_installed(ros, monkeypatch):
     assert uses_rclpy()
     _choose_installed.cache_clear()
     monkeypatch.setenv(VARIABLE, "embedded")
@@ -75,7 +75,7 @@ def test_rclpy_is_taken_where_it_and_all_interfaces_are_found(ros, monkeypatch):
         ("rclpy", "__init__.py", "rclpy"),
     ],
 )
-def test_an_rclpy_without_all_interfaces_is_taken_only_if_asked_for_and_then_says_what_is_missing(
+def test_a_missing_package_or_interface_is_an_error_only_if_rclpy_is_asked_for(
     package, files, lacking, ros, monkeypatch
 ):
     (ros / package / files).unlink()
@@ -98,7 +98,7 @@ def test_an_rclpy_without_all_interfaces_is_taken_only_if_asked_for_and_then_say
         (("cpython", (3, 11, 2), "aarch64"), "by pip it is for CPython 3.11 on Linux, x86-64, with glibc alone"),
     ],
 )
-def test_the_way_to_rclpy_is_that_of_this_python_and_machine(platform, hint, ros, monkeypatch):
+def test_the_hint_how_to_install_rclpy_fits_python_and_machine(platform, hint, ros, monkeypatch):
     name, number, machine = platform
     monkeypatch.setattr("sys.implementation", SimpleNamespace(name=name, cache_tag="cpython-311"))
     monkeypatch.setattr("sys.version_info", number)
@@ -107,7 +107,7 @@ def test_the_way_to_rclpy_is_that_of_this_python_and_machine(platform, hint, ros
     assert ("pip install" in how_to_install()) == hint.startswith("pip")
 
 
-def test_an_rmw_that_is_not_installed_is_one_message(ros, monkeypatch):
+def test_an_rmw_that_is_not_installed_is_refused_with_a_list_of_others(ros, monkeypatch):
     monkeypatch.setenv(RMW_VARIABLE, "rmw_cyclonedds_cpp")
     with pytest.raises(ConfigError, match="RMW_IMPLEMENTATION is rmw_cyclonedds_cpp, which is not installed") as told:
         uses_rclpy()
@@ -116,7 +116,7 @@ def test_an_rmw_that_is_not_installed_is_one_message(ros, monkeypatch):
     assert uses_rclpy()
 
 
-def test_where_ros_has_no_zenoh_the_embedded_backend_speaks_it(ros, monkeypatch):
+def test_the_embedded_backend_is_used_for_zenoh_if_its_rmw_is_missing(ros, monkeypatch):
     monkeypatch.setenv(RMW_VARIABLE, "rmw_zenoh_cpp")
     assert not uses_rclpy()
     _choose_installed.cache_clear()
@@ -128,7 +128,7 @@ def test_where_ros_has_no_zenoh_the_embedded_backend_speaks_it(ros, monkeypatch)
 ROOMS = ("coordinator", "runs", "runtimes", "sim", "episode")
 
 
-def test_all_packages_whose_interfaces_nodes_use_are_looked_for():
+def test_the_check_for_rclpy_covers_all_packages_of_used_interfaces():
     source = ROOT / "src" / "throwcollect"
     rooms = [path for room in ROOMS for path in (source / room).rglob("*.py")]
     named = re.compile(r"""["']([a-z0-9_]+)/(?:msg|srv|action)/""")
@@ -141,7 +141,7 @@ OF_DATASETS = {"diagnostic_msgs", "visualization_msgs"}
 """Packages of messages that are written into recordings, and that no node sends."""
 
 
-def test_another_value_is_one_clear_message_and_exit_code_2(tmp_path):
+def test_up_reports_an_unknown_backend_with_exit_code_2(tmp_path):
     sweep = "sweep: {sampler: uniform, parameters: {task.duration_s: {min: 0.9, max: 1.3}}}"
     (tmp_path / "throws.yaml").write_text(f"trials: 1\n{sweep}\n")
     options = ["--runtime", "local", "--output", str(tmp_path / "data")]
@@ -153,7 +153,7 @@ def test_another_value_is_one_clear_message_and_exit_code_2(tmp_path):
     assert not (tmp_path / "data").exists()
 
 
-def test_both_backends_offer_the_same_names():
+def test_the_genuine_backend_offers_all_names_of_the_embedded_one():
     tree = ast.parse(Path(throwcollect.ros.__file__).with_name("genuine.py").read_text())
     imports = [node for node in tree.body if isinstance(node, ast.ImportFrom)]
     imported = {each.asname or each.name for node in imports for each in node.names}

@@ -21,7 +21,7 @@ def key(tmp_path):
     return made
 
 
-def test_processes_are_told_all_of_it_by_their_environment_but_no_secret(key):
+def test_the_environment_of_a_process_has_the_connection_but_no_secret(key):
     environment = Connection("tls/127.0.0.1:7447", key, 7).environment()
     assert environment[VARIABLE] == "embedded"
     assert (environment["ROS_DOMAIN_ID"], environment[KEY_VARIABLE]) == ("7", str(key.directory))
@@ -29,7 +29,7 @@ def test_processes_are_told_all_of_it_by_their_environment_but_no_secret(key):
     assert str(key.private_key) in environment[OVERRIDE_VARIABLE]
 
 
-def test_contexts_of_one_process_are_in_different_runs_and_the_environment_has_no_part_in_it(key, monkeypatch):
+def test_a_process_can_be_in_several_runs_whatever_its_environment_says(key, monkeypatch):
     for variable in (OVERRIDE_VARIABLE, CONFIG_FILE_VARIABLE, "ROS_DOMAIN_ID"):
         monkeypatch.setenv(variable, "nonsense")
     before = dict(os.environ)
@@ -43,7 +43,7 @@ def test_contexts_of_one_process_are_in_different_runs_and_the_environment_has_n
                 nodes[name] = ros.Node(name, context=context)
             assert [nodes[name].context.get_domain_id() for name in nodes] == [3, 3, 4]
             for name, way in ways.items():
-                # Whoever comes later sees who is there already.
+                # A node that comes later discovers those that are there already.
                 context = ros.Context()
                 ros.init(context=context, connection=way)
                 seen = names_of(ros.Node("late", context=context))
@@ -55,17 +55,17 @@ def test_contexts_of_one_process_are_in_different_runs_and_the_environment_has_n
     assert dict(os.environ) == before
 
 
-def test_a_run_on_other_middleware_is_not_joined(key):
+def test_joining_a_run_on_other_middleware_is_refused(key):
     way = Connection("udp/127.0.0.1:7447", key, 0, Middleware("rclpy", "rmw_fastrtps_cpp"))
     with pytest.raises(ConfigError, match="7447 is on rmw_fastrtps_cpp, and this process on rmw_zenoh_cpp"):
         ros.init(connection=way)
 
 
-def test_a_key_that_cannot_be_read_is_named(tmp_path):
+def test_joining_with_a_key_that_cannot_be_read_is_refused(tmp_path):
     with pytest.raises(ConfigError, match=r"the key of the run cannot be read: .*gone"):
         ros.init(connection=Connection("tls/127.0.0.1:7447", RunKey(tmp_path / "gone")))
 
 
-def test_an_endpoint_that_is_none_is_refused(key):
+def test_joining_at_a_malformed_endpoint_is_refused(key):
     with pytest.raises(ConfigError, match="endpoint: connect/endpoints cannot be"):
         ros.init(connection=Connection("nowhere", key))

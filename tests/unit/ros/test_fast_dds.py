@@ -1,4 +1,4 @@
-"""Profiles of Fast DDS for a run, and the discovery server that they lead to."""
+"""The Fast DDS profiles of a run, and its discovery server."""
 
 import re
 import stat
@@ -26,7 +26,7 @@ class Profile:
         return [(each.text or "").strip() for each in self._root.iter() if each.tag.rpartition("}")[2] == tag]
 
 
-def test_nodes_know_of_one_server_and_learn_of_everybody_there():
+def test_the_profile_of_a_node_names_one_discovery_server():
     profile = Profile(client_profile(ENDPOINT))
     assert profile("discoveryProtocol") == ["SUPER_CLIENT"]
     assert profile("port") == ["7447"]
@@ -35,7 +35,7 @@ def test_nodes_know_of_one_server_and_learn_of_everybody_there():
     assert profile("useBuiltinTransports") == ["false"]
 
 
-def test_the_server_listens_where_it_is_told():
+def test_the_profile_of_the_discovery_server_has_the_given_port():
     profile = Profile(server_profile(ENDPOINT))
     assert profile("discoveryProtocol") == ["SERVER"]
     assert profile("port") == ["7447"]
@@ -43,18 +43,18 @@ def test_the_server_listens_where_it_is_told():
     assert profile("prefix") == [remote]
 
 
-def test_nodes_that_other_machines_may_reach_listen_everywhere():
+def test_nodes_listen_everywhere_unless_the_endpoint_is_on_loopback():
     assert Profile(client_profile(ENDPOINT))("interfaceWhiteList")
     assert not Profile(client_profile("udp/192.0.2.7:7447"))("interfaceWhiteList")
 
 
 @pytest.mark.parametrize("endpoint", ["udp/nowhere.invalid:1", "udp/127.0.0.1:x", "udp/" + 70 * "x" + ":1", "udp/"])
-def test_an_endpoint_without_an_address_is_refused(endpoint):
+def test_a_fast_dds_endpoint_without_an_address_is_refused(endpoint):
     with pytest.raises(ConfigError, match="no address of a discovery server"):
         client_profile(endpoint)
 
 
-def test_a_temporary_profile_is_for_its_owner_alone_and_goes_with_the_process():
+def test_a_temporary_profile_is_private_and_removed_with_the_process():
     program = (
         "from throwcollect.ros.fast_dds import write_temporarily; import os, stat\n"
         "path = write_temporarily('<ä/>')\n"
@@ -69,7 +69,7 @@ def test_a_temporary_profile_is_for_its_owner_alone_and_goes_with_the_process():
     assert stat.S_IMODE(write_temporarily("").stat().st_mode) == 0o600
 
 
-def test_without_the_program_of_fast_dds_there_is_one_message(monkeypatch, tmp_path):
+def test_a_missing_discovery_server_program_is_an_error_with_a_hint(monkeypatch, tmp_path):
     monkeypatch.setattr("sys.prefix", str(tmp_path))
     monkeypatch.setenv("PATH", str(tmp_path))
     with (
@@ -94,7 +94,7 @@ def program(monkeypatch, tmp_path):
     return put
 
 
-def test_a_port_that_something_else_listens_on_is_refused(program):
+def test_a_discovery_server_on_a_busy_port_is_refused(program):
     program("exit 1")
     with (
         router("tcp/127.0.0.1:0") as taken,
@@ -104,7 +104,7 @@ def test_a_port_that_something_else_listens_on_is_refused(program):
         pass
 
 
-def test_a_server_that_ends_at_once_says_why(program):
+def test_a_discovery_server_that_ends_at_once_is_an_error_with_its_output(program):
     program("echo it cannot be; exit 1")
     with (
         pytest.raises(WorkerError, match=r"udp/127.0.0.1:\d+ has ended[\s\S]*it cannot be"),
@@ -113,8 +113,8 @@ def test_a_server_that_ends_at_once_says_why(program):
         pass
 
 
-def test_a_server_that_says_a_lot_while_it_runs_goes_on(program, tmp_path):
-    # More than a pipe holds that nobody reads.
+def test_a_discovery_server_with_much_output_does_not_block(program, tmp_path):
+    # More than fits into a pipe that nobody reads.
     program(f"echo Server is running; head -c 1000000 /dev/zero; echo > {tmp_path}/said; exec sleep 60")
     with discovery_server("udp/127.0.0.1:0"):
         deadline = time.monotonic() + 10

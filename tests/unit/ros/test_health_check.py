@@ -33,7 +33,7 @@ def impatient(monkeypatch):
 
 
 @pytest.mark.parametrize(("name", "namespace"), [("sim_3", "/sim_3"), ("sim_3", "/"), ("coordinator", "/")])
-def test_a_node_that_works_answers(rig, spinning, name, namespace):
+def test_a_health_check_of_a_working_node_passes(rig, spinning, name, namespace):
     rig.node(name, namespace=namespace)
     spinning()
     # The router may hear the question before it knows of the node: nothing orders two sessions.
@@ -45,7 +45,7 @@ def test_a_node_that_works_answers(rig, spinning, name, namespace):
     check(name)
 
 
-def test_asking_leaves_no_trace_in_the_graph_and_in_the_logs(rig, spinning, capfd):
+def test_a_health_check_leaves_no_trace_in_the_graph_and_in_the_logs(rig, spinning, capfd):
     node = rig.node("sim_3", namespace="/sim_3")
     spinning()
     changes = node.context.graph.changes
@@ -54,7 +54,7 @@ def test_asking_leaves_no_trace_in_the_graph_and_in_the_logs(rig, spinning, capf
     assert "ignored" not in capfd.readouterr().err
 
 
-def test_a_node_whose_loop_is_stuck_does_not_answer(rig, impatient):
+def test_a_health_check_of_a_stuck_node_fails(rig, impatient):
     rig.node("sim_3", namespace="/sim_3")
     with pytest.raises(ThrowcollectError, match="sim_3: does not answer") as caught:
         check("sim_3")
@@ -62,12 +62,12 @@ def test_a_node_whose_loop_is_stuck_does_not_answer(rig, impatient):
     assert "\n" not in str(caught.value)
 
 
-def test_a_node_that_is_not_there_does_not_answer(environment):
+def test_a_health_check_of_a_missing_node_fails(environment):
     with pytest.raises(ThrowcollectError, match="sim_4: does not answer"):
         check("sim_4")
 
 
-def test_a_node_of_another_domain_is_another_node(rig, spinning, monkeypatch):
+def test_a_health_check_does_not_reach_a_node_of_another_domain(rig, spinning, monkeypatch):
     rig.node("sim_3", namespace="/sim_3")
     spinning()
     monkeypatch.setenv("ROS_DOMAIN_ID", "231")
@@ -75,7 +75,7 @@ def test_a_node_of_another_domain_is_another_node(rig, spinning, monkeypatch):
         check("sim_3")
 
 
-def test_the_environment_names_the_node(environment, monkeypatch):
+def test_a_health_check_without_a_name_asks_the_node_of_the_environment(environment, monkeypatch):
     monkeypatch.setenv("THROWCOLLECT_NODE", "router")
     check()
     monkeypatch.setenv("THROWCOLLECT_NODE", "sim_4")
@@ -84,20 +84,20 @@ def test_the_environment_names_the_node(environment, monkeypatch):
 
 
 @pytest.mark.parametrize("name", ["", "a*", "**", "a/b", "$x"])
-def test_a_name_that_is_none_is_refused(environment, monkeypatch, name):
+def test_a_health_check_of_a_malformed_name_is_refused(environment, monkeypatch, name):
     monkeypatch.delenv("THROWCOLLECT_NODE", raising=False)
     with pytest.raises(ConfigError, match="health: "):
         check(name)
 
 
-def test_without_a_router_nothing_is_healthy(environment, monkeypatch):
+def test_every_health_check_without_a_router_fails(environment, monkeypatch):
     monkeypatch.setenv(OVERRIDE_VARIABLE, 'connect/endpoints=["tcp/127.0.0.1:1"]')
     for node in ("router", "sim_3"):
         with pytest.raises(ThrowcollectError, match=f"{node}: no session with the router: .*tcp/127.0.0.1:1"):
             check(node)
 
 
-def test_a_router_that_is_stuck_is_not_healthy(environment, monkeypatch, impatient):
+def test_a_health_check_of_a_stuck_router_fails(environment, monkeypatch, impatient):
     command = [sys.executable, "-m", "throwcollect.ros.router", "--listen", "tcp/127.0.0.1:0"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as router:
         try:
@@ -113,7 +113,7 @@ def test_a_router_that_is_stuck_is_not_healthy(environment, monkeypatch, impatie
             router.kill()
 
 
-def test_a_session_is_waited_for_no_longer_than_an_answer(environment, monkeypatch):
+def test_a_health_check_waits_for_a_session_as_long_as_for_an_answer(environment, monkeypatch):
     opened = []
 
     def refuse(config):

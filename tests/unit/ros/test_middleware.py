@@ -1,4 +1,4 @@
-"""What carries the messages of a run."""
+"""The middleware, which carries the messages of a run."""
 
 import os
 
@@ -21,7 +21,7 @@ ZENOH, OTHER = Middleware("rclpy", "rmw_zenoh_cpp"), Middleware("rclpy", "rmw_cy
 @pytest.fixture(autouse=True)
 def _fresh(monkeypatch):
     for variable in (VARIABLE, RMW_VARIABLE):
-        # Both calls, so that whatever a test leaves there is taken away.
+        # Both calls, so that monkeypatch removes whatever a test leaves there.
         monkeypatch.setenv(variable, "")
         monkeypatch.delenv(variable)
     _choose_installed.cache_clear()
@@ -40,20 +40,20 @@ def rclpy(monkeypatch):
     ("middleware", "by_server", "private"),
     [(EMBEDDED, False, True), (FAST_DDS, True, False), (ZENOH, False, True), (OTHER, False, False)],
 )
-def test_some_find_each_other_by_a_server_and_some_keep_others_out(middleware, by_server, private):
+def test_only_fast_dds_uses_a_server_and_only_zenoh_keeps_others_out(middleware, by_server, private):
     assert (middleware.is_fast_dds, middleware.keeps_others_out) == (by_server, private)
 
 
-def test_our_own_commands_join_over_zenoh_without_rclpy():
+def test_commands_join_a_zenoh_run_with_the_embedded_backend():
     assert [each.joining for each in (EMBEDDED, ZENOH, FAST_DDS, OTHER)] == [EMBEDDED, EMBEDDED, FAST_DDS, OTHER]
 
 
-def test_processes_are_told_the_backend_and_an_rmw_that_it_uses():
+def test_the_environment_of_a_process_names_the_backend_and_its_rmw():
     assert EMBEDDED.environment() == {VARIABLE: "embedded"}
     assert OTHER.environment() == {VARIABLE: "rclpy", RMW_VARIABLE: "rmw_cyclonedds_cpp"}
 
 
-def test_that_of_a_process_is_what_its_environment_says(rclpy, monkeypatch):
+def test_the_middleware_of_a_process_follows_from_its_environment(rclpy, monkeypatch):
     assert Middleware.of_process() == FAST_DDS
     monkeypatch.setenv(RMW_VARIABLE, OTHER.rmw)
     assert Middleware.of_process() == OTHER
@@ -61,7 +61,7 @@ def test_that_of_a_process_is_what_its_environment_says(rclpy, monkeypatch):
     assert Middleware.of_process() == EMBEDDED
 
 
-def test_a_process_settles_it_whatever_its_environment_says_and_leaves_that_alone(rclpy, monkeypatch):
+def test_settled_middleware_overrules_the_environment_without_changing_it(rclpy, monkeypatch):
     monkeypatch.setenv(VARIABLE, "embedded")
     before = dict(os.environ)
     assert not uses_rclpy()
@@ -73,7 +73,7 @@ def test_a_process_settles_it_whatever_its_environment_says_and_leaves_that_alon
         ZENOH.settle()
 
 
-def test_a_configuration_may_leave_it_open_or_ask_for_a_backend(rclpy, monkeypatch):
+def test_a_configuration_can_ask_for_a_backend_or_leave_it_open(rclpy, monkeypatch):
     assert choose_middleware("auto") == FAST_DDS
     assert choose_middleware("embedded") == EMBEDDED
     assert Middleware.of_process() == FAST_DDS

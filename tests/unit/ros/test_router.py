@@ -18,7 +18,7 @@ from throwcollect.run_key import KEY_VARIABLE, RunKey
 COMMAND = [sys.executable, "-m", "throwcollect.ros.router", "--listen"]
 
 
-def test_a_busy_port_is_one_clear_error(endpoint):
+def test_a_router_on_a_busy_port_is_refused(endpoint):
     with (
         pytest.raises(ConfigError, match=f"cannot listen on {endpoint}: Address already in use\n") as caught,
         router(endpoint),
@@ -37,21 +37,21 @@ def test_a_busy_port_is_one_clear_error(endpoint):
         ("tcp/127.0.0.1:99999", "invalid port value\n"),
     ],
 )
-def test_an_endpoint_that_is_none_is_refused(listen, reason):
+def test_a_router_at_a_malformed_endpoint_is_refused(listen, reason):
     with pytest.raises(ConfigError, match=reason) as caught, router(listen):
         pass
     assert ".rs" not in str(caught.value)
 
 
 @pytest.mark.parametrize("stop", [signal.SIGTERM, signal.SIGINT])
-def test_the_command_says_where_it_listens_and_stops_when_told(stop):
+def test_the_router_command_prints_its_endpoint_and_stops_on_a_signal(stop):
     process = subprocess.Popen([*COMMAND, "tcp/127.0.0.1:0"], stdout=subprocess.PIPE, text=True)
     assert process.stdout.readline().startswith("router listening on tcp/127.0.0.1:")
     process.send_signal(stop)
     assert process.wait(10) == 0
 
 
-def test_the_command_reports_a_busy_port(endpoint):
+def test_the_router_command_reports_a_busy_port(endpoint):
     ended = subprocess.run([*COMMAND, endpoint], capture_output=True, text=True, timeout=20, check=False)
     assert ended.returncode == 2
     assert ended.stderr.startswith(f"the router cannot listen on {endpoint}")
@@ -68,7 +68,7 @@ def override_of(endpoint, key):
     return client_override(endpoint, session_key(endpoint, key))
 
 
-def test_a_protected_router_lets_in_who_has_its_key_and_nobody_else(environment, rig, monkeypatch, key, tmp_path):
+def test_a_protected_router_admits_only_clients_with_its_key(environment, rig, monkeypatch, key, tmp_path):
     stranger = RunKey(tmp_path / "stranger")
     stranger.create()
     monkeypatch.setattr(session, "_PATIENCE_S", 0.1)
@@ -96,21 +96,21 @@ def test_a_protected_router_needs_a_key_that_can_be_read(key):
         pass
 
 
-def test_a_key_where_zenoh_does_not_find_it_is_refused(tmp_path):
+def test_a_key_in_a_directory_that_zenoh_cannot_handle_is_refused(tmp_path):
     key = RunKey(tmp_path / "what;now?")
     key.create()
     with pytest.raises(ConfigError, match="what;now\\?: Zenoh finds no key in a directory with ; or \\? in its name"):
         override_of("tls/127.0.0.1:1", key)
 
 
-def test_a_client_is_told_of_a_key_that_cannot_be_read(environment, monkeypatch, key):
+def test_a_client_with_an_unreadable_key_is_refused(environment, monkeypatch, key):
     key.certificate.unlink()
     monkeypatch.setenv(OVERRIDE_VARIABLE, override_of("tls/127.0.0.1:1", key))
     with pytest.raises(ConfigError, match=r"cannot be read: .*/certificate.pem: No such file"):
         ros.init()
 
 
-def test_the_command_makes_a_key_where_there_is_none_and_keeps_the_one_that_is_there(tmp_path):
+def test_the_router_command_makes_a_missing_key_and_keeps_an_existing_one(tmp_path):
     command = [*COMMAND, "tls/127.0.0.1:0", "--key", str(tmp_path / "new")]
     keys = []
     for _ in range(2):
@@ -121,20 +121,20 @@ def test_the_command_makes_a_key_where_there_is_none_and_keeps_the_one_that_is_t
     assert keys[0] == keys[1]
 
 
-def test_a_key_that_would_keep_nobody_out_is_refused(tmp_path):
+def test_a_key_for_an_unprotected_endpoint_is_refused(tmp_path):
     with pytest.raises(ConfigError, match=r"--key: tcp/127.0.0.1:0 lets anybody in"):
         serve("tcp/127.0.0.1:0", tmp_path / "new")
     assert not (tmp_path / "new").exists()
 
 
-def test_the_key_of_the_environment_is_used_and_never_made(monkeypatch, tmp_path):
+def test_a_missing_key_that_the_environment_names_is_not_created(monkeypatch, tmp_path):
     monkeypatch.setenv(KEY_VARIABLE, str(tmp_path / "gone"))
     with pytest.raises(ConfigError, match=r"cannot be read: .*gone/key.pem"):
         serve("tls/127.0.0.1:0")
     assert not (tmp_path / "gone").exists()
 
 
-def test_a_router_shows_that_its_loop_goes_round(tmp_path, monkeypatch):
+def test_a_running_router_keeps_renewing_its_heartbeat(tmp_path, monkeypatch):
     monkeypatch.setenv(VARIABLE, str(tmp_path / "alive"))
     with subprocess.Popen([*COMMAND, "tcp/127.0.0.1:0"], stdout=subprocess.PIPE, text=True) as process:
         try:

@@ -16,14 +16,14 @@ def port() -> int:
         return number
 
 
-def test_what_does_not_listen_does_not_answer(port: int) -> None:
+def test_an_endpoint_at_which_nothing_listens_does_not_answer(port: int) -> None:
     begun = time.monotonic()
     assert not answers(f"tcp/127.0.0.1:{port}")
     assert not answers(f"tls/127.0.0.1:{port}", patience_s=0.1)
     assert time.monotonic() - begun >= 0.1
 
 
-def test_what_starts_meanwhile_is_waited_for(port: int) -> None:
+def test_an_endpoint_that_begins_to_listen_in_time_answers(port: int) -> None:
     def listen() -> None:
         time.sleep(0.1)
         with socket.create_server(("127.0.0.1", port)) as server:

@@ -1,4 +1,4 @@
-"""Runs that begin in a process of their own, without what that process does (which `tests/e2e/test_serve.py` sees)."""
+"""Beginning runs in the background; `tests/e2e/test_serve.py` has tests of what their processes do."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ time.sleep(60)
 
 @pytest.fixture
 def processes(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[subprocess.Popen[bytes]]]:
-    """Processes that take an order and do nothing, until they are ended."""
+    """Processes that read an order and then do nothing until they are ended."""
     started: list[subprocess.Popen[bytes]] = []
     begin = subprocess.Popen
 
@@ -64,7 +64,7 @@ def processes(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[subprocess.Popen
 
 
 def end(process: subprocess.Popen[bytes]) -> bytes:
-    """End a process; returns what it was told."""
+    """End a process and return the order that it has read."""
     assert process.stdout is not None
     with process.stdout as told:
         order = told.read()
@@ -77,7 +77,7 @@ def begin(config: Path, tmp_path: Path, **options: Any) -> Any:
     return begin_run(config, overrides=["trials=1"], output=tmp_path / "data", run="a", origin=ORIGIN, **options)
 
 
-def test_a_run_has_a_record_from_its_first_moment(
+def test_a_run_begun_in_the_background_has_a_record_at_once(
     config: Path, tmp_path: Path, processes: list[subprocess.Popen[bytes]]
 ) -> None:
     run = begin(config, tmp_path)
@@ -89,11 +89,13 @@ def test_a_run_has_a_record_from_its_first_moment(
     order = end(process)
     made_from = background._ORDERS.validate_json(order)
     assert (made_from.config, made_from.overrides, made_from.resumed) == (config, ("trials=1",), False)
-    # Its lock goes with the process, and with that alone.
+    # The lock is released when the process ends, and not before.
     assert Records().get("a").status == "died"
 
 
-def test_there_is_one_run_of_an_id(config: Path, tmp_path: Path, processes: list[subprocess.Popen[bytes]]) -> None:
+def test_a_second_run_with_the_same_id_is_refused(
+    config: Path, tmp_path: Path, processes: list[subprocess.Popen[bytes]]
+) -> None:
     begin(config, tmp_path)
     with pytest.raises(ConflictError, match="there is a run a already"):
         begin(config, tmp_path)
@@ -101,7 +103,7 @@ def test_there_is_one_run_of_an_id(config: Path, tmp_path: Path, processes: list
     end(processes[0])
 
 
-def test_a_signal_that_asks_to_stop_waits_until_it_can_be_heeded(
+def test_stop_signals_are_blocked_in_a_new_launcher_process(
     config: Path, tmp_path: Path, processes: list[subprocess.Popen[bytes]]
 ) -> None:
     before = signal.pthread_sigmask(signal.SIG_BLOCK, [])
@@ -118,7 +120,7 @@ def test_a_signal_that_asks_to_stop_waits_until_it_can_be_heeded(
     end(processes[0])
 
 
-def test_what_cannot_be_begun_leaves_nothing(
+def test_a_run_that_cannot_be_begun_leaves_no_record_and_no_process(
     config: Path,
     tmp_path: Path,
     state: Path,
@@ -147,12 +149,12 @@ def test_what_cannot_be_begun_leaves_nothing(
 
 
 def take_over(config: Path, tmp_path: Path, processes: list[subprocess.Popen[bytes]]) -> bytes:
-    """A run that has been begun, whose order this process carries out in place of the one that was started."""
+    """Begin a run and return its order, so that the test can carry it out instead of the process that was started."""
     begin(config, tmp_path)
     return end(processes[0])
 
 
-def test_what_the_preparation_fails_of_is_in_the_record(
+def test_an_error_of_the_preparation_is_written_to_the_record(
     config: Path, tmp_path: Path, processes: list[subprocess.Popen[bytes]]
 ) -> None:
     order = take_over(config, tmp_path, processes)
@@ -170,7 +172,7 @@ def test_what_the_preparation_fails_of_is_in_the_record(
     assert record.origin == ORIGIN
 
 
-def test_who_stops_it_while_it_is_prepared_is_heeded(
+def test_a_run_can_be_interrupted_during_its_preparation(
     config: Path, tmp_path: Path, processes: list[subprocess.Popen[bytes]]
 ) -> None:
     order = take_over(config, tmp_path, processes)
@@ -184,7 +186,7 @@ def test_who_stops_it_while_it_is_prepared_is_heeded(
     assert (record.origin, record.kind) == (ORIGIN, "collection")
 
 
-def test_what_was_made_for_a_run_is_removed_if_it_fails_between_preparation_and_launch(
+def test_a_run_that_fails_between_preparation_and_launch_leaves_no_dataset(
     config: Path, tmp_path: Path, processes: list[subprocess.Popen[bytes]], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     order = take_over(config, tmp_path, processes)
@@ -203,7 +205,7 @@ def test_what_was_made_for_a_run_is_removed_if_it_fails_between_preparation_and_
     assert Records().get("a").status == "ended"
 
 
-def test_while_a_large_plan_is_made_the_record_tells_how_far_it_is_and_who_stops_it_does_not_wait(
+def test_making_a_large_plan_shows_its_progress_and_can_be_interrupted(
     config: Path, tmp_path: Path, processes: list[subprocess.Popen[bytes]], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(background, "MANY_TRIALS", 1)
@@ -236,7 +238,7 @@ print("a warning", file=sys.stderr)
 """
 
 
-def test_the_launcher_goes_on_printing_beside_the_nodes(tmp_path: Path) -> None:
+def test_the_log_of_the_launcher_continues_after_it_was_moved(tmp_path: Path) -> None:
     before, after = tmp_path / "launcher.log", tmp_path / "logs" / "launcher.log"
     with before.open("ab") as log:
         words = [sys.executable, "-c", PREPARATION, str(before), str(after)]

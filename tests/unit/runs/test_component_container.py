@@ -1,4 +1,4 @@
-"""Runs that are one container of the catalogue, on an engine that runs nothing."""
+"""Runs that are one container of the catalogue, on a fake Docker engine."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def launch(engine: Engine, each_look: Callable[[], bool], order: ContainerOrder 
     return Records().get("ear-1").record
 
 
-def test_it_is_seen_while_it_runs_and_removed_when_it_is_told_to_end(engine: Engine) -> None:
+def test_a_container_is_in_the_record_while_it_runs_and_removed_at_the_end(engine: Engine) -> None:
     seen: list[tuple[str, str]] = []
 
     def look() -> bool:
@@ -84,7 +84,7 @@ def test_it_is_seen_while_it_runs_and_removed_when_it_is_told_to_end(engine: Eng
     assert engine.names() == []
 
 
-def test_what_it_ended_with_is_told(engine: Engine) -> None:
+def test_the_exit_code_of_a_container_that_has_ended_is_in_the_record(engine: Engine) -> None:
     def end() -> bool:
         engine.end("throwcollect-ear-1-container", 7)
         return False
@@ -96,7 +96,7 @@ def test_what_it_ended_with_is_told(engine: Engine) -> None:
     assert engine.names() == []
 
 
-def test_it_ends_with_the_run_that_it_has_joined(engine: Engine, session: OpenRun) -> None:
+def test_a_container_ends_with_the_run_that_it_has_joined(engine: Engine, session: OpenRun) -> None:
     def end() -> bool:
         (container,) = engine.containers.values()
         assert container["Config"]["Labels"][JOINED_LABEL] == "talos"
@@ -108,7 +108,7 @@ def test_it_ends_with_the_run_that_it_has_joined(engine: Engine, session: OpenRu
     assert engine.names() == []
 
 
-def test_it_fails_if_it_ends_before_the_run_that_it_has_joined(engine: Engine, session: OpenRun) -> None:
+def test_a_container_that_ends_before_the_run_it_has_joined_fails(engine: Engine, session: OpenRun) -> None:
     def end() -> bool:
         engine.end("throwcollect-ear-1-container", 7)
         return False
@@ -116,7 +116,7 @@ def test_it_fails_if_it_ends_before_the_run_that_it_has_joined(engine: Engine, s
     assert launch(engine, end, replace(ORDER, joins="talos")).exit_code == WorkerError.exit_code
 
 
-def test_down_ends_what_a_launcher_that_died_has_left(engine: Engine) -> None:
+def test_down_removes_the_container_of_a_launcher_that_died(engine: Engine) -> None:
     run = remember("ear-1", "container", "docker")
     engine.create("throwcollect-ear-1-container", {RUN_LABEL: "ear-1", NODE_LABEL: "container"})
     run.close()
@@ -124,7 +124,9 @@ def test_down_ends_what_a_launcher_that_died_has_left(engine: Engine) -> None:
     assert engine.names() == []
 
 
-def test_what_cannot_be_is_refused_at_once(session: OpenRun, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_an_order_for_a_container_that_cannot_work_is_refused(
+    session: OpenRun, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
     check_order(replace(ORDER, joins="talos"))
     with pytest.raises(NotFoundError, match="no run nobody"):
         check_order(replace(ORDER, joins="nobody"))
@@ -146,7 +148,7 @@ def test_what_cannot_be_is_refused_at_once(session: OpenRun, monkeypatch: pytest
         check_order(ORDER)
 
 
-def test_the_way_into_a_run_of_containers_is_its_own_network(tmp_path: Path) -> None:
+def test_a_container_joins_a_run_of_containers_over_the_network_of_the_run(tmp_path: Path) -> None:
     connection = Connection("tls/172.18.0.2:7447", RunKey(tmp_path), 7)
     way = find_way("talos", "docker", connection, SPEC)
     assert (way.network, way.key["Source"], way.key["ReadOnly"]) == (
@@ -161,7 +163,7 @@ def test_the_way_into_a_run_of_containers_is_its_own_network(tmp_path: Path) -> 
     assert "tls/172.18.0.2:7447" in way.environment["ZENOH_CONFIG_OVERRIDE"]
 
 
-def test_no_container_joins_what_it_cannot_reach(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_container_cannot_join_a_run_that_it_cannot_reach(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     fast_dds = Connection("udp/127.0.0.1:11811", RunKey(tmp_path), 0, Middleware("rclpy", "rmw_fastrtps_cpp"))
     with pytest.raises(ConfigError, match="is on Fast DDS"):
         find_way("talos", "local", fast_dds, SPEC)

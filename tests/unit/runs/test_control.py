@@ -45,7 +45,7 @@ def most() -> int:
 
 @pytest.fixture
 def wanted(endpoint: str, most: int, monkeypatch: pytest.MonkeyPatch) -> Iterator[list[int]]:
-    """What a launcher that offers scaling is asked for."""
+    """The numbers of simulations that a launcher is asked for."""
     asked: list[int] = []
     monkeypatch.setenv(OVERRIDE_VARIABLE, f'connect/endpoints=["{endpoint}"]')
     context = Context()
@@ -68,35 +68,37 @@ def wanted(endpoint: str, most: int, monkeypatch: pytest.MonkeyPatch) -> Iterato
     context.shutdown()
 
 
-def test_the_launcher_is_asked_for_another_number(endpoint: str, wanted: list[int]) -> None:
+def test_scaling_asks_the_launcher_for_the_number_of_simulations(endpoint: str, wanted: list[int]) -> None:
     for simulations in (5, 0, 256):
         scale(living(endpoint), simulations)
     assert wanted == [5, 0, 256]
 
 
 @pytest.mark.parametrize("simulations", [-1, 257])
-def test_the_launcher_refuses_what_is_out_of_range(simulations: int, endpoint: str, wanted: list[int]) -> None:
+def test_scaling_below_zero_or_above_the_largest_number_is_refused(
+    simulations: int, endpoint: str, wanted: list[int]
+) -> None:
     with pytest.raises(ConfigError, match=f"run a-0123: .* out of range. Min: 0, max: 256, value: {simulations}"):
         scale(living(endpoint), simulations)
     assert wanted == []
 
 
 @pytest.mark.parametrize("most", [1])
-def test_the_launcher_refuses_a_second_simulation_where_there_is_room_for_one(endpoint: str, wanted: list[int]) -> None:
+def test_scaling_above_the_limit_of_the_launcher_is_refused(endpoint: str, wanted: list[int]) -> None:
     with pytest.raises(ConfigError, match=r"out of range. Min: 0, max: 1, value: 2"):
         scale(living(endpoint), 2)
     scale(living(endpoint), 0)
     assert wanted == [0]
 
 
-def test_a_launcher_that_is_not_there_is_one_message(endpoint: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_scaling_without_a_launcher_is_an_error(endpoint: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(control, "_ANSWER_S", 0.2)
     with pytest.raises(WorkerError, match=f"run a-0123: its launcher does not answer over the router at {endpoint}"):
         scale(living(endpoint), 3)
 
 
 @pytest.mark.parametrize("nowhere", [None, "tcp/127.0.0.1:1"])
-def test_a_router_that_is_not_there_is_one_message(nowhere: str | None, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_scaling_without_a_router_is_an_error(nowhere: str | None, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(control, "_ANSWER_S", 0.2)
     with pytest.raises(WorkerError, match="run a-0123: its launcher does not answer"):
         scale(living(nowhere), 3)

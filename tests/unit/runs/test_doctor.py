@@ -18,7 +18,7 @@ from throwcollect.runtimes.docker.image import SOURCES_LABEL, default_tag
 PLUGINS = Path(__file__).parents[2] / "plugins"
 
 
-def test_a_machine_that_runs_the_tests_has_no_problem(tmp_path: Path) -> None:
+def test_doctor_finds_no_problem_on_a_machine_that_runs_the_tests(tmp_path: Path) -> None:
     checks = {check.name: check for check in examine(tmp_path)}
     assert list(checks) == [
         "python",
@@ -39,7 +39,7 @@ def test_a_machine_that_runs_the_tests_has_no_problem(tmp_path: Path) -> None:
     assert str(tmp_path) in checks["disk"].finding
 
 
-def test_all_extras_that_are_there_are_listed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_doctor_lists_installed_and_missing_extras(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("throwcollect.runs.doctor.is_installed", lambda package: package != "onnx")
     monkeypatch.setattr("throwcollect.runs.doctor.has_wheel", lambda _: True)
     (finding,) = (check.finding for check in examine(tmp_path) if check.name == "extras")
@@ -54,7 +54,7 @@ def lack_disk() -> Path:
 LOST_ARM = replace(TALOS, name="lost", share=lack_disk)
 
 
-def test_robots_of_other_packages_are_examined_and_one_that_fails_is_noted(
+def test_doctor_examines_robots_of_other_packages_and_notes_failures(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.syspath_prepend(PLUGINS)
@@ -81,7 +81,7 @@ def backends(directory: Path) -> dict[str, tuple[str, str]]:
     return {name: found[name] for name in ("rclpy", "embedded")}
 
 
-def test_both_backends_and_what_is_missing_of_one_are_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_doctor_reports_both_backends_and_their_missing_parts(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     zenoh = f"Zenoh {version('eclipse-zenoh')}"
     monkeypatch.delenv(VARIABLE, raising=False)
     monkeypatch.setattr("throwcollect.ros_installation.rmws", lambda: ["rmw_fastrtps_cpp"])
@@ -99,7 +99,9 @@ def test_both_backends_and_what_is_missing_of_one_are_told(tmp_path: Path, monke
     assert backends(tmp_path)["embedded"] == ("ok", finding)
 
 
-def test_a_backend_that_nodes_cannot_run_on_is_a_problem(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_doctor_reports_a_backend_that_nodes_cannot_run_on_as_a_problem(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setenv(VARIABLE, "rclpy")
     monkeypatch.setattr("throwcollect.ros.middleware.missing", lambda: ["tf2_msgs"])
     status, finding = backends(tmp_path)["embedded"]
@@ -108,7 +110,7 @@ def test_a_backend_that_nodes_cannot_run_on_is_a_problem(tmp_path: Path, monkeyp
 
 
 class Engine(BaseHTTPRequestHandler):
-    """As much of a Docker engine as says its version, and whether it has an image."""
+    """A fake Docker engine that answers only what its version is and whether it has an image."""
 
     images: tuple[str, ...] = ()
     sources = "unknown"
@@ -136,7 +138,7 @@ class Engine(BaseHTTPRequestHandler):
         pass
 
 
-def test_a_docker_engine_and_its_image_are_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_doctor_reports_the_docker_engine_and_its_image(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = tmp_path / "docker.sock"
     monkeypatch.setenv("DOCKER_HOST", f"unix://{path}")
 
@@ -164,7 +166,7 @@ def test_a_docker_engine_and_its_image_are_found(tmp_path: Path, monkeypatch: py
         server.shutdown()
 
 
-def test_a_python_without_a_wheel_of_bullet_is_noted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_doctor_notes_a_python_without_wheels_of_bullet(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("sys.version_info", (3, 12, 3))
     (python,) = [check for check in examine(tmp_path) if check.name == "python"]
     said = "3.12.3; pybullet has wheels for 3.10 and 3.11, MuJoCo (sim.engine) for this"
@@ -172,7 +174,7 @@ def test_a_python_without_a_wheel_of_bullet_is_noted(tmp_path: Path, monkeypatch
 
 
 @pytest.mark.parametrize(("missing", "status"), [({"pybullet"}, "note"), ({"pybullet", "mujoco"}, "problem")])
-def test_a_missing_engine_is_a_problem_if_no_other_one_is_there(
+def test_a_missing_physics_engine_is_a_problem_only_if_no_other_is_installed(
     missing: set[str], status: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("throwcollect.runs.doctor.is_installed", lambda package: package not in missing)

@@ -35,7 +35,7 @@ def read(logs: Path) -> list[Event]:
         ([ROUTER, LOST], [ROUTER, LOST], []),
     ],
 )
-def test_changes_of_nodes_are_told(
+def test_changes_in_the_states_of_nodes_become_events(
     before: list[NodeState], after: list[NodeState], told: list[str], tmp_path: Path
 ) -> None:
     log = EventLog(tmp_path / "logs", "small-1234")
@@ -44,7 +44,7 @@ def test_changes_of_nodes_are_told(
     assert list(map(str, read(tmp_path / "logs"))) == ["small-1234 started: 2 simulations", *told]
 
 
-def test_an_event_is_one_line_of_json_with_nothing_that_does_not_apply(tmp_path: Path) -> None:
+def test_an_event_is_one_line_of_json_without_empty_fields(tmp_path: Path) -> None:
     log = EventLog(tmp_path, "small-1234")
     log.run_event("failed", reason="the coordinator stopped\n  evidence: many\n  lines", exit_code=3)
     (line,) = (tmp_path / EVENTS).read_text().splitlines()
@@ -60,7 +60,7 @@ def test_an_event_is_one_line_of_json_with_nothing_that_does_not_apply(tmp_path:
 
 
 @pytest.mark.parametrize("line", ['{"time": "2026', "[]", '{"event": "started"}', '{"new": 1}'])
-def test_a_torn_line_is_no_event(line: str) -> None:
+def test_a_damaged_line_is_not_read_as_an_event(line: str) -> None:
     assert parse(line) is None
 
 
@@ -68,5 +68,5 @@ def test_a_torn_line_is_no_event(line: str) -> None:
     ("event", "node", "alarming"),
     [("lost", "sim_0", True), ("given up", "sim_0", True), ("frozen", "router", True), ("ready", "sim_0", False)],
 )
-def test_losses_are_alarming(event: str, node: str, alarming: bool) -> None:
+def test_only_events_of_failing_nodes_are_alarming(event: str, node: str, alarming: bool) -> None:
     assert Event("now", "small-1234", event, node).alarming == alarming

@@ -15,7 +15,7 @@ from throwcollect.runs.state_directory import STATE_VARIABLE
 
 
 @pytest.mark.parametrize("words", [("events",), ("logs", "-f")], ids=" ".join)
-def test_what_follows_a_run_ends_with_its_reader_even_if_nothing_happens_any_more(
+def test_the_commands_events_and_logs_end_when_their_output_is_closed(
     words: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv(STATE_VARIABLE, str(tmp_path / "state"))
@@ -47,7 +47,7 @@ def test_what_follows_a_run_ends_with_its_reader_even_if_nothing_happens_any_mor
 
 @pytest.fixture
 def planned(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[Run, Callable[[], bool]]:
-    """A run whose plan is being made in the background, and what first launches it, then ends it, and then agrees."""
+    """A run whose plan is being made, and a function whose second call launches the run and third call ends it."""
     monkeypatch.setenv(STATE_VARIABLE, str(tmp_path / "state"))
     first, later = tmp_path / "first", tmp_path / "data" / "logs"
     now = datetime.now(timezone.utc)
@@ -72,18 +72,18 @@ def planned(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[Run, Calla
     return Records().get(run.run), go_on
 
 
-def test_logs_are_followed_to_where_they_move(planned: tuple[Run, Callable[[], bool]]) -> None:
+def test_logs_are_followed_when_they_move_to_the_dataset(planned: tuple[Run, Callable[[], bool]]) -> None:
     run, go_on = planned
     lines = [(name, line) for name, line, _ in read_logs(run, (), follow=True, keep_on=go_on)]
     assert lines == [("launcher", "plan: 3 trials"), ("sim_0", "ready")]
 
 
-def test_events_are_followed_to_where_they_are_written(planned: tuple[Run, Callable[[], bool]]) -> None:
+def test_events_are_followed_when_logs_move_to_the_dataset(planned: tuple[Run, Callable[[], bool]]) -> None:
     run, go_on = planned
     assert [event.run for event, _ in read_events(run, keep_on=go_on)] == [run.id]
 
 
-def test_who_waits_is_told_what_happens_in_this_run_from_where_it_is_written(
+def test_follow_gives_only_events_of_this_run_even_if_its_logs_move(
     planned: tuple[Run, Callable[[], bool]],
 ) -> None:
     run, go_on = planned

@@ -1,4 +1,4 @@
-"""What a launcher leaves behind on a Docker engine, and what the record of the run says of it."""
+"""Containers that a launcher leaves on a Docker engine, and what the record of the run says about them."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ CONFIG = Config.model_validate({"containers": {"image": "image"}, "run": {"simul
 
 
 class Onlooker:
-    """Remembers what it is warned of."""
+    """Remembers the warnings."""
 
     def __init__(self) -> None:
         self.warnings: list[str] = []
@@ -108,7 +108,7 @@ def test_a_launcher_that_gives_up_says_that_containers_are_left(
     assert re.search(r"  sim_0 +running +container ", told)
 
 
-def test_a_launcher_that_gets_no_answer_at_all_leaves_the_record_of_what_was_there(
+def test_a_run_with_left_containers_stays_abandoned_if_the_engine_is_silent(
     engine: Engine, run: OpenRun, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(docker_clock, "SILENCE_S", 0.1)
@@ -119,20 +119,20 @@ def test_a_launcher_that_gets_no_answer_at_all_leaves_the_record_of_what_was_the
     assert status(run) == "abandoned"
 
 
-def test_what_was_left_is_ended_even_if_the_coordinator_has_finished_meanwhile(engine: Engine, run: OpenRun) -> None:
+def test_a_new_launch_removes_left_containers_after_the_coordinator_finished(engine: Engine, run: OpenRun) -> None:
     for name in ("router", "sim_0", COORDINATOR):
         key = engine.create(f"throwcollect-{run.run}-{name}", {RUN_LABEL: run.run, NODE_LABEL: name})
         engine.answer("POST", f"/containers/{key}/start", {}, None)
     engine.end(f"throwcollect-{run.run}-{COORDINATOR}", 0)
     run.update(left=True)
-    # There is no dataset here, which is found out when the coordinator has ended well.
+    # There is no dataset here, which becomes an error once the coordinator has ended well.
     with pytest.raises(DatasetError, match=r"/data: "):
         launch_run(run)
     assert engine.names() == []
     assert status(run) == "ended"
 
 
-def test_times_are_told_by_rfc_3339(run: OpenRun, capsys: pytest.CaptureFixture[str]) -> None:
+def test_ps_prints_times_as_rfc_3339_prescribes(run: OpenRun, capsys: pytest.CaptureFixture[str]) -> None:
     ps(everything=True, json=True)
     document = json.loads(capsys.readouterr().out)[0]
     assert re.fullmatch(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{3}\+00:00", document["started"])

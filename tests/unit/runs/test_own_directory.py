@@ -1,4 +1,4 @@
-"""Directories of single processes: private, and gone with their process, however that ends."""
+"""Directories of single processes: private, and removed after their process, however that ends."""
 
 from __future__ import annotations
 
@@ -38,14 +38,14 @@ def grow_old(directory: Path) -> None:
     os.utime(directory, (then, then))
 
 
-def test_nobody_else_can_read_it_and_it_is_gone_afterwards(place: Path) -> None:
+def test_an_own_directory_is_private_and_removed_afterwards(place: Path) -> None:
     with make_own_directory(PREFIX) as path:
         assert stat.S_IMODE(path.stat().st_mode) == 0o700
         (path / "key").touch()
     assert not list(place.iterdir())
 
 
-def test_that_of_a_process_that_was_killed_is_removed_by_the_next_one(place: Path) -> None:
+def test_the_directory_of_a_killed_process_is_removed_by_the_next_process(place: Path) -> None:
     subprocess.run([sys.executable, "-c", KILLED], env={**os.environ, "TMPDIR": str(place)}, check=False)
     (left,) = place.iterdir()
     assert (left / "key").exists()
@@ -56,14 +56,14 @@ def test_that_of_a_process_that_was_killed_is_removed_by_the_next_one(place: Pat
         assert not left.exists()
 
 
-def test_that_of_a_process_that_lives_stays(place: Path) -> None:
+def test_the_directory_of_a_living_process_is_kept(place: Path) -> None:
     with make_own_directory(PREFIX) as first:
         grow_old(first)
         with make_own_directory(PREFIX):
             assert first.exists()
 
 
-def test_what_is_no_directory_of_its_own_stays(place: Path) -> None:
+def test_links_files_and_other_directories_are_not_removed(place: Path) -> None:
     (place / "elsewhere").mkdir()
     (place / "elsewhere" / "file").touch()
     (place / f"{PREFIX}link").symlink_to(place / "elsewhere")
@@ -76,7 +76,9 @@ def test_what_is_no_directory_of_its_own_stays(place: Path) -> None:
     assert sorted(place.rglob("*")) == before
 
 
-def test_a_file_system_without_locks_will_do(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_own_directory_can_be_made_on_a_file_system_without_locks(
+    place: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     def refuse(_: int, __: int) -> None:
         raise OSError(37, os.strerror(37))
 

@@ -1,4 +1,4 @@
-"""Where a dataset goes if nobody says so, what is refused, and what stays as it is where nothing can go on."""
+"""The default directory of a dataset, refused arguments, and a resume that fails."""
 
 import re
 from pathlib import Path
@@ -11,7 +11,9 @@ from throwcollect.runs.preparation import _name_directory, prepare, resume
 from throwcollect.runs.state_directory import STATE_VARIABLE
 
 
-def test_the_name_alone_and_the_time_where_something_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_default_directory_gets_a_time_if_the_plain_name_is_taken(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.chdir(tmp_path)
     plain = Path("datasets/quick")
     assert _name_directory("quick") == plain
@@ -23,7 +25,7 @@ def test_the_name_alone_and_the_time_where_something_is(tmp_path: Path, monkeypa
     assert _name_directory("link") != Path("datasets/link")
 
 
-def test_wrong_arguments_are_refused_before_anything_is_made(tmp_path: Path) -> None:
+def test_prepare_refuses_wrong_arguments_before_it_makes_a_directory(tmp_path: Path) -> None:
     (tmp_path / "some.yaml").write_text("trials: 1\n")
     for wrong, message in (
         ({"processes": -3}, "processes: got -3\n  expected: 1 or more"),
@@ -55,7 +57,7 @@ def read_files(directory: Path) -> dict[str, bytes]:
         (["run.runtime=docker", "containers.volume=throws"], "no Docker engine answers"),
     ],
 )
-def test_where_nothing_can_go_on_a_finished_dataset_stays_one(
+def test_a_failed_resume_leaves_a_finished_dataset_unchanged(
     overrides: list[str], problem: str, finished: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv(STATE_VARIABLE, str(tmp_path / "state"))

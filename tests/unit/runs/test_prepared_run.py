@@ -1,4 +1,4 @@
-"""A prepared run is launched once."""
+"""A prepared run can be launched only once."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def prepared(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> PreparedRun:
 
 
 @launched_again
-def test_a_run_that_was_launched_is_not_launched_again(prepared: PreparedRun, launch) -> None:
+def test_launching_a_prepared_run_twice_is_refused(prepared: PreparedRun, launch) -> None:
     with prepared as run:
         summary = run.collect()
         with pytest.raises(ConflictError, match=f"run {run.record.run}: was launched already"):
@@ -40,7 +40,7 @@ def test_a_run_that_was_launched_is_not_launched_again(prepared: PreparedRun, la
 
 
 @launched_again
-def test_a_run_that_was_given_up_is_not_launched(prepared: PreparedRun, launch, tmp_path: Path) -> None:
+def test_launching_a_prepared_run_after_its_block_is_refused(prepared: PreparedRun, launch, tmp_path: Path) -> None:
     with prepared as run:
         pass
     with pytest.raises(ConflictError, match=f"run {run.record.run}: was given up when its block was left"):

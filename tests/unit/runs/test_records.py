@@ -61,7 +61,7 @@ def remember(records: Records, **fields: object) -> str:
     return run.run
 
 
-def test_what_is_written_is_read_by_others(state: Path) -> None:
+def test_a_written_and_updated_record_can_be_read_again(state: Path) -> None:
     run = Records().new("small")
     written = record(run, nodes=(NODE,), progress=PROGRESS, endpoint="tcp/127.0.0.1:1", summary=SUMMARY)
     run.write(written)
@@ -73,7 +73,7 @@ def test_what_is_written_is_read_by_others(state: Path) -> None:
     assert Records().ids() == [run.run]
 
 
-def test_a_file_system_without_locks_is_named(state: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_state_directory_without_file_locks_is_refused(state: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def refuse(_descriptor: int, _how: int) -> None:
         raise OSError(errno.ENOSYS, os.strerror(errno.ENOSYS))
 
@@ -84,7 +84,7 @@ def test_a_file_system_without_locks_is_named(state: Path, monkeypatch: pytest.M
     assert list((state / "runs").iterdir()) == []
 
 
-def test_a_run_is_named_after_its_collection_and_never_like_another(
+def test_the_id_of_a_run_begins_with_the_name_of_its_collection_and_is_unique(
     state: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     draws = iter(["aaaa", "aaaa", "bbbb"])
@@ -93,7 +93,7 @@ def test_a_run_is_named_after_its_collection_and_never_like_another(
     assert [records.new("small").run, records.new("small").run] == ["small-aaaa", "small-bbbb"]
 
 
-def test_a_run_without_a_record_is_none(state: Path) -> None:
+def test_a_run_without_a_record_is_not_found(state: Path) -> None:
     records = Records()
     run = records.new("small")
     assert records.ids() == []
@@ -112,7 +112,7 @@ def test_a_record_is_written_only_when_something_has_changed(state: Path, monkey
     assert [each.simulations for each in written] == [3]
 
 
-def test_a_run_lives_as_long_as_somebody_holds_it(state: Path) -> None:
+def test_a_run_lives_as_long_as_its_lock_is_held(state: Path) -> None:
     records = Records()
     run = records.new("small")
     run.write(record(run))
@@ -121,12 +121,12 @@ def test_a_run_lives_as_long_as_somebody_holds_it(state: Path) -> None:
     assert (records.lives(run.run), records.get(run.run).status) == (False, "died")
 
 
-def test_a_run_that_has_ended_has_not_died(state: Path) -> None:
+def test_a_run_that_has_ended_does_not_count_as_died(state: Path) -> None:
     records = Records()
     assert records.get(remember(records, ended=NOW, exit_code=3)).status == "ended"
 
 
-def test_a_launcher_that_is_killed_holds_nothing_though_its_pid_may_be_used_again(state: Path) -> None:
+def test_a_killed_launcher_releases_its_run_even_if_its_pid_is_in_use(state: Path) -> None:
     code = (
         "import sys; from throwcollect.runs.records import Records; sys.path.insert(0, sys.argv[1])\n"
         "from test_records import record; run = Records().new('small'); run.write(record(run, launcher=1))\n"
@@ -159,7 +159,7 @@ def test_a_run_is_handed_to_another_process_without_ever_seeming_dead(state: Pat
     assert not records.lives(run.run)
 
 
-def test_a_dead_run_is_taken_by_one_and_refused_to_others(state: Path) -> None:
+def test_only_one_process_can_take_over_a_dead_run(state: Path) -> None:
     records = Records()
     name = remember(records)
     taken = records.take(name)
@@ -171,7 +171,7 @@ def test_a_dead_run_is_taken_by_one_and_refused_to_others(state: Path) -> None:
     assert records.get(name).record.simulations == 5
 
 
-def test_the_lock_of_a_run_that_was_just_forgotten_counts_for_nothing(
+def test_a_run_that_is_forgotten_while_it_is_taken_over_gets_a_new_lock(
     state: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     found = Records()
@@ -208,7 +208,7 @@ def test_runs_are_found_by_any_spelling_of_their_directory(
     assert records.into(tmp_path / "configs") == []
 
 
-def test_what_is_forgotten_leaves_no_file_but_datasets(state: Path, tmp_path: Path) -> None:
+def test_forgetting_a_run_removes_all_its_files_except_the_dataset(state: Path, tmp_path: Path) -> None:
     (tmp_path / "data").mkdir()
     records = Records()
     run = records.new("small")
@@ -241,9 +241,7 @@ def test_runs_are_remembered_for_a_week_after_their_end(
 
 
 @pytest.mark.parametrize(("days", "remembered"), [(6, True), (8, False)])
-def test_the_key_of_a_run_that_was_killed_before_it_had_a_record_is_removed(
-    days: int, remembered: bool, state: Path
-) -> None:
+def test_the_key_of_a_run_without_a_record_is_removed_after_a_week(days: int, remembered: bool, state: Path) -> None:
     records = Records()
     run = records.new("small")
     run.close()
@@ -282,7 +280,7 @@ def without(key: str) -> Callable[[str], str]:
         ),
     ],
 )
-def test_a_record_that_cannot_be_read_is_one_message_and_no_obstacle(
+def test_a_damaged_record_is_an_error_but_other_runs_can_be_listed(
     damage: Callable[[str], str], message: str, state: Path
 ) -> None:
     records = Records()
@@ -296,7 +294,7 @@ def test_a_record_that_cannot_be_read_is_one_message_and_no_obstacle(
     records.new("small")
 
 
-def test_runs_of_a_directory_are_found_whatever_is_in_its_name(state: Path, tmp_path: Path) -> None:
+def test_runs_are_found_by_a_directory_with_special_characters(state: Path, tmp_path: Path) -> None:
     records = Records()
     odd = tmp_path / 'a "quoted" \\ name\n\u00e9\x7f'
     remember(records, directory=str(tmp_path))
@@ -307,13 +305,13 @@ def test_runs_of_a_directory_are_found_whatever_is_in_its_name(state: Path, tmp_
     assert of_volume in records.ids()
 
 
-def test_runs_come_in_the_order_of_their_start(state: Path) -> None:
+def test_runs_are_listed_in_the_order_of_their_start(state: Path) -> None:
     records = Records()
     late, early = remember(records, started=NOW), remember(records, started=NOW - timedelta(hours=1))
     assert [each.record.run for each in records.all()] == [early, late]
 
 
-def test_all_that_is_remembered_is_for_its_owner_alone(state: Path) -> None:
+def test_the_files_and_directories_of_a_run_are_private(state: Path) -> None:
     state.mkdir(mode=0o755)
     (state / "runs").mkdir(mode=0o755)
     before = os.umask(0)
@@ -329,7 +327,7 @@ def test_all_that_is_remembered_is_for_its_owner_alone(state: Path) -> None:
     assert {mode(path) for path in files} == {0o600}
 
 
-def test_every_run_has_a_key_of_its_own_which_those_who_find_it_and_take_it_over_get(state: Path) -> None:
+def test_every_run_has_its_own_key_until_the_run_is_forgotten(state: Path) -> None:
     records = Records()
     names = [remember(records), remember(records)]
     keys = [records.get(name).key for name in names]
@@ -341,7 +339,7 @@ def test_every_run_has_a_key_of_its_own_which_those_who_find_it_and_take_it_over
     assert (keys[0].exists, keys[1].exists) == (False, True)
 
 
-def test_a_run_that_can_have_no_key_is_none(state: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_run_whose_key_cannot_be_written_leaves_no_files(state: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def fail(_: RunKey) -> None:
         raise ConfigError("the key of the run cannot be written: No space left on device")
 
@@ -351,7 +349,9 @@ def test_a_run_that_can_have_no_key_is_none(state: Path, monkeypatch: pytest.Mon
     assert list((state / "runs").iterdir()) == []
 
 
-def test_a_full_disk_is_named(state: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_record_that_cannot_be_written_to_a_full_disk_is_an_error(
+    state: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     run = Records().new("small")
 
     def full(*_: object) -> None:
@@ -363,7 +363,7 @@ def test_a_full_disk_is_named(state: Path, monkeypatch: pytest.MonkeyPatch) -> N
     assert "free space there" in str(caught.value)
 
 
-def test_the_error_of_an_earlier_version_is_still_told(state: Path) -> None:
+def test_the_error_in_a_record_of_an_earlier_version_can_be_read(state: Path) -> None:
     name = remember(Records(), exit_code=3)
     path = state / "runs" / f"{name}.json"
     written = json.loads(path.read_text())

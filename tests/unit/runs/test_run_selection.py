@@ -40,7 +40,7 @@ def find_to_watch(records: Records, named: str) -> Run:
 
 
 def find_watched(records: Records) -> tuple[RunRecord, list[str]]:
-    """The run that is looked at without being named, and what is said of it."""
+    """The run that is watched if none is named, and what is printed about it."""
     said: list[str] = []
     return find_run_to_watch(records, None, say=said.append).record, said
 
@@ -108,7 +108,7 @@ def test_an_exact_id_wins_over_longer_ones(records: Records, make: Make) -> None
     assert find(records, "a-0123").record == short
 
 
-def test_a_name_of_several_or_of_none_is_refused_with_what_there_is(records: Records, make: Make) -> None:
+def test_an_ambiguous_or_unknown_id_is_refused_with_a_list_of_runs(records: Records, make: Make) -> None:
     with pytest.raises(ConfigError, match="no run 'x'"):
         find(records, "x")
     make("ab", "ended", age_h=1)
@@ -120,7 +120,7 @@ def test_a_name_of_several_or_of_none_is_refused_with_what_there_is(records: Rec
         find(records, "x")
 
 
-def test_of_many_runs_the_latest_are_named(records: Records, make: Make) -> None:
+def test_an_error_lists_only_the_latest_of_many_runs(records: Records, make: Make) -> None:
     for age_h in range(8):
         make(f"a{age_h}", "ended", age_h=age_h)
     latest = "a0-0123, a1-0123, a2-0123, a3-0123, a4-0123 and 3 more"
@@ -134,7 +134,7 @@ def test_of_many_runs_the_latest_are_named(records: Records, make: Make) -> None
 
 
 @pytest.mark.parametrize("look", [find, find_to_watch])
-def test_of_runs_that_begin_alike_the_only_one_that_lives_is_meant(
+def test_an_ambiguous_id_means_the_only_living_run(
     records: Records, make: Make, look: Callable[[Records, str], Run]
 ) -> None:
     make("ab", "ended")
@@ -149,7 +149,7 @@ def test_of_runs_that_begin_alike_the_only_one_that_lives_is_meant(
     assert re.findall(r"\((\w+)\): /", str(told.value))[2:] in (["ended", "died"], ["died", "ended"])
 
 
-def test_without_a_name_it_is_the_only_one_that_lives(records: Records, make: Make) -> None:
+def test_without_an_id_the_only_living_run_is_changed(records: Records, make: Make) -> None:
     with pytest.raises(ConfigError, match=r"no run lives\n  try: throwcollect up -d starts one"):
         find(records, None)
     make("a", "ended")
@@ -163,7 +163,7 @@ def test_without_a_name_it_is_the_only_one_that_lives(records: Records, make: Ma
         find(records, None)
 
 
-def test_what_is_looked_at_may_have_ended(records: Records, make: Make) -> None:
+def test_without_an_id_the_living_or_else_the_latest_run_is_watched(records: Records, make: Make) -> None:
     latest = make("a", "ended")
     make("b", "ended", age_h=1)
     assert find_watched(records) == (latest, [])
@@ -174,7 +174,7 @@ def test_what_is_looked_at_may_have_ended(records: Records, make: Make) -> None:
 @pytest.mark.parametrize(
     "elsewhere", [{"begun_in": "/other", "directory": "/other/data"}, {"directory": "/other/data"}]
 )
-def test_a_run_of_another_directory_is_not_changed_without_its_name(
+def test_a_run_of_another_directory_is_not_changed_without_its_id(
     elsewhere: dict[str, str], records: Records, make: Make
 ) -> None:
     record = make("a", "lives", **elsewhere)
@@ -189,7 +189,7 @@ def test_a_run_of_another_directory_is_not_changed_without_its_name(
     assert find_watched(records) == (record, [f"run a-0123, which {origin}"])
 
 
-def test_a_run_belongs_to_where_it_was_begun_and_to_where_its_dataset_lies(
+def test_a_run_belongs_to_the_directories_where_it_was_begun_and_collects(
     records: Records, make: Make, tmp_path: Path
 ) -> None:
     make("a", "lives", begun_in="/other", directory="/other/data")
@@ -201,20 +201,20 @@ def test_a_run_belongs_to_where_it_was_begun_and_to_where_its_dataset_lies(
         find(records, None)
 
 
-def test_what_ended_here_is_looked_at_before_what_lives_elsewhere(records: Records, make: Make) -> None:
+def test_an_ended_run_of_this_directory_is_watched_before_a_living_one_elsewhere(records: Records, make: Make) -> None:
     make("a", "lives", begun_in="/other", directory="/other/data")
     ended = make("b", "ended", age_h=1)
     assert find_watched(records) == (ended, [])
 
 
-def test_a_run_whose_dataset_is_in_a_volume_belongs_to_where_it_was_begun_alone(records: Records, make: Make) -> None:
+def test_a_run_with_a_volume_belongs_only_to_the_directory_where_it_was_begun(records: Records, make: Make) -> None:
     record = make("a", "lives", begun_in="/other", volume="v")
     with pytest.raises(ConfigError, match=r"a-0123 was begun in /other"):
         find(records, None)
     assert find_watched(records) == (record, ["run a-0123, which was begun in /other"])
 
 
-def test_whose_launcher_died_may_be_ended(records: Records, make: Make) -> None:
+def test_down_can_end_a_run_whose_launcher_died(records: Records, make: Make) -> None:
     record = make("a", "died")
     assert find_run_to_change(records, None, command="down", died=True).record == record
     with pytest.raises(ConfigError, match="no run lives"):
@@ -225,7 +225,9 @@ def test_whose_launcher_died_may_be_ended(records: Records, make: Make) -> None:
     ("code", "kind"),
     [(1, ThrowcollectError), (2, ConfigError), (3, WorkerError), (4, DatasetError), (130, Interrupted)],
 )
-def test_what_a_run_ended_with_is_told_with_its_exit_code(code: int, kind: type, records: Records, make: Make) -> None:
+def test_the_error_of_an_ended_run_has_the_type_of_its_exit_code(
+    code: int, kind: type, records: Records, make: Make
+) -> None:
     make("a", "ended", exit_code=code, failure=RunFailure("no luck", evidence="none"))
     error = records.get("a-0123").record.error
     assert (type(error), error and error.exit_code, str(error)) == (kind, code, "no luck\n  evidence: none")
@@ -270,12 +272,12 @@ def engine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Engine]:
         ({"runtime": "docker"}, [], False),
         ({"runtime": "local"}, ["coordinator"], False),
         ({"runtime": "docker", "ended": NOW}, ["coordinator"], False),
-        # Its launcher gave up, and could not remove them.
+        # The launcher gave up and could not remove the containers.
         ({"runtime": "docker", "ended": NOW, "left": True}, ["sim_0"], True),
         ({"runtime": "docker", "ended": NOW, "left": True}, [], False),
     ],
 )
-def test_containers_outlive_their_launcher(
+def test_a_dead_run_counts_as_left_only_if_containers_of_it_remain(
     fields: dict[str, object],
     nodes: list[str],
     left: bool,
@@ -292,7 +294,7 @@ def test_containers_outlive_their_launcher(
     assert run is None or run.record == record
 
 
-def test_a_directory_into_which_containers_may_still_collect_is_refused_while_the_engine_is_silent(
+def test_the_directory_of_a_dead_docker_run_is_refused_if_the_engine_is_silent(
     records: Records, make: Make, tmp_path: Path, engine: Engine, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     make("a", "died", runtime="docker")
@@ -304,7 +306,7 @@ def test_a_directory_into_which_containers_may_still_collect_is_refused_while_th
         find_left_in(records, tmp_path / "a")
 
 
-def test_an_engine_that_is_gone_holds_no_containers_that_run(
+def test_the_directory_of_a_dead_docker_run_is_free_if_the_engine_is_gone(
     records: Records, make: Make, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     make("a", "died", runtime="docker")
@@ -312,7 +314,9 @@ def test_an_engine_that_is_gone_holds_no_containers_that_run(
     assert find_left_in(records, tmp_path / "a") is None
 
 
-def test_the_record_of_containers_that_are_left_is_kept(records: Records, make: Make, tmp_path: Path) -> None:
+def test_the_record_of_a_run_with_left_containers_is_kept_beyond_a_week(
+    records: Records, make: Make, tmp_path: Path
+) -> None:
     left = make("a", "ended", age_h=999, ended=NOW - timedelta(hours=999), left=True)
     make("b", "ended", age_h=999, ended=NOW - timedelta(hours=999))
     for path in (tmp_path / "state" / "runs").glob("*.json"):
@@ -321,12 +325,12 @@ def test_the_record_of_containers_that_are_left_is_kept(records: Records, make: 
     assert [(run.record.run, run.status) for run in records.all()] == [(left.run, "abandoned")]
 
 
-def test_the_way_on_after_the_death_of_a_launcher_depends_on_where_the_dataset_is(records: Records, make: Make) -> None:
+def test_the_hint_after_the_death_of_a_launcher_depends_on_the_dataset(records: Records, make: Make) -> None:
     def tell_death(record: RunRecord) -> str:
         return str(describe_death(records.get(record.run)))
 
     again = "try: throwcollect resume /b goes on where it ended, or with its containers if they live; throwcollect down"
-    # Before there is a plan there is no dataset, but one that is resumed is there from the start.
+    # Before there is a plan, there is no dataset, except if a run resumes one.
     for died in (make("d", "died", runtime=""), make("e", "died", kind="session")):
         assert tell_death(died) == (
             f"run {died.run}: its launcher died\n  evidence: the logs are in logs\n"
@@ -341,7 +345,7 @@ def test_the_way_on_after_the_death_of_a_launcher_depends_on_where_the_dataset_i
     assert "resume" not in tell_death(make("c", "died", runtime="docker", volume="v"))
 
 
-def test_a_run_that_died_is_told_with_a_dataset_that_is_complete_by_now(
+def test_a_dead_run_is_reported_with_its_dataset_if_that_is_complete(
     records: Records, make: Make, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     collect_here(write_config(tmp_path, trials=2, sim=FAST), tmp_path / "data")
@@ -358,7 +362,7 @@ def test_a_run_that_died_is_told_with_a_dataset_that_is_complete_by_now(
     assert [each["complete"] for each in json.loads(capsys.readouterr().out) if each["run"] == record.run] == [False]
 
 
-def test_without_a_client_of_engines_none_is_asked(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_without_the_docker_package_no_held_runs_are_found(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     def import_client(**_: object) -> None:
         raise ModuleNotFoundError("No module named 'docker'", name="docker")
 
@@ -368,6 +372,6 @@ def test_without_a_client_of_engines_none_is_asked(monkeypatch: pytest.MonkeyPat
     assert find_held_runs() == {}
 
 
-def test_an_engine_that_is_not_there_is_not_waited_for(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_without_a_docker_engine_no_held_runs_are_found(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setenv("DOCKER_HOST", f"unix://{tmp_path}/none.sock")
     assert find_held_runs() == {}

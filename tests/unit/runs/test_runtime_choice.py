@@ -20,7 +20,7 @@ from throwcollect.runtimes.node_server import NodeServer
 
 @pytest.fixture
 def choose() -> Callable[..., tuple[str, list[str]]]:
-    """Chooses the runtime; what was warned of begins with an exclamation mark."""
+    """Chooses the runtime and returns what was printed; warnings begin with an exclamation mark."""
 
     def choose(runtime: str, image: str | None = None) -> tuple[str, list[str]]:
         said: list[str] = []
@@ -51,7 +51,7 @@ def engine(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture
 def outdated(engine, monkeypatch: pytest.MonkeyPatch) -> Mock:
-    """An engine whose images are all there, and of other sources; what it is told to build."""
+    """An engine whose images are all outdated; returns the mock that builds images."""
     monkeypatch.setattr(docker_image, "ensure", lambda *_, **__: None)
     monkeypatch.setattr(docker_image, "is_outdated", lambda *_: True)
     monkeypatch.setattr(docker_image, "rmw_of", lambda *_: None)
@@ -64,7 +64,7 @@ def lacks_image(*_: object, **__: object) -> None:
     raise WorkerError("the image is not here and cannot be built")
 
 
-def test_without_an_engine_auto_takes_processes_and_says_why(choose, no_engine, tmp_path: Path) -> None:
+def test_auto_chooses_processes_without_a_docker_engine_and_says_why(choose, no_engine, tmp_path: Path) -> None:
     assert choose("auto") == (
         "local",
         [
@@ -74,7 +74,7 @@ def test_without_an_engine_auto_takes_processes_and_says_why(choose, no_engine, 
     )
 
 
-def test_without_a_client_of_an_engine_auto_takes_processes_and_says_why(
+def test_auto_chooses_processes_without_the_docker_package_and_says_why(
     choose, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def import_client(**_: object) -> None:
@@ -87,7 +87,7 @@ def test_without_a_client_of_an_engine_auto_takes_processes_and_says_why(
     assert caught.value.extra == "docker"
 
 
-def test_containers_that_are_asked_for_and_cannot_be_had_are_an_error(choose, no_engine) -> None:
+def test_requested_containers_without_a_docker_engine_are_an_error(choose, no_engine) -> None:
     with pytest.raises(WorkerError, match="no Docker engine answers") as caught:
         choose("docker")
     assert caught.value.exit_code == 3
@@ -95,14 +95,14 @@ def test_containers_that_are_asked_for_and_cannot_be_had_are_an_error(choose, no
 
 
 @pytest.mark.parametrize(("runtime", "note"), [("auto", " (auto)"), ("docker", "")])
-def test_where_engine_and_image_are_there_containers_are_taken(
+def test_containers_are_chosen_if_engine_and_image_are_there(
     choose, engine, monkeypatch: pytest.MonkeyPatch, runtime: str, note: str
 ) -> None:
     monkeypatch.setattr(docker_image, "ensure", lambda *_, **__: None)
     assert choose(runtime) == ("docker", [f"runtime: Docker containers of {default_tag()}{note}"])
 
 
-def test_an_image_that_cannot_be_had_counts_like_no_engine(choose, engine, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_unavailable_image_counts_like_a_missing_engine(choose, engine, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(docker_image, "ensure", lacks_image)
     assert choose("auto") == (
         "local",
@@ -112,12 +112,12 @@ def test_an_image_that_cannot_be_had_counts_like_no_engine(choose, engine, monke
         choose("docker")
 
 
-def test_processes_need_no_engine(choose, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_requested_processes_need_no_docker_engine(choose, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(docker_engine, "connect", lacks_image)
     assert choose("local") == ("local", ["runtime: local processes"])
 
 
-def test_auto_takes_processes_where_the_image_is_of_other_sources_and_says_how_to_get_it(choose, outdated) -> None:
+def test_auto_chooses_processes_if_the_image_is_outdated_and_says_why(choose, outdated) -> None:
     assert choose("auto") == (
         "local",
         [
@@ -128,7 +128,7 @@ def test_auto_takes_processes_where_the_image_is_of_other_sources_and_says_how_t
     outdated.assert_not_called()
 
 
-def test_containers_that_are_asked_for_get_an_image_of_these_sources(choose, outdated) -> None:
+def test_requested_containers_get_an_outdated_image_rebuilt(choose, outdated) -> None:
     runtime, (warning, _) = choose("docker")
     assert (runtime, outdated.call_args.args[1]) == ("docker", default_tag())
     assert warning == (
@@ -136,7 +136,7 @@ def test_containers_that_are_asked_for_get_an_image_of_these_sources(choose, out
     )
 
 
-def test_an_image_of_other_sources_that_cannot_be_built_anew_is_an_error(choose, outdated) -> None:
+def test_an_outdated_image_that_cannot_be_rebuilt_is_an_error(choose, outdated) -> None:
     outdated.side_effect = WorkerError("cannot be built")
     with pytest.raises(WorkerError, match="cannot be built"):
         choose("docker")
@@ -144,7 +144,9 @@ def test_an_image_of_other_sources_that_cannot_be_built_anew_is_an_error(choose,
 
 @pytest.mark.parametrize("runtime", ["auto", "docker"])
 @pytest.mark.parametrize("image", ["lab/throws:2", default_tag()])
-def test_an_image_that_the_user_names_is_used_with_a_warning(choose, outdated, runtime: str, image: str) -> None:
+def test_an_outdated_image_that_the_user_names_is_used_with_a_warning(
+    choose, outdated, runtime: str, image: str
+) -> None:
     chosen, (warning, _) = choose(runtime, image)
     assert chosen == "docker"
     assert warning == (
@@ -169,7 +171,7 @@ ZENOH = Middleware("rclpy", "rmw_zenoh_cpp")
         (Middleware(), "rmw_zenoh_cpp", "embedded", Middleware()),
     ],
 )
-def test_containers_get_what_their_image_has_and_the_launcher_can_join(
+def test_containers_use_middleware_of_their_image_that_the_launcher_can_join(
     engine, monkeypatch: pytest.MonkeyPatch, launcher: Middleware, rmw: str | None, ros: str, expected: Middleware
 ) -> None:
     monkeypatch.setattr(docker_image, "ensure", lambda *_, **__: None)
@@ -188,7 +190,7 @@ def test_containers_get_what_their_image_has_and_the_launcher_can_join(
         ("rmw_fastrtps_cpp", "tcp://192.0.2.7:2375", "those at tcp://192.0.2.7:2375 cannot"),
     ],
 )
-def test_rclpy_that_is_asked_for_and_cannot_be_had_in_containers_is_an_error(
+def test_requested_rclpy_that_containers_cannot_have_is_an_error(
     engine, monkeypatch: pytest.MonkeyPatch, rmw: str | None, host: str | None, problem: str
 ) -> None:
     monkeypatch.setattr(docker_image, "ensure", lambda *_, **__: None)
@@ -205,7 +207,7 @@ def test_rclpy_that_is_asked_for_and_cannot_be_had_in_containers_is_an_error(
     ("wanted", "no_docker", "name", "begun"),
     [("local", False, "local", True), ("auto", True, "local", True), ("auto", False, "docker", False)],
 )
-def test_processes_are_begun_when_it_is_plain_that_they_will_be_needed(
+def test_processes_are_begun_early_only_if_they_will_surely_be_needed(
     wanted: str, no_docker: bool, name: str, begun: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     begin = Mock()
@@ -223,6 +225,6 @@ def test_processes_are_begun_when_it_is_plain_that_they_will_be_needed(
         assert chosen.runtime is found.runtime
 
 
-def test_nothing_is_begun_of_a_runtime_that_cannot_be_had(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_unavailable_runtime_is_not_begun_early(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(DockerRuntime, "is_absent", lambda _: True)
     assert runtime_choice.begin(Config(run=RunConfig(runtime="docker"))) is None

@@ -1,4 +1,4 @@
-"""The directory of what is remembered of a user's runs: nobody else can put anything there."""
+"""The state directory, which holds the records of a user's runs: nobody else can write there."""
 
 import os
 from pathlib import Path
@@ -15,7 +15,7 @@ def state(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path / "state"
 
 
-def test_by_default_the_state_is_the_users_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_default_state_directory_is_private_to_the_user(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv(STATE_VARIABLE, raising=False)
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
     state_directory()
@@ -27,7 +27,7 @@ def test_by_default_the_state_is_the_users_alone(tmp_path: Path, monkeypatch: py
 
 
 @pytest.mark.parametrize(("permissions", "taken"), [(0o755, True), (0o775, False), (0o757, False), (0o1777, False)])
-def test_a_named_directory_may_be_read_by_others_but_not_written(state: Path, permissions: int, taken: bool) -> None:
+def test_a_named_state_directory_that_others_can_write_is_refused(state: Path, permissions: int, taken: bool) -> None:
     state.mkdir()
     state.chmod(permissions)
     if taken:
@@ -37,13 +37,15 @@ def test_a_named_directory_may_be_read_by_others_but_not_written(state: Path, pe
             state_directory()
 
 
-def test_a_link_that_the_user_has_named_is_followed(state: Path, tmp_path: Path) -> None:
+def test_a_link_that_is_named_as_state_directory_is_followed(state: Path, tmp_path: Path) -> None:
     (tmp_path / "elsewhere").mkdir(mode=0o700)
     state.symlink_to(tmp_path / "elsewhere")
     assert state_directory().samefile(tmp_path / "elsewhere")
 
 
-def test_a_link_that_somebody_else_has_laid_is_not_followed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_link_in_place_of_the_default_state_directory_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.delenv(STATE_VARIABLE, raising=False)
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
     (tmp_path / "elsewhere").mkdir(mode=0o700)
@@ -52,7 +54,7 @@ def test_a_link_that_somebody_else_has_laid_is_not_followed(tmp_path: Path, monk
         state_directory()
 
 
-def test_a_state_directory_that_is_none_is_named_with_a_way_out(state: Path) -> None:
+def test_a_file_in_place_of_the_state_directory_is_refused_with_a_hint(state: Path) -> None:
     state.write_text("a file")
     with pytest.raises(ConfigError, match=f"{state}.*: runs cannot be remembered there: ") as caught:
         state_directory()

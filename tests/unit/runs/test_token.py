@@ -1,4 +1,4 @@
-"""Tokens are one word, are read as they were made, and are refused where other throws would be computed."""
+"""Tokens to join a run: each is one word, and is refused where other sources would compute other throws."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ def make(build: str = "") -> JoinToken:
     return JoinToken("many-1234", "tls/10.0.0.1:7447", "0f" * 32, 7, "bullet", build or build_digest("bullet"))
 
 
-def test_a_token_is_one_word_and_is_read_as_it_was_made() -> None:
+def test_a_token_is_one_word_and_decodes_to_the_same_values() -> None:
     word = make().encode()
     assert re.fullmatch(r"tc2\.[A-Za-z0-9_-]+", word)
     assert len(word) < 400
@@ -23,17 +23,17 @@ def test_a_token_is_one_word_and_is_read_as_it_was_made() -> None:
 
 
 @pytest.mark.parametrize("cut", [0, 3, 10, 100, -1])
-def test_a_token_that_is_not_whole_is_refused(cut: int) -> None:
+def test_an_incomplete_token_is_refused(cut: int) -> None:
     with pytest.raises(ConfigError, match="not a whole one"):
         JoinToken.decode(make().encode()[:cut])
 
 
-def test_a_secret_is_not_what_it_should_be() -> None:
+def test_a_token_with_a_malformed_secret_is_refused() -> None:
     with pytest.raises(ConfigError, match="no token"):
         JoinToken.decode(JoinToken("many", "tls/x:1", "secret", 0, "bullet", "").encode())
 
 
-def test_what_computes_there_has_to_compute_here() -> None:
+def test_a_token_of_a_run_with_other_sources_is_refused() -> None:
     make().check_build()
     with pytest.raises(ConfigError, match="run many-1234: other sources, or another engine bullet") as refused:
         make("f" * 64).check_build()

@@ -1,4 +1,4 @@
-"""Processes that are forked off a command: what they let go of, and how they end."""
+"""Processes that are forked off a command: what they do not inherit, and how they end."""
 
 import subprocess
 import sys
@@ -50,7 +50,7 @@ TOLD = (
     [("return", 0), ("sys.exit(3)", 3), ("raise KeyError", 1), ("os.kill(os.getpid(), 9)", -9)],
     ids=["comes back", "exits", "fails", "is killed"],
 )
-def test_a_forked_process_has_nothing_of_its_parent_and_does_nothing_for_it(end: str, code: int) -> None:
+def test_a_forked_process_inherits_nothing_and_runs_no_code_of_its_parent(end: str, code: int) -> None:
     done = subprocess.run(
         [sys.executable, "-c", PROGRAM.format(end=end)], capture_output=True, text=True, timeout=60, check=False
     )

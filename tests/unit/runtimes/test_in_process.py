@@ -1,4 +1,4 @@
-"""Runs in one process: the dataset of a run with nodes, and every way to its end."""
+"""Runs of the runtime `inprocess`: their datasets, and the ways in which they end."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ sweep: {sampler: uniform, parameters: {task.duration_s: {min: 1.0, max: 1.2}}}
 
 
 class Onlooker(runs.Onlooker):
-    """Remembers what it is told."""
+    """Remembers reports and warnings."""
 
     def __init__(self) -> None:
         self.reports: list[Progress] = []
@@ -58,7 +58,7 @@ def collect(
         return run.collect(interruptions=interruptions)
 
 
-def test_the_episodes_are_those_of_the_plan_and_the_environment_stays(yaml: Path) -> None:
+def test_an_inprocess_run_gives_the_throws_of_a_simulator(yaml: Path) -> None:
     before = dict(os.environ)
     onlooker = Onlooker()
     summary = collect(yaml, onlooker=onlooker)
@@ -72,7 +72,7 @@ def test_the_episodes_are_those_of_the_plan_and_the_environment_stays(yaml: Path
     assert onlooker.warnings == []
 
 
-def test_the_record_and_the_events_tell_of_it(yaml: Path) -> None:
+def test_an_inprocess_run_writes_a_record_and_events(yaml: Path) -> None:
     summary = collect(yaml)
     run = runs.find(yaml.parent / "data")
     assert (run.status, run.record.runtime, run.record.simulations) == ("ended", "inprocess", 1)
@@ -89,7 +89,7 @@ def test_the_record_and_the_events_tell_of_it(yaml: Path) -> None:
     ]
 
 
-def test_what_is_interrupted_goes_on_later_to_the_same_dataset(yaml: Path) -> None:
+def test_an_interrupted_inprocess_run_resumes_to_the_same_dataset(yaml: Path) -> None:
     reports: list[Progress] = []
 
     class Impatient(Onlooker):
@@ -111,7 +111,7 @@ def test_what_is_interrupted_goes_on_later_to_the_same_dataset(yaml: Path) -> No
     assert runs.resume(yaml.parent / "data") is None
 
 
-def test_who_asks_twice_to_stop_does_not_wait_for_trials_that_are_simulated_again(
+def test_a_second_interruption_does_not_wait_for_the_replay_of_throws(
     yaml: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     asked = [0]
@@ -125,14 +125,12 @@ def test_who_asks_twice_to_stop_does_not_wait_for_trials_that_are_simulated_agai
         collect(yaml, "run.replay=1", onlooker=Ended(), interruptions=lambda: asked[0])
 
 
-def test_a_plan_grows_with_what_came_of_it(yaml: Path) -> None:
+def test_a_plan_grows_until_enough_throws_have_landed(yaml: Path) -> None:
     summary = collect(yaml, "until.landed=4", "trials=8")
     assert summary.outcomes["landed"] >= 4
 
 
-def test_a_trial_that_is_refused_again_and_again_is_lost_with_the_reason(
-    yaml: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_trial_that_fails_in_all_retries_is_lost_with_warnings(yaml: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     simulate = Replayer.delivery
 
     def delivery(self: Replayer, trial: object) -> object:
@@ -149,7 +147,7 @@ def test_a_trial_that_is_refused_again_and_again_is_lost_with_the_reason(
     assert runs.find(yaml.parent / "data").record.exit_code == 5
 
 
-def test_a_run_that_is_prepared_and_not_launched_leaves_nothing(yaml: Path) -> None:
+def test_a_run_that_is_prepared_and_not_launched_leaves_no_files(yaml: Path) -> None:
     with runs.prepare(yaml, output=yaml.parent / "data") as run:
         assert (yaml.parent / "data" / "plan.parquet").exists()
         assert Records().ids() == [run.record.run]
@@ -157,7 +155,7 @@ def test_a_run_that_is_prepared_and_not_launched_leaves_nothing(yaml: Path) -> N
     assert Records().ids() == []
 
 
-def test_only_a_mistake_in_the_file_of_a_dataset_is_blamed_on_it(tmp_path: Path) -> None:
+def test_a_wrong_override_of_resume_is_not_blamed_on_the_configuration_file(tmp_path: Path) -> None:
     directory = tmp_path / "data"
     directory.mkdir()
     (directory / "plan.parquet").write_bytes(b"")

@@ -64,7 +64,7 @@ def runtime(begun: LocalRuntime, tmp_path: Path) -> Iterator[LocalNodes]:
 
 @pytest.fixture
 def alone(tmp_path: Path) -> Iterator[LocalNodes]:
-    """A host that starts such a process of its own."""
+    """A host that starts its own process from which nodes are forked."""
     local = nodes(tmp_path / "alone", domain_id=7)
     yield local
     local.stop(local.running(), grace_s=0.0)
@@ -95,14 +95,14 @@ def test_a_node_that_ends_is_reported_once_with_its_code_and_last_lines(runtime:
         assert (host.exits(), host.running()) == ([], ())
 
 
-def test_a_signal_is_named(runtime: LocalNodes) -> None:
+def test_a_node_that_a_signal_ends_is_reported_with_that_signal(runtime: LocalNodes) -> None:
     runtime.start(node("import time; time.sleep(60)"))
     runtime.signal("node", signal.SIGKILL)
     assert wait_for_end(runtime).reason == "ended by SIGKILL"
     runtime.signal("node", signal.SIGKILL)  # gone, so left alone
 
 
-def test_what_a_node_has_said_outlives_it(runtime: LocalNodes) -> None:
+def test_the_readiness_and_the_log_of_a_node_outlive_it(runtime: LocalNodes) -> None:
     assert not runtime.ready("node")
     runtime.start(node("print('node is ready', flush=True); import time; time.sleep(60)"))
     until(lambda: runtime.ready("node"))
@@ -112,7 +112,7 @@ def test_what_a_node_has_said_outlives_it(runtime: LocalNodes) -> None:
     assert runtime.log_tail("node") == "node is ready"
 
 
-def test_a_node_that_is_stopped_in_its_tracks_is_frozen(runtime: LocalNodes) -> None:
+def test_a_node_that_a_signal_stops_is_frozen_until_it_continues(runtime: LocalNodes) -> None:
     runtime.start(node("import time; time.sleep(60)"))
     assert runtime.frozen() == frozenset()
     runtime.signal("node", signal.SIGSTOP)
@@ -131,13 +131,13 @@ def test_a_node_that_ignores_requests_is_ended_by_force(runtime: LocalNodes) -> 
     assert (runtime.running(), runtime.handle("node")) == ((), None)
 
 
-def test_a_log_that_cannot_be_written_is_an_error(tmp_path: Path) -> None:
+def test_a_node_whose_log_cannot_be_written_cannot_be_started(tmp_path: Path) -> None:
     (tmp_path / "logs").write_text("a file")
     with pytest.raises(WorkerError, match=r"node: cannot be started: .*File exists"):
         nodes(tmp_path).start(node(""))
 
 
-def test_a_busy_port_is_refused_with_a_way_out(tmp_path: Path) -> None:
+def test_a_busy_port_of_the_router_is_refused_with_a_hint(tmp_path: Path) -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
         with pytest.raises(ConfigError, match=f"run.router_port: port {port} of 127.0.0.1 cannot be used") as caught:
@@ -145,7 +145,7 @@ def test_a_busy_port_is_refused_with_a_way_out(tmp_path: Path) -> None:
     assert caught.value.hint == "--set run.router_port=0 takes a free one"
 
 
-def test_the_port_is_kept_until_the_router_needs_it(runtime: LocalNodes) -> None:
+def test_the_port_of_the_router_is_reserved_until_the_router_starts(runtime: LocalNodes) -> None:
     host, port = split_address(runtime.endpoint)
     with socket.socket() as other, pytest.raises(OSError, match="Address already in use"):
         other.bind((host, port))

@@ -15,7 +15,7 @@ BLIND = Progress(total=4, ended=0, outcomes={}, simulations=0, throws_per_s=0.0,
 
 
 def collection_of(monkeypatch: pytest.MonkeyPatch, session: Mock) -> NodeCollection:
-    """One that has no nodes."""
+    """A collection without nodes."""
     supervisor = Mock(states=Mock(return_value=[]))
     monkeypatch.setattr(node_collection, "Supervisor", Mock(return_value=supervisor))
     monkeypatch.setattr(node_collection, "RunListener", Mock())
@@ -25,7 +25,7 @@ def collection_of(monkeypatch: pytest.MonkeyPatch, session: Mock) -> NodeCollect
     return NodeCollection(host, session)
 
 
-def test_the_end_of_the_coordinator_is_noticed_soon_once_all_trials_have_ended(
+def test_the_launcher_waits_less_for_messages_once_all_trials_have_ended(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     collection = collection_of(monkeypatch, Mock())
@@ -36,7 +36,7 @@ def test_the_end_of_the_coordinator_is_noticed_soon_once_all_trials_have_ended(
         assert spin.call_args.args[1] <= longest_s
 
 
-def test_nodes_that_are_started_again_have_as_much_time_to_meet_as_before(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_restarted_nodes_have_the_same_time_to_find_each_other_again(monkeypatch: pytest.MonkeyPatch) -> None:
     now = [0.0]
     monkeypatch.setattr(node_collection, "time", SimpleNamespace(monotonic=lambda: now[0]))
     session = Mock()
@@ -46,7 +46,7 @@ def test_nodes_that_are_started_again_have_as_much_time_to_meet_as_before(monkey
     for now[0] in (0.0, 11.0, 13.0):
         collection._report(BLIND)
     assert "started again" in session.warn.call_args.args[0]
-    # The coordinator was started again, too, so the next report is late, and finds simulations that are ready.
+    # The coordinator was restarted too, so the next report comes late, when simulations are ready already.
     for now[0] in (23.0, 34.0):
         collection._report(BLIND)
     now[0] = 36.0

@@ -9,7 +9,7 @@ from throwcollect.runtimes.node_logs import NodeLogs, Tail
 
 
 @pytest.mark.parametrize(("printed", "before"), [("", ""), ("at work\n", "at work\n")])
-def test_a_log_that_a_full_disk_has_cut_off_ends_with_the_reason(
+def test_the_tail_of_a_log_ends_with_a_note_if_the_disk_is_full(
     printed: str, before: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     logs = NodeLogs(tmp_path)
@@ -19,7 +19,7 @@ def test_a_log_that_a_full_disk_has_cut_off_ends_with_the_reason(
     assert logs.tail("sim_0") == (f"{before}the disk of {tmp_path} is full: 512 bytes are free; free space, and resume")
 
 
-def test_what_an_earlier_run_printed_is_left_out(tmp_path: Path) -> None:
+def test_logs_leave_out_what_an_earlier_run_printed(tmp_path: Path) -> None:
     logs = NodeLogs(tmp_path)
     ready = f"{ready_line('sim_0')}\n".encode()
     append(logs.path("sim_0"), ready + "größer\n".encode())
@@ -30,7 +30,7 @@ def test_what_an_earlier_run_printed_is_left_out(tmp_path: Path) -> None:
     assert NodeLogs(tmp_path).tail("sim_0").splitlines()[1] == "größer"
 
 
-def test_what_a_node_printed_that_was_scaled_away_is_left_out(tmp_path: Path) -> None:
+def test_logs_forget_that_a_removed_node_was_ready(tmp_path: Path) -> None:
     logs = NodeLogs(tmp_path)
     for name in ("sim_0", "sim_1"):
         append(logs.path(name), f"{ready_line(name)}\n".encode())
@@ -41,7 +41,7 @@ def test_what_a_node_printed_that_was_scaled_away_is_left_out(tmp_path: Path) ->
     assert logs.said_ready("sim_1")
 
 
-def test_a_node_without_a_log_has_said_nothing(tmp_path: Path) -> None:
+def test_the_tail_of_a_missing_log_is_empty(tmp_path: Path) -> None:
     assert NodeLogs(tmp_path / "none").tail("sim_0") == ""
 
 
@@ -50,7 +50,7 @@ def append(path: Path, data: bytes) -> None:
         file.write(data)
 
 
-def test_lines_come_once_and_whole(tmp_path: Path) -> None:
+def test_the_tail_of_a_log_gives_every_line_once_and_whole(tmp_path: Path) -> None:
     path = tmp_path / "sim_0.log"
     tail = Tail(path)
     assert list(tail.lines()) == []
@@ -63,7 +63,7 @@ def test_lines_come_once_and_whole(tmp_path: Path) -> None:
     assert list(tail.lines(torn=True)) == []
 
 
-def test_what_is_there_can_be_skipped(tmp_path: Path) -> None:
+def test_the_tail_of_a_log_can_skip_existing_lines(tmp_path: Path) -> None:
     path = tmp_path / "sim_0.log"
     Tail(path).skip()
     append(path, b"old\n")
@@ -73,7 +73,7 @@ def test_what_is_there_can_be_skipped(tmp_path: Path) -> None:
     assert list(tail.lines()) == ["new"]
 
 
-def test_logs_come_in_the_order_in_which_nodes_are_started(tmp_path: Path) -> None:
+def test_logs_are_listed_in_the_order_in_which_nodes_are_started(tmp_path: Path) -> None:
     names = ["launcher", "router", "coordinator", "sim_0", "sim_2", "sim_10"]
     for name in reversed(names):
         (tmp_path / f"{name}.log").touch()

@@ -19,7 +19,7 @@ ENVIRONMENT = {**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"
 
 @pytest.fixture(scope="module")
 def lasting() -> Iterator[NodeServer]:
-    """For what leaves it as it is: starting one takes a second."""
+    """A server for tests that do not end it, because starting one takes a second."""
     server = NodeServer(ENVIRONMENT)
     yield server
     server.close()
@@ -27,7 +27,7 @@ def lasting() -> Iterator[NodeServer]:
 
 @pytest.fixture
 def server() -> Iterator[NodeServer]:
-    """For what ends it."""
+    """A server for tests that end it."""
     server = NodeServer(ENVIRONMENT)
     yield server
     server.close()
@@ -67,12 +67,12 @@ def wait_until(condition: Callable[[], bool]) -> None:
 
 
 @pytest.mark.parametrize(("argument", "code", "words"), [("--version", 0, "throwcollect "), ("dance", 2, "dance")])
-def test_a_node_does_what_the_command_does_and_its_end_is_told(start_there, tmp_path, argument, code, words) -> None:
+def test_a_forked_node_runs_the_command_and_returns_its_exit_code(start_there, tmp_path, argument, code, words) -> None:
     assert start_there(argument).wait(WAIT_S) == code
     assert words in (tmp_path / "log").read_text()
 
 
-def test_nodes_are_processes_like_those_that_are_started_by_themselves(start_there, tmp_path) -> None:
+def test_a_forked_node_has_its_own_command_line_core_session_and_log(start_there, tmp_path) -> None:
     core = max(os.sched_getaffinity(0))
     node = start_there(*(arguments := router()), core=core)
     wait_until(lambda: "listening" in (tmp_path / "log").read_text())
@@ -87,8 +87,8 @@ def test_nodes_are_processes_like_those_that_are_started_by_themselves(start_the
     assert node.wait(WAIT_S) == 0
 
 
-def test_a_signal_that_comes_with_the_fork_ends_the_node(tmp_path: Path) -> None:
-    # While Python prepares a forked process, it forgets signals that have come, and ignores exceptions of handlers.
+def test_a_signal_during_the_fork_ends_the_node(tmp_path: Path) -> None:
+    # While Python prepares a forked process, it drops signals that have come and ignores exceptions of handlers.
     early = "import os, signal\nos.register_at_fork(after_in_child=lambda: os.kill(os.getpid(), signal.SIGINT))\n"
     (tmp_path / "sitecustomize.py").write_text(early)
     server = NodeServer({**ENVIRONMENT, "PYTHONPATH": str(tmp_path)})
@@ -100,7 +100,7 @@ def test_a_signal_that_comes_with_the_fork_ends_the_node(tmp_path: Path) -> None
     assert (tmp_path / "log").read_text() == ""
 
 
-def test_a_node_that_is_killed_is_told_apart_from_the_others(start_there) -> None:
+def test_killing_a_node_leaves_other_nodes_alive(start_there) -> None:
     killed, other = start_there(*router()), start_there(*router())
     killed.send_signal(signal.SIGKILL)
     assert killed.wait(WAIT_S) == -signal.SIGKILL
@@ -109,7 +109,7 @@ def test_a_node_that_is_killed_is_told_apart_from_the_others(start_there) -> Non
     assert killed.wait(0.0) == -signal.SIGKILL
 
 
-def test_where_the_server_dies_its_nodes_do_and_the_next_one_has_a_new_server(start) -> None:
+def test_nodes_die_with_their_server_and_the_next_node_gets_a_new_server(start) -> None:
     nodes = [start(*router()) for _ in range(2)]
     psutil.Process(nodes[0].pid).parent().kill()
     assert [node.wait(WAIT_S) for node in nodes] == [-signal.SIGKILL] * 2
@@ -117,7 +117,7 @@ def test_where_the_server_dies_its_nodes_do_and_the_next_one_has_a_new_server(st
     assert start("--version").wait(WAIT_S) == 0
 
 
-def test_a_server_that_is_stopped_goes_on(start_there) -> None:
+def test_a_stopped_node_server_continues_when_a_node_is_started(start_there) -> None:
     node = start_there(*router())
     psutil.Process(node.pid).parent().suspend()
     assert start_there("--version").wait(WAIT_S) == 0
@@ -132,14 +132,14 @@ def _handles(pid: int, number: signal.Signals) -> bool:
 
 
 def begin(server: NodeServer) -> psutil.Process:
-    """Begin a server; its process, beside which there may be those of other tests."""
+    """Begin a server and return its process; other tests may have processes too."""
     before = set(psutil.Process().children())
     server.begin(Config())
     (begun,) = set(psutil.Process().children()) - before
     return begun
 
 
-def test_a_server_that_was_begun_forks_the_first_node_and_closing_ends_both(server, start) -> None:
+def test_a_server_begun_early_forks_the_first_node_and_closing_ends_both(server, start) -> None:
     begun = begin(server)
     node = start(*router())
     assert psutil.Process(node.pid).ppid() == begun.pid
@@ -148,7 +148,7 @@ def test_a_server_that_was_begun_forks_the_first_node_and_closing_ends_both(serv
     assert not begun.is_running()
 
 
-def test_where_a_server_that_was_begun_cannot_work_the_first_node_has_another_one(server, start, tmp_path) -> None:
+def test_a_node_gets_a_new_server_if_the_one_begun_early_was_killed(server, start, tmp_path) -> None:
     begin(server).kill()
     assert start("--version").wait(WAIT_S) == 0
     assert "throwcollect" in (tmp_path / "log").read_text()

@@ -16,12 +16,12 @@ from throwcollect.runtimes.ports import format_endpoint, reach_from_elsewhere, r
     ("protocol", "host", "port", "endpoint"),
     [("tls", "127.0.0.1", 7447, "tls/127.0.0.1:7447"), ("tcp", "::1", 1, "tcp/[::1]:1"), ("tls", "n1", 2, "tls/n1:2")],
 )
-def test_endpoints_are_read_as_they_are_written(protocol: str, host: str, port: int, endpoint: str) -> None:
+def test_an_endpoint_can_be_formatted_and_split_again(protocol: str, host: str, port: int, endpoint: str) -> None:
     assert format_endpoint(protocol, host, port) == endpoint
     assert split_address(endpoint) == (host, port)
 
 
-def test_who_listens_everywhere_is_reached_at_one_address() -> None:
+def test_a_router_that_listens_everywhere_is_reached_at_a_single_address() -> None:
     everywhere = "0.0.0.0"  # noqa: S104 - nothing listens there
     assert reach_from_here(everywhere) == "127.0.0.1"
     assert reach_from_here("::") == "::1"
@@ -30,7 +30,7 @@ def test_who_listens_everywhere_is_reached_at_one_address() -> None:
     assert reach_from_elsewhere(everywhere) not in (everywhere, "")
 
 
-def test_a_port_that_is_taken_is_named() -> None:
+def test_reserving_a_busy_port_is_refused_with_its_key() -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
         with pytest.raises(ConfigError, match=rf"run.router_port: port {port} of 127.0.0.1 cannot be used"):
@@ -39,13 +39,13 @@ def test_a_port_that_is_taken_is_named() -> None:
             reserve_port(RunConfig(listen=f"tcp/127.0.0.1:{port}"))
 
 
-def test_an_address_of_another_machine_is_named() -> None:
+def test_listening_at_an_address_of_another_machine_is_refused() -> None:
     with pytest.raises(ConfigError, match=r"run.listen: port 7447 of 192.0.2.7 cannot be used"):
         reserve_port(RunConfig(listen="tcp/192.0.2.7:7447"))
 
 
 @pytest.mark.parametrize("address", ["0.0.0.0:7447", "tcp/0.0.0.0", "tcp/0.0.0.0:0", "tcp/0.0.0.0:70000", "udp/a:1"])
-def test_what_is_no_address_is_refused(address: str) -> None:
+def test_a_malformed_address_to_listen_at_is_refused(address: str) -> None:
     with pytest.raises(ValueError, match="should be tcp/ADDRESS:PORT"):
         RunConfig(listen=address)
 
@@ -58,6 +58,8 @@ def test_what_is_no_address_is_refused(address: str) -> None:
         ({"listen": "tcp/0.0.0.0:7447", "runtime": "inprocess"}, "should be local"),
     ],
 )
-def test_what_contradicts_joining_is_refused(values: dict[str, object], message: str) -> None:
+def test_options_that_contradict_joining_from_other_machines_are_refused(
+    values: dict[str, object], message: str
+) -> None:
     with pytest.raises(ValueError, match=message):
         RunConfig.model_validate(values)

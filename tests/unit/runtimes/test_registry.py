@@ -1,4 +1,4 @@
-"""The table of runtimes, and what each member promises."""
+"""The table of runtimes, and what every runtime has to fulfil."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from throwcollect.runtimes.runtime import Host, Place, Runtime
 
 
 class Cluster(Runtime):
-    """A runtime of somebody else's."""
+    """A runtime of another package."""
 
     def in_words(self, config: Config) -> str:
         return "a cluster"
@@ -48,7 +48,7 @@ def added(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     members._table.cache_clear()
 
 
-def test_the_table_has_the_runtimes_of_the_configuration() -> None:
+def test_every_runtime_of_the_table_is_valid_in_a_configuration() -> None:
     assert names_of("runtimes") == ("local", "docker", "inprocess")
     assert set(AUTOMATIC) < set(names_of("runtimes"))
     for name in names_of("runtimes"):
@@ -56,7 +56,7 @@ def test_the_table_has_the_runtimes_of_the_configuration() -> None:
 
 
 @pytest.mark.parametrize("name", ["docker", "local", "inprocess"])
-def test_a_member_says_what_it_is_and_holds_nothing_of_a_run_that_never_was(
+def test_a_runtime_describes_itself_and_holds_nothing_of_an_unknown_run(
     name: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.setenv("DOCKER_HOST", f"unix://{tmp_path}/none.sock")
@@ -69,7 +69,7 @@ def test_a_member_says_what_it_is_and_holds_nothing_of_a_run_that_never_was(
 
 
 @pytest.mark.parametrize("name", ["local", "inprocess"])
-def test_a_host_that_was_never_used_leaves_nothing(name: str, tmp_path: Path) -> None:
+def test_a_host_that_was_never_used_leaves_no_files(name: str, tmp_path: Path) -> None:
     place = Place("run", tmp_path, None, tmp_path / "logs", 1, Middleware(), RunKey(tmp_path / "key"))
     host = get_runtime(name).host(place, Config(), warn=print)
     host.close()
@@ -77,7 +77,7 @@ def test_a_host_that_was_never_used_leaves_nothing(name: str, tmp_path: Path) ->
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_package_of_somebody_else_adds_a_runtime(added: None, tmp_path: Path) -> None:
+def test_a_runtime_can_be_added_by_another_package(added: None, tmp_path: Path) -> None:
     assert type(get_runtime("cluster")).__name__ == "Cluster"
     config, said = Config(), list[str]()
     config = config.model_copy(update={"run": config.run.model_copy(update={"runtime": "cluster"})})
@@ -85,7 +85,7 @@ def test_a_package_of_somebody_else_adds_a_runtime(added: None, tmp_path: Path) 
     assert said == ["runtime: a cluster"]
 
 
-def test_the_configuration_takes_a_runtime_that_a_package_adds(added: None, tmp_path: Path) -> None:
+def test_a_configuration_can_name_a_runtime_of_another_package(added: None, tmp_path: Path) -> None:
     (tmp_path / "far.yaml").write_text("name: far\nrun: {runtime: cluster}\n")
     code = f"from throwcollect.config.loader import load; print(load({str(tmp_path / 'far.yaml')!r}).run.runtime)"
     path = os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")])
@@ -93,7 +93,7 @@ def test_the_configuration_takes_a_runtime_that_a_package_adds(added: None, tmp_
     assert subprocess.run(command, env=env, check=True, capture_output=True, text=True).stdout == "cluster\n"
 
 
-def test_a_runtime_that_is_not_there_is_refused_with_those_that_are(tmp_path: Path) -> None:
+def test_an_unknown_runtime_is_refused_with_a_list_of_the_runtimes(tmp_path: Path) -> None:
     (tmp_path / "far.yaml").write_text("name: far\nrun: {runtime: cluster}\n")
     with pytest.raises(ConfigError, match=r"far.yaml:2: run.runtime: .*'inprocess', got 'cluster'"):
         load(tmp_path / "far.yaml")
@@ -103,7 +103,7 @@ def test_a_runtime_that_is_not_there_is_refused_with_those_that_are(tmp_path: Pa
 
 @pytest.mark.parametrize(("engine", "package"), [("bullet", "pybullet"), ("mujoco", "mujoco")])
 @pytest.mark.parametrize("name", ["local", "inprocess"])
-def test_simulations_on_this_python_need_its_engine_before_anything_starts(
+def test_a_missing_package_of_the_engine_is_an_error_before_nodes_start(
     name: str, engine: str, package: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(extras, "is_installed", lambda each: each != package)

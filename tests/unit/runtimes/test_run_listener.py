@@ -31,7 +31,7 @@ def key(tmp_path: Path) -> RunKey:
 
 @pytest.fixture
 def endpoints(key: RunKey) -> Iterator[list[str]]:
-    """Routers of two runs, with coordinators that have told how many trials there are: 1 and 2."""
+    """Routers of two runs, whose coordinators have reported totals of 1 and 2 trials."""
     with router("tls/127.0.0.1:0", key) as one, router("tcp/127.0.0.1:0") as other:
         contexts = []
         for total, endpoint in ((1, one), (2, other)):
@@ -46,7 +46,7 @@ def endpoints(key: RunKey) -> Iterator[list[str]]:
             shutdown(context=context)
 
 
-def test_one_process_listens_to_two_runs_at_once(endpoints: list[str], key: RunKey) -> None:
+def test_a_process_can_listen_to_two_runs_at_once(endpoints: list[str], key: RunKey) -> None:
     before = dict(os.environ)
     heard: list[list[int]] = [[], []]
     listeners = [RunListener(lambda told, to=to: to.append(told.total)) for to in heard]
@@ -60,7 +60,7 @@ def test_one_process_listens_to_two_runs_at_once(endpoints: list[str], key: RunK
 
 
 @pytest.mark.parametrize(("reports", "times"), [(False, 1), (True, 2)])
-def test_silence_is_no_reason_to_connect_anew_where_nobody_reports(
+def test_a_silent_run_is_connected_anew_only_if_it_should_report(
     endpoints: list[str], key: RunKey, monkeypatch: pytest.MonkeyPatch, *, reports: bool, times: int
 ) -> None:
     monkeypatch.setattr(run_listener, "_SILENT_S", -1.0)

@@ -36,7 +36,7 @@ class Clock:
 
 
 class FakeRuntime(NodeHost):
-    """A place whose nodes do what the test says."""
+    """A host of nodes that do what the test says."""
 
     data = "/data"
     listen = "tcp/127.0.0.1:1"
@@ -151,13 +151,13 @@ def test_the_router_is_started_first_and_the_coordinator_last(runtime: FakeRunti
     ]
 
 
-def test_nodes_that_are_found_are_not_started_again(runtime: FakeRuntime, clock: Clock) -> None:
+def test_nodes_that_already_run_are_not_started_again(runtime: FakeRuntime, clock: Clock) -> None:
     runtime.alive = [ROUTER, "sim_1", COORDINATOR]
     Supervisor(runtime, RunConfig(), roster(runtime, 2)).start(found=runtime.alive)
     assert runtime.started == ["sim_0"]
 
 
-def test_a_lost_node_is_started_again_and_told(runtime: FakeRuntime, clock: Clock) -> None:
+def test_a_lost_node_is_restarted_and_reported(runtime: FakeRuntime, clock: Clock) -> None:
     supervisor = supervise(runtime)
     runtime.die("sim_1", log="first\nlast words")
     end, news = supervisor.poll()
@@ -169,7 +169,7 @@ def test_a_lost_node_is_started_again_and_told(runtime: FakeRuntime, clock: Cloc
     assert supervisor.poll() == (None, [])
 
 
-def test_each_restart_waits_twice_as_long_up_to_ten_seconds(runtime: FakeRuntime, clock: Clock) -> None:
+def test_the_wait_before_a_restart_doubles_up_to_ten_seconds(runtime: FakeRuntime, clock: Clock) -> None:
     supervisor = supervise(runtime)
     waits = []
     for _ in range(8):
@@ -179,7 +179,7 @@ def test_each_restart_waits_twice_as_long_up_to_ten_seconds(runtime: FakeRuntime
     assert waits == pytest.approx([0.2, 0.4, 0.8, 1.6, 3.2, 6.4, 10.0, 10.0], abs=0.06)
 
 
-def test_after_all_restarts_a_simulation_is_given_up_and_the_others_go_on(runtime: FakeRuntime, clock: Clock) -> None:
+def test_a_simulation_without_restarts_left_is_given_up_while_others_go_on(runtime: FakeRuntime, clock: Clock) -> None:
     supervisor = supervise(runtime, restarts=2)
     for _ in range(2):
         runtime.die("sim_0")
@@ -193,7 +193,7 @@ def test_after_all_restarts_a_simulation_is_given_up_and_the_others_go_on(runtim
     assert state(supervisor, "sim_1").status == "running"
 
 
-def test_a_simulation_that_was_never_ready_is_started_again_only_once(runtime: FakeRuntime, clock: Clock) -> None:
+def test_a_simulation_that_was_never_ready_is_restarted_only_once(runtime: FakeRuntime, clock: Clock) -> None:
     supervisor = Supervisor(runtime, RunConfig(restarts=10), roster(runtime, 2))
     supervisor.start()
     runtime.ready_ones.add("sim_1")
@@ -204,7 +204,7 @@ def test_a_simulation_that_was_never_ready_is_started_again_only_once(runtime: F
     assert "is given up" in supervisor.poll()[1][0]
 
 
-def test_without_any_simulation_left_the_run_ends_with_the_last_ones_log(runtime: FakeRuntime, clock: Clock) -> None:
+def test_a_run_without_simulations_left_fails_with_the_log_of_the_last(runtime: FakeRuntime, clock: Clock) -> None:
     supervisor = supervise(runtime, restarts=0)
     runtime.die("sim_0")
     supervisor.poll()
@@ -215,7 +215,7 @@ def test_without_any_simulation_left_the_run_ends_with_the_last_ones_log(runtime
     assert caught.value.evidence == "no memory"
 
 
-def test_without_the_router_the_run_ends(runtime: FakeRuntime, clock: Clock) -> None:
+def test_a_run_fails_if_its_router_has_no_restarts_left(runtime: FakeRuntime, clock: Clock) -> None:
     supervisor = supervise(runtime, restarts=1)
     runtime.die(ROUTER)
     assert supervisor.poll()[1] == ["router was lost (exit code 3) and is started again"]
@@ -225,7 +225,7 @@ def test_without_the_router_the_run_ends(runtime: FakeRuntime, clock: Clock) -> 
         supervisor.poll()
 
 
-def test_a_router_rests_for_as_long_as_its_nodes_need_to_miss_it(runtime: FakeRuntime, clock: Clock) -> None:
+def test_a_lost_discovery_server_is_restarted_only_after_eleven_seconds(runtime: FakeRuntime, clock: Clock) -> None:
     runtime.place = replace(runtime.place, middleware=Middleware("rclpy", "rmw_fastrtps_cpp"))
     supervisor = Supervisor(runtime, RunConfig(), roster(runtime, 2))
     supervisor.start()
@@ -239,7 +239,9 @@ def test_a_router_rests_for_as_long_as_its_nodes_need_to_miss_it(runtime: FakeRu
     assert state(supervisor, ROUTER).status == "running"
 
 
-def test_the_end_of_the_coordinator_is_handed_out_whatever_else_is_lost(runtime: FakeRuntime, clock: Clock) -> None:
+def test_the_end_of_the_coordinator_is_returned_even_if_simulations_are_lost(
+    runtime: FakeRuntime, clock: Clock
+) -> None:
     supervisor = supervise(runtime, restarts=0)
     for name in SIMULATIONS:
         runtime.die(name)
@@ -248,7 +250,7 @@ def test_the_end_of_the_coordinator_is_handed_out_whatever_else_is_lost(runtime:
     assert end == NodeExit(COORDINATOR, 0, "exit code 0", "")
 
 
-def test_a_simulation_must_be_ready_in_time(runtime: FakeRuntime, clock: Clock) -> None:
+def test_a_run_fails_if_no_simulation_is_ready_in_time(runtime: FakeRuntime, clock: Clock) -> None:
     supervisor = Supervisor(runtime, RunConfig(start_timeout_s=7), roster(runtime, 2))
     supervisor.start()
     clock.now += 6.9
@@ -260,7 +262,7 @@ def test_a_simulation_must_be_ready_in_time(runtime: FakeRuntime, clock: Clock) 
     assert caught.value.evidence == "log of sim_0"
 
 
-def test_an_engine_that_is_slow_to_start_containers_does_not_take_the_time_of_simulations(
+def test_time_in_which_an_engine_creates_containers_is_not_start_time(
     runtime: FakeRuntime, clock: Clock, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     supervisor = Supervisor(runtime, RunConfig(start_timeout_s=7), roster(runtime, 2))
@@ -276,7 +278,7 @@ def test_an_engine_that_is_slow_to_start_containers_does_not_take_the_time_of_si
         supervisor.poll()
 
 
-def test_one_ready_simulation_is_enough(runtime: FakeRuntime, clock: Clock) -> None:
+def test_a_run_with_one_ready_simulation_passes_the_start_timeout(runtime: FakeRuntime, clock: Clock) -> None:
     supervisor = Supervisor(runtime, RunConfig(start_timeout_s=7), roster(runtime, 2))
     supervisor.start()
     runtime.ready_ones.add("sim_1")
@@ -300,7 +302,7 @@ def test_a_frozen_node_is_ended_after_three_seconds(name: str, runtime: FakeRunt
 
 
 @pytest.mark.parametrize("code", [-9, 137])
-def test_a_coordinator_that_was_killed_is_started_again(code: int, runtime: FakeRuntime, clock: Clock) -> None:
+def test_a_coordinator_that_was_killed_is_restarted(code: int, runtime: FakeRuntime, clock: Clock) -> None:
     supervisor = supervise(runtime, restarts=1)
     runtime.die(COORDINATOR, code)
     end, news = supervisor.poll()
@@ -313,14 +315,14 @@ def test_a_coordinator_that_was_killed_is_started_again(code: int, runtime: Fake
 
 
 @pytest.mark.parametrize("code", [0, 1, 2, 3, 4, 130])
-def test_a_coordinator_that_came_to_its_own_end_has_ended(code: int, runtime: FakeRuntime, clock: Clock) -> None:
+def test_a_coordinator_that_exits_by_itself_is_not_restarted(code: int, runtime: FakeRuntime, clock: Clock) -> None:
     supervisor = supervise(runtime)
     runtime.die(COORDINATOR, code)
     end, _ = supervisor.poll()
     assert (end is not None, state(supervisor, COORDINATOR).restarts) == (True, 0)
 
 
-def test_a_simulation_that_continues_in_time_is_left_alone(runtime: FakeRuntime, clock: Clock) -> None:
+def test_a_frozen_simulation_that_continues_in_time_is_not_ended(runtime: FakeRuntime, clock: Clock) -> None:
     supervisor = supervise(runtime)
     for _ in range(2):
         runtime.paused.add("sim_0")
@@ -331,14 +333,14 @@ def test_a_simulation_that_continues_in_time_is_left_alone(runtime: FakeRuntime,
     assert runtime.signals == []
 
 
-def test_each_hanging_simulation_is_ended_once_until_it_is_well_again(runtime: FakeRuntime, clock: Clock) -> None:
+def test_a_hanging_simulation_is_ended_only_once_until_it_recovers(runtime: FakeRuntime, clock: Clock) -> None:
     supervisor = supervise(runtime)
     for hung in (["sim_0"], ["sim_0", "sim_1"], ["sim_1"], [], ["sim_0"]):
         supervisor.replace(hung)
     assert runtime.signals == [("sim_0", signal.SIGKILL), ("sim_1", signal.SIGKILL), ("sim_0", signal.SIGKILL)]
 
 
-def test_scaling_up_starts_more_and_scaling_down_ends_the_last(runtime: FakeRuntime, clock: Clock) -> None:
+def test_scaling_up_starts_simulations_and_scaling_down_ends_the_last(runtime: FakeRuntime, clock: Clock) -> None:
     supervisor = supervise(runtime)
     assert runtime.started
     supervisor.change(roster(runtime, 4))
@@ -349,7 +351,7 @@ def test_scaling_up_starts_more_and_scaling_down_ends_the_last(runtime: FakeRunt
     assert runtime.started == []
 
 
-def test_a_simulation_that_was_scaled_away_comes_back_with_a_clean_slate(runtime: FakeRuntime, clock: Clock) -> None:
+def test_a_simulation_that_is_scaled_away_and_back_begins_without_losses(runtime: FakeRuntime, clock: Clock) -> None:
     supervisor = supervise(runtime, restarts=0)
     runtime.die("sim_1")
     supervisor.poll()
@@ -359,7 +361,7 @@ def test_a_simulation_that_was_scaled_away_comes_back_with_a_clean_slate(runtime
     assert state(supervisor, "sim_1") == NodeState("sim_1", "starting", 0, "id of sim_1", None)
 
 
-def test_a_run_without_simulations_waits_for_some(runtime: FakeRuntime, clock: Clock) -> None:
+def test_a_run_scaled_to_zero_simulations_waits_without_a_timeout(runtime: FakeRuntime, clock: Clock) -> None:
     supervisor = supervise(runtime, start_timeout_s=7)
     supervisor.change(roster(runtime, 0))
     clock.now += 1000
@@ -386,7 +388,7 @@ def test_draining_asks_the_coordinator_and_waits_for_its_end(runtime: FakeRuntim
     assert runtime.stopped == []
 
 
-def test_whoever_is_in_a_hurry_ends_the_coordinator_by_force(runtime: FakeRuntime, clock: Clock) -> None:
+def test_draining_in_a_hurry_ends_the_coordinator_by_force(runtime: FakeRuntime, clock: Clock) -> None:
     supervisor = supervise(runtime)
     begin = clock.now
     assert supervisor.drain(hurry=lambda: clock.now > begin + 1) is None
@@ -402,7 +404,7 @@ def test_a_coordinator_that_does_not_drain_is_ended_by_force(runtime: FakeRuntim
     assert runtime.stopped == [(COORDINATOR, 0.0)]
 
 
-def test_leaving_closes_the_runtime(runtime: FakeRuntime, clock: Clock) -> None:
+def test_leaving_the_block_of_a_supervisor_closes_its_host(runtime: FakeRuntime, clock: Clock) -> None:
     with supervise(runtime):
         assert not runtime.closed
     assert runtime.closed

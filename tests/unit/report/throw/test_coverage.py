@@ -16,7 +16,7 @@ def make_landings(distance: list[float], angle: list[float]) -> Landings:
     return Landings(trials, np.array(distance), zero, np.array(distance), np.array(angle), zero, zero, trials * 0)
 
 
-def test_cells_are_those_of_the_targets() -> None:
+def test_throws_are_counted_in_the_cells_of_the_configured_target() -> None:
     target = TargetConfig.model_validate(
         {
             "distance_m": {"min": 1, "max": 2, "bins": 2},
@@ -38,7 +38,7 @@ def test_cells_are_those_of_the_targets() -> None:
     assert found.pairs[2][2].tolist() == [[1, 2]]
 
 
-def test_cells_without_targets_are_of_round_numbers() -> None:
+def test_cells_have_round_edges_if_no_target_is_configured() -> None:
     found = count_throws(make_landings([1.0, 1.34, 2.4], [1.2, 1.21, 1.3]), pa.table({}), target=None)
     assert found is not None
     distance, angle = found.axes
@@ -49,7 +49,7 @@ def test_cells_without_targets_are_of_round_numbers() -> None:
 
 
 @pytest.mark.parametrize(("most", "mark"), [(1, 1), (8, 1), (9, None)])
-def test_the_scale_begins_with_no_throw_and_its_marks_are_whole_throws(most: int, mark: int | None) -> None:
+def test_the_colour_scale_begins_at_0_and_marks_only_whole_throws(most: int, mark: int | None) -> None:
     axis = CellAxis("landing distance", "landing distance [m]", np.array([1.0, 2.0]))
     (cells,) = draw_coverage_map(axis, axis, np.array([[most]])).data
     assert (cells.zmin, cells.zmax, cells.colorbar.dtick) == (0, most, mark)

@@ -12,9 +12,7 @@ from throwcollect.report.throw.episodes import choose_examples, measure_residual
 from throwcollect.report.throw.landings import read_landings
 
 
-def test_examples_are_of_trials_with_an_episode_from_the_nearest_to_the_farthest(
-    collection: Any, tmp_path: Path
-) -> None:
+def test_example_throws_have_an_episode_and_are_in_order_of_distance(collection: Any, tmp_path: Path) -> None:
     collection.refuse(5, "too fast")
     dataset = Dataset.open(collection.collect(tmp_path / "dataset", [0, 1, 2, 3, 4, 6], lost=[2]))
     outcomes = Outcomes.of(dataset.throws["outcome"].to_pylist())
@@ -38,13 +36,15 @@ def test_flights_of_a_sound_dataset_are_ballistic(collected: Path) -> None:
     assert residuals.distance_m.max() < 1e-12
 
 
-def test_residuals_are_computed_for_a_part_of_many_episodes(collected: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_residuals_of_many_episodes_are_computed_only_for_a_part(
+    collected: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr("throwcollect.report.throw.episodes.MOST_RESIDUALS", 3)
     found = measure_residuals(Dataset.open(collected))
     assert (found.episodes, found.checked, len(found.distance_m)) == (7, 3, 3)
 
 
-def test_a_flight_with_a_kick_stands_out(collection: Any, tmp_path: Path) -> None:
+def test_a_kick_in_a_flight_shows_in_its_residual(collection: Any, tmp_path: Path) -> None:
     def kick(samples: Any, header: Any) -> Any:
         if header.trial == 3:
             samples.ball_position[-5:, 0] += 1e-6

@@ -1,4 +1,4 @@
-"""Archives of images: what is none is named, and what is one becomes a directory that Apptainer reads."""
+"""Archives of images: they are unpacked into a directory that Apptainer reads, and other files are refused."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def test_an_image_is_unpacked_into_the_layout_of_oci(
     plain, packed = bytes(10_000), compress(b"more" * 1000)
     image = {"Config": "it.json", "Layers": [PLAIN, PACKED, LINKED]}
     files = {"it.json": config, PLAIN: plain, PACKED: packed, "manifest.json": json.dumps([image]).encode()}
-    # Engines link a layer that is there already.
+    # A Docker engine stores a repeated layer as a link.
     archive = write_files(tmp_path / "image.tar", files, {LINKED: f"../{PLAIN}"})
 
     unpack_archive(archive, tmp_path / "image")
@@ -69,14 +69,14 @@ def test_an_image_is_unpacked_into_the_layout_of_oci(
 
 
 def read(layout: Path, reference: dict[str, Any]) -> bytes:
-    """What a reference in a layout refers to."""
+    """The content that a reference in a layout names."""
     algorithm, _, digest = reference["digest"].partition(":")
     content = (layout / "blobs" / algorithm / digest).read_bytes()
     assert (len(content), hashlib.sha256(content).hexdigest()) == (reference["size"], digest)
     return content
 
 
-def test_an_archive_that_ends_early_is_damaged(tmp_path: Path) -> None:
+def test_an_archive_that_is_cut_off_is_refused_as_damaged(tmp_path: Path) -> None:
     image = [{"Config": "it.json", "Layers": [PLAIN]}]
     files = {"it.json": b"{}", "manifest.json": json.dumps(image).encode(), PLAIN: bytes(100_000)}
     archive = write_files(tmp_path / "image.tar", files)
@@ -85,7 +85,7 @@ def test_an_archive_that_ends_early_is_damaged(tmp_path: Path) -> None:
         unpack_archive(archive, tmp_path / "image")
 
 
-def test_an_archive_that_is_none_is_named(tmp_path: Path) -> None:
+def test_a_file_that_is_no_archive_of_our_image_is_refused(tmp_path: Path) -> None:
     nothing = tmp_path / "nothing.tar"
     with pytest.raises(ConfigError, match=r"nothing\.tar: No such file or directory"):
         check_archive(nothing)

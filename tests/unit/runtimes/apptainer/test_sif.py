@@ -1,4 +1,4 @@
-"""SIFs without Apptainer: what it is asked for, and what is said when something is wrong."""
+"""Making SIFs with a fake Apptainer: how it is called, and the messages of errors."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def small_clone(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def apptainer(tmp_path: Path, small_clone: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A directory in which stands what Apptainer was asked for; it only pretends, and is given the small clone."""
+    """A directory with a fake Apptainer, which writes there how it was called, and is given the small clone."""
     monkeypatch.setattr(PACKAGE, small_clone / "src" / "throwcollect")
     directory = tmp_path / "apptainer"
     directory.mkdir()
@@ -76,9 +76,7 @@ def make(output: Path, **named: object) -> list[str]:
     return said
 
 
-def test_an_archive_is_converted_and_nothing_is_written_outside_of_the_directory_for_it(
-    apptainer: Path, tmp_path: Path
-) -> None:
+def test_an_archive_is_converted_to_a_sif_and_no_other_files_are_left(apptainer: Path, tmp_path: Path) -> None:
     archive = write_archive(tmp_path / "image.tar", "throwcollect")
     make(tmp_path / "it.sif", archive=archive)
     assert (apptainer / "asked").read_text().splitlines()[-2:] == [f"{tmp_path}/it.sif.new", "oci:image"]
@@ -91,7 +89,7 @@ def test_an_archive_is_converted_and_nothing_is_written_outside_of_the_directory
 
 
 @pytest.mark.parametrize("named", [{"archive": "image.tar"}, {}])
-def test_a_sif_that_is_there_is_replaced_whole_or_not_at_all(
+def test_an_existing_sif_is_replaced_as_a_whole_or_not_at_all(
     named: dict[str, str], apptainer: Path, tmp_path: Path
 ) -> None:
     write_archive(tmp_path / "image.tar", "throwcollect")
@@ -107,7 +105,7 @@ def test_a_sif_that_is_there_is_replaced_whole_or_not_at_all(
     assert output.read_bytes() == SIF + b" new"
 
 
-def test_without_an_engine_the_clone_itself_is_built(
+def test_without_a_docker_engine_a_sif_is_built_from_the_clone(
     apptainer: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(PACKAGE, Path(throwcollect.__file__).parent)
@@ -125,7 +123,7 @@ def test_without_an_engine_the_clone_itself_is_built(
     assert asked[-1] == "docker/throwcollect.def"
 
 
-def test_a_base_image_may_be_a_file_or_a_directory(apptainer: Path, tmp_path: Path) -> None:
+def test_the_base_image_of_a_sif_may_be_a_file_or_a_directory(apptainer: Path, tmp_path: Path) -> None:
     (tmp_path / "base").mkdir()
     (tmp_path / "base.sif").write_bytes(SIF)
     (tmp_path / "base.tar").write_bytes(b"")
@@ -134,7 +132,7 @@ def test_a_base_image_may_be_a_file_or_a_directory(apptainer: Path, tmp_path: Pa
         assert f"bootstrap={bootstrap}" in (apptainer / "asked").read_text().splitlines()
 
 
-def test_without_the_client_of_engines_the_clone_is_built_but_no_image_of_an_engine_is_found(
+def test_without_the_docker_package_a_sif_is_built_only_from_the_clone(
     apptainer: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def import_client(**_: object) -> None:
@@ -146,19 +144,19 @@ def test_without_the_client_of_engines_the_clone_is_built_but_no_image_of_an_eng
         make(tmp_path / "it.sif", image="mine")
 
 
-def test_an_image_that_is_named_needs_an_engine(apptainer: Path, tmp_path: Path) -> None:
+def test_making_a_sif_of_a_named_image_needs_a_docker_engine(apptainer: Path, tmp_path: Path) -> None:
     with pytest.raises(WorkerError, match="no Docker engine answers"):
         make(tmp_path / "it.sif", image="mine")
 
 
-def test_a_full_disk_is_named_with_the_place_that_is_needed(apptainer: Path, tmp_path: Path) -> None:
+def test_a_disk_that_fills_up_while_apptainer_builds_gives_a_hint_at_tmpdir(apptainer: Path, tmp_path: Path) -> None:
     write_program(apptainer, 'echo "FATAL: write /a/b: no space left on device" >&2; exit 255')
     with pytest.raises(WorkerError, match=r"it\.sif: cannot be made: no space left on device") as caught:
         make(tmp_path / "it.sif")
     assert "TMPDIR" in str(caught.value.hint)
 
 
-def test_a_disk_that_is_full_before_apptainer_begins_is_named_as_well(
+def test_a_disk_that_is_full_before_apptainer_begins_gives_a_hint_at_tmpdir(
     apptainer: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def fill(_archive: Path, _directory: Path) -> None:
@@ -172,7 +170,7 @@ def test_a_disk_that_is_full_before_apptainer_begins_is_named_as_well(
     assert archive.exists()
 
 
-def test_a_base_image_that_cannot_be_had_is_told_with_a_way_out(apptainer: Path, tmp_path: Path) -> None:
+def test_a_base_image_of_a_sif_that_cannot_be_pulled_gives_a_hint(apptainer: Path, tmp_path: Path) -> None:
     write_program(
         apptainer, 'echo "FATAL:   While performing build: conveyor failed to get: no such host" >&2; exit 255'
     )
@@ -181,7 +179,7 @@ def test_a_base_image_that_cannot_be_had_is_told_with_a_way_out(apptainer: Path,
     assert "--base" in str(caught.value.hint)
 
 
-def test_without_a_directory_for_temporary_files_nothing_is_begun(
+def test_making_a_sif_without_a_temporary_directory_is_refused(
     apptainer: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "gone"))
@@ -189,19 +187,21 @@ def test_without_a_directory_for_temporary_files_nothing_is_begun(
         make(tmp_path / "it.sif")
 
 
-def test_where_neither_program_is_installed_this_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_making_a_sif_without_apptainer_and_singularity_is_an_error(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setenv("PATH", str(tmp_path))
     with pytest.raises(WorkerError, match="neither apptainer nor singularity is installed"):
         make(tmp_path / "it.sif")
 
 
-def test_singularity_does_as_well(apptainer: Path, tmp_path: Path) -> None:
+def test_singularity_is_used_if_apptainer_is_missing(apptainer: Path, tmp_path: Path) -> None:
     (apptainer / "apptainer").rename(apptainer / "singularity")
     make(tmp_path / "it.sif")
     assert (tmp_path / "it.sif").exists()
 
 
-def test_what_is_no_sif_is_not_replaced(apptainer: Path, tmp_path: Path) -> None:
+def test_a_file_that_is_no_sif_is_not_replaced(apptainer: Path, tmp_path: Path) -> None:
     (tmp_path / "throws.yaml").write_text("trials: 2\n")
     for name in ("throws.yaml", "apptainer"):
         with pytest.raises(ConfigError, match="is there and no SIF"):
@@ -211,14 +211,14 @@ def test_what_is_no_sif_is_not_replaced(apptainer: Path, tmp_path: Path) -> None
         make(tmp_path / "missing" / "it.sif")
 
 
-def test_an_archive_of_something_else_is_not_converted(apptainer: Path, tmp_path: Path) -> None:
+def test_an_archive_of_another_image_is_not_converted(apptainer: Path, tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match="holds another image than one of throwcollect"):
         make(tmp_path / "it.sif", archive=write_archive(tmp_path / "image.tar", "bash"))
     assert not (apptainer / "asked").exists()
     assert not list(tmp_path.glob("it.sif*"))
 
 
-def test_a_sif_of_another_version_or_of_other_sources_is_told_from_ours(apptainer: Path, tmp_path: Path) -> None:
+def test_a_sif_of_another_version_or_of_other_sources_is_refused(apptainer: Path, tmp_path: Path) -> None:
     sif = tmp_path / "it.sif"
     sif.write_bytes(SIF)
     own = {VERSION_LABEL: throwcollect.__version__, SOURCES_LABEL: digest_sources(source_root())}
@@ -244,7 +244,7 @@ def test_a_sif_of_another_version_or_of_other_sources_is_told_from_ours(apptaine
     assert read_labels(sif)[VERSION_LABEL] == throwcollect.__version__
 
 
-def test_what_is_no_sif_is_named(apptainer: Path, tmp_path: Path) -> None:
+def test_checking_a_file_that_is_no_sif_is_an_error(apptainer: Path, tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match=r"it\.sif: No such file or directory"):
         check_sif(tmp_path / "it.sif")
     (tmp_path / "it.sif").write_text("trials: 2\n")

@@ -1,4 +1,4 @@
-"""A Docker engine that runs nothing, and answers as late as a test wants."""
+"""A fake Docker engine, which runs nothing and answers as late as a test wants."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Engine:
         self.closed = threading.Event()
 
     def answer_all(self) -> None:
-        """Answer what was withheld, and all that comes."""
+        """Answer the withheld requests and all later ones."""
         self.withheld = None
         self.released.set()
 
@@ -82,7 +82,7 @@ class Engine:
         return 404, {"message": f"no {method} {path}"}
 
     def create(self, name: str, labels: dict[str, str]) -> str:
-        """Make a container, and say which id it has."""
+        """Make a container and return its id."""
         key = f"{len(self.asked) + len(self.containers):064x}"
         state = {"Status": "created", "Running": False, "ExitCode": 0, "OOMKilled": False}
         config = {"Labels": labels, "Tty": False}
@@ -144,7 +144,7 @@ class _Handler(BaseHTTPRequestHandler):
     do_GET = do_POST = do_PUT = do_DELETE = _answer  # noqa: N815
 
     def _stream(self, for_s: float | None) -> None:
-        """Nothing happens, and nobody prints anything."""
+        """Answer with a stream in which there are no events and no output."""
         self.send_response(200)
         self.send_header("Transfer-Encoding", "chunked")
         self.end_headers()

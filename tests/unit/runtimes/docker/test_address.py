@@ -1,4 +1,4 @@
-"""Where the Docker engine is looked for, without its client."""
+"""Looking for the socket of the Docker engine without importing its client."""
 
 import subprocess
 import sys
@@ -19,7 +19,7 @@ print(sorted({"docker", "requests", "urllib3"} & sys.modules.keys()))
 """
 
 
-def test_a_socket_that_is_not_there_is_told_as_the_client_would(tmp_path: Path, monkeypatch) -> None:
+def test_a_missing_docker_socket_is_an_error_with_a_hint(tmp_path: Path, monkeypatch) -> None:
     monkeypatch.setenv("DOCKER_HOST", f"unix://{tmp_path}/none.sock")
     assert not has_socket()
     with pytest.raises(WorkerError, match=r"no Docker engine answers at unix:///\S+/none.sock: No such file") as caught:
@@ -28,13 +28,15 @@ def test_a_socket_that_is_not_there_is_told_as_the_client_would(tmp_path: Path, 
 
 
 @pytest.mark.parametrize(("host", "local"), [("unix://{}", True), ("tcp://127.0.0.1:1", False), ("ssh://lab", False)])
-def test_engines_that_may_be_there_are_left_to_the_client(tmp_path: Path, monkeypatch, host: str, local: bool) -> None:
+def test_an_address_of_a_possible_engine_passes_the_check_of_the_socket(
+    tmp_path: Path, monkeypatch, host: str, local: bool
+) -> None:
     monkeypatch.setenv("DOCKER_HOST", host.format(tmp_path))
     check_socket()
     assert is_local() == local
 
 
-def test_where_no_engine_is_its_client_is_not_imported(tmp_path: Path) -> None:
+def test_the_docker_client_is_not_imported_without_an_engine(tmp_path: Path) -> None:
     done = subprocess.run(
         [sys.executable, "-c", CHOOSES],
         env={"DOCKER_HOST": f"unix://{tmp_path}/none.sock"},

@@ -1,4 +1,4 @@
-"""What the machine has of what a configuration asks for; links are followed."""
+"""The check that mounts, devices and ports of a configuration exist and are allowed; links are followed."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def engine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Engine]:
 
 @pytest.fixture
 def problems(engine: Engine) -> Check:
-    """What is wrong with options of simulations."""
+    """The problems that the check finds in options of simulations."""
 
     def problems(**section: object) -> list[str]:
         config = Config.model_validate({"containers": {"image": "image", "sim": section}})
@@ -44,20 +44,20 @@ def problems(engine: Engine) -> Check:
     return problems
 
 
-def test_data_may_be_mounted(problems: Check, tmp_path: Path) -> None:
+def test_a_data_directory_may_be_mounted(problems: Check, tmp_path: Path) -> None:
     (tmp_path / "models").mkdir()
     assert problems(mounts=[f"{tmp_path}/models:/models:ro"]) == []
 
 
 @pytest.mark.parametrize("place", ["/etc", "/var/run", "/usr/share", "/"])
-def test_a_link_to_a_part_of_the_system_is_refused(problems: Check, tmp_path: Path, place: str) -> None:
+def test_mounting_a_link_to_a_part_of_the_system_is_refused(problems: Check, tmp_path: Path, place: str) -> None:
     (tmp_path / "link").symlink_to(place)
     found = problems(mounts=[f"{tmp_path}/link:/x:ro"])
     assert len(found) == 1
     assert found[0].startswith(f"mounts.0: {tmp_path}/link, which is {(tmp_path / 'link').resolve()}, is refused, as /")
 
 
-def test_what_belongs_to_the_engine_and_what_holds_it_is_refused(problems: Check, tmp_path: Path) -> None:
+def test_mounting_the_engine_secrets_or_missing_directories_is_refused(problems: Check, tmp_path: Path) -> None:
     for name in ("engine/volumes", "keys/.ssh", "other"):
         (tmp_path / name).mkdir(parents=True)
     wanted = ["none", "engine", "engine/volumes", "run", "", "keys", "other"]
@@ -72,7 +72,7 @@ def test_what_belongs_to_the_engine_and_what_holds_it_is_refused(problems: Check
     ]
 
 
-def test_a_device_that_leads_to_another_one_is_refused(
+def test_a_device_link_to_a_device_that_is_not_allowed_is_refused(
     problems: Check, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     gpus = tmp_path / "gpus"
@@ -89,7 +89,7 @@ def test_a_device_that_leads_to_another_one_is_refused(
 
 
 @pytest.mark.parametrize("port", ["7447", "7447/tcp"])
-def test_the_port_of_the_router_is_published_once(engine: Engine, port: str) -> None:
+def test_publishing_the_port_of_the_router_twice_is_refused(engine: Engine, port: str) -> None:
     published = {"containers": {"image": "image", "router": {"ports": {port: 7450, "80": 8080}}}}
     with closing(connect()) as client:
         check(client, RunPlace("run", "/data"), Config.model_validate(published))

@@ -26,7 +26,7 @@ def options(
 
 
 @pytest.mark.parametrize("name", ["router", "sim_0", "coordinator"])
-def test_every_container_can_do_little_but_compute(name: str) -> None:
+def test_every_container_has_few_rights(name: str) -> None:
     made = options(name)
     assert (made["init"], made["read_only"], made["cap_drop"]) == (True, True, ["ALL"])
     assert made["security_opt"] == ["no-new-privileges"]
@@ -38,7 +38,7 @@ def test_every_container_can_do_little_but_compute(name: str) -> None:
     assert not {"privileged", "network_mode", "pid_mode", "ipc_mode", "restart_policy", "cap_add"} & set(made)
 
 
-def test_a_node_is_told_who_it_is_and_where_the_router_is() -> None:
+def test_a_container_gets_the_name_of_its_node_and_the_address_of_the_router() -> None:
     made = options("sim_3", run={"domain_id": 9})
     assert made["command"] == ["command", "--option"]
     assert (made["name"], made["network"]) == ("throwcollect-throws-1a2b-sim_3", "throwcollect-throws-1a2b")
@@ -58,7 +58,7 @@ def test_a_node_is_told_who_it_is_and_where_the_router_is() -> None:
     }
 
 
-def test_the_dataset_is_written_by_the_coordinator_read_by_simulations_and_not_there_for_the_router() -> None:
+def test_only_the_coordinator_can_write_the_dataset_and_simulations_can_read_it() -> None:
     def mounts(name: str, place: RunPlace) -> list[tuple[str, str, str, bool]]:
         found = options(name, place)["mounts"][1:]
         return [(each["Type"], each["Source"], each["Target"], each["ReadOnly"]) for each in found]
@@ -69,7 +69,7 @@ def test_the_dataset_is_written_by_the_coordinator_read_by_simulations_and_not_t
     assert mounts("router", VOLUME) == []
 
 
-def test_every_node_gets_the_key_as_files_that_it_can_only_read_and_the_paths_of_these() -> None:
+def test_every_node_gets_the_key_of_the_run_in_a_read_only_mount() -> None:
     for name in ("router", "sim_0", "coordinator"):
         made = options(name)
         mount = made["mounts"][0]
@@ -79,7 +79,7 @@ def test_every_node_gets_the_key_as_files_that_it_can_only_read_and_the_paths_of
         assert 'connect_private_key="/key/key.pem"' in made["environment"]["ZENOH_CONFIG_OVERRIDE"]
 
 
-def test_an_open_run_has_a_router_that_asks_for_no_key_and_nodes_that_have_one() -> None:
+def test_nodes_of_an_open_run_connect_without_a_key_but_still_have_it() -> None:
     environment = options("sim_0", run={"open": True})["environment"]
     assert environment["ZENOH_CONFIG_OVERRIDE"] == client_override("tcp/router:7447")
     assert environment["THROWCOLLECT_KEY"] == "/key"
@@ -95,7 +95,7 @@ def test_a_simulation_is_bound_to_its_core_unless_the_configuration_binds_it() -
     assert options("sim_1", core=None)["cpuset_cpus"] is None
 
 
-def test_a_section_is_for_its_kind_of_node_alone() -> None:
+def test_container_options_of_simulations_do_not_apply_to_other_nodes() -> None:
     section = {"cpus": 1.5, "memory": "512m", "environment": {"ANSWER": 42}}
     made = options("sim_7", sim=section)
     assert (made["nano_cpus"], made["mem_limit"], made["memswap_limit"]) == (1_500_000_000, "512m", "512m")
@@ -105,7 +105,7 @@ def test_a_section_is_for_its_kind_of_node_alone() -> None:
         assert (other["nano_cpus"], other["mem_limit"], other["environment"].get("ANSWER")) == (None, None, None)
 
 
-def test_mounts_of_the_configuration_join_the_dataset() -> None:
+def test_mounts_of_the_configuration_are_added_to_that_of_the_dataset() -> None:
     found = options("sim_0", sim={"mounts": ["/a b:/c:ro", "/d:/e"]})["mounts"]
     assert [(each["Source"], each["Target"], each["ReadOnly"]) for each in found[2:]] == [
         ("/a b", "/c", True),
@@ -114,19 +114,19 @@ def test_mounts_of_the_configuration_join_the_dataset() -> None:
     assert mount_source("/a b:/c:ro") == Path("/a b")
 
 
-def test_what_is_published_is_published_on_the_loopback_interface() -> None:
+def test_ports_are_published_on_the_loopback_interface() -> None:
     made = options("router", run={"router_port": 7448}, router={"ports": {"80": 8080}})
     assert made["ports"] == {"80": ("127.0.0.1", 8080), "7447/tcp": ("127.0.0.1", 7448)}
     assert options("sim_0", run={"router_port": 7448})["ports"] == {}
 
 
-def test_the_network_has_a_way_out_only_if_something_is_published() -> None:
+def test_a_port_is_published_only_if_the_configuration_names_one() -> None:
     assert not publishes_port(Config())
     assert publishes_port(Config.model_validate({"run": {"router_port": 7448}}))
     assert publishes_port(Config.model_validate({"containers": {"coordinator": {"ports": {"80": 80}}}}))
 
 
-def test_further_options_are_passed_on_and_never_replace_what_protects_the_host() -> None:
+def test_further_options_are_passed_on_but_never_replace_the_protections() -> None:
     further = {
         "shm_size": "64m",
         "pids_limit": 99,

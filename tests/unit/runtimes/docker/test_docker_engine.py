@@ -27,18 +27,18 @@ def api_error(explanation: str) -> APIError:
         (requests.ConnectionError(ReadTimeoutError(None, "/", "Read timed out.")), "no answer in time"),
     ],
 )
-def test_the_engines_own_words_come_through(error: Exception, words: str) -> None:
+def test_an_error_of_the_docker_engine_is_raised_in_plain_words(error: Exception, words: str) -> None:
     assert in_words(error) == words
     with pytest.raises(WorkerError, match=f"^sim_0: {words}$"), engine_errors("sim_0"):
         raise error
 
 
-def test_other_errors_are_none_of_the_engines() -> None:
+def test_errors_that_are_not_of_the_docker_engine_pass_unchanged() -> None:
     with pytest.raises(KeyError, match="a mistake"), engine_errors("sim_0"):
         raise KeyError("a mistake")
 
 
-def test_where_no_engine_answers_the_place_and_a_way_out_are_told(
+def test_connecting_without_an_engine_names_its_address_and_a_hint(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     address = f"unix://{tmp_path}/nothing.sock"

@@ -30,7 +30,7 @@ CONFIG = Config.model_validate({"containers": {"image": "image"}})
 def engine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Engine]:
     path = tmp_path / "engine.sock"
     monkeypatch.setenv("DOCKER_HOST", f"unix://{path}")
-    # Times are a hundredth or so of what they are.
+    # All times are about a hundredth of the real ones.
     monkeypatch.setattr(docker_watch, "_LOOK_EVERY_S", 0.1)
     monkeypatch.setattr(docker_clock, "_TICK_S", 0.025)
     monkeypatch.setattr(docker_clock, "_WARN_S", 0.3)
@@ -69,7 +69,7 @@ def make(engine: Engine, tmp_path: Path, warnings: list[str]) -> Iterator[Callab
 
 
 def until(condition: Callable[[], Any], *, runtime: DockerNodes | None = None) -> list[NodeExit]:
-    """Wait, and look after the nodes as a supervisor does."""
+    """Wait for a condition, and meanwhile ask for ended nodes as a supervisor does."""
     exits: list[NodeExit] = []
     deadline = time.monotonic() + 10
     while not condition():
@@ -79,11 +79,11 @@ def until(condition: Callable[[], Any], *, runtime: DockerNodes | None = None) -
     return exits
 
 
-def test_an_engine_that_answers_others_is_not_silent(
+def test_an_engine_that_answers_only_some_requests_is_not_silent(
     engine: Engine, make: Callable[[], DockerNodes], warnings: list[str]
 ) -> None:
     runtime = make()
-    # What the nodes are watched by is not answered; starts are.
+    # Requests that watch the nodes get no answer; requests that start nodes do.
     engine.withheld = "GET /containers/json|GET /events"
     began = time.monotonic()
     number = 0
@@ -96,7 +96,7 @@ def test_an_engine_that_answers_others_is_not_silent(
     assert not runtime.exits()
 
 
-def test_a_slow_answer_is_waited_for_with_a_word(
+def test_a_slow_engine_is_waited_for_with_a_warning(
     engine: Engine, make: Callable[[], DockerNodes], warnings: list[str]
 ) -> None:
     runtime = make()
@@ -110,7 +110,7 @@ def test_a_slow_answer_is_waited_for_with_a_word(
     assert runtime.cleared
 
 
-def test_an_engine_is_listened_to_even_if_nobody_hears_of_it(
+def test_a_silent_engine_is_given_up_even_if_warnings_cannot_be_printed(
     engine: Engine, make: Callable[[], DockerNodes], warnings: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def break_pipe(_: str) -> None:
@@ -123,7 +123,7 @@ def test_an_engine_is_listened_to_even_if_nobody_hears_of_it(
         until(lambda: False, runtime=runtime)
 
 
-def test_a_silent_engine_is_given_up_with_what_is_left_on_it_and_how_to_go_on(
+def test_giving_up_a_silent_engine_names_left_containers_and_how_to_go_on(
     engine: Engine, make: Callable[[], DockerNodes], tmp_path: Path
 ) -> None:
     runtime = make()
@@ -144,7 +144,7 @@ def test_a_silent_engine_is_given_up_with_what_is_left_on_it_and_how_to_go_on(
     assert engine.names() == ["throwcollect-run-1a2b-sim_0"]
 
 
-def test_time_in_which_the_launcher_itself_was_stopped_is_no_silence(
+def test_time_in_which_the_launcher_was_stopped_does_not_count_as_silence(
     make: Callable[[], DockerNodes], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     runtime = make()
@@ -152,7 +152,7 @@ def test_time_in_which_the_launcher_itself_was_stopped_is_no_silence(
     assert runtime.exits() == []
 
 
-def test_a_container_that_is_still_being_made_at_the_end_is_removed_when_it_is_there(
+def test_a_container_that_is_created_late_is_removed_at_the_end(
     engine: Engine, make: Callable[[], DockerNodes], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(module, "_BEGIN_S", 0.1)
@@ -167,7 +167,7 @@ def test_a_container_that_is_still_being_made_at_the_end_is_removed_when_it_is_t
     assert runtime.cleared
 
 
-def test_an_answer_that_does_not_come_in_time_is_said_in_our_words(
+def test_a_late_engine_is_reported_as_no_answer_in_time(
     engine: Engine, make: Callable[[], DockerNodes], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     engine.withheld = "version"

@@ -1,4 +1,4 @@
-"""The image without an engine: what goes into the build, and what is said when it fails."""
+"""Building the image with a fake engine: what goes into the build, and the messages of failures."""
 
 from __future__ import annotations
 
@@ -86,21 +86,21 @@ def wheelhouse(tmp_path: Path) -> Path:
     return directory
 
 
-def test_the_default_base_is_that_of_the_dockerfile() -> None:
+def test_the_default_base_image_is_that_of_the_dockerfile() -> None:
     assert re.findall(r"^ARG BASE_IMAGE=(.*)$", DOCKERFILE, re.MULTILINE) == [DEFAULT_BASE]
 
 
-def test_the_target_and_the_arguments_are_those_of_the_dockerfile(said: list[str]) -> None:
+def test_a_build_uses_the_target_and_the_arguments_of_the_dockerfile(said: list[str]) -> None:
     engine = Engine("base")
     build(engine, "mine", base="base", say=said.append)
     assert f" AS {engine.options['target']}\n" in DOCKERFILE
-    # The base of the target with ROS is for those who build that.
+    # ROS_IMAGE is only for builds of the target with ROS.
     declared = set(re.findall(r"^ARG (\w+)", DOCKERFILE, re.MULTILINE)) - {"ROS_IMAGE"}
     assert set(engine.options["buildargs"]) == declared
     assert engine.options["buildargs"]["VERSION"] == throwcollect.__version__
 
 
-def test_the_context_is_what_the_dockerfile_copies_and_nothing_else(said: list[str], wheelhouse: Path) -> None:
+def test_the_build_context_holds_only_what_the_dockerfile_copies(said: list[str], wheelhouse: Path) -> None:
     engine = Engine("base")
     build(engine, "mine", base="base", wheelhouse=wheelhouse, say=said.append)
     for source in COPIED:
@@ -116,7 +116,7 @@ def test_the_context_is_what_the_dockerfile_copies_and_nothing_else(said: list[s
     assert {member.uid for member in engine.context.values()} == {0}
 
 
-def test_whoever_runs_the_image_can_read_it_also_from_a_clone_that_others_cannot_read(tmp_path: Path) -> None:
+def test_files_of_the_build_context_are_readable_even_from_a_private_clone(tmp_path: Path) -> None:
     for name in ("src", "configs", "packaging", "docker"):
         shutil.copytree(ROOT / name, tmp_path / name, ignore=shutil.ignore_patterns("__pycache__"))
     shutil.copy(ROOT / "pyproject.toml", tmp_path)
@@ -132,15 +132,15 @@ def test_whoever_runs_the_image_can_read_it_also_from_a_clone_that_others_cannot
     assert set(modes.values()) == {0o644, 0o755}
 
 
-def test_a_build_by_docker_alone_finds_what_the_dockerfile_copies() -> None:
+def test_the_dockerignore_file_excludes_nothing_that_the_dockerfile_copies() -> None:
     patterns = (ROOT / ".dockerignore").read_text().splitlines()
     sent = exclude_paths(str(ROOT), patterns)
-    # Directories of wheels are there only where somebody has filled one.
+    # A directory of wheels exists only if somebody has filled one.
     for source in (each for each in COPIED if not each.endswith("*")):
         assert any(path == source or path.startswith(f"{source}/") for path in sent), source
 
 
-def test_each_step_is_one_line_and_the_size_is_returned(said: list[str]) -> None:
+def test_a_build_prints_one_line_per_step_and_returns_the_size(said: list[str]) -> None:
     output = [{"stream": "Step 1/2 : RUN a  \\\n"}, {"stream": " ---> Running in 1\n"}, {"stream": "noise\n"}]
     engine = Engine("base", answers=[*output, {"stream": "Step 2/2 : RUN " + 200 * "b" + "\n"}])
     assert build(engine, "mine", base="base", say=said.append) == 1234
@@ -149,7 +149,7 @@ def test_each_step_is_one_line_and_the_size_is_returned(said: list[str]) -> None
     assert max(map(len, said)) < 120
 
 
-def test_a_step_that_fails_brings_the_end_of_its_output_without_colours(said: list[str]) -> None:
+def test_a_failed_build_step_shows_the_end_of_its_output_without_colours(said: list[str]) -> None:
     output = [{"stream": f"\x1b[91mline {number}\n\x1b[0m"} for number in range(100)]
     engine = Engine("base", answers=[*output, {"stream": "Removing intermediate container 1\n"}, {"error": "code: 1"}])
     with pytest.raises(WorkerError, match="mine: cannot be built: code: 1") as caught:
@@ -159,9 +159,7 @@ def test_a_step_that_fails_brings_the_end_of_its_output_without_colours(said: li
     assert "line 0" not in caught.value.evidence.splitlines()
 
 
-def test_a_wheel_that_is_missing_is_named_together_with_the_place_that_lacks_it(
-    said: list[str], wheelhouse: Path
-) -> None:
+def test_a_missing_wheel_is_named_with_the_wheelhouse_or_index_that_lacks_it(said: list[str], wheelhouse: Path) -> None:
     answers = [{"stream": "ERROR: No matching distribution found for scipy>=1.11\n"}, {"error": "code: 1"}]
     with pytest.raises(WorkerError, match=rf"{wheelhouse} lacks scipy>=1.11") as caught:
         build(Engine("base", answers=answers), "mine", base="base", wheelhouse=wheelhouse, say=said.append)
@@ -200,26 +198,26 @@ def test_a_base_image_that_is_missing_is_pulled(said: list[str]) -> None:
     assert said[0] == "pulling base"
 
 
-def test_a_base_image_that_cannot_be_had_is_named_with_a_way_out(said: list[str]) -> None:
+def test_a_base_image_that_cannot_be_pulled_is_an_error_with_a_hint(said: list[str]) -> None:
     with pytest.raises(WorkerError, match="base image base is not here and cannot be pulled: no such host") as caught:
         build(Engine(), "mine", base="base", say=said.append)
     assert caught.value.hint is not None
     assert "--base" in caught.value.hint
 
 
-def test_a_package_outside_a_clone_cannot_be_built_from(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_the_sources_of_a_build_are_not_found_outside_a_clone(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setattr("throwcollect.runtimes.image_sources._PACKAGE", tmp_path / "lib" / "throwcollect")
     with pytest.raises(ConfigError, match="is not in a clone of the project"):
         source_root()
 
 
-def test_an_image_that_is_there_is_neither_built_nor_pulled(said: list[str]) -> None:
+def test_an_existing_image_is_neither_built_nor_pulled(said: list[str]) -> None:
     engine = Engine("mine")
     ensure(engine, "mine", say=said.append)
     assert (engine.options, engine.pulled, said) == ({}, [], [])
 
 
-def test_the_default_image_is_built_when_it_is_missing_after_one_line_that_says_so(said: list[str]) -> None:
+def test_a_missing_default_image_is_built_after_one_line_that_says_so(said: list[str]) -> None:
     engine = Engine(DEFAULT_BASE)
     ensure(engine, default_tag(), say=said.append)
     assert engine.options["tag"] == default_tag()
@@ -227,19 +225,19 @@ def test_the_default_image_is_built_when_it_is_missing_after_one_line_that_says_
     assert default_tag() in said[0]
 
 
-def test_any_other_image_is_pulled_when_it_is_missing(said: list[str]) -> None:
+def test_a_missing_image_other_than_the_default_is_pulled(said: list[str]) -> None:
     engine = Engine(registry=("lab/throws:2",))
     ensure(engine, "lab/throws:2", say=said.append)
     assert engine.pulled == ["lab/throws:2"]
     assert said == ["image lab/throws:2 is not here; pulling it"]
 
 
-def test_an_image_that_cannot_be_pulled_is_an_error_of_the_runtime(said: list[str]) -> None:
+def test_a_named_image_that_cannot_be_pulled_is_an_error(said: list[str]) -> None:
     with pytest.raises(WorkerError, match="lab/throws:2 is not here and cannot be pulled: no such host"):
         ensure(Engine(), "lab/throws:2", say=said.append)
 
 
-def test_without_a_clone_the_default_image_cannot_be_had(
+def test_without_a_clone_a_missing_default_image_is_an_error(
     monkeypatch: pytest.MonkeyPatch, said: list[str], tmp_path: Path
 ) -> None:
     monkeypatch.setattr("throwcollect.runtimes.image_sources._PACKAGE", tmp_path / "lib" / "throwcollect")
@@ -252,7 +250,7 @@ def git(root: Path, *arguments: str) -> str:
     return subprocess.run(["git", "-C", root, *identity, *arguments], check=True, capture_output=True, text=True).stdout
 
 
-def test_the_revision_is_the_commit_and_says_when_files_differ_from_it(tmp_path: Path) -> None:
+def test_the_revision_of_an_image_is_the_commit_and_marks_changed_files(tmp_path: Path) -> None:
     assert find_revision(tmp_path) is None
     git(tmp_path, "init", "-q")
     (tmp_path / "pyproject.toml").write_text("")
@@ -274,14 +272,14 @@ def test_the_revision_is_the_commit_and_says_when_files_differ_from_it(tmp_path:
         ("https://example.org/lab/throws.git?token=1#x", "https://example.org/lab/throws.git"),
         ("ssh://git@example.org:2222/lab/throws.git", "ssh://example.org:2222/lab/throws.git"),
         ("git@example.org:lab/throws.git", "ssh://example.org/lab/throws.git"),
-        # Nobody else can do anything with a place on this machine.
+        # A path on this machine is of no use to others.
         ("/work/throws.git", None),
         ("../throws", None),
         ("file:///work/throws.git", None),
         (None, None),
     ],
 )
-def test_the_source_is_an_address_for_others_without_what_is_secret_in_it(
+def test_the_source_address_of_an_image_is_public_and_has_no_secrets(
     tmp_path: Path, origin: str | None, address: str | None
 ) -> None:
     assert find_address(tmp_path) is None
@@ -291,7 +289,9 @@ def test_the_source_is_an_address_for_others_without_what_is_secret_in_it(
     assert find_address(tmp_path) == address
 
 
-def test_an_image_without_an_address_has_no_such_label(said: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_image_without_a_source_address_has_no_label_for_it(
+    said: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
     for address, labels in (("https://example.org/x", {image.SOURCE_LABEL: "https://example.org/x"}), (None, {})):
         monkeypatch.setattr(image, "find_address", lambda _, address=address: address)
         engine = Engine("base")
@@ -299,7 +299,7 @@ def test_an_image_without_an_address_has_no_such_label(said: list[str], monkeypa
         assert engine.options["labels"] == labels
 
 
-def test_every_build_in_the_documents_names_the_target() -> None:
+def test_every_docker_build_in_the_documents_names_a_target() -> None:
     pages = [ROOT / "README.md", *(ROOT / "docs").glob("*.md")]
     text = "\n".join(page.read_text(encoding="utf-8") for page in pages)
     # Images on top of ours are built from a file of their own.
@@ -309,9 +309,7 @@ def test_every_build_in_the_documents_names_the_target() -> None:
     assert not [build for build in builds if "--target" not in build]
 
 
-def test_an_image_is_outdated_if_its_label_names_other_sources_than_those_of_the_clone(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
+def test_an_image_is_outdated_if_its_label_names_other_sources(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     engine = Engine("base")
     build(engine, "mine", base="base", say=lambda _line: None)
     own = engine.options["buildargs"]["SOURCES"]
@@ -322,7 +320,7 @@ def test_an_image_is_outdated_if_its_label_names_other_sources_than_those_of_the
     assert not is_outdated(engine, "mine")
 
 
-def test_whatever_is_installed_changes_the_label_of_the_sources(said: list[str], tmp_path: Path) -> None:
+def test_every_installed_file_changes_the_digest_of_the_sources(said: list[str], tmp_path: Path) -> None:
     (tmp_path / "src" / "__pycache__").mkdir(parents=True)
     changes = {"pyproject.toml": "a", "src/a.py": "a", "src/b.py": "a", "src/__pycache__/a.pyc": "a"}
     for name, content in changes.items():

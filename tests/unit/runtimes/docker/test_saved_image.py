@@ -1,4 +1,4 @@
-"""Images in files, of an engine that only pretends."""
+"""Saving images to files with a fake engine."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from throwcollect.runtimes.docker.image import default_tag, save_image
 
 @pytest.fixture
 def client(monkeypatch: pytest.MonkeyPatch) -> Mock:
-    """A client of an engine that has all images, of these sources."""
+    """A client of an engine that has all images, none of them outdated."""
     client = Mock()
     client.images.get.return_value.save.return_value = iter([b"first ", b"second"])
     monkeypatch.setattr(saved_image, "connect", lambda: client)
@@ -31,7 +31,7 @@ def save(archive: Path, image: str | None = None) -> list[str]:
     return said
 
 
-def test_the_image_of_these_sources_is_saved_as_it_is(client: Mock, tmp_path: Path) -> None:
+def test_an_image_that_is_up_to_date_is_saved_without_a_build(client: Mock, tmp_path: Path) -> None:
     assert save(tmp_path / "image.tar") == [f"saving {default_tag()}"]
     assert (tmp_path / "image.tar").read_bytes() == b"first second"
     saved_image.build.assert_not_called()
@@ -39,7 +39,7 @@ def test_the_image_of_these_sources_is_saved_as_it_is(client: Mock, tmp_path: Pa
 
 
 @pytest.mark.parametrize(("name", "answer"), [("is_there", False), ("is_outdated", True)])
-def test_it_is_built_first_where_it_is_missing_or_of_other_sources(
+def test_a_missing_or_outdated_image_is_built_before_it_is_saved(
     client: Mock, tmp_path: Path, name: str, answer: bool
 ) -> None:
     getattr(saved_image, name).return_value = answer
@@ -47,14 +47,14 @@ def test_it_is_built_first_where_it_is_missing_or_of_other_sources(
     assert saved_image.build.call_args.kwargs["base"] == "base"
 
 
-def test_an_image_that_is_named_is_taken_with_a_word_if_it_is_of_other_sources(client: Mock, tmp_path: Path) -> None:
+def test_an_outdated_image_that_is_named_is_saved_with_a_warning(client: Mock, tmp_path: Path) -> None:
     saved_image.is_outdated.return_value = True
     assert "it is used, as it is named" in save(tmp_path / "image.tar", "mine")[0]
     saved_image.ensure.assert_called_once()
     saved_image.build.assert_not_called()
 
 
-def test_an_engine_that_fails_meanwhile_is_told_from_a_disk_that_does(
+def test_errors_of_the_engine_and_of_the_disk_while_saving_differ(
     client: Mock, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def fail(error: Exception) -> Callable[..., Iterator[bytes]]:

@@ -13,19 +13,19 @@ from throwcollect.runtimes.docker.watch import ContainerState
         (ContainerState("exited", 139), None, "ended by SIGSEGV"),
         (ContainerState("exited", 137, out_of_memory=True), "512m", "ran out of memory (limit 512m)"),
         (ContainerState("exited", 137, out_of_memory=True), None, "ran out of memory"),
-        # Of its processes another one was ended.
+        # Another process of the container ran out of memory.
         (ContainerState("exited", 5, out_of_memory=True), "512m", "exit code 5"),
-        # What our own commands exit with after an interruption.
+        # The exit code of our commands after an interruption.
         (ContainerState("exited", 130), None, "exit code 130"),
         (ContainerState("exited", 255), None, "exit code 255"),
         (ContainerState("removed"), None, "its container was removed"),
     ],
 )
-def test_ends_are_told_in_words(state: ContainerState, memory: str | None, words: str) -> None:
+def test_the_end_of_a_container_is_described_in_words(state: ContainerState, memory: str | None, words: str) -> None:
     assert state.ended
     assert end_in_words(state, memory) == words
 
 
 @pytest.mark.parametrize("status", ["created", "running", "paused", "restarting"])
-def test_what_may_run_on_has_not_ended(status: str) -> None:
+def test_a_container_that_may_run_on_has_not_ended(status: str) -> None:
     assert not ContainerState(status).ended
