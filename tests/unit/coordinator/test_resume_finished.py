@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 from tests.unit.coordinator.listener import Listener
 from tests.unit.dataset.conftest import Collection
+from tests.unit.dataset.damage import flip
 
 from throwcollect.coordinator.resume import has_all_trials, resume
 from throwcollect.dataset.creation import create
@@ -92,9 +93,7 @@ def cut(path: Path) -> None:
 
 
 def flip_bit(path: Path) -> None:
-    data = bytearray(path.read_bytes())
-    data[len(data) - len(data) // 3] ^= 1
-    path.write_bytes(data)
+    flip(path, path.stat().st_size * 2 // 3)
 
 
 def test_resuming_a_finished_dataset_changes_no_file(trials: Trials, dataset: Path) -> None:

@@ -10,6 +10,7 @@ from typing import Any
 
 import pyarrow.parquet as pq
 import pytest
+from tests.unit.dataset.damage import flip
 
 from throwcollect.config.schema import Config
 from throwcollect.dataset.mcap_reader import open_mcap
@@ -32,12 +33,6 @@ def never(config: Config) -> Plan:
 @pytest.fixture
 def output(tmp_path: Path) -> Path:
     return tmp_path / "output"
-
-
-def spoil(path: Path, place: int) -> None:
-    data = bytearray(path.read_bytes())
-    data[place] ^= 1
-    path.write_bytes(data)
 
 
 def chunk_of(directory: Path, trial: int) -> int:
@@ -67,11 +62,11 @@ def cut_summary(directory: Path) -> None:
 def damage_index(directory: Path) -> None:
     with open_mcap(directory / SHARD) as contents:
         index = contents.episode(chunk_of(directory, 4)).chunks[0].indexes[4]
-    spoil(directory / SHARD, index.offset + 100)
+    flip(directory / SHARD, index.offset + 100)
 
 
 def damage_latched_topics(directory: Path) -> None:
-    spoil(directory / SHARD, 6000)
+    flip(directory / SHARD, 6000)
 
 
 def swap_shards(directory: Path) -> None:
@@ -102,7 +97,7 @@ def test_repair_restores_the_original_files_if_no_episode_is_damaged(
 
 
 def test_repair_loses_only_the_damaged_episode(collection: Any, dataset: Path, output: Path, tmp_path: Path) -> None:
-    spoil(dataset / SHARD, chunk_of(dataset, 4) + 3000)
+    flip(dataset / SHARD, chunk_of(dataset, 4) + 3000)
     before = {path.name: path.read_bytes() for path in dataset.iterdir()}
     repaired = repair(dataset, output, remake=never)
     assert repaired.lost == (LostTrial(4, "no whole episode of it was left"),)
@@ -224,7 +219,7 @@ def test_repair_without_a_table_reports_no_differing_episode(make_collection: An
 def test_repair_makes_a_damaged_plan_again_from_the_table_of_throws(
     collected: Path, dataset: Path, output: Path
 ) -> None:
-    spoil(dataset / "plan.parquet", 60)
+    flip(dataset / "plan.parquet", 60)
     repaired = repair(dataset, output, remake=never)
     assert len(repaired.remarks) == 1
     assert repaired.remarks[0].startswith("plan.parquet: is damaged: ")
@@ -255,7 +250,7 @@ def test_a_plan_made_again_from_the_table_keeps_its_refusals(collection: Any, tm
 
 
 def test_repair_draws_the_plan_again_if_plan_and_table_are_lost(collected: Path, dataset: Path, output: Path) -> None:
-    spoil(dataset / "plan.parquet", 60)
+    flip(dataset / "plan.parquet", 60)
     (dataset / "throws.parquet").unlink()
     repaired = repair(dataset, output, remake=make_plan)
     assert repaired.remarks[0].endswith("made again from config.yaml")

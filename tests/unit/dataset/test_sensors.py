@@ -16,13 +16,14 @@ import zstandard
 from mcap import records
 from mcap.reader import make_reader
 from tests.unit.dataset.conftest import Collection
+from tests.unit.dataset.damage import find_stored, flip
 from tests.unit.dataset.mutations import fit_manifest, no_plan
 
 from rclzenoh.interfaces import deserialize, get_message, serialize
 from throwcollect.dataset.creation import create
 from throwcollect.dataset.inspect import digest, info
 from throwcollect.dataset.mcap_file import EPISODE
-from throwcollect.dataset.mcap_reader import StoredEpisode, open_mcap
+from throwcollect.dataset.mcap_reader import open_mcap
 from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.rebuild import rebuild
 from throwcollect.dataset.recovery import remove_unfinished
@@ -86,18 +87,6 @@ def dataset(tmp_path: Path) -> Path:
     return Filmed().collect(tmp_path / "dataset")
 
 
-def find_stored(directory: Path, trial: int) -> StoredEpisode:
-    offset = pq.read_table(directory / "throws.parquet")["chunk_offset"].to_pylist()[trial]
-    with open_mcap(directory / SHARD) as contents:
-        return contents.episode(offset)
-
-
-def flip(path: Path, place: int) -> None:
-    data = bytearray(path.read_bytes())
-    data[place] ^= 1
-    path.write_bytes(data)
-
-
 def test_the_message_of_an_episode_carries_its_sensor_chunk(collection: Collection) -> None:
     signer = Signer(b"key of the run")
     sent = add_images(collection.episode(2))
@@ -143,7 +132,7 @@ def test_a_dataset_with_sensors_has_no_findings_and_rebuild_keeps_it(dataset: Pa
 def test_a_damaged_sensor_chunk_is_found_and_loses_its_episode(
     dataset: Path, tmp_path: Path, begin: int, problem: str
 ) -> None:
-    flip(dataset / SHARD, find_stored(dataset, 4).chunks[1].record.offset + begin)
+    flip(dataset / SHARD, find_stored(dataset / SHARD, 4).chunks[1].record.offset + begin)
     fit_manifest(dataset)
     assert any((finding.place, problem in finding.problem) == ("trial 4", True) for finding in verify(dataset))
     assert [lost.trial for lost in repair(dataset, tmp_path / "repaired", remake=no_plan).lost] == [4]
@@ -152,11 +141,11 @@ def test_a_damaged_sensor_chunk_is_found_and_loses_its_episode(
 
 def test_repair_restores_damaged_indexes_of_a_sensor_chunk(dataset: Path, tmp_path: Path) -> None:
     whole = (dataset / SHARD).read_bytes()
-    flip(dataset / SHARD, find_stored(dataset, 4).chunks[1].indexes[CAMERA].offset + 30)
+    flip(dataset / SHARD, find_stored(dataset / SHARD, 4).chunks[1].indexes[CAMERA].offset + 30)
     fit_manifest(dataset)
     (finding,) = (finding for finding in verify(dataset) if finding.file == SHARD and finding.place == "trial 4")
     assert "message indexes" in finding.problem
-    flip(dataset / SHARD, find_stored(dataset, 4).chunks[1].indexes[CAMERA].offset + 1)
+    flip(dataset / SHARD, find_stored(dataset / SHARD, 4).chunks[1].indexes[CAMERA].offset + 1)
     repaired = repair(dataset, tmp_path / "repaired", remake=no_plan)
     assert (repaired.lost, (tmp_path / "repaired" / SHARD).read_bytes()) == ((), whole)
 

@@ -9,6 +9,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 from tests.unit.dataset.conftest import Collection
+from tests.unit.dataset.damage import flip
 
 from throwcollect.cli.main import main
 from throwcollect.episode.record import EpisodeHeader, Samples
@@ -19,12 +20,6 @@ Run = Callable[..., int]
 @pytest.fixture
 def source(tmp_path: Path) -> Path:
     return Collection({"trials": 3}).collect(tmp_path / "source")
-
-
-def spoil_byte(path: Path, place: int) -> None:
-    data = bytearray(path.read_bytes())
-    data[place] ^= 1
-    path.write_bytes(data)
 
 
 @pytest.fixture
@@ -113,7 +108,7 @@ def test_rebuild_lists_throws_that_are_judged_otherwise_than_before(
 def test_rebuild_of_a_damaged_dataset_hints_at_repair(
     run: Run, source: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    spoil_byte(source / "quick_00000.mcap", 20_000)
+    flip(source / "quick_00000.mcap", 20_000)
     assert run("dataset", "rebuild", source) == 4
     assert f"try: throwcollect dataset repair {source} OUTPUT" in capsys.readouterr().err
 
@@ -132,7 +127,7 @@ def test_repair_without_losses_ends_with_0(
 def test_repair_lists_what_is_lost_and_ends_with_5(
     run: Run, source: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    spoil_byte(source / "quick_00000.mcap", 20_000)
+    flip(source / "quick_00000.mcap", 20_000)
     output = tmp_path / "output"
     assert run("dataset", "repair", source, output) == 5
     told = capsys.readouterr()
