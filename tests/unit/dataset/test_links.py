@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
+import threading
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
@@ -145,9 +146,20 @@ def test_verify_and_resume_do_not_wait_for_a_pipe_in_the_place_of_a_file(
     (directory / name).unlink(missing_ok=True)
     (directory / name).parent.mkdir(exist_ok=True)
     os.mkfifo(directory / name)
-    for use in ("verify", "resume"):
-        with suppress(ThrowcollectError):
-            USES[use](directory, source, tmp_path / "output")
+
+    finished: list[bool] = []
+
+    def use_dataset() -> None:
+        for use in ("verify", "resume"):
+            with suppress(ThrowcollectError):
+                USES[use](directory, source, tmp_path / "output")
+        finished.append(True)
+
+    # Nobody writes into the pipe, so a thread that waits for it never ends.
+    using = threading.Thread(target=use_dataset, daemon=True)
+    using.start()
+    using.join(timeout=30)
+    assert finished
 
 
 def test_a_file_with_a_second_hard_link_is_not_changed(source: Collection, sound: Path, tmp_path: Path) -> None:
