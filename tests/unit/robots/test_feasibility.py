@@ -65,19 +65,19 @@ def shares(config):
     return efforts[:, columns].max(), (np.abs(motion[1]) / joint_limits(TALOS).velocity).max()
 
 
-def test_default_throw_needs_the_effort_and_speed_measured_in_the_physics(reason):
+def test_the_default_throw_needs_the_effort_and_speed_measured_in_the_physics(reason):
     assert reason(Config()) is None
     # Measured in the physics: 0.86 and 0.69.
     assert shares(Config()) == pytest.approx((0.86, 0.69), abs=0.01)
 
 
-def test_long_throw_is_refused_for_the_effort_that_saturated_in_the_physics(reason):
+def test_the_long_throw_is_refused_for_the_effort_that_saturated_in_the_physics(reason):
     assert reason(LONG).startswith("arm_right_2_joint needs 23.9")
     assert reason(LONG).endswith("its limit is 22.32 Nm")
     assert shares(LONG)[1] == pytest.approx(0.79, abs=0.01)
 
 
-def test_recommended_sweep_box_is_feasible(reason):
+def test_random_throws_from_the_recommended_sweep_box_are_feasible(reason):
     draw = np.random.default_rng(0)
     for _ in range(200):
         elbow, wrist, duration_s, gamma = draw.uniform([-0.95, 0.1, 0.9, 0.95], [-0.25, 0.5, 1.3, 1.3])
@@ -85,23 +85,23 @@ def test_recommended_sweep_box_is_feasible(reason):
         assert reason(config) is None
 
 
-def test_position_beyond_its_limit_is_refused(reason):
+def test_a_position_beyond_the_limit_of_its_joint_is_refused(reason):
     assert reason(throw({"arm_right_7_joint": 0.75})) == (
         "arm_right_7_joint is at 0.75 rad at 1.000 s; its upper limit is 0.6981 rad"
     )
     assert "its lower limit is -2.88 rad" in reason(throw({"arm_right_2_joint": -2.9}))
 
 
-def test_held_posture_beyond_its_limit_is_refused(reason):
+def test_a_held_joint_beyond_its_limit_is_refused(reason):
     assert reason(throw(robot={"posture": {"head_1_joint": 1.0}})).startswith("head_1_joint is at 1 rad at 0.000 s")
 
 
-def test_joint_may_end_exactly_at_its_limit(reason):
+def test_a_joint_may_end_exactly_at_its_limit(reason):
     limit = float(joint_limits(TALOS).upper[JOINTS.index("arm_right_7_joint")])
     assert reason(throw({"arm_right_7_joint": limit}, duration_s=1.2)) is None
 
 
-def test_speed_above_its_limit_is_refused(reason):
+def test_a_speed_above_the_limit_of_its_joint_is_refused(reason):
     assert reason(throw(duration_s=0.5)) == "arm_right_7_joint moves at 2.413 rad/s at 0.290 s; its limit is 1.76 rad/s"
 
 
@@ -119,18 +119,18 @@ def test_feasibility_depends_on_masses_gravity_and_effort_scale(reason, change):
     assert reason(Config()) is None
 
 
-def test_stronger_robot_can_do_the_long_throw(reason):
+def test_a_stronger_robot_can_do_the_long_throw(reason):
     assert reason(LONG.model_copy(update={"robot": Config(robot={"effort_scale": 1.1}).robot})) is None
 
 
-def test_effort_of_held_joints_is_limited_only_where_they_are_simulated(reason):
+def test_the_effort_of_held_joints_is_limited_only_if_they_are_simulated(reason):
     """An overloaded arm does not matter as long as it is rigid and only the torso moves."""
     task = {"start": TASK.start, "end": {"torso_1_joint": 0.1}}
     assert reason(Config(task=task, tool={"mass_kg": 2.0})) is None
     assert reason(Config(task=task, tool={"mass_kg": 2.0}, robot={"locked": "none"})).startswith("arm_right_")
 
 
-def test_static_torque_is_the_weight_times_its_lever():
+def test_the_static_torque_is_the_weight_times_its_lever():
     """Lifting one more kilogram in the cup by a joint's small turn takes the work that the torque gives."""
     heavy = Config(ball={"mass_kg": 1.045})
     posture = np.array([{**TALOS.rest_posture, **TASK.start}[joint] for joint in JOINTS])[None]
@@ -167,7 +167,7 @@ def test_damping_and_inertia_show_in_the_torque():
     assert faster - rest > 1.0
 
 
-def test_throw_that_brings_the_arm_against_the_head_is_refused(reason):
+def test_a_throw_that_brings_the_arm_against_the_head_is_refused(reason):
     config = throw(
         {"arm_right_2_joint": -2.15, "arm_right_3_joint": 1.95, "arm_right_5_joint": 2.33, "arm_right_6_joint": -1.19},
         duration_s=6.0,
@@ -186,7 +186,7 @@ def test_a_spoon_with_a_long_handle_hits_the_leg_and_one_with_a_short_does_not(r
 
 
 @pytest.mark.parametrize("joint", ["arm_left_4_joint", "head_1_joint", "arm_right_4_joint"])
-def test_throw_that_does_not_move_the_spoon_is_refused(reason, joint):
+def test_a_throw_that_does_not_move_the_spoon_is_refused(reason, joint):
     start = {**TASK.start, "arm_left_4_joint": -1.9, "head_1_joint": 0.0}
     end = {joint: start[joint] + (0.0 if "right" in joint else 0.3)}
     assert reason(Config(task={"start": start, "end": end})) == (
@@ -196,11 +196,11 @@ def test_throw_that_does_not_move_the_spoon_is_refused(reason, joint):
     )
 
 
-def test_throw_of_one_joint_that_carries_the_spoon_is_feasible(reason):
+def test_a_throw_of_one_joint_that_carries_the_spoon_is_feasible(reason):
     assert reason(Config(task={"start": TASK.start, "end": {"torso_1_joint": 0.3}})) is None
 
 
-def test_start_posture_that_does_not_hold_the_ball_is_refused(reason):
+def test_a_start_posture_that_does_not_hold_the_ball_is_refused(reason):
     assert reason(throw(start={"arm_right_5_joint": 1.5})) == (
         "task.start does not hold the ball: it tilts the spoon by 1.48 rad, so that the ball rolls out, 0.824 rad "
         "downwards; up to 0.594 rad, a tilt in any direction is safe"
@@ -211,18 +211,18 @@ def test_start_posture_that_does_not_hold_the_ball_is_refused(reason):
     assert "task.start does not hold" in reason(Config(task={"start": half_sitting_arm, "end": {"torso_1_joint": 0.3}}))
 
 
-def test_handle_of_the_spoon_may_reach_into_the_hand(reason):
+def test_the_handle_of_the_spoon_may_reach_into_the_hand(reason):
     assert reason(throw(tool={"mount_offset_m": 0.0})) is None
 
 
-def test_posture_in_which_held_links_overlap_is_refused(reason):
+def test_a_posture_in_which_held_links_overlap_is_refused(reason):
     posture = {"arm_left_1_joint": 0.0, "arm_left_2_joint": 0.0, "arm_left_3_joint": 0.0, "arm_left_4_joint": 0.0}
     assert "leg_left_3_link" in reason(
         throw(robot={"posture": posture | {f"leg_left_{n}_joint": 0.0 for n in range(1, 7)}})
     )
 
 
-def test_clearance_check_agrees_with_the_distances_of_all_pairs():
+def test_the_clearance_check_agrees_with_the_distances_of_all_pairs():
     """Every pair's distance, one by one, is the reference for the pruned check."""
     model = pinocchio.buildModelFromUrdf(str(TALOS.urdf_path))
     clearance = Clearance(TALOS, model, tool_of(Config().tool))
@@ -247,7 +247,7 @@ def test_clearance_check_agrees_with_the_distances_of_all_pairs():
 
 
 class Unknowing:
-    """Takes no posture for clear, so that all links are checked in every posture."""
+    """Knows no posture to be clear, so that all links are checked in every posture."""
 
     def find_unknown(self, postures):
         return np.ones(len(postures), bool)
