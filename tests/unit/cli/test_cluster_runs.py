@@ -91,7 +91,7 @@ def test_logs_of_a_cluster_run_are_followed_until_it_ends(
     monkeypatch.setattr(cluster_runs, "follow", follow)
     cluster_runs.print_logs(run, [], until_end=True)
     assert capsys.readouterr().out.splitlines() == ["0 | begins", "0 | half", "1 | ends"]
-    # A task that is named may still wait for a node.
+    # A task that has not begun yet may be named; its log is printed once it has one.
     logs.clear()
     cluster_runs.print_logs(run, ["1"], until_end=True)
     assert capsys.readouterr().out.splitlines() == ["1 | ends"]

@@ -21,7 +21,7 @@ QUEUE = """\
 def test_a_task_that_slurm_warns_of_its_time_limit_counts_as_running(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Otherwise its slice would be submitted once more."""
+    """If the task counted as ended, its slice would be submitted once more."""
     (tmp_path / "squeue").write_text(f"#!/bin/sh\ncat <<END\n{QUEUE}END\n")
     (tmp_path / "squeue").chmod(0o755)
     monkeypatch.setenv("PATH", f"{tmp_path}:/usr/bin:/bin")

@@ -90,7 +90,7 @@ def test_a_replay_process_begun_early_that_fails_is_replaced(check, digests, sta
 
 
 @pytest.mark.parametrize("early", [False, True])
-def test_a_trial_that_replays_otherwise_is_an_error(check, digests, early) -> None:
+def test_a_trial_that_replays_differently_is_an_error(check, digests, early) -> None:
     if early:
         check.begin(NUMBERS)
     with pytest.raises(DatasetError, match=f"1 of 2 trials came out differently in a fresh process: trial {CHOSEN[1]}"):

@@ -104,7 +104,7 @@ def test_resuming_a_finished_dataset_changes_no_file(trials: Trials, dataset: Pa
 
 
 def test_resume_keeps_a_configuration_of_an_earlier_version(trials: Trials, promised: Path) -> None:
-    """It has fewer keys than a configuration has now, and the manifest has its size and hash."""
+    """The configuration lacks keys that were added later, and the manifest has its size and hash."""
     path = promised / "config.yaml"
     earlier = path.read_text()[: path.read_text().index("cluster:")]
     path.write_text(earlier)

@@ -14,7 +14,7 @@ SHARD = "quick_00001.mcap"
 
 
 FIRST = 3
-"""The first trial of that shard."""
+"""The first trial of `SHARD`."""
 
 
 def find_stored(path: Path, trial: int) -> StoredEpisode:

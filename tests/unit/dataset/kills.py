@@ -12,7 +12,7 @@ import pytest
 
 
 class Killed(BaseException):
-    """Stands for the end of the process: no later call has an effect."""
+    """Raised where the process would die; every later call that changes a file raises it again."""
 
 
 class KilledAt:

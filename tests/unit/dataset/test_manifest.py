@@ -85,7 +85,7 @@ def test_a_flipped_bit_in_any_file_is_found(derived: Path, tmp_path: Path) -> No
 
 
 def test_a_flipped_bit_in_the_footer_of_a_table_is_found_in_that_file(dataset: Path) -> None:
-    """Readers of the columns do not notice such a flip."""
+    """Only the hash of the file shows such a flip, as readers of the columns do not use these bytes."""
     for name in ("plan.parquet", "throws.parquet"):
         path = dataset / name
         whole = path.read_bytes()

@@ -102,7 +102,7 @@ def test_a_report_without_plotly_says_what_to_install(
     assert raised.value.hint == "pip install 'throwcollect[report]'"
 
 
-def test_the_report_command_writes_beside_the_dataset_and_prints_what(dataset: Path, tmp_path: Path) -> None:
+def test_the_report_command_writes_beside_the_dataset_and_prints_a_summary(dataset: Path, tmp_path: Path) -> None:
     printed = CliRunner().invoke(dataset_app, ["report", str(dataset), "--json"])
     assert printed.exit_code == 0, printed.output
     found = json.loads(printed.output)

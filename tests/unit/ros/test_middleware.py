@@ -21,7 +21,7 @@ ZENOH, OTHER = Middleware("rclpy", "rmw_zenoh_cpp"), Middleware("rclpy", "rmw_cy
 @pytest.fixture(autouse=True)
 def _fresh(monkeypatch):
     for variable in (VARIABLE, RMW_VARIABLE):
-        # Both calls, so that monkeypatch removes whatever a test leaves there.
+        # After both calls, monkeypatch removes the variable at the end even if the test has set it.
         monkeypatch.setenv(variable, "")
         monkeypatch.delenv(variable)
     _choose_installed.cache_clear()
@@ -31,7 +31,7 @@ def _fresh(monkeypatch):
 
 @pytest.fixture
 def rclpy(monkeypatch):
-    """As if rclpy with two RMWs were there."""
+    """Pretends that rclpy is installed with two RMWs."""
     monkeypatch.setattr("throwcollect.ros.middleware.missing", list)
     monkeypatch.setattr("throwcollect.ros.middleware.rmws", lambda: ["rmw_fastrtps_cpp", "rmw_cyclonedds_cpp"])
 

@@ -99,7 +99,8 @@ def test_a_node_that_a_signal_ends_is_reported_with_that_signal(runtime: LocalNo
     runtime.start(node("import time; time.sleep(60)"))
     runtime.signal("node", signal.SIGKILL)
     assert wait_for_end(runtime).reason == "ended by SIGKILL"
-    runtime.signal("node", signal.SIGKILL)  # gone, so left alone
+    # A signal to a node that has ended is ignored.
+    runtime.signal("node", signal.SIGKILL)
 
 
 def test_the_readiness_and_the_log_of_a_node_outlive_it(runtime: LocalNodes) -> None:

@@ -105,7 +105,8 @@ def test_killing_a_node_leaves_other_nodes_alive(start_there) -> None:
     killed.send_signal(signal.SIGKILL)
     assert killed.wait(WAIT_S) == -signal.SIGKILL
     assert other.poll() is None
-    killed.send_signal(signal.SIGTERM)  # Its process id may be somebody else's by now.
+    # No signal may be sent to the id of an ended process, as another process may have that id by now.
+    killed.send_signal(signal.SIGTERM)
     assert killed.wait(0.0) == -signal.SIGKILL
 
 

@@ -72,10 +72,10 @@ def test_rebuild_says_what_it_wrote(run: Run, source: Path, capsys: pytest.Captu
     }
 
 
-def test_rebuild_lists_throws_that_are_judged_otherwise_than_before(
+def test_rebuild_lists_throws_that_are_judged_differently_than_before(
     run: Run, source: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """As in a dataset that is older than one of the outcomes."""
+    """The table has wrong outcomes, as in a dataset that is older than one of the outcomes."""
     table = pq.read_table(source / "throws.parquet")
     card, metadata = (source / "README.md").read_text(), (source / "metadata.yaml").read_bytes()
 

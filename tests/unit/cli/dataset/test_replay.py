@@ -48,7 +48,7 @@ def test_replay_counts_the_throws_that_are_the_same_again(
     assert capsys.readouterr().out == "data: 2 throws replayed, the same bit for bit\n"
 
 
-def test_a_throw_that_replays_otherwise_is_an_error_and_its_differences_are_printed(
+def test_a_throw_that_replays_differently_is_an_error_and_its_differences_are_printed(
     chosen: list[int], capsys: pytest.CaptureFixture[str]
 ) -> None:
     with pytest.raises(DatasetError, match="data: 1 of 2 throws came out differently"):

@@ -50,7 +50,7 @@ def test_without_an_engine_verify_names_the_missing_package_and_no_replay_comman
     assert "--replay" not in second
 
 
-def test_a_throw_that_replays_otherwise_is_a_finding_of_verify(
+def test_a_throw_that_replays_differently_is_a_finding_of_verify(
     source: Path, replays: list[int], capsys: pytest.CaptureFixture[str]
 ) -> None:
     with pytest.raises(DatasetError, match="1 finding"):

@@ -288,7 +288,7 @@ def test_a_wrong_argument_gives_one_clear_message_and_exit_code_2(
     said = say(*words)
     assert (said.code, said.out) == (2, "")
     assert message in said.err
-    # The robot logs to the same stream, maybe before the command.
+    # The robot logs to the same stream, so its lines may come before the message of the command.
     assert "\nthrowcollect: " in f"\n{said.err}"
     assert "internal error" not in said.err
 
@@ -407,7 +407,7 @@ def test_ctrl_c_cancels_the_goal_of_action_send(endpoint: str, joints: str, line
     assert process.stdout is not None
     while not process.stdout.readline().startswith(line):
         assert process.poll() is None
-    # Until the goal is sent; "late" goals are accepted after the signal.
+    # This is time enough to send the goal; a "late" goal is accepted only after the signal.
     time.sleep(0.2)
     process.send_signal(signal.SIGINT)
     out, err = process.communicate(timeout=10)
