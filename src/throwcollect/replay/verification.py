@@ -64,7 +64,7 @@ def _replay_findings(directory: Path, count: int) -> Iterator[Finding]:
         shards = dataset.throws["shard"].to_pylist()
         for comparison in replay_throws(directory, select_trials(dataset, sample=count)):
             if comparison.differences:
-                problem = f"comes out otherwise: {'; '.join(comparison.differences)}"
+                problem = f"comes out differently: {'; '.join(comparison.differences)}"
                 yield Finding(shards[comparison.trial], f"trial {comparison.trial}", problem)
     except DatasetError as error:
         # What it recommends is the command that has called this.

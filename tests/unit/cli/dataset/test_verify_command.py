@@ -57,7 +57,7 @@ def test_a_throw_that_replays_differently_is_a_finding_of_verify(
         verify_dataset(source, replay=100, json=True)
     assert replays == [0, 1, 2]
     assert json.loads(capsys.readouterr().out) == [
-        {"file": "quick_00000.mcap", "place": "trial 1", "problem": "comes out otherwise: effort: otherwise"}
+        {"file": "quick_00000.mcap", "place": "trial 1", "problem": "comes out differently: effort: otherwise"}
     ]
 
 
