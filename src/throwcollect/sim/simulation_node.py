@@ -67,7 +67,7 @@ DESCRIPTION = "robot_description"
 _NOT_RECORDED = (_FACTOR, DESCRIPTION)
 """Parameters that change nothing that is recorded, so clients may set them during a trial.
 
-A lower real-time factor waits for the end of the trial, as the coordinator would think that the simulation hangs."""
+A real-time factor so low that the coordinator would think that the simulation hangs is refused during a trial."""
 _NO_LIMIT = 0.0
 _FACTORS = f"a number from {SLOWEST} to {FASTEST}, or 0 for no limit"
 _HIDDEN = (Effect.PLAN, Effect.RUN)

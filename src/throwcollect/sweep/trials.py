@@ -1,4 +1,4 @@
-"""Trials as a plan holds them: in columns of some 80 bytes per trial, from which single trials are made on demand."""
+"""Holds the trials of a plan in columns of some 80 bytes per trial, from which single trials are made on demand."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ class Trial:
     """One numbered point of the sweep.
 
     Attributes:
-        number: From 0.
+        number: Number of the trial in its plan, from 0.
         values: Value of each swept dotted key, in the key's unit.
         seed: Seed for anything random in the trial, from the root seed and the number; fits uint64.
         digest: SHA-256 in hex over everything that determines the trial's samples.
-        refused: Why the trial is not run, or None.
-        target: Place where it should end, by column; empty if it has none. The simulation does not depend on it.
+        refused: Why the trial is not run; None if it is run.
+        target: Place where the trial should end, by column; empty if it has none. The simulation does not depend on it.
     """
 
     number: int
@@ -118,10 +118,10 @@ class Trials(Sequence[Trial]):
     @overload
     def __getitem__(self, which: slice) -> Trials: ...
     def __getitem__(self, which: int | slice) -> Trial | Trials:
-        """Return the trial at a position, or those of a slice without gaps.
+        """Return the trial at a position, or the trials of a Python slice without gaps.
 
         Raises:
-            IndexError: If there are not so many.
+            IndexError: If there is no trial at that position.
             ValueError: If the slice has gaps.
         """
         # A range takes negative positions and slices, and raises the IndexError.
@@ -157,7 +157,8 @@ class Trials(Sequence[Trial]):
         """Append trials.
 
         Raises:
-            ValueError: If they do not begin where these end, vary other keys, or have other columns of targets.
+            ValueError: If the others do not begin where these trials end, vary other keys, or have other columns of
+                targets.
         """
         names = (others.keys, others.target_names)
         if others.first != self.numbers.stop or names != (self.keys, self.target_names):
