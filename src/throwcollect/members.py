@@ -78,12 +78,12 @@ _left_out: set[str] = set()
 def leave_out_others() -> None:
     """Leave out members of other packages in this process; it must be called before names of members are asked for."""
     _left_out.update(_OWN)
-    _table.cache_clear()
+    _find_members.cache_clear()
 
 
 def names_of(family: str) -> tuple[str, ...]:
     """List the names of the members of a family: our own first, then those of other packages, by name."""
-    return tuple(_table()[family])
+    return tuple(_find_members()[family])
 
 
 @cache
@@ -100,7 +100,7 @@ def load_member(family: str, name: str) -> Any:
         ConfigError: If the member comes from another package, and cannot be imported or does not fit the family.
         ImportError: If the member is our own, and a package that it needs cannot be imported.
     """
-    entry = _table()[family][name]
+    entry = _find_members()[family][name]
     if name in _OWN[family]:
         return entry.load()
     what, namesakes = _describe(family, name), _find_namesakes(family, name)
@@ -212,7 +212,7 @@ def _name_owner(entry: EntryPoint) -> str:
 
 
 @cache
-def _table() -> Mapping[str, Mapping[str, EntryPoint]]:
+def _find_members() -> Mapping[str, Mapping[str, EntryPoint]]:
     """Find all members, by family and name.
 
     All families are looked up together, because Python reads the files of all installed packages each time that it
@@ -220,10 +220,10 @@ def _table() -> Mapping[str, Mapping[str, EntryPoint]]:
     """
     select = entry_points().select
     added = {family: () if family in _left_out else select(group=f"throwcollect.{family}") for family in _OWN}
-    return MappingProxyType({family: _members_of(family, entries) for family, entries in added.items()})
+    return MappingProxyType({family: _join_members(family, entries) for family, entries in added.items()})
 
 
-def _members_of(family: str, added: Iterable[EntryPoint]) -> Mapping[str, EntryPoint]:
+def _join_members(family: str, added: Iterable[EntryPoint]) -> Mapping[str, EntryPoint]:
     own = {name: EntryPoint(name, path, f"throwcollect.{family}") for name, path in _OWN[family].items()}
     others = {entry.name: entry for entry in sorted(added, key=lambda entry: entry.name)}
     # No package may replace a member of our own, or a configuration would mean something else where the package is.

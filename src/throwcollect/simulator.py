@@ -117,8 +117,8 @@ class Simulator:
             raise ConfigError([Problem(reason, key=name) for name, reason in wrong.items()])
         # This checks the keys, too, which `make_trials` does not.
         refused = self.find_refusal(point)
-        wanted = None if target is None else Targets(tuple(target), _row(target))
-        points = Points(tuple(point), _row(point), wanted)
+        wanted = None if target is None else Targets(tuple(target), _make_row(target))
+        points = Points(tuple(point), _make_row(point), wanted)
         (planned,) = make_trials(self.config, points, first=trial)
         if refused is not None:
             raise PlanError([Problem(refused)], hint="a collection would leave this trial out, as refused")
@@ -211,7 +211,7 @@ def _locate(problem: Problem, index: int, point: Point) -> Problem:
     return Problem(f"{problem.message} ({values or 'with no value of its own'})", place, argument=True)
 
 
-def _row(values: Point) -> NDArray[np.float64]:
+def _make_row(values: Point) -> NDArray[np.float64]:
     """Make a table of values as its only row, shape ``(1, n_values)``."""
     return np.array([list(values.values())], np.float64).reshape(1, len(values))
 

@@ -110,9 +110,9 @@ def full_description(config: Config) -> str:
 
 def _write_full(robot: Robot, tool: Tool) -> str:
     description = _read_description(robot)
-    description.append(_tool_link(tool, visual=True))
-    description.append(_tool_joint(tool, robot.hand, tool.mount))
-    return _text(description)
+    description.append(_make_tool_link(tool, visual=True))
+    description.append(_make_tool_joint(tool, robot.hand, tool.mount))
+    return _write_text(description)
 
 
 def touchable_bodies(config: Config) -> frozenset[str]:
@@ -157,24 +157,24 @@ def physics_description(config: Config) -> Description:
     source, whole = _read_whole(robot)
     model = lock_joints(whole, locked)
     joints = {joint.get("name"): joint for joint in source.iter("joint")}
-    names = [_root_link(source), *(_child(joints[name]) for name in model.names[1:])]
+    names = [_find_root_link(source), *(_find_child(joints[name]) for name in model.names[1:])]
 
     description = ElementTree.Element("robot", name=source.get("name", robot.name))
     for number, name in enumerate(names):
-        description.append(_link(name, model.inertias[number], _collect_shapes(robot, source, model, number)))
+        description.append(_make_link(name, model.inertias[number], _collect_shapes(robot, source, model, number)))
     for number in range(1, model.njoints):
         joint = ElementTree.SubElement(description, "joint", name=model.names[number], type="revolute")
         ElementTree.SubElement(joint, "parent", link=names[model.parents[number]])
         ElementTree.SubElement(joint, "child", link=names[number])
-        joint.append(_origin(model.jointPlacements[number]))
+        joint.append(_make_origin(model.jointPlacements[number]))
         for tag in ("axis", "limit", "dynamics"):
             # The elements are copied, because writing the text indents each element, perhaps in another thread.
             joint.extend(copy.deepcopy(joints[model.names[number]].findall(tag)))
     hand = model.frames[model.getFrameId(robot.hand, pinocchio.BODY)]
-    description.append(_tool_link(tool, visual=False))
-    description.append(_tool_joint(tool, names[hand.parentJoint], hand.placement * tool.mount))
+    description.append(_make_tool_link(tool, visual=False))
+    description.append(_make_tool_joint(tool, names[hand.parentJoint], hand.placement * tool.mount))
     moving = tuple(joint for joint in robot.joints if joint not in locked)
-    return Description(urdf=_text(description), moving=moving, locked=locked)
+    return Description(urdf=_write_text(description), moving=moving, locked=locked)
 
 
 def _read_description(robot: Robot) -> ElementTree.Element:
@@ -252,7 +252,7 @@ def _collect_shapes(
             continue
         for original in link.findall("collision"):
             shape = ElementTree.Element("collision")
-            shape.append(_origin(frame.placement * _read_origin(original)))
+            shape.append(_make_origin(frame.placement * _read_origin(original)))
             geometry = ElementTree.SubElement(shape, "geometry")
             geometry.extend(copy.deepcopy(list(original.iterfind("geometry/*"))))
             for mesh in geometry.iter("mesh"):
@@ -262,44 +262,46 @@ def _collect_shapes(
     return shapes
 
 
-def _link(name: str, body: pinocchio.Inertia, shapes: list[ElementTree.Element]) -> ElementTree.Element:
+def _make_link(name: str, body: pinocchio.Inertia, shapes: list[ElementTree.Element]) -> ElementTree.Element:
     link = ElementTree.Element("link", name=name)
     inertial = ElementTree.SubElement(link, "inertial")
-    inertial.append(_origin(pinocchio.SE3(np.eye(3), body.lever)))
-    ElementTree.SubElement(inertial, "mass", value=_number(body.mass))
+    inertial.append(_make_origin(pinocchio.SE3(np.eye(3), body.lever)))
+    ElementTree.SubElement(inertial, "mass", value=_format_number(body.mass))
     keys = {"ixx": (0, 0), "ixy": (0, 1), "ixz": (0, 2), "iyy": (1, 1), "iyz": (1, 2), "izz": (2, 2)}
-    ElementTree.SubElement(inertial, "inertia", {key: _number(body.inertia[place]) for key, place in keys.items()})
+    ElementTree.SubElement(
+        inertial, "inertia", {key: _format_number(body.inertia[place]) for key, place in keys.items()}
+    )
     link.extend(shapes)
     return link
 
 
-def _tool_link(tool: Tool, *, visual: bool) -> ElementTree.Element:
+def _make_tool_link(tool: Tool, *, visual: bool) -> ElementTree.Element:
     shapes = []
     for kind in ("visual", "collision") if visual else ("collision",):
         for box in tool.boxes:
             shape = ElementTree.Element(kind)
-            shape.append(_origin(box.placement))
+            shape.append(_make_origin(box.placement))
             geometry = ElementTree.SubElement(shape, "geometry")
-            ElementTree.SubElement(geometry, "box", size=" ".join(map(_number, box.size)))
+            ElementTree.SubElement(geometry, "box", size=" ".join(map(_format_number, box.size)))
             shapes.append(shape)
-    return _link(tool.link, tool.inertia, shapes)
+    return _make_link(tool.link, tool.inertia, shapes)
 
 
-def _tool_joint(tool: Tool, parent: str, placement: pinocchio.SE3) -> ElementTree.Element:
+def _make_tool_joint(tool: Tool, parent: str, placement: pinocchio.SE3) -> ElementTree.Element:
     joint = ElementTree.Element("joint", name=f"{tool.name}_joint", type="fixed")
     ElementTree.SubElement(joint, "parent", link=parent)
     ElementTree.SubElement(joint, "child", link=tool.link)
-    joint.append(_origin(placement))
+    joint.append(_make_origin(placement))
     return joint
 
 
-def _child(joint: ElementTree.Element) -> str:
+def _find_child(joint: ElementTree.Element) -> str:
     child = joint.find("child")
     return child.get("link", "") if child is not None else ""
 
 
-def _root_link(source: ElementTree.Element) -> str:
-    children = {_child(joint) for joint in source.iter("joint")}
+def _find_root_link(source: ElementTree.Element) -> str:
+    children = {_find_child(joint) for joint in source.iter("joint")}
     return next(name for link in source.iter("link") if (name := link.get("name", "")) not in children)
 
 
@@ -311,17 +313,17 @@ def _read_origin(element: ElementTree.Element) -> pinocchio.SE3:
     return pinocchio.SE3(pinocchio.rpy.rpyToMatrix(*rpy), np.array(xyz))
 
 
-def _origin(placement: pinocchio.SE3) -> ElementTree.Element:
+def _make_origin(placement: pinocchio.SE3) -> ElementTree.Element:
     angles = pinocchio.rpy.matrixToRpy(placement.rotation)
     return ElementTree.Element(
-        "origin", xyz=" ".join(map(_number, placement.translation)), rpy=" ".join(map(_number, angles))
+        "origin", xyz=" ".join(map(_format_number, placement.translation)), rpy=" ".join(map(_format_number, angles))
     )
 
 
-def _number(value: float) -> str:
+def _format_number(value: float) -> str:
     return repr(float(value))
 
 
-def _text(robot: ElementTree.Element) -> str:
+def _write_text(robot: ElementTree.Element) -> str:
     ElementTree.indent(robot)
     return ElementTree.tostring(robot, encoding="unicode", xml_declaration=True) + "\n"

@@ -107,14 +107,14 @@ class Feasibility:
         limits = self._limits
         # About the middle of its range, a joint has one limit in both directions.
         middle, half = (limits.upper + limits.lower) / 2, (limits.upper - limits.lower) / 2
-        if worst := _worst(positions - middle, half + _POSITION_SLACK_RAD):
+        if worst := _find_worst(positions - middle, half + _POSITION_SLACK_RAD):
             row, joint = worst
             side, limit = ("upper", limits.upper) if positions[worst] > middle[joint] else ("lower", limits.lower)
             return (
                 f"{joints[joint]} is at {positions[worst]:.4g} rad at {times[row]:.3f} s; "
                 f"its {side} limit is {limit[joint]:.4g} rad"
             )
-        if worst := _worst(velocities, limits.velocity):
+        if worst := _find_worst(velocities, limits.velocity):
             row, joint = worst
             return (
                 f"{joints[joint]} moves at {abs(velocities[worst]):.4g} rad/s at {times[row]:.3f} s; "
@@ -128,7 +128,7 @@ class Feasibility:
         if (shares_of(efforts, limit) <= _SURELY).all():
             return None
         efforts = self._dynamics.efforts(config, tool, motion)
-        if worst := _worst(efforts, limit):
+        if worst := _find_worst(efforts, limit):
             row, joint = worst
             return (
                 f"{joints[joint]} needs {abs(efforts[worst]):.4g} Nm at {times[row]:.3f} s; "
@@ -195,7 +195,7 @@ def _choose_rows(positions: NDArray[np.float64]) -> NDArray[np.intp]:
     return np.append(0, np.flatnonzero(passed) + 1)
 
 
-def _worst(values: NDArray[np.float64], limits: NDArray[np.float64]) -> tuple[int, int] | None:
+def _find_worst(values: NDArray[np.float64], limits: NDArray[np.float64]) -> tuple[int, int] | None:
     """Find row and column of the largest magnitude over its limit; None if no limit is exceeded."""
     shares = shares_of(values, limits)
     row, column = np.unravel_index(int(np.argmax(shares)), shares.shape)

@@ -32,7 +32,7 @@ def sample_quintic(
     coefficients, u, spans = _find_polynomials(trajectory, times)
     first = coefficients[1:] * _ORDERS[1:, np.newaxis, np.newaxis]
     second = first[1:] * _ORDERS[1:-1, np.newaxis, np.newaxis]
-    return _values(coefficients, u).T, (_values(first, u) / spans).T, (_values(second, u) / spans**2).T
+    return _evaluate(coefficients, u).T, (_evaluate(first, u) / spans).T, (_evaluate(second, u) / spans**2).T
 
 
 def sample_positions(trajectory: JointTrajectory, times: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -42,7 +42,7 @@ def sample_positions(trajectory: JointTrajectory, times: NDArray[np.float64]) ->
         ValueError: If the trajectory has fewer than two points.
     """
     coefficients, u, _ = _find_polynomials(trajectory, times)
-    return _values(coefficients, u).T
+    return _evaluate(coefficients, u).T
 
 
 def _find_polynomials(
@@ -75,7 +75,7 @@ def _find_polynomials(
     return np.ascontiguousarray(rows.T).reshape(*coefficients.shape[1:], len(times)), u, spans
 
 
-def _values(coefficients: NDArray[np.float64], u: NDArray[np.float64]) -> NDArray[np.float64]:
+def _evaluate(coefficients: NDArray[np.float64], u: NDArray[np.float64]) -> NDArray[np.float64]:
     """Evaluate polynomials in u, ``(n_joints, n)``; coefficients ``(n_orders, n_joints, n)``, lowest order first."""
     values: NDArray[np.float64] = coefficients[-1].copy()
     for coefficient in coefficients[-2::-1]:

@@ -100,17 +100,17 @@ class InverseModel:
         slopes, inverses = self._fit_linear_models(distinct)
         slope, inverse = slopes[which], inverses[which]
         start, landing, goal = self._landed.points[bases], self._landings.points[bases], flat[:, np.newaxis]
-        step = _product(inverse, goal - landing)
+        step = _multiply(inverse, goal - landing)
         length = np.sqrt((step**2).sum(axis=-1, keepdims=True))
         # A linear model says little about places far from its neighbours.
         step *= _LONGEST_STEP / np.maximum(length, _LONGEST_STEP)
         along = _ALONG_NOISE * randomness.standard_normal(step.shape)
         # This takes away the part of the noise that, by the model, moves the landing.
-        along -= _product(inverse, _product(slope, along))
+        along -= _multiply(inverse, _multiply(slope, along))
         ends = start + step + along + _NOISE * randomness.standard_normal(step.shape)
         # `spread` takes places below 1.
         ends = np.clip(ends, 0.0, 1.0 - 1e-9)
-        missing = landing + _product(slope, ends - start) - goal
+        missing = landing + _multiply(slope, ends - start) - goal
         error = np.sqrt((missing**2).sum(axis=-1))
         near = self._all.find(ends.reshape(-1, ends.shape[-1]), _FAILURE_NEIGHBOURS)[1]
         failing = 1.0 - self._success.all[near].mean(axis=-1).reshape(error.shape)
@@ -143,5 +143,5 @@ class InverseModel:
         return slopes, np.swapaxes(solve(damped, slopes), 1, 2)
 
 
-def _product(matrices: NDArray[np.float64], vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+def _multiply(matrices: NDArray[np.float64], vectors: NDArray[np.float64]) -> NDArray[np.float64]:
     return matmul(matrices, vectors[..., np.newaxis])[..., 0]

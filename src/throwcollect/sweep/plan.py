@@ -123,7 +123,7 @@ class Plan:
         metadata = {_FORMAT_KEY: _FORMAT, _CONFIG_KEY: config_digest(self.config)}
         if self.slice is not None:
             metadata[_SLICE_KEY] = str(self.slice)
-        schema = _schema(self.keys, trials.target_names).with_metadata(metadata)
+        schema = _make_schema(self.keys, trials.target_names).with_metadata(metadata)
         return encode_table(make_table(columns, schema))
 
     @classmethod
@@ -147,7 +147,11 @@ class Plan:
             keys = tuple(name for name in columns if not is_target(name))
             targets = tuple(name for name in columns if is_target(name))
             version = metadata.get(_FORMAT_KEY, b"none").decode(errors="replace")
-            if version != _FORMAT or not file.schema_arrow.equals(_schema(keys, targets)) or not file.metadata.num_rows:
+            if (
+                version != _FORMAT
+                or not file.schema_arrow.equals(_make_schema(keys, targets))
+                or not file.metadata.num_rows
+            ):
                 raise DatasetError(
                     "not a plan that this version reads",
                     path=path,
@@ -292,7 +296,7 @@ def _make_trials_of(rows: Any, keys: tuple[str, ...], targets: tuple[str, ...], 
     )
 
 
-def _schema(keys: Sequence[str], targets: Sequence[str]) -> Any:
+def _make_schema(keys: Sequence[str], targets: Sequence[str]) -> Any:
     import pyarrow as pa
 
     kinds = {"trial": pa.int64(), "digest": pa.string(), "seed": pa.uint64(), "refused": pa.string()}

@@ -57,11 +57,11 @@ def draw_points(config: Config, *, directory: Path) -> Points:
     return Points(tuple(sweep.parameters), np.column_stack(columns))
 
 
-def _uniform(count: int, dimensions: int, randomness: np.random.Generator) -> NDArray[np.float64]:
+def _draw_uniform(count: int, dimensions: int, randomness: np.random.Generator) -> NDArray[np.float64]:
     return randomness.random((count, dimensions))
 
 
-def _latin_hypercube(count: int, dimensions: int, randomness: np.random.Generator) -> NDArray[np.float64]:
+def _draw_latin_hypercube(count: int, dimensions: int, randomness: np.random.Generator) -> NDArray[np.float64]:
     """Draw points so that each of `count` equal strips along each key holds one; SciPy draws the same points."""
     # SciPy's samplers spawn a generator from the one that they are given, and draw from the spawned one.
     (own,) = randomness.spawn(1)
@@ -72,7 +72,7 @@ def _latin_hypercube(count: int, dimensions: int, randomness: np.random.Generato
     return np.asarray((strips.T - places) / count)
 
 
-def _sobol(count: int, dimensions: int, randomness: np.random.Generator) -> NDArray[np.float64]:
+def _draw_sobol(count: int, dimensions: int, randomness: np.random.Generator) -> NDArray[np.float64]:
     if dimensions > MOST_DIMENSIONS:
         raise PlanError(
             [Problem(f"{dimensions} keys are swept", key="sweep.parameters")],
@@ -83,7 +83,7 @@ def _sobol(count: int, dimensions: int, randomness: np.random.Generator) -> NDAr
 
 
 UNIT_SAMPLERS = MappingProxyType[str, UnitSampler](
-    {"uniform": _uniform, "latin_hypercube": _latin_hypercube, "sobol": _sobol}
+    {"uniform": _draw_uniform, "latin_hypercube": _draw_latin_hypercube, "sobol": _draw_sobol}
 )
 """Samplers that fill the unit cube, by their names in `sweep.sampler`."""
 
@@ -118,7 +118,7 @@ def places(parameter: Parameter, values: NDArray[np.float64]) -> NDArray[np.floa
 
 
 def _draw_grid(parameters: dict[str, Parameter], trials: int | None) -> Points:
-    size = math.prod(len(key.values) if isinstance(key, Values) else _count(key) for key in parameters.values())
+    size = math.prod(len(key.values) if isinstance(key, Values) else _require_count(key) for key in parameters.values())
     if trials is None and size > MOST_TRIALS:
         raise PlanError(
             [Problem(f"the grid has {size} points", key="sweep.parameters")], expected=f"at most {MOST_TRIALS}"
@@ -137,14 +137,14 @@ def _list_grid_values(parameter: Parameter) -> NDArray[np.float64]:
     if isinstance(parameter, Values):
         return np.array(parameter.values)
     if parameter.scale == "linear":
-        return np.linspace(parameter.min, parameter.max, _count(parameter))
-    axis = spread(parameter, np.linspace(0, 1, _count(parameter)))
+        return np.linspace(parameter.min, parameter.max, _require_count(parameter))
+    axis = spread(parameter, np.linspace(0, 1, _require_count(parameter)))
     # The exponential of a number's logarithm is not always exactly that number.
     axis[[0, -1]] = parameter.min, parameter.max
     return axis
 
 
-def _count(parameter: Range) -> int:
+def _require_count(parameter: Range) -> int:
     if parameter.count is None:
         raise ValueError("a range without count has no grid points")
     return parameter.count

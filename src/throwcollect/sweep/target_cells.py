@@ -94,7 +94,7 @@ class Thinness:
     ) -> None:
         self._missed = missed
         self._doubted = np.zeros(len(missed), dtype=np.bool_)
-        self._score = landed + asked + _futile(missed) + np.maximum(away - 1, 0) ** 2
+        self._score = landed + asked + _penalise(missed) + np.maximum(away - 1, 0) ** 2
         # A throw counts 1, so this small number decides only between equal scores.
         self._score += _TIE * randomness.permutation(len(missed)) / len(missed)
 
@@ -118,10 +118,10 @@ class Thinness:
         np.subtract.at(self._score, cells[fresh], 1)
         doubted = np.unique(cells[fresh])
         self._doubted[doubted] = True
-        self._score[doubted] += _futile(self._missed[doubted] + _DOUBT) - _futile(self._missed[doubted])
+        self._score[doubted] += _penalise(self._missed[doubted] + _DOUBT) - _penalise(self._missed[doubted])
         return fresh
 
 
-def _futile(missed: NDArray[np.int64]) -> NDArray[np.float64]:
+def _penalise(missed: NDArray[np.int64]) -> NDArray[np.float64]:
     # `ldexp` computes exact powers of two on all machines; the bound keeps them finite.
     return np.ldexp(1.0, np.clip(missed - 1, 0, _MOST_DOUBLINGS)) - 1

@@ -127,7 +127,7 @@ class Trials(Sequence[Trial]):
         # A range takes negative positions and slices, and raises the IndexError.
         chosen = self.numbers[which]
         if isinstance(chosen, int):
-            return self._trial(chosen)
+            return self._make_trial(chosen)
         if chosen.step != 1:
             raise ValueError(f"trials have no gaps: {which}")
         rows = slice(chosen.start - self.first, chosen.stop - self.first)
@@ -135,7 +135,7 @@ class Trials(Sequence[Trial]):
         return Trials(self.points[rows], self.seeds[rows], self.digests[rows], first=chosen.start, refused=refused)
 
     def __iter__(self) -> Iterator[Trial]:
-        return map(self._trial, self.numbers)
+        return map(self._make_trial, self.numbers)
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Trials):
@@ -175,7 +175,7 @@ class Trials(Sequence[Trial]):
         refused = {number: reason for number, reason in pairs if reason is not None}
         return Trials(self.points, self.seeds, self.digests, first=self.first, refused=refused)
 
-    def _trial(self, number: int) -> Trial:
+    def _make_trial(self, number: int) -> Trial:
         row = number - self.first
         values = dict(zip(self.keys, self.values[row].tolist(), strict=True))
         digest = self.digests[row].tobytes().hex()

@@ -35,8 +35,8 @@ def measure_joints(
     robot = robot_of(config)
     limits = joint_limits(robot)
     effort_limits = limits.effort * config.robot.effort_scale
-    velocity_peak = _peak(shares_of(np.abs(samples.velocity).max(axis=0), limits.velocity), robot.joints)
-    effort_peak = _peak(shares_of(np.abs(samples.effort).max(axis=0), effort_limits), robot.joints)
+    velocity_peak = _find_peak(shares_of(np.abs(samples.velocity).max(axis=0), limits.velocity), robot.joints)
+    effort_peak = _find_peak(shares_of(np.abs(samples.effort).max(axis=0), effort_limits), robot.joints)
     # A sum is not finite if any of its terms is not.
     if not math.isfinite(velocity_peak.share + effort_peak.share + samples.position.sum()):
         return None
@@ -53,7 +53,7 @@ def measure_joints(
         saturated = float((shares_of(samples.effort, effort_limits) >= _AT_LIMIT).any(axis=1).mean())
     return replace(
         result,
-        position_peak=_peak(positions, trajectory.joints),
+        position_peak=_find_peak(positions, trajectory.joints),
         velocity_peak=velocity_peak,
         effort_peak=effort_peak,
         effort_saturated_share=saturated,
@@ -89,6 +89,6 @@ def explain_violation(result: Result) -> str | None:
     return None
 
 
-def _peak(shares: NDArray[np.float64], joints: tuple[str, ...]) -> Peak:
+def _find_peak(shares: NDArray[np.float64], joints: tuple[str, ...]) -> Peak:
     column = int(shares.argmax())
     return Peak(joint=joints[column], share=float(shares[column]))

@@ -67,9 +67,9 @@ def _write_lines(
     yield "seed: 1 # everything that is random follows from it"
     yield ""
     yield "robot:"
-    yield f"  name: {robot} # {_choices(names_of('robots'))}"
+    yield f"  name: {robot} # {_list_choices(names_of('robots'))}"
     yield "task:"
-    yield f"  name: {task} # {_choices(names_of('tasks'))}"
+    yield f"  name: {task} # {_list_choices(names_of('tasks'))}"
     yield f"  duration_s: {duration_s:g} # how long the motion takes"
     yield f"  start: {value_as_yaml(dict(start))}"
     yield f"  end: {value_as_yaml(dict(end))} # the joints that move"
@@ -79,7 +79,7 @@ def _write_lines(
         yield "  engine: mujoco # bullet, the default, has no wheel for this Python"
     yield ""
     yield "sweep: # what varies from trial to trial: any number of any section, by its dotted key"
-    yield f"  sampler: {sampler} # {_choices(samplers())}"
+    yield f"  sampler: {sampler} # {_list_choices(samplers())}"
     if sampler == "list":
         yield f"  file: {POINTS} # one row a trial, one column a key"
         return
@@ -97,5 +97,5 @@ def _write_own_keys(section: type[TaskConfig]) -> Iterator[str]:
             yield f"{key}: {value_as_yaml(node['default'])}{f' # {meaning}' if meaning else ''}"
 
 
-def _choices(names: Iterable[str]) -> str:
+def _list_choices(names: Iterable[str]) -> str:
     return f"one of {', '.join(names)}"

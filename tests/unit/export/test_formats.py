@@ -190,12 +190,12 @@ def test_units_follow_from_names(column: str, unit: str) -> None:
 @pytest.fixture
 def with_csv(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """The package of `tests/plugins/csv_export` is installed."""
-    for cached in (members._table, load_member):
+    for cached in (members._find_members, load_member):
         cached.cache_clear()
     monkeypatch.syspath_prepend(PLUGINS)
     yield
     monkeypatch.undo()
-    members._table.cache_clear()
+    members._find_members.cache_clear()
 
 
 @pytest.mark.usefixtures("with_csv")
