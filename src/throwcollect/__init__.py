@@ -106,7 +106,7 @@ def __getattr__(name: str) -> object:
 
     Raises:
         AttributeError: If there is no such name.
-        MissingExtraError: If it needs an extra that is not installed.
+        MissingExtraError: If the object needs an extra that is not installed.
     """
     if name not in _PLACES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

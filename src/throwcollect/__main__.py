@@ -7,7 +7,7 @@ from throwcollect.interruption import leave_when_stopped
 
 def main() -> None:
     """Run the command line of this process and exit with its code."""
-    # The handlers come before all other imports: these take a while, and Ctrl-C within them would end in a traceback.
+    # The handlers come before all other imports, which take a while: Ctrl-C during them would end in a traceback.
     leave_when_stopped()
     from throwcollect.cli.streams import open_streams
     from throwcollect.own_process import claim_process

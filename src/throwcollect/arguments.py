@@ -1,6 +1,6 @@
-"""Checks arguments of functions that other programs call, and tells a wrong one by its name.
+"""Checks arguments of functions that other programs call; an error names the argument that is wrong.
 
-A command that takes such an argument by an option has its users read the name of that option.
+If a command takes the argument by an option, its message names the option instead.
 """
 
 from __future__ import annotations
@@ -21,27 +21,27 @@ _Word = TypeVar("_Word", bound=Enum)
 def refuse_argument(
     argument: str, problem: str, *, expected: str | None = None, hint: str | None = None
 ) -> ConfigError:
-    """Make the error that says what is wrong with an argument, of which `argument` is the name."""
+    """Make the error that says what is wrong with the argument of a name."""
     return ConfigError([Problem(problem, argument, argument=True)], expected=expected, hint=hint)
 
 
 def show_value(given: object) -> str:
-    """Write a value, a text in quotes, and cut it where a message would become too long."""
+    """Write a value for a message: put a text in quotes, and cut what is too long."""
     text = repr(given) if isinstance(given, str) else str(given)
     return text if len(text) <= _LONGEST_QUOTE else f"{text[:_LONGEST_QUOTE]}…"
 
 
 def check_list(argument: str, given: object, of: str, *, texts: bool = False) -> None:
-    """Refuse what is no list, as a text would be taken letter by letter, and a mapping key by key.
+    """Refuse a value that is no list; a text or a mapping, too, which would be taken letter by letter or key by key.
 
     Args:
         argument: Name of the argument.
-        given: Its value; what can be iterated over once is left as it is.
-        of: What it should be a list of, such as ``names``.
-        texts: Whether these are texts, so that a single one belongs into a list.
+        given: Its value; an iterator is not used up.
+        of: What the list should hold, such as ``names``.
+        texts: Whether the list should hold texts; if a single text is given, the message then shows it in a list.
 
     Raises:
-        ConfigError: If it is a text or a mapping, or cannot be iterated over.
+        ConfigError: If the value is a text or a mapping, or cannot be iterated over.
     """
     kind = "a text" if isinstance(given, str | bytes) else "a mapping" if isinstance(given, Mapping) else None
     if kind is None:
@@ -55,10 +55,10 @@ def check_list(argument: str, given: object, of: str, *, texts: bool = False) ->
 
 
 def read_list(argument: str, given: Any, of: str, kinds: tuple[type, ...] = (str,)) -> tuple[Any, ...]:
-    """Read a list whose elements are of these kinds; the other arguments are those of `check_list`.
+    """Read a list whose elements are of these kinds; see `check_list` for the other arguments.
 
     Raises:
-        ConfigError: If it is no list, or an element is of another kind.
+        ConfigError: If the value is no list, or an element is of another kind.
     """
     check_list(argument, given, of, texts=str in kinds)
     elements = tuple(given)
@@ -69,25 +69,25 @@ def read_list(argument: str, given: Any, of: str, kinds: tuple[type, ...] = (str
 
 
 def check_mapping(argument: str, given: object, example: str) -> None:
-    """Refuse what does not map keys to values, such as those of `example`.
+    """Refuse a value that does not map keys to values; `example` shows what is right.
 
     Raises:
-        ConfigError: If it is no mapping, or a key in it is no text.
+        ConfigError: If the value is no mapping, or a key in it is no text.
     """
     if not isinstance(given, Mapping) or not all(isinstance(key, str) for key in given):
         raise refuse_argument(argument, f"got {show_value(given)}", expected=f"a mapping, such as {example}")
 
 
 def is_whole(given: object) -> bool:
-    """Whether a value is a whole number; True and False are none."""
+    """Say whether a value is a whole number; True and False are not."""
     return isinstance(given, Integral) and not isinstance(given, bool)
 
 
 def check_whole_number(argument: str, given: Any, *, least: int, most: int | None = None) -> None:
-    """Refuse what is no whole number of at least `least`, and at most `most` if there is such a bound.
+    """Refuse a value that is not a whole number from `least` to `most`; None for no upper bound.
 
     Raises:
-        ConfigError: If it is none.
+        ConfigError: If the value is not such a number.
     """
     whole = is_whole(given)
     if not whole or given < least or (most is not None and given > most):
@@ -97,7 +97,7 @@ def check_whole_number(argument: str, given: Any, *, least: int, most: int | Non
 
 
 def as_float(given: Any) -> float:
-    """Make a number of a value; NaN if it is none, for a caller that refuses numbers that are not finite."""
+    """Convert a value to a number; return NaN if it is none, for callers that refuse numbers that are not finite."""
     try:
         return float(given)
     except (TypeError, ValueError, OverflowError):

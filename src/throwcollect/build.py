@@ -1,4 +1,4 @@
-"""One digest over everything that computes episodes: sources, physics engine, robot model, compression.
+"""Computes one digest over everything that computes episodes: sources, physics engine, robot model, compression.
 
 Two processes with the same digest compute the same episodes. A coordinator takes only episodes with its own digest.
 """
@@ -16,33 +16,33 @@ import rclzenoh
 from throwcollect.engine_packages import PACKAGES
 
 _PACKAGES = ("example-robot-data", "zstandard")
-"""Packages whose versions count with every engine."""
+"""Packages whose versions count for every engine."""
 _SOURCES = (".py", ".msg", ".srv", ".action", ".json")
 
 
 @cache
 def build_digest(engine: str) -> str:
-    """SHA-256, in hexadecimal, over the installed sources, and over versions of engine, model and added packages."""
+    """Hash the installed sources, and versions of engine, model and added packages; SHA-256, in hexadecimal."""
     digest = hashlib.sha256()
     root = Path(__file__).parents[1]
     # The ROS client counts, too, because it lays out the messages of an episode.
     packages = (Path(__file__).parent, Path(rclzenoh.__file__).parent)
     for path in sorted(path for package in packages for path in package.rglob("*") if path.suffix in _SOURCES):
         content = path.read_bytes()
-        # With its name and length before each file, bytes cannot move from one file to the next unnoticed.
+        # Each file's name and length come before its bytes, so bytes cannot move from one file to the next unnoticed.
         digest.update(f"{path.relative_to(root).as_posix()}\0{len(content)}\0".encode() + content)
-    for fact in _facts(engine):
+    for fact in _list_facts(engine):
         digest.update(fact.encode() + b"\n")
     return digest.hexdigest()
 
 
-def _facts(engine: str) -> Iterator[str]:
+def _list_facts(engine: str) -> Iterator[str]:
     for distribution in _PACKAGES:
         yield _version_of(distribution)
     if engine in PACKAGES:
         package = PACKAGES[engine]
         yield _version_of(package.distribution)
-        # Two builds of one version differ in size. A hash would take each node a second, as Bullet has 140 MB.
+        # Two builds of one version differ in size. Hashing would take each node a second, because Bullet has 140 MB.
         found = find_spec(package.module)
         beside = Path(found.origin).parent.glob(package.compiled) if found and found.origin else []
         sizes = [path.stat().st_size for path in sorted(beside)]

@@ -13,9 +13,9 @@ class EnginePackage:
     """The package of an engine.
 
     Attributes:
-        distribution: Its name on the package index.
-        module: Its name in imports.
-        compiled: Pattern of the compiled file beside its module.
+        distribution: Name of the package on the package index.
+        module: Name of the package in imports.
+        compiled: Pattern of the name of the compiled file, which lies beside the module.
     """
 
     distribution: str
@@ -29,14 +29,14 @@ PACKAGES = MappingProxyType(
         "mujoco": EnginePackage("mujoco-core", "mujoco", "libmujoco.so.*"),
     }
 )
-"""The package of each engine of our own that has one, by name of the engine."""
+"""The package of each engine of our own that needs one, by name of the engine."""
 
 
 def require_engine(name: str) -> None:
     """Check that the package of an engine is installed, before anything begins.
 
     Raises:
-        MissingExtraError: If its package is not installed.
+        MissingExtraError: If the package is not installed.
     """
     if name in PACKAGES:
         require(PACKAGES[name].module)

@@ -90,8 +90,8 @@ class ConfigError(ThrowcollectError):
     """The request is wrong; nothing has been started.
 
     Args:
-        problems: All problems that were found, at least one; or a single sentence.
-        more: Number of further problems, which are only counted.
+        problems: All problems that were found, at least one; or a single problem as a sentence.
+        more: Number of further problems, which the message only counts.
     """
 
     exit_code = 2
@@ -164,22 +164,22 @@ class DatasetError(ThrowcollectError):
 
     @property
     def details(self) -> str:
-        """The message without file and place, for reports that have columns of their own for these."""
+        """The message without file and place, for reports that have separate columns for file and place."""
         return self._with_facts(self.problem)
 
     def locate(self, path: Path | None = None, place: str = "") -> DatasetError:
         """Return the same error with file and place, for a caller that knows where the bytes came from.
 
-        The place of the bytes in the file comes before that of the error in the bytes.
+        `place` says where the bytes are in the file; it comes before the place of the error in the bytes.
         """
-        # The message is made with the error, so another place makes another error.
+        # An error makes its message when it is made, so another place needs another error.
         whole = ": ".join(filter(None, (place, self.place)))
         facts = {"expected": self.expected, "evidence": self.evidence, "hint": self.hint}
         return type(self)(self.problem, path=path or self.path, place=whole, **facts)
 
 
 class ForeignPlanError(DatasetError):
-    """A plan was made for another configuration than the one beside it."""
+    """A plan was made for a configuration other than the one beside it."""
 
 
 class OutputError(ThrowcollectError):

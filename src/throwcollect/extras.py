@@ -1,9 +1,9 @@
-"""The extras of the distribution: the packages that they bring, and the errors where such a package is missing.
+"""The extras of the distribution: the packages that they bring, and the errors if such a package is missing.
 
 `pip install throwcollect` reads, exports and derives datasets and checks configurations, on any Python from 3.10 on.
 Extras such as `pip install 'throwcollect[collect]'` bring the packages for simulating, containers, reports and further
-formats; `docs/installing.md` lists them. A module that is useless without such a package imports it as any other; a
-module that is useful even so imports it through `lazily`.
+formats; `docs/installing.md` lists them. A module that is useless without such a package imports it in the usual way; a
+module that is useful even without the package imports it through `lazily`.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ EXTRA_OF = MappingProxyType(
 """The extra that brings a package, by the name of the package in imports."""
 
 _LAST_WITH_BULLET = (3, 11)
-"""The latest Python with a wheel of pybullet. To compile Bullet is no way out, because it would compute other bytes."""
+"""The latest Python with a wheel of pybullet. Compiling Bullet would not help, because it would compute other bytes."""
 
 _FIRST_WITH_MUJOCO = (3, 11)
 """The first Python with a wheel of MuJoCo."""
@@ -74,10 +74,10 @@ _INSTEAD = {
     "millimetres elsewhere",
     "mujoco": "Python 3.11 or later, or `sim.engine: bullet`",
 }
-"""The hint where the package of an engine has no wheel for this Python. Bullet also draws pictures."""
+"""The hint if the package of an engine has no wheel for this Python. Pictures need Bullet, too."""
 
 _SYSTEM_LIBRARY_OF = MappingProxyType({"pinocchio": ("libgomp.so.1", "libgomp1")})
-"""The system library that a package loads and no wheel brings, and the package of Debian that has it."""
+"""The system library that a package loads but no wheel brings, and the package of Debian that has this library."""
 
 
 class MissingLibraryError(ThrowcollectError, ImportError):
@@ -95,7 +95,7 @@ class MissingLibraryError(ThrowcollectError, ImportError):
 
 
 def has_wheel(package: str) -> bool:
-    """Whether a package can be installed on this Python without a compiler."""
+    """Say whether a package can be installed on this Python without a compiler."""
     python = sys.version_info[:2]
     if package == "pybullet":
         return python <= _LAST_WITH_BULLET
@@ -103,24 +103,24 @@ def has_wheel(package: str) -> bool:
 
 
 def install_command(extra: str) -> str:
-    """The command that installs an extra."""
+    """Write the command that installs an extra."""
     return f"pip install 'throwcollect[{extra}]'"
 
 
 def is_installed(package: str) -> bool:
-    """Whether a package can be imported, found out without importing it."""
+    """Say whether a package can be imported, without importing it."""
     spec = find_spec(package)
-    # Any directory of that name has a spec without an origin, such as `docker` where `python -m` runs in a clone.
+    # Any directory of that name has a spec without an origin, such as `docker` if `python -m` runs in a clone.
     return spec is not None and spec.origin is not None
 
 
 def require(*packages: str, extra: str | None = None) -> None:
     """Check that packages, by their names in imports, are installed, before anything begins.
 
-    The error names `extra`, or else that of `EXTRA_OF`.
+    The error names `extra`, or else the extra in `EXTRA_OF`.
 
     Raises:
-        MissingExtraError: If one is not installed; it names the first.
+        MissingExtraError: If a package is not installed; it names the first one.
     """
     for package in packages:
         if not is_installed(package):
@@ -129,7 +129,7 @@ def require(*packages: str, extra: str | None = None) -> None:
 
 @contextmanager
 def explain_missing(extra: str | None = None) -> Iterator[None]:
-    """Turn a failed import in the block into an error that names `extra`, or else that of `EXTRA_OF`.
+    """Turn a failed import in the block into an error that names `extra`, or else the extra in `EXTRA_OF`.
 
     Raises:
         MissingExtraError: If a package that an extra brings is not installed.
@@ -144,16 +144,16 @@ def explain_missing(extra: str | None = None) -> Iterator[None]:
 
 
 def lazily(name: str, *, extra: str | None = None) -> Any:
-    """Make a stand-in for a module of a package in `EXTRA_OF`, which imports it when an attribute of it is first used.
+    """Make a stand-in for a module of a package in `EXTRA_OF`, which imports the module when it is first used.
 
-    The use of an attribute raises `MissingExtraError` if the package is not installed, which names `extra`, or else
-    that of `EXTRA_OF`, and `MissingLibraryError` if the system lacks a library that the package loads.
+    Using an attribute raises `MissingExtraError` if the package is not installed, which names `extra`, or else the
+    extra in `EXTRA_OF`; and `MissingLibraryError` if the system lacks a library that the package loads.
     """
     return _LazyModule(name, extra)
 
 
 def _lacks_library(package: str) -> bool:
-    """Whether a package is installed, but a system library that it loads is missing."""
+    """Say whether a package is installed, but a system library that it loads is missing."""
     if package not in _SYSTEM_LIBRARY_OF or not is_installed(package):
         return False
     import ctypes  # takes 7 ms, and is needed only after an import has failed
@@ -179,7 +179,7 @@ class _LazyModule:
                 if _lacks_library(self._name):
                     raise MissingLibraryError(self._name) from error
                 raise
-        # This is outside of the block above: a missing attribute is an error of the caller, and no missing package.
+        # This is outside of the block above, because a missing attribute is an error of the caller.
         value = getattr(module, attribute)
         # The next look-up finds the value in the instance, and does not call this function.
         setattr(self, attribute, value)

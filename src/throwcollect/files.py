@@ -1,9 +1,9 @@
-"""Files that appear whole or not at all, that lie where they seem to lie, and errors that say what is wrong.
+"""Writes files that appear whole or not at all, opens them only where they seem to lie, and says what is wrong.
 
 A dataset may come from anybody, so a name in its directory may be a symbolic link to any file of the user, a pipe that
 blocks the process that opens it, or a second name of a file elsewhere. Nothing here follows such a name: a file is
-read, written or cut only if it is a regular file in the very directory that it is looked for in. The user chooses that
-directory, so the way to it may go through links.
+read, written or cut only if it is a regular file in the very directory in which it is looked for. The user chooses that
+directory, so its own path may go through links.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from pathlib import Path
 from throwcollect.errors import ConfigError, DatasetError
 
 StrPath = str | os.PathLike[str]
-"""A path, as functions take it that other programs call."""
+"""A path, for functions that other programs call."""
 
 _MOVE_HERE = "put the file itself, or a copy of it, in that place; or remove it"
 _HINTS = {
@@ -38,22 +38,22 @@ _REASONS = {
     errno.ENXIO: "not a file",
     errno.EMLINK: "it has another name (hard link), under which it would change, too",
 }
-"""The meaning of these numbers here; the system's own texts are about other cases."""
+"""What these error numbers mean here; the system's own texts are about other cases."""
 
 
 def unwritable(path: Path, error: OSError) -> DatasetError:
     """Make the error that says why a path cannot be written."""
-    return DatasetError(f"cannot be written: {_reason(error)}", path=path, hint=_HINTS.get(error.errno or 0))
+    return DatasetError(f"cannot be written: {_find_reason(error)}", path=path, hint=_HINTS.get(error.errno or 0))
 
 
 def unreadable(path: Path, error: OSError) -> DatasetError:
     """Make the error that says why a path cannot be read."""
     hint = _MOVE_HERE if error.errno in _REASONS else None
-    return DatasetError(f"cannot be read: {_reason(error)}", path=path, hint=hint)
+    return DatasetError(f"cannot be read: {_find_reason(error)}", path=path, hint=hint)
 
 
-def _reason(error: OSError) -> str:
-    # Some libraries put a text of their own into the error, but leave the number of the system.
+def _find_reason(error: OSError) -> str:
+    # Some libraries put a text of their own into the error, but keep the error number of the system.
     number = error.errno or 0
     return _REASONS.get(number) or (os.strerror(number) if number else str(error))
 
@@ -62,15 +62,15 @@ def open_regular(path: Path, flags: int = os.O_RDONLY, *, folder: int | None = N
     """Open a regular file and return its descriptor; a link is not followed, and a pipe does not block.
 
     Args:
-        path: The file; its name alone if `folder` is given.
+        path: The file; only its name if `folder` is given.
         flags: As for `os.open`. A file that is opened for writing must have no other name.
-        folder: Descriptor of the directory that it is in; None if `path` says that.
+        folder: Descriptor of the file's directory; None if the directory is in `path`.
 
     Raises:
-        OSError: If it cannot be opened; see `unwritable` and `unreadable`.
+        OSError: If the file cannot be opened; see `unwritable` and `unreadable`.
     """
     descriptor = os.open(path, flags | os.O_NOFOLLOW | os.O_NONBLOCK, 0o666, dir_fd=folder)
-    # The open file is examined, and not its name, which may stand for another file by now.
+    # The open file is examined, because its name may stand for another file by now.
     status = os.fstat(descriptor)
     wrong = 0 if stat.S_ISREG(status.st_mode) else errno.ENXIO
     if flags & os.O_ACCMODE != os.O_RDONLY and status.st_nlink > 1:
@@ -84,11 +84,10 @@ def open_regular(path: Path, flags: int = os.O_RDONLY, *, folder: int | None = N
 def open_log(path: Path, flags: int = os.O_WRONLY | os.O_CREAT | os.O_APPEND) -> int:
     """Open a file in a folder of its own, such as ``logs``, which must not be a link.
 
-    With ``os.O_CREAT`` among the flags, which are those of `open_regular`, file and folder are made if they are
-    missing.
+    The flags are as for `open_regular`. With ``os.O_CREAT`` among them, file and folder are made if they are missing.
 
     Raises:
-        OSError: If it cannot be opened, or the folder cannot be made.
+        OSError: If the file cannot be opened, or the folder cannot be made.
     """
     if path.parent.is_symlink():
         raise OSError(errno.ELOOP, _REASONS[errno.ELOOP], str(path.parent))
@@ -102,15 +101,15 @@ def open_log(path: Path, flags: int = os.O_WRONLY | os.O_CREAT | os.O_APPEND) ->
 
 
 def is_there(path: Path) -> bool:
-    """Whether a file, or a link that may lead nowhere, has this name."""
+    """Say whether a file, or a link that may lead nowhere, has this name."""
     return os.path.lexists(path)
 
 
 def check_regular(path: Path) -> None:
-    """Refuse a link, a pipe or a directory where another library will open a file, which reports all other errors.
+    """Refuse a link, a pipe or a directory before another library opens a file; the library reports all other errors.
 
     Raises:
-        DatasetError: If the name is that of something else than a regular file.
+        DatasetError: If something other than a regular file has the name.
     """
     try:
         os.close(open_regular(path))
@@ -121,10 +120,10 @@ def check_regular(path: Path) -> None:
 
 @contextmanager
 def beside(path: Path, *, mode: int = 0o666) -> Iterator[int]:
-    """Open a new file that takes the place of `path` when the block ends well, and vanishes when it does not.
+    """Open a new file that takes the place of `path` if the block ends well, and vanishes if it does not.
 
-    While it is written, it is called ``<name>.new``. A file that already has that name was left by a process that was
-    killed, or put there by another program, and is removed. The mode is before the process's mask.
+    While the file is written, it is called ``<name>.new``. A file that already has that name was left by a process that
+    was killed, or put there by another program, and is removed. The umask of the process is applied to the mode.
 
     Yields:
         File descriptor to write to.
@@ -139,7 +138,7 @@ def beside(path: Path, *, mode: int = 0o666) -> Iterator[int]:
     own = os.fstat(descriptor)
 
     def is_own() -> bool:
-        """Whether the file is that of this block, and not one of another process that has begun to write it as well."""
+        """Say whether the file is this block's, and not that of another process that has begun to write it, too."""
         with suppress(OSError):
             return os.path.samestat(own, new.lstat())
         return False
@@ -152,7 +151,7 @@ def beside(path: Path, *, mode: int = 0o666) -> Iterator[int]:
         if not is_own():
             raise OSError(errno.EBUSY, "another process writes it, too", str(path))
         os.replace(new, path)
-    # Also after Ctrl-C, which is no `Exception`, no half-written file shall stay.
+    # No half-written file shall stay, not even after Ctrl-C, which is no `Exception`.
     except BaseException:
         if is_own():
             with suppress(OSError):
@@ -162,7 +161,7 @@ def beside(path: Path, *, mode: int = 0o666) -> Iterator[int]:
 
 @contextmanager
 def replacing(path: Path) -> Iterator[int]:
-    """Open a new file as `beside` does, which survives a power cut once the block has ended.
+    """Open a new file as `beside` does; once the block has ended, the file survives a power cut.
 
     Yields:
         File descriptor to write to.
@@ -181,12 +180,12 @@ def replacing(path: Path) -> Iterator[int]:
 
 @contextmanager
 def new_directory(path: Path) -> Iterator[Path]:
-    """Make a directory that gets its name when the block ends well, and vanishes when it does not.
+    """Make a directory that gets its name if the block ends well, and vanishes if it does not.
 
-    There must be none of that name, or an empty one.
+    There must be nothing of that name, or only an empty directory.
 
     Yields:
-        A hidden directory beside it, to write into meanwhile.
+        A hidden directory beside `path`, to write into meanwhile.
 
     Raises:
         ConfigError: If something is in its place already.
@@ -197,20 +196,20 @@ def new_directory(path: Path) -> Iterator[Path]:
             raise ConfigError(f"{path}: exists", expected="a directory that is new or empty")
         taken = path.stat() if path.exists() else None
         if taken is not None and (path.is_mount() or os.path.samestat(taken, os.stat("."))):
-            # Neither can be replaced, and that would only show when all is written.
+            # Neither can be replaced, and without this check, that would show only when everything is written.
             raise ConfigError(
                 f"{path}: cannot be replaced, as it is the working directory or a mount point",
                 expected="another directory",
             )
         if not path.parent.exists():
             path.parent.mkdir(parents=True)
-        # The directory beside is on the same file system, so one rename can give it its name.
+        # The hidden directory is on the same file system, so one rename can give it its name.
         beside = Path(tempfile.mkdtemp(prefix=f".{path.name}.", dir=path.parent))
     except OSError as error:
         raise unwritable(path, error) from error
     try:
         yield beside
-        # `mkdtemp` lets nobody but the owner in. Whoever made the directory has decided who may.
+        # `mkdtemp` lets only the owner in. If the directory exists, whoever made it has decided who may enter.
         if taken is not None:
             with suppress(PermissionError):
                 os.chown(beside, -1, taken.st_gid)
@@ -225,7 +224,7 @@ def new_directory(path: Path) -> Iterator[Path]:
 
 def _find_umask() -> int:
     """Find the permissions that new files of this process lack."""
-    # `os.umask` sets another one meanwhile, with which another thread may make a file.
+    # `os.umask` could only read it by setting another one meanwhile, with which another thread might make a file.
     for line in Path("/proc/self/status").read_text(encoding="ascii", errors="replace").splitlines():
         if line.startswith("Umask:"):
             return int(line.split()[1], 8)
@@ -261,7 +260,7 @@ def write_all(descriptor: int, data: bytes | bytearray) -> None:
     """Write all bytes; `os.write` may write only some of them at a time.
 
     Raises:
-        OSError: If the system writes no more of them.
+        OSError: If the system cannot write all bytes.
     """
     view = memoryview(data)
     while view:
@@ -272,7 +271,7 @@ def read_text(path: Path, *, most_bytes: int) -> str:
     """Read a regular file as UTF-8 text.
 
     Raises:
-        DatasetError: If it is missing, no regular file, no such text, or larger than `most_bytes`.
+        DatasetError: If the file is missing, no regular file, no UTF-8 text, or larger than `most_bytes`.
     """
     try:
         with open(open_regular(path), "rb") as file:
@@ -298,13 +297,13 @@ def write_file(path: Path, data: bytes) -> None:
 
 
 def write_secret(path: Path, data: bytes) -> None:
-    """Write a file as `write_file` does, which its owner alone can read.
+    """Write a file that only its owner can read, whole or not at all.
 
     Raises:
         DatasetError: If it cannot be written.
     """
     try:
-        # The permissions are set when the file is made, so it can be read by others at no moment.
+        # The permissions are set when the file is made, so others can read it at no moment.
         with beside(path, mode=0o600) as descriptor:
             write_all(descriptor, data)
     except OSError as error:

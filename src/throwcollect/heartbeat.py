@@ -1,8 +1,8 @@
-"""Signs of a node that need no ROS: a line in its log when it is ready, and a file that shows that its loop runs.
+"""Signs of life of a node that need no ROS: a line in its log when it is ready, and a file that shows that it runs.
 
-The loop of a node touches the file, and the health check of its container looks at its time, which costs nearly
-nothing: to ask the node itself would take a process that joins its graph, every few seconds in every container. The
-image names the file; outside of containers there is none.
+The loop of a node touches the file, and the health check of its container looks at the time of the file, which costs
+nearly nothing. To ask the node itself, a process would have to join the graph, every few seconds in every container.
+The image names the file; outside of containers there is none.
 """
 
 from __future__ import annotations
@@ -14,12 +14,12 @@ from pathlib import Path
 VARIABLE = "THROWCOLLECT_HEARTBEAT"
 """Name of the environment variable that names the file."""
 SILENT_S = 5.0
-"""Age of the file at which a node counts as stuck, also in the image: its loop runs several times a second."""
+"""Age of the file at which a node counts as stuck, here and in the image; its loop runs several times a second."""
 _PERIOD_S = 1.0
 
 
 def ready_line(name: str) -> str:
-    """The line in the log of a simulation that says that its node is ready for trials."""
+    """Write the line in the log of a simulation that says that its node is ready for trials."""
     return f"{name} is ready"
 
 
@@ -33,7 +33,7 @@ class Heartbeat:
 
     def beat(self) -> None:
         """Touch the file, at most once a second, so that the loop may call this each time."""
-        # Unlike the time of day, this clock cannot be set back, after which no beat would be due for long.
+        # Unlike the time of day, this clock cannot be set back; after that, no beat would be due for a long time.
         now = time.monotonic()
         if self._path is not None and now >= self._due:
             self._due = now + _PERIOD_S
@@ -41,9 +41,9 @@ class Heartbeat:
 
 
 def is_beating() -> bool:
-    """Whether the node of this container has touched its file within the last seconds."""
+    """Say whether the node of this container has touched its file within the last seconds."""
     try:
-        # Times of files are times of day, so they cannot be compared with the monotonic clock.
+        # The time of a file is a time of day, so it cannot be compared with the monotonic clock.
         return time.time() - Path(os.environ[VARIABLE]).stat().st_mtime < SILENT_S
     except (KeyError, OSError):
         return False

@@ -15,19 +15,22 @@ _LIBC = ctypes.CDLL(None)
 
 
 def stop_signals() -> tuple[signal.Signals, ...]:
-    """SIGINT, SIGTERM, and SIGHUP, which a closed terminal sends, unless it is ignored, as `nohup` arranges."""
+    """List the signals that ask this process to end: SIGINT, SIGTERM, and SIGHUP, which a closed terminal sends.
+
+    SIGHUP is left out if this process ignores it, as `nohup` arranges.
+    """
     if signal.getsignal(signal.SIGHUP) is signal.SIG_IGN:
         return (signal.SIGINT, signal.SIGTERM)
     return (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 def leave_when_stopped() -> None:
-    """Have this process end at once when a signal asks for it, as it has begun nothing yet that has to end in order.
+    """Let signals end this process at once, because it has not yet begun anything that has to be ended in order.
 
     A handler that raises an exception would not do, because a library that is being imported may ignore it.
     """
     for number in stop_signals():
-        # What is ignored stays ignored: scripts start commands with `&` so that Ctrl-C does not end them, for example.
+        # Ignored signals stay ignored; for example, Ctrl-C should not end commands that a script started with `&`.
         if signal.getsignal(number) is not signal.SIG_IGN:
             signal.signal(number, _leave)
 
@@ -37,9 +40,10 @@ def _leave(_number: int, _frame: FrameType | None) -> NoReturn:
 
 
 def die_with_parent(parent: int) -> None:
-    """Ask the kernel to kill this process when its parent dies; to be called by a child right after the fork.
+    """Ask the kernel to kill this process when its parent dies; a child has to call it right after the fork.
 
-    If the parent, whose process id is given, has died before the call, no signal comes, so this process ends at once.
+    `parent` is the process id of the parent. If the parent has died before the call, the kernel will send no signal, so
+    this process ends at once.
     """
     _LIBC.prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
     if os.getppid() != parent:

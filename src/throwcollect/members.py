@@ -1,8 +1,8 @@
 """Families of parts, such as robots, tools and formats of exports, and their members by name.
 
-A family has members of our own, and those that other installed packages add by an entry point of the group
-``throwcollect.<family>``. The name of the entry point is that of the member, and its object is of the same kind as the
-objects in the table here::
+A family has members of our own, and members that other installed packages add by an entry point of the group
+``throwcollect.<family>``. The entry point has the name of the member, and its object is of the same kind as the objects
+in the table here::
 
     [project.entry-points."throwcollect.robots"]
     planar_arm = "my_package.robot:PLANAR_ARM"
@@ -61,46 +61,46 @@ _KINDS = MappingProxyType(
         "exporters": "throwcollect.export.exporter:Exporter",
     }
 )
-"""What the members of a family are: values of this class, or else classes derived from it."""
+"""The class of each family: its members are values of this class (see `_VALUES`), or else classes derived from it."""
 
 _VALUES = frozenset({"robots", "exporters"})
-"""The families whose members are values."""
+"""The families whose members are values; members of all other families are classes."""
 
 _DEBUG = "THROWCOLLECT_DEBUG"
-_WAY_OUT = f"mend or uninstall the package that it is of; {_DEBUG}=1 shows where it fails"
-"""The hint where code of another package fails."""
+_WAY_OUT = f"mend or uninstall the package that it belongs to; {_DEBUG}=1 shows where it fails"
+"""The hint if code of another package fails."""
 
 
 _left_out: set[str] = set()
-"""Families of which this process has no members of other packages."""
+"""Families for which this process leaves out members of other packages."""
 
 
 def leave_out_others() -> None:
-    """Have only our own members in this process; to be called before anything asks for their names."""
+    """Leave out members of other packages in this process; it must be called before names of members are asked for."""
     _left_out.update(_OWN)
-    _table.cache_clear()
+    _find_members.cache_clear()
 
 
 def names_of(family: str) -> tuple[str, ...]:
     """List the names of the members of a family: our own first, then those of other packages, by name."""
-    return tuple(_table()[family])
+    return tuple(_find_members()[family])
 
 
 @cache
 def load_member(family: str, name: str) -> Any:
     """Import a member of ``robots``, ``tools``, ``engines``, ``tasks``, ``runtimes`` or ``exporters`` by its name.
 
-    The cache is for callers that ask with every trial.
+    The result is cached for callers that ask for it in every trial.
 
     Returns:
         A `Robot` or an `Exporter`; the class of an engine or a runtime; for a tool or a task, the class of its section.
 
     Raises:
         KeyError: If the family has no such member.
-        ConfigError: If it is of another package, and cannot be imported or is not what the family consists of.
-        ImportError: If it is our own, and a package that it needs cannot be imported.
+        ConfigError: If the member comes from another package, and cannot be imported or does not fit the family.
+        ImportError: If the member is our own, and a package that it needs cannot be imported.
     """
-    entry = _table()[family][name]
+    entry = _find_members()[family][name]
     if name in _OWN[family]:
         return entry.load()
     what, namesakes = _describe(family, name), _find_namesakes(family, name)
@@ -117,10 +117,10 @@ def load_member(family: str, name: str) -> Any:
 
 
 def load_object(path: str, kind: type | None = None) -> Any:
-    """Import the object ``module:name``; where a kind is given, it has to be a whole class that is derived from it.
+    """Import the object ``module:name``; if a kind is given, the object has to be a complete class derived from it.
 
     Raises:
-        ConfigError: If it is of another package, and cannot be imported or is not of this kind.
+        ConfigError: If the object comes from another package, and cannot be imported or is not of this kind.
     """
     module, _, name = path.partition(":")
     if module.partition(".")[0] == __package__:
@@ -131,13 +131,19 @@ def load_object(path: str, kind: type | None = None) -> Any:
 
 @contextmanager
 def explain_failure(family: str, name: str, doing: str, *, passing: tuple[type[Exception], ...] = ()) -> Iterator[None]:
-    """Report what a member of another package raises in the block as a fault of that package.
+    """Report an error that a member of another package raises in the block as a fault of that package.
 
-    What our own members raise is let through, because it is a fault of throwcollect, and so is what is `passing`,
-    because the caller explains it. `doing` says what the member was asked to do, such as ``judge trial 3``.
+    Errors of our own members are let through, because they are faults of throwcollect. Errors of the types `passing`
+    are let through, too, because the caller explains them.
+
+    Args:
+        family: Family of the member.
+        name: Name of the member.
+        doing: What the member was asked to do, such as ``judge trial 3``.
+        passing: Types of errors to let through.
 
     Raises:
-        MemberError: If the block raises anything else that is not raised on purpose.
+        MemberError: If the block raises another error, which was not raised on purpose.
     """
     if name in _OWN[family]:
         yield
@@ -151,21 +157,21 @@ def explain_failure(family: str, name: str, doing: str, *, passing: tuple[type[E
         if isinstance(error, passing):
             raise
         if os.environ.get(_DEBUG):
-            # Where a simulation fails, the error becomes the reason for which a trial is refused, without its trace.
+            # In a simulation, only the message of the error gets on, as the reason for which a trial is refused.
             traceback.print_exc()
         what = _describe(family, name)
         raise MemberError(f"{what} cannot {doing}: {type(error).__name__}: {error}", hint=_WAY_OUT) from error
 
 
 def _import(path: str, what: str) -> Any:
-    """Import ``module:name`` of another package; the message about a mistake in there begins with `what` it is.
+    """Import ``module:name`` of another package; the message of an error begins with `what`.
 
     Raises:
-        ConfigError: If it cannot be imported.
+        ConfigError: If the object cannot be imported.
     """
     try:
         with explain_missing():
-            # Unlike `getattr`, it also finds an attribute of an attribute.
+            # Unlike `getattr`, an entry point also finds an attribute of an attribute.
             return EntryPoint("", path, "").load()
     except ThrowcollectError:
         raise
@@ -174,10 +180,10 @@ def _import(path: str, what: str) -> Any:
 
 
 def _check_class(found: Any, kind: type, where: str) -> Any:
-    """Make sure that an object of another package is a class that is derived from a kind, and has all that it needs.
+    """Make sure that an object of another package is a class derived from a kind, and lacks nothing.
 
     Raises:
-        ConfigError: If it is anything else.
+        ConfigError: If the object is anything else.
     """
     if not (isinstance(found, type) and issubclass(found, kind)):
         raise ConfigError(f"{where} should be a class derived from {kind.__module__}.{kind.__name__}, is {found!r}")
@@ -192,7 +198,7 @@ def _check_class(found: Any, kind: type, where: str) -> Any:
 
 def _describe(family: str, name: str) -> str:
     """Name a member of another package and that package, as the beginning of a message."""
-    owners = sorted(map(_owner, _find_namesakes(family, name)))
+    owners = sorted(map(_name_owner, _find_namesakes(family, name)))
     return f"the {family.removesuffix('s')} {name} of {' and '.join(owners)}"
 
 
@@ -201,24 +207,24 @@ def _find_namesakes(family: str, name: str) -> list[EntryPoint]:
     return [each for each in entry_points(group=f"throwcollect.{family}") if each.name == name]
 
 
-def _owner(entry: EntryPoint) -> str:
+def _name_owner(entry: EntryPoint) -> str:
     return f"{entry.dist.name} {entry.dist.version}" if entry.dist else "an unknown package"
 
 
 @cache
-def _table() -> Mapping[str, Mapping[str, EntryPoint]]:
-    """All members by family and name.
+def _find_members() -> Mapping[str, Mapping[str, EntryPoint]]:
+    """Find all members, by family and name.
 
-    They are looked for together, as Python reads the files of all installed packages each time that it is asked for a
-    group of entry points, which takes 10 ms.
+    All families are looked up together, because Python reads the files of all installed packages each time that it
+    looks for entry points, which takes 10 ms.
     """
     select = entry_points().select
     added = {family: () if family in _left_out else select(group=f"throwcollect.{family}") for family in _OWN}
-    return MappingProxyType({family: _members_of(family, entries) for family, entries in added.items()})
+    return MappingProxyType({family: _join_members(family, entries) for family, entries in added.items()})
 
 
-def _members_of(family: str, added: Iterable[EntryPoint]) -> Mapping[str, EntryPoint]:
+def _join_members(family: str, added: Iterable[EntryPoint]) -> Mapping[str, EntryPoint]:
     own = {name: EntryPoint(name, path, f"throwcollect.{family}") for name, path in _OWN[family].items()}
     others = {entry.name: entry for entry in sorted(added, key=lambda entry: entry.name)}
-    # No package may replace a member of our own, or a configuration would mean something else where it is installed.
+    # No package may replace a member of our own, or a configuration would mean something else where the package is.
     return MappingProxyType(own | {name: entry for name, entry in others.items() if name not in own})

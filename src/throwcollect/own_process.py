@@ -1,7 +1,7 @@
-"""Tells the process of a command of ours from that of another program that imports us, and how to start one more.
+"""Says whether this process runs a command of ours or another program that imports us, and how to start a command.
 
-A command may be forked, because its threads, files and settings are known. Those of another program are not, and a fork
-of it would have them, too.
+The process of a command may be forked, because its threads, files and settings are known. Threads, files and settings
+of another program are unknown, and a fork would inherit them.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ from types import MappingProxyType
 SERIAL_LIBRARIES = MappingProxyType({"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"})
 """Environment variables for processes that import numerical libraries.
 
-These would start threads, which wait busily for work in the beginning. Ours has none for them: one process per core
-fills the machine, and what ends up in files is computed without BLAS.
+These libraries would start threads, which at first wait busily for work. We have no work for them: one process per core
+fills the machine, and everything that ends up in files is computed without BLAS.
 """
 
 _commands: list[bool] = []
@@ -30,15 +30,15 @@ def claim_process() -> None:
 
 
 def may_be_forked() -> bool:
-    """Whether this process runs a command, and has no other thread whose locks a fork would copy."""
+    """Say whether this process runs a command, and has no other thread whose locks a fork would copy."""
     return bool(_commands) and threading.active_count() == 1
 
 
 def keep_objects() -> None:
-    """Have the garbage collector pass over all present objects until the end of this process, if it runs a command.
+    """If this process runs a command, let the garbage collector ignore all present objects until the process ends.
 
-    Nearly all of them belong to modules, and the end of the interpreter would look through them once more, for a tenth
-    of a second. What comes later is still looked through: sessions of Zenoh leave files behind where it is not.
+    Nearly all of them belong to modules, and at its end the interpreter would look through them once more, for a tenth
+    of a second. Later objects are still looked through, because otherwise sessions of Zenoh would leave files behind.
     """
     if _commands:
         gc.freeze()
@@ -47,8 +47,8 @@ def keep_objects() -> None:
 def make_command(module: str = "throwcollect") -> list[str]:
     """Make the beginning of a command line that runs a module of ours by this Python.
 
-    With ``-m`` alone, Python would look for all modules in the working directory first, also for those of its own
-    library: a file of the user's, or one that comes with somebody's dataset, would be run in place of them.
+    With ``-m`` alone, Python would look for all modules in the working directory first, even for modules of its own
+    library: a file of the user, or a file in somebody's dataset, would be run in their place.
     """
     if sys.version_info >= (3, 11):
         return [sys.executable, "-P", "-m", module]

@@ -1,4 +1,4 @@
-"""Pinocchio, imported when it is first used, because a reader of datasets needs a robot's names of joints alone."""
+"""Pinocchio, imported when it is first used, because a reader of datasets needs only the names of a robot's joints."""
 
 from typing import TYPE_CHECKING
 

@@ -2,7 +2,7 @@
 
 NumPy chooses its code for exponentials, logarithms, powers and sines by the processor (with AVX-512 the last bits
 differ), and so do BLAS and LAPACK for products and solutions of matrices. Code that determines bytes of a dataset calls
-these functions instead. Of NumPy, it uses only operations that IEEE 754 defines: + - * /, square roots, comparisons.
+these functions instead, and of NumPy uses only operations that IEEE 754 defines: + - * /, square roots, comparisons.
 The C library behind `math` has the same code for all processors with fused multiply-add (Intel since 2013, AMD since
 2012).
 """
@@ -21,56 +21,56 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 
-def _each(function: Callable[..., float], values: Array, *others: Iterable[float]) -> Array:
+def _map_each(function: Callable[..., float], values: Array, *others: Iterable[float]) -> Array:
     each = map(function, values.ravel().tolist(), *others)
     return np.fromiter(each, np.float64, values.size).reshape(values.shape)
 
 
 def exp(values: Array) -> Array:
-    """Exponential of each value.
+    """Compute the exponential of each value.
 
     Raises:
         OverflowError: If a result is too large.
     """
-    return _each(math.exp, values)
+    return _map_each(math.exp, values)
 
 
 def log(values: Array) -> Array:
-    """Natural logarithm of each value.
+    """Compute the natural logarithm of each value.
 
     Raises:
         ValueError: If a value is not above 0.
     """
-    return _each(math.log, values)
+    return _map_each(math.log, values)
 
 
 def power(bases: Array, exponent: float) -> Array:
-    """Each base to the power of one exponent.
+    """Raise each base to the power of one exponent.
 
     Raises:
-        ValueError: If a base is negative, or 0 where the exponent is.
+        ValueError: If a base is 0 and the exponent negative, or a base negative and the exponent not whole.
         OverflowError: If a result is too large.
     """
-    return _each(math.pow, bases, repeat(exponent))
+    return _map_each(math.pow, bases, repeat(exponent))
 
 
 def sin(angles: Array) -> Array:
-    """Sine of each angle [rad]."""
-    return _each(math.sin, angles)
+    """Compute the sine of each angle [rad]."""
+    return _map_each(math.sin, angles)
 
 
 def cos(angles: Array) -> Array:
-    """Cosine of each angle [rad]."""
-    return _each(math.cos, angles)
+    """Compute the cosine of each angle [rad]."""
+    return _map_each(math.cos, angles)
 
 
 def add_up(values: Iterable[float]) -> float:
-    """Add from the first value to the last, and round each sum; from Python 3.12 on, `sum` compensates for rounding."""
+    """Add from the first value to the last, and round each sum, unlike `sum` from Python 3.12 on."""
     return reduce(add, values, 0.0)
 
 
 def matmul(left: Array, right: Array) -> Array:
-    """Products of matrices, each element summed up in order; the leading axes are broadcast.
+    """Multiply matrices, and sum up each element in order; the leading axes are broadcast.
 
     Args:
         left: Shape ``(..., n, k)``.
@@ -87,7 +87,7 @@ def matmul(left: Array, right: Array) -> Array:
 
 
 def solve(matrices: Array, right: Array) -> Array:
-    """Solutions X of A X = B by elimination without exchange of rows.
+    """Find the solutions X of A X = B by elimination without exchange of rows.
 
     Args:
         matrices: A, symmetric and positive definite, shape ``(..., n, n)``.

@@ -1,6 +1,6 @@
 """Finds out which parts of genuine ROS 2 are installed for this Python, without importing any of them.
 
-This is no part of `ros`, because the import of `ros` already needs the answer.
+This module is not a part of `ros`, because importing `ros` already needs the answer.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from pathlib import Path
 
 import rclzenoh
 
-# Not from `rclzenoh.interfaces`, whose import health checks cannot afford.
+# The path is not taken from `rclzenoh.interfaces`, because importing that would take health checks too long.
 DEFINITIONS = Path(rclzenoh.__file__).parent / "interfaces" / "definitions"
 """Definitions of interfaces, by package and kind."""
 PACKAGES = (
@@ -44,12 +44,12 @@ _INTERFACES = "packaging/ros_interfaces"
 
 
 def missing() -> list[str]:
-    """List what nodes need of genuine ROS 2 and Python does not find: rclpy, or else packages and single interfaces."""
-    if _directory("rclpy") is None:
+    """List the parts of genuine ROS 2 that nodes need and Python lacks: rclpy, or else packages and interfaces."""
+    if _find_directory("rclpy") is None:
         return ["rclpy"]
     lacking = []
     for package in PACKAGES:
-        directory = _directory(package)
+        directory = _find_directory(package)
         if directory is None:
             lacking.append(package)
             continue
@@ -61,17 +61,17 @@ def missing() -> list[str]:
 
 
 def rmws() -> list[str]:
-    """Names of the RMW implementations that are installed, in alphabetical order."""
+    """List the names of the RMW implementations that are installed, in alphabetical order."""
     # Setup scripts of ROS set AMENT_PREFIX_PATH; wheels install below the prefix of Python, and set no variable.
     prefixes = [*filter(None, os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep)), sys.prefix]
     index = Path("share", "ament_index", "resource_index", "rmw_typesupport")
     names = {path.name for prefix in prefixes for path in (Path(prefix) / index).glob("rmw_*")}
-    # That package only loads one of the others.
+    # The package `rmw_implementation` only loads one of the others.
     return sorted(names - {"rmw_implementation"})
 
 
 def rclpy_version() -> str | None:
-    """Version of rclpy, by its wheel or else by its package; None without either."""
+    """Find the version of rclpy, by its wheel or else by its package; None if there is neither."""
     for distribution in ("ros-rclpy", "rclpy"):
         try:
             return version(distribution)
@@ -92,8 +92,8 @@ def how_to_install() -> str:
 
 
 def module_name(interface: str) -> str:
-    """Name of the module of an interface, without its leading underscore: ``SpawnEntity`` is in ``spawn_entity``."""
-    # These are the two substitutions of rosidl_pycommon, with which ROS' own generators name the modules.
+    """Name the module of an interface, without its leading underscore: ``SpawnEntity`` is in ``spawn_entity``."""
+    # These are the two substitutions of rosidl_pycommon, by which ROS' own generators name the modules.
     words = re.sub(r"(.)([A-Z][a-z]+)", r"\1_\2", interface)
     return re.sub(r"([a-z0-9])([A-Z])", r"\1_\2", words).lower()
 
@@ -104,7 +104,7 @@ def _has_wheels() -> bool:
     return python == ("cpython", 3, 11) and system == ("Linux", "x86_64", "glibc")
 
 
-def _directory(package: str) -> Path | None:
+def _find_directory(package: str) -> Path | None:
     spec = find_spec(package)
     # A directory of that name in the working directory, without a module in it, is no package of ROS.
     return Path(spec.origin).parent if spec is not None and spec.origin else None

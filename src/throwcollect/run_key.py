@@ -1,7 +1,7 @@
 """The key of a run: processes that have it may join the run, and the dataset takes only episodes signed with it.
 
 A key is a directory of two files, which only its owner can read: a private key, and its certificate. Every run makes
-its own. The router and all nodes of a run show each other the certificate (mutual TLS), and trust no other one. We use
+its own key. The router and all nodes of a run show each other the certificate (mutual TLS), and trust no other. We use
 mutual TLS because the Zenoh library inside the genuine rmw_zenoh_cpp was built without user/password and without Unix
 sockets, so it has no other way to keep strangers out.
 """
@@ -53,7 +53,7 @@ class RunKey:
 
     @classmethod
     def of_environment(cls) -> RunKey | None:
-        """The key of the run that this process belongs to; None if it belongs to none."""
+        """Find the key of the run that this process belongs to; None if it belongs to none."""
         named = os.environ.get(KEY_VARIABLE)
         return cls(Path(named).absolute()) if named else None
 
@@ -61,7 +61,7 @@ class RunKey:
         """Check that this process can read the key.
 
         Raises:
-            ConfigError: If one of its files is missing, or cannot be read.
+            ConfigError: If a file of the key is missing, or cannot be read.
         """
         for path in (self.private_key, self.certificate):
             _read(path)
@@ -82,9 +82,9 @@ class RunKey:
         return key.private_numbers().private_value.to_bytes(_SECRET_BYTES, "big")
 
     def create(self, secret: bytes | None = None) -> None:
-        """Make a new key, or from its secret the key of another machine again, in a directory that need not exist.
+        """Make a new key in a directory that need not exist; given a secret, make the key of another machine again.
 
-        The certificate of a key that is made again differs, but nodes trust it, because they check only who signed it.
+        A key that is made again has another certificate, but nodes trust it, because they check only who signed it.
 
         Raises:
             ConfigError: If the files cannot be written, or no key has this secret.
@@ -126,26 +126,26 @@ class Signer:
         """Make the signer of the run with a key.
 
         Raises:
-            ConfigError: If its key cannot be read.
+            ConfigError: If the key cannot be read.
         """
-        # The purpose is hashed along, so that the secret for signatures is that of nothing else made of the key.
+        # The purpose is hashed, too, so that this secret differs from any other that is made from the key.
         return cls(hashlib.sha256(_PURPOSE + _read(key.private_key)).digest())
 
     def sign(self, *parts: bytes | memoryview) -> str:
-        """Make the signature (HMAC-SHA256, in hexadecimal) of the parts one after the other."""
+        """Make the signature (HMAC-SHA256, in hexadecimal) of the parts, put together in their order."""
         signature = hmac.new(self._secret, digestmod=hashlib.sha256)
         for part in parts:
             signature.update(part)
         return signature.hexdigest()
 
     def has_signed(self, signature: str, *parts: bytes | memoryview) -> bool:
-        """Whether a signature is that of the parts."""
-        # How long `==` takes would tell how many characters of a forged signature are right.
+        """Say whether a signature was made of these parts."""
+        # The time that `==` takes would tell a forger how many characters of a signature are right.
         return hmac.compare_digest(signature.encode(), self.sign(*parts).encode())
 
 
 def unreadable_key(path: Path, reason: str) -> ConfigError:
-    """Make the error for a file of a key that cannot be read, for some reason in words."""
+    """Make the error for a file of a key that cannot be read; `reason` says why, in words."""
     return ConfigError(
         f"the key of the run cannot be read: {path}: {reason}",
         expected=f"a directory with the key of a run, which only its owner can read (--key, {KEY_VARIABLE})",
@@ -190,7 +190,7 @@ def _make_pair(secret: bytes | None) -> tuple[bytes, bytes]:
         .not_valid_before(now - _CLOCKS_DIFFER_BY)
         .not_valid_after(now + _LASTS)
         .add_extension(x509.SubjectAlternativeName([x509.DNSName(_NAME)]), critical=False)
-        # The TLS library of Zenoh (rustls) takes no certificate of a CA as that of a peer.
+        # The TLS library of Zenoh (rustls) does not accept the certificate of a CA as the certificate of a peer.
         .add_extension(x509.BasicConstraints(ca=False, path_length=None), critical=True)
         .sign(key, hashes.SHA256())
     )

@@ -16,19 +16,19 @@ from throwcollect.errors import WorkerError
 from throwcollect.interruption import die_with_parent
 
 THROWS_A_START = 20
-"""A process takes about as long to begin as to simulate so many throws."""
+"""Number of throws that a process simulates in about the time that it takes to start."""
 
 _SAFE_PATH = "PYTHONSAFEPATH"
 _safe_path_lock = threading.Lock()
 _values_before: list[str | None] = []
-"""Value of that variable before each block that has set it and is not left yet, in whatever threads; oldest first."""
+"""Value of the variable `_SAFE_PATH` before each block of any thread that has set it and still runs; oldest first."""
 
 _Piece = TypeVar("_Piece")
 _Found = TypeVar("_Found")
 
 
 def count_cores() -> int:
-    """Number of processor cores that this process may use."""
+    """Count the processor cores that this process may use."""
     return len(os.sched_getaffinity(0))
 
 
@@ -62,8 +62,8 @@ def working_side_by_side(
 ) -> Iterator[Iterator[_Found]]:
     """Do pieces of work in several processes, which import the calling program, as `multiprocessing` does.
 
-    They begin at once, so this process can do something else meanwhile. The end of this process or of the block, by
-    Ctrl-C, too, ends them at once.
+    The processes begin at once, so this process can do something else meanwhile. They end at once when this process or
+    the block ends, even by Ctrl-C.
 
     Args:
         pieces: The pieces; each is sent to a process.
@@ -71,7 +71,7 @@ def working_side_by_side(
         arguments: Arguments of `begin`.
         processes: Largest number of processes; with 1, this process does the work itself.
         doing: Verb and object for messages, such as ``checks trials``.
-        worth: How many pieces take as long as the start of a process: with fewer for each, there are fewer processes.
+        worth: How many pieces take as long as the start of a process; a process is started only for at least as many.
         fork: Whether to fork the processes off this one, with everything that it has imported and read, if it has only
             one Python thread. The pieces must not use libraries with threads of their own.
 
@@ -80,7 +80,7 @@ def working_side_by_side(
 
     Raises:
         WorkerError: If a process is killed.
-        ThrowcollectError: When it is the turn of a piece that has raised it.
+        ThrowcollectError: If a piece has raised it, when it is the turn of the piece's result.
     """
     # Imported here, because most commands need neither.
     import multiprocessing
@@ -91,16 +91,16 @@ def working_side_by_side(
     if processes <= 1:
         yield _do_here(pieces, begin, arguments)
         return
-    # With several threads, new interpreters are started: a fork could wait for ever for a lock of another thread.
+    # If there are several threads, new interpreters are started: a fork could wait for ever for another thread's lock.
     context = multiprocessing.get_context("fork" if fork and threading.active_count() == 1 else "spawn")
     with _hiding_working_directory():
         pool = ProcessPoolExecutor(processes, context, _begin, (partial(begin, *arguments), os.getpid()))
     try:
-        # Only this process shall see Ctrl-C, and then end the others, so these start with the signal blocked.
+        # Only this process shall see Ctrl-C and then end the others, so the others start with the signal blocked.
         unblocked = signal.pthread_sigmask(signal.SIG_BLOCK, (signal.SIGINT,))
         try:
             with _hiding_working_directory(), warnings.catch_warnings():
-                # From 3.12 on, Python warns of the threads of Arrow and BLAS, which forked processes do not use.
+                # From 3.12 on, Python warns about the threads of Arrow and BLAS, which forked processes do not use.
                 warnings.filterwarnings("ignore", "This process .* is multi-threaded", DeprecationWarning)
                 found = pool.map(_work, pieces)
         finally:
@@ -112,7 +112,7 @@ def working_side_by_side(
         ) from error
     finally:
         # `shutdown` waits for pieces that are being worked on, so the processes are killed first. Only the pool knows
-        # which are its own, as other threads start some, too; before 3.14, Python has no public way to kill them.
+        # its own, because other threads start processes, too; before 3.14, Python has no public way to kill them.
         for process in list(pool._processes.values()):
             process.kill()
         pool.shutdown(cancel_futures=True)
@@ -120,11 +120,11 @@ def working_side_by_side(
 
 @contextmanager
 def _hiding_working_directory() -> Iterator[None]:
-    """Have Python processes that are started in the block look for no module in the working directory.
+    """Keep Python processes that are started in the block from looking for modules in the working directory.
 
-    They would run what lies there in place of modules of Python's own library, also in a dataset of somebody else's.
-    A pool starts a process, which looks after what the others share, as soon as it is made.
-    Python before 3.11 knows no way to prevent that.
+    They would run files in that directory, perhaps somebody else's dataset, in place of modules of Python's own
+    library. A pool that has just been made starts a process, too, which looks after what the others share. Python
+    before 3.11 has no way to prevent that.
     """
     with _safe_path_lock:
         _values_before.append(os.environ.get(_SAFE_PATH))
@@ -133,7 +133,7 @@ def _hiding_working_directory() -> Iterator[None]:
         yield
     finally:
         with _safe_path_lock:
-            # While other threads are in such a block, the newest value is that of a block, which keeps it for them.
+            # While other threads are in such a block, the newest value was set by a block, so the variable stays set.
             if (before := _values_before.pop()) is None:
                 del os.environ[_SAFE_PATH]
             else:
@@ -147,12 +147,12 @@ def _do_here(
 
 
 _make: list[Callable[[], Callable[[Any], Any]]] = []
-"""Returns the function that does a piece in this process; empty before the process begins."""
+"""Holds the function that makes the function that does a piece in this process; empty before the process begins."""
 
 
 def _begin(make: Callable[[], Callable[[Any], Any]], parent: int) -> None:
     die_with_parent(parent)
-    # All objects so far live until the end, so the garbage collector need not examine them again and again.
+    # The objects made so far live until the end, so the garbage collector need not examine them again and again.
     gc.freeze()
     # The function is made with the first piece, because an error here would not reach the parent.
     _make[:] = [cache(make)]

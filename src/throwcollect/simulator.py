@@ -1,4 +1,4 @@
-"""Throws of a configuration, simulated in this process: no nodes, no files, the same bits."""
+"""Simulates throws of a configuration in this process, without nodes and files, but with the same bits."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from throwcollect.sweep.plan import make_trials, refusal
 from throwcollect.sweep.points import Points, Targets
 from throwcollect.sweep.trials import Trial
 
-# The import of `Simulator` fails with the hint on the missing extra, and not the first throw.
+# If the extra is missing, importing `Simulator` fails with the hint on it, and not only the first throw.
 require("pinocchio")
 
 Point = Mapping[str, float]
@@ -44,10 +44,10 @@ class Simulator:
     """Simulates throws of one configuration, one after the other, as a collection of it would.
 
     A throw has the samples, the events and the digest that a dataset of the same configuration has for the same values
-    under the same number. The first throw takes about a second, as the robot is loaded, and each further one less than
-    a tenth of that.
+    under the same number. The first throw takes about a second, because the robot is loaded, and each further throw
+    less than a tenth of that.
 
-    Use it as a context manager, or `close` it: a process can have a few physics engines at a time.
+    Use it as a context manager, or `close` it, because a process can have only a few physics engines at a time.
 
     Args:
         config: YAML file of a configuration; its sweep is not looked at.
@@ -65,7 +65,7 @@ class Simulator:
         self._start(load(config, overrides), os.fspath(config))
 
     def _start(self, config: Config, source: str) -> None:
-        """Make the robot and the physics engine of a configuration; `source` is the file that it was read from."""
+        """Make the robot and the physics engine of a configuration, which was read from the file `source`."""
         self._source = source
         self.config: Config = config
         self._check = feasibility_check(self.config)
@@ -80,19 +80,19 @@ class Simulator:
         self.close()
 
     def close(self) -> None:
-        """Free the physics engine; nothing can be simulated afterwards. To close it once more does nothing."""
+        """Free the physics engine; nothing can be simulated afterwards. Closing it once more does nothing."""
         self._replayer.close()
 
     def throw(self, values: Point | None = None, *, trial: int = 0, target: Point | None = None) -> Throw:
         """Simulate one throw.
 
         Args:
-            values: What differs from the configuration: any key that a sweep may vary, such as
+            values: Values that differ from the configuration, of any keys that a sweep may vary, such as
                 ``{"task.duration_s": 1.1}``.
             trial: Number of the trial, from 0. The clock of a later trial shows a later time, which is in the stamps
                 and in the digest; nothing else depends on the number.
-            target: Where it should end, such as ``{"target_x_m": 1.4, "target_y_m": -0.2}``; the throw then says by how
-                much it missed, and is the same otherwise.
+            target: Where the throw should end, such as ``{"target_x_m": 1.4, "target_y_m": -0.2}``; the throw then says
+                by how much it missed, and is the same otherwise.
 
         Returns:
             The throw, as `throwcollect.load` gives it; it is in no shard.
@@ -100,7 +100,7 @@ class Simulator:
         Raises:
             ConfigError: If a key cannot vary, a value is out of its range, or the task has no such target.
             ConflictError: If the simulator is closed.
-            PlanError: If the plan of a collection would refuse it, for the reason that it would have.
+            PlanError: If the plan of a collection would refuse the throw; the error gives the plan's reason.
         """
         self._require_open()
         check_whole_number("trial", trial, least=0, most=MOST_TRIALS - 1)
@@ -115,10 +115,10 @@ class Simulator:
         }
         if wrong:
             raise ConfigError([Problem(reason, key=name) for name, reason in wrong.items()])
-        # This checks the keys, too, which `make_trials` takes as they are.
+        # This checks the keys, too, which `make_trials` does not.
         refused = self.find_refusal(point)
-        wanted = None if target is None else Targets(tuple(target), _row(target))
-        points = Points(tuple(point), _row(point), wanted)
+        wanted = None if target is None else Targets(tuple(target), _make_row(target))
+        points = Points(tuple(point), _make_row(point), wanted)
         (planned,) = make_trials(self.config, points, first=trial)
         if refused is not None:
             raise PlanError([Problem(refused)], hint="a collection would leave this trial out, as refused")
@@ -140,18 +140,18 @@ class Simulator:
         """Simulate many throws, which are the trials 0, 1, 2 and so on.
 
         With several processes, the program must do its work below ``if __name__ == "__main__":``, because each process
-        imports it (see `multiprocessing`). All points are taken before the first throw is there then.
+        imports it (see `multiprocessing`). Then all points are taken before the first throw is there.
 
         Args:
-            points: What differs from the configuration, for each of them.
-            processes: How many processes simulate, each with a physics engine of its own; 1 is this process alone.
+            points: Values that differ from the configuration, for each throw.
+            processes: How many processes simulate, each with a physics engine of its own; 1 for only this process.
 
         Yields:
             The throws, in the order of their points.
 
         Raises:
             ConfigError: As `throw`, when it is the turn of that throw; its problems name the index of the point.
-            PlanError: As `throw`, likewise.
+            PlanError: As `throw`, when it is the turn of that throw; its problem names the index of the point.
             ConflictError: If the simulator is closed.
             WorkerError: If the physics engine of a process does not start, or a process is killed.
         """
@@ -168,7 +168,7 @@ class Simulator:
         )
 
     def _throw_numbered(self, numbered: tuple[int, Point]) -> Throw:
-        """Simulate the throw of a point of a list, given after its index there, which an error then names."""
+        """Simulate the throw of a point of a list, given as index and point; an error names the index."""
         index, point = numbered
         try:
             return self.throw(point, trial=index)
@@ -182,7 +182,7 @@ class Simulator:
             ) from error
 
     def _require_open(self) -> None:
-        """Refuse to simulate after the end.
+        """Refuse to simulate after `close`.
 
         Raises:
             ConflictError: If the simulator is closed.
@@ -195,13 +195,13 @@ class Simulator:
         keys = tuple(trial.values)
         table = ThrowsTable(keys, self.config, tuple(trial.target))
         row = table.row(trial, judge_episode(with_values(self.config, trial.values), episode), None)
-        # The row is made without a place in a shard, from which these two come in a dataset.
+        # In a dataset, these two values come from a shard; the row was made without one.
         row |= {"samples": episode.header.samples, "digest": episode.digest}
         return Throw(table.table([row]), 0, keys, _Simulated(episode), self._source)
 
 
 def _locate(problem: Problem, index: int, point: Point) -> Problem:
-    """Name the point of a list that has a problem: its index and, where the problem names no key, all its values."""
+    """Name the point of a list that has a problem: its index and, if the problem names no key, all its values."""
     place = f"points[{index}]"
     if problem.argument:
         return replace(problem, key=place)
@@ -211,14 +211,14 @@ def _locate(problem: Problem, index: int, point: Point) -> Problem:
     return Problem(f"{problem.message} ({values or 'with no value of its own'})", place, argument=True)
 
 
-def _row(values: Point) -> NDArray[np.float64]:
-    """Values as the only row of a table, shape ``(1, n_values)``."""
+def _make_row(values: Point) -> NDArray[np.float64]:
+    """Make a table of values as its only row, shape ``(1, n_values)``."""
     return np.array([list(values.values())], np.float64).reshape(1, len(values))
 
 
 @dataclass(frozen=True)
 class _Simulated:
-    """The episode of a throw that is in memory alone."""
+    """The episode of a throw that exists only in memory."""
 
     episode: Episode
 
@@ -242,7 +242,7 @@ class _Simulated:
 
 
 def _begin(config: Config, source: str) -> Callable[[tuple[int, Point]], Throw]:
-    """Make the simulator of a process of `Simulator.throw_many`, without the file, which may have changed by then."""
+    """Make the simulator of a process of `Simulator.throw_many`; the file is not read, because it may have changed."""
     simulator = Simulator.__new__(Simulator)
     simulator._start(config, source)
     return simulator._throw_numbered

@@ -1,4 +1,4 @@
-"""Units that names end with, and the number of nanoseconds in a second."""
+"""Finds the units that names end with, and knows the number of nanoseconds in a second."""
 
 from __future__ import annotations
 
@@ -22,5 +22,5 @@ _SUFFIXES = {
 
 
 def unit_of_name(name: str) -> str:
-    """Unit that the name of a key or a column ends with, such as ``m/s²`` of ``gravity_mps2``; empty if none."""
+    """Find the unit that a name of a key or column ends with, such as ``m/s²`` for ``gravity_mps2``, or empty."""
     return next((unit for suffix, unit in _SUFFIXES.items() if name.endswith(suffix)), "")

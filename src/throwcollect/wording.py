@@ -1,4 +1,4 @@
-"""Wording of messages: counts, lists of names, recommended commands, and characters that are safe to print."""
+"""Words parts of messages: counts, lists of names, recommended commands, and characters that are safe to print."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ def format_count(number: int, noun: str) -> str:
 
 
 def join_names(names: Sequence[str], word: str = "and") -> str:
-    """List names in a sentence, such as ``a, b and c``; of more than six, the others are counted."""
+    """List names in a sentence, such as ``a, b and c``; of more than six names, the last ones are only counted."""
     if len(names) > _MOST_NAMES:
         names = [*names[: _MOST_NAMES - 1], f"{len(names) - _MOST_NAMES + 1} more"]
     return f" {word} ".join(filter(None, [", ".join(names[:-1]), *names[-1:]]))
 
 
 def blank_numbers(text: str) -> str:
-    """Put ``#`` in place of each number of a text, so that reasons that differ only in numbers count as the same.
+    """Put ``#`` in place of each number in a text, so that reasons that differ only in numbers count as the same.
 
-    Plans and datasets store reasons as text alone. Numbers in names such as ``arm_right_4_joint`` stay.
+    Plans and datasets store reasons only as text. Numbers in names such as ``arm_right_4_joint`` stay.
     """
     return _NUMBER.sub("#", text)
 
@@ -51,7 +51,7 @@ def _printable_line(line: str) -> str:
 
 
 def is_text(text: str) -> bool:
-    """Whether a name from the system can be written as UTF-8: the name of a file may hold any bytes."""
+    """Say whether a name from the system can be written as UTF-8; the name of a file may hold any bytes."""
     try:
         text.encode()
     except UnicodeEncodeError:

@@ -42,7 +42,7 @@ def test_a_member_of_another_package_is_found_and_takes_the_place_of_none_of_our
     group = "throwcollect.engines"
     points = EntryPoints([EntryPoint("free_fall", BALLISTIC, group), EntryPoint("bullet", "x:Other", group)])
     monkeypatch.setattr(members, "entry_points", lambda **_: points)
-    caches = (members._table, load_member)
+    caches = (members._find_members, load_member)
     for cached in caches:
         cached.cache_clear()
     assert names_of("engines") == ("bullet", "mujoco", "ballistic", "free_fall")
@@ -55,11 +55,11 @@ def test_a_member_of_another_package_is_found_and_takes_the_place_of_none_of_our
 def test_installed_packages_are_asked_once_for_all_families(monkeypatch: pytest.MonkeyPatch) -> None:
     ask = Mock(return_value=EntryPoints())
     monkeypatch.setattr(members, "entry_points", ask)
-    members._table.cache_clear()
+    members._find_members.cache_clear()
     for family in ("robots", "tools", "engines", "tasks", "runtimes", "exporters"):
         assert names_of(family)
     assert ask.call_count == 1
-    members._table.cache_clear()
+    members._find_members.cache_clear()
 
 
 def test_an_unknown_member_is_an_error() -> None:
@@ -141,28 +141,28 @@ def test_a_broken_member_is_an_error_that_names_its_package(
     install(tmp_path, "somebodys", family, value)
     monkeypatch.syspath_prepend(tmp_path)
     monkeypatch.delitem(sys.modules, "broken", raising=False)
-    for cached in (members._table, load_member):
+    for cached in (members._find_members, load_member):
         cached.cache_clear()
     with pytest.raises(ConfigError) as caught:
         load_member(family, "mine")
     assert str(caught.value).startswith(f"the {family[:-1]} mine of somebodys 1.0")
     assert said in str(caught.value)
     monkeypatch.undo()
-    members._table.cache_clear()
+    members._find_members.cache_clear()
 
 
 def test_two_packages_with_a_member_of_one_name_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     install(tmp_path, "first", "engines", BALLISTIC)
     install(tmp_path, "second", "engines", "x:Other")
     monkeypatch.syspath_prepend(tmp_path)
-    for cached in (members._table, load_member):
+    for cached in (members._find_members, load_member):
         cached.cache_clear()
     with pytest.raises(
         ConfigError, match=r"the engine mine of first 1\.0 and second 1\.0: only one package may use a name"
     ):
         load_member("engines", "mine")
     monkeypatch.undo()
-    members._table.cache_clear()
+    members._find_members.cache_clear()
 
 
 def test_a_broken_engine_is_an_error_before_a_run_begins(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""Compares robot descriptions: of a robot that is simulated, nothing but its appearance may change."""
+"""Compares robot descriptions, because only the appearance of a robot may change while it is simulated."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ from pathlib import Path
 from throwcollect.errors import ConfigError, ConflictError
 
 _SEEN = ("visual", "material")
-"""Elements of links that the physics ignores."""
+"""Elements of links that can only be seen, and that the physics ignores."""
 
 
 def check_appearance(description: str, drawn: str) -> None:
     """Refuse a URDF for viewers that changes more of the simulated robot's description than its appearance.
 
     Raises:
-        ConfigError: If it is no URDF.
+        ConfigError: If the text for viewers is no URDF.
         ConflictError: If it has other joints, masses or collision shapes.
     """
-    if differing := _physics_of(description) ^ _physics_of(drawn):
+    if differing := _read_physics(description) ^ _read_physics(drawn):
         first = min(text.split(">", 1)[0].removeprefix("<") for text in differing)
         raise ConflictError(
             f"robot_description: may differ only in what is seen, but {first} is another one",
@@ -54,13 +54,14 @@ def _parse(text: str, name: str) -> ElementTree.Element:
 
 
 @lru_cache(maxsize=4)
-def _physics_of(description: str) -> frozenset[str]:
-    """Links and joints without their appearance, each in the canonical form of XML.
+def _read_physics(description: str) -> frozenset[str]:
+    """Read links and joints without their appearance, each in the canonical form of XML.
 
-    Only these are compared: tooltips of links, to which viewers bind plots, are no part of the physics either.
+    All other elements are left out, because they are no part of the physics, such as the tooltips of links to which
+    viewers bind plots.
 
     Raises:
-        ConfigError: If it is no URDF, or its elements are nested too deeply to be compared.
+        ConfigError: If the text is no URDF, or its elements are nested too deeply to be compared.
     """
     texts = []
     for element in _parse(description, "robot_description"):

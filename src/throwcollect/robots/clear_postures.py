@@ -10,32 +10,32 @@ from numpy.typing import NDArray
 from throwcollect.pinocchio_library import pinocchio
 
 _DOUBT_M = 1e-4
-"""How much a computed distance may exceed the true one; the search for it ends at a hundredth of that."""
+"""How much a computed distance may exceed the true one; the solver's own tolerance is a hundredth of that."""
 _FAR_M = 0.3
 """A lower bound suffices for the distance of links that are at least so far apart."""
 _FEW_PAIRS = 10
-"""Up to so many distances are computed faster one by one than in a tree of all links."""
+"""Up to this many distances are computed faster one by one than all together."""
 _MOST_TRIES = 300
-"""Most postures that are examined: with more, finding a near one would take longer than it saves."""
+"""Most postures that are examined: with more postures, the search for a near one would take longer than it saves."""
 _LEAST_WORTH = 3
-"""A posture is kept if it shows that so many postures of the motion are clear, itself among them."""
+"""A posture is kept if it shows that at least this many postures of the motion are clear, itself included."""
 _UNBOUNDED_M = 1e9
-"""Reach of links beyond a joint that does not turn about an axis: how they move is unknown."""
+"""Reach of links beyond a joint that does not turn about an axis, because it is unknown how they move."""
 
 
 class ClearPostures:
     """Postures in which pairs of links are farther apart than a margin, and how far around each of them this holds.
 
-    A joint that turns by an angle moves no point of the links beyond it by more than the angle times a reach, which is
-    the same in all postures. So links at a distance d stay apart by at least d minus the sum of angles times reaches
-    over the joints between the two. Postures are in the order of the model.
+    A joint that turns by an angle moves the points of the links beyond it by at most the angle times a reach, which is
+    the same in all postures. So two links at a distance d stay apart by at least d minus the sum of angles times
+    reaches over the joints between the two. Angles of postures are in the order of the model.
 
     Args:
         model: The robot with all joints.
         geometry: Its shapes, and the pairs of them that must stay apart.
         reaches: The result of `find_reaches`.
         pairs: Numbers of the pairs that this object looks at, shape ``(n,)`` with at least one.
-        margin_m: Distance that a clear pair exceeds [m].
+        margin_m: A pair is clear if its distance is larger than this [m].
     """
 
     def __init__(
@@ -59,12 +59,12 @@ class ClearPostures:
     def find_unknown(self, postures: NDArray[np.float64]) -> NDArray[np.bool_]:
         """Find the postures [rad], shape ``(n, n_joints)``, that are not known to be clear, shape ``(n,)``."""
         lowest, highest = postures.min(axis=0), postures.max(axis=0)
-        # Known postures that are too far from the box around all of these cannot show that any of them is clear.
+        # A known posture that is too far from the box around `postures` cannot show that any of them is clear.
         gaps = np.maximum(np.maximum(lowest - self._postures, self._postures - highest), 0.0)
         near = np.flatnonzero((gaps * self._steepness).sum(axis=1) < 1)
         known, steepness = self._postures[near], self._steepness[near]
-        # Slack keeps a known posture clear, and the way to another posture uses up a share of it. Joints that are the
-        # same in all of them need none.
+        # A known posture is clear by some slack, and the way to another posture uses up a share of it. Joints that have
+        # the same angle in all postures use up nothing.
         spent = np.zeros((len(postures), len(near)))
         for joint in np.flatnonzero((known != lowest).any(axis=0) | (lowest != highest)):
             spent += np.abs(postures[:, joint, np.newaxis] - known[:, joint]) * steepness[:, joint]
@@ -77,7 +77,8 @@ class ClearPostures:
         """
         unknown: NDArray[np.bool_] = np.ones(len(postures), bool)
         if not self._tries:
-            # No further posture is kept, but for few pairs, their distances cost less than the tree would.
+            # No further posture is kept. But if there are few pairs, computing their distances costs less than a check
+            # for collisions.
             unknown[0] = len(self._pairs) > _FEW_PAIRS or self._compute_distances(postures[0]).min() <= self._needed
             return unknown
         self._tries -= 1
@@ -85,7 +86,7 @@ class ClearPostures:
         slack = distances - self._needed
         if slack.min() <= 0:
             return unknown
-        # Of each joint the steepest pair counts, so that the bound holds for all pairs at once.
+        # For each joint, the steepest pair counts, so that the bound holds for all pairs at once.
         steepness = (self._reaches / slack[:, np.newaxis]).max(axis=0)
         unknown = np.greater_equal(np.abs(postures - postures[0]) @ steepness, 1)
         if np.count_nonzero(~unknown) >= _LEAST_WORTH:
@@ -95,14 +96,14 @@ class ClearPostures:
         return unknown
 
     def _find_least_distances(self, posture: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Find lower bounds of the distance of each pair [m]; exact to `_DOUBT_M` for those below `_FAR_M`."""
+        """Find a lower bound of the distance of each pair [m]; bounds below `_FAR_M` are exact to `_DOUBT_M`."""
         if not len(self._postures):
             return self._compute_distances(posture)
         away = np.abs(self._postures - posture)
         nearest = int(np.argmin(away @ self._reaches.max(axis=0)))
         least: NDArray[np.float64] = self._distances[nearest] - self._reaches @ away[nearest]
         close = np.flatnonzero(least < _FAR_M)
-        # A distance that is computed alone takes three times as long as one of all that are computed together.
+        # A distance that is computed alone takes three times as long as one that is computed together with all others.
         if 3 * len(close) > len(self._geometry.collisionPairs):
             return self._compute_distances(posture)
         self._place(posture)
@@ -129,11 +130,11 @@ def find_reaches(model: pinocchio.Model, geometry: pinocchio.GeometryModel) -> N
     """Find how far a turn of each joint moves the links of each pair against each other at most [m/rad].
 
     Returns:
-        Shape ``(n_pairs, n_joints)``, in the order of the model; 0 for joints that are not between the two.
+        Shape ``(n_pairs, n_joints)``, in the order of the model; 0 for joints that are not between the two links.
     """
     shapes = np.array([_find_reach(model, shape) for shape in geometry.geometryObjects])
     pairs = [(pair.first, pair.second) for pair in geometry.collisionPairs]
-    # Without the reshape, a robot that has no shapes, and so no pairs, would have no columns.
+    # Without the reshape, a robot without shapes, and so without pairs, would have no columns.
     one, other = np.array(pairs, np.intp).reshape(-1, 2).T
     # A joint that carries both links, or neither, does not move them against each other.
     between = (shapes[one] > 0) != (shapes[other] > 0)
@@ -142,18 +143,18 @@ def find_reaches(model: pinocchio.Model, geometry: pinocchio.GeometryModel) -> N
 
 
 def _find_reach(model: pinocchio.Model, shape: pinocchio.GeometryObject) -> NDArray[np.float64]:
-    """Largest distance of a shape from each joint that carries it, in any posture [m]; 0 for other joints."""
+    """Find the largest distance of a shape, in any posture, from each joint that carries it [m]; 0 for other joints."""
     shape.geometry.computeLocalAABB()
     box = shape.geometry.aabb_local
     corners = [shape.placement.act(np.array(corner)) for corner in product(*zip(box.min_, box.max_, strict=True))]
     reaches = np.zeros(model.nq)
     joint, reach = shape.parentJoint, max(float(np.linalg.norm(corner)) for corner in corners)
     while joint > 0:
-        # In Pinocchio the names of all joints that turn about an axis begin like that, such as JointModelRX.
+        # In Pinocchio, the names of all joints that turn about an axis begin with these letters, such as JointModelRX.
         if not model.joints[joint].shortname().startswith("JointModelR"):
             reach = _UNBOUNDED_M
         reaches[model.idx_qs[joint]] = reach
-        # Whatever the angles are, a point is no farther away than the lengths of the links up to it, added up.
+        # Whatever the angles are, a point is no farther away than the sum of the lengths of the links up to it.
         reach += float(np.linalg.norm(model.jointPlacements[joint].translation))
         joint = model.parents[joint]
     return reaches

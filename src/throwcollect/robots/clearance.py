@@ -1,4 +1,4 @@
-"""How close the links of a robot and its tool come to each other."""
+"""Computes how close the links of a robot and its tool come to each other."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from throwcollect.robots.robot import Robot
 from throwcollect.tools.tool import Tool
 
 MARGIN_M = 0.002
-"""Least distance between links. It covers how far the spoon, 1 m from the torso's axis, cuts into a body of the head's
-curvature on a path between two postures 0.02 rad apart."""
+"""Least distance between links. On a path between two checked postures, which are 0.02 rad apart, the spoon, 1 m from
+the torso's axis, could cut by this much into a body as curved as the head."""
 _SHORT_CHAIN = 2
-"""Links with at most so many joints between them are always close to each other."""
+"""Links with at most this many joints between them are always close to each other."""
 
 
 @dataclass(frozen=True)
@@ -27,9 +27,9 @@ class Approach:
     """Two links that come too close.
 
     Attributes:
-        links: Their names; the tool has its own name here.
+        links: Names of the two links; the tool counts as a link, by its own name.
         index: Row of the posture.
-        distance_m: Distance [m]; negative when they overlap.
+        distance_m: Distance of the links [m]; negative if they overlap.
     """
 
     links: tuple[str, str]
@@ -63,8 +63,8 @@ class Clearance:
         for request in self._distances.collisionRequests:
             request.security_margin = MARGIN_M
         self._broadphase = pinocchio.BroadPhaseManager_DynamicAABBTreeCollisionManager(model, geometry, self._distances)
-        # Links with few joints between them are never clear by much, so a posture would show little about those near
-        # it if the same object looked at these links and at all others.
+        # Links with few joints between them are never clear by much. If one object looked at these links and at all
+        # others, a posture would show little about the postures near it.
         reaches = find_reaches(model, geometry)
         short = (reaches > 0).sum(axis=1) <= _SHORT_CHAIN
         self._clear = [
@@ -76,7 +76,7 @@ class Clearance:
     def first_approach(self, configurations: NDArray[np.float64]) -> Approach | None:
         """Find the first posture in which two links are closer than `MARGIN_M`, and the closest links in it, if any.
 
-        Most postures need no computation: a posture near them was clear by more than the way between the two.
+        Most postures need no computation, because a posture near them was clear by more than the way between the two.
 
         Args:
             configurations: In the order of the model [rad], shape ``(n, n_joints)``.
@@ -86,7 +86,7 @@ class Clearance:
             if self._is_clear(configurations[index:], [rows[index:] for rows in unknown]):
                 continue
             posture = configurations[index]
-            # The tree tells quickly whether anything is too close, and no more. The message has to say what it is.
+            # The tree tells quickly whether any links are too close, but the message has to say which links.
             if pinocchio.computeCollisions(self._model, self._data, self._broadphase, posture, True):
                 pinocchio.computeDistances(self._model, self._data, self.geometry, self._distances, posture)
                 distances = [result.min_distance for result in self._distances.distanceResults]
@@ -140,15 +140,15 @@ class Clearance:
 
 @lru_cache(maxsize=4)
 def _read_shapes(robot: Robot) -> pinocchio.GeometryModel:
-    """Read the shapes of a robot's links, and the pairs of them that must stay apart; to be changed by nobody.
+    """Read the shapes of a robot's links, and the pairs that must stay apart; callers must not change the result.
 
-    Reading meshes takes a third of a second, and programs that look at several datasets check each of them.
+    The result is cached, because reading meshes takes a third of a second, and some programs check several datasets.
 
     Raises:
         ConfigError: If the robot's meshes cannot be read.
     """
     model, kind = joint_model(robot), pinocchio.GeometryType.COLLISION
-    # Only the vertices of meshes are used. Bounding boxes come with them; those of this kind are built fastest.
+    # Only the vertices of meshes are used. Bounding boxes are built with them; boxes of this kind are built fastest.
     loader = pinocchio.coal.MeshLoader(pinocchio.coal.BV_OBB)
     try:
         geometry = pinocchio.buildGeomFromUrdf(
@@ -158,7 +158,7 @@ def _read_shapes(robot: Robot) -> pinocchio.GeometryModel:
         raise ConfigError(f"{robot.urdf_path}: its meshes cannot be read: {error}") from error
     for shape in geometry.geometryObjects:
         if isinstance(shape.geometry, pinocchio.coal.BVHModelBase):
-            # Bullet collides the convex hulls of meshes, so those are what has to stay apart.
+            # Bullet simulates collisions of the convex hulls of meshes, so it is the hulls that must stay apart.
             shape.geometry.buildConvexHull(True, "Qt")
             shape.geometry = shape.geometry.convex
     geometry.addAllCollisionPairs()

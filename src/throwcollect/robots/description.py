@@ -1,4 +1,4 @@
-"""A robot's description in URDF, with its tool: in full for viewers, and reduced to moving parts for the physics."""
+"""Writes a robot's description with its tool in URDF: in full for viewers, reduced to moving parts for the physics."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ from throwcollect.tools.tool import Tool, tool_of
 
 _PACKAGE = "package://"
 _written: dict[tuple[Robot, str], str] = {}
-"""The last full descriptions, by robot and configuration of the tool: all that looks at a dataset needs the same one,
-and to write it takes 20 ms."""
+"""The latest full descriptions, by robot and configuration of the tool. They are kept, because everything that looks at
+a dataset needs the same description, and writing it takes 20 ms."""
 _MOST_WRITTEN = 8
 
 
@@ -33,9 +33,9 @@ class Description:
     """The robot as the physics loads it.
 
     Attributes:
-        urdf: URDF text; mesh paths are absolute, every movable joint of it is in `moving`.
+        urdf: URDF text; mesh paths are absolute, and every movable joint in the text is in `moving`.
         moving: Joints that are simulated, in the order of `Robot.joints`.
-        locked: Angle [rad] at which each other joint is fixed.
+        locked: Angle [rad] at which each of the other joints is fixed.
     """
 
     urdf: str
@@ -61,7 +61,7 @@ def is_available(config: Config) -> bool:
 def start_posture(config: Config) -> Mapping[str, float]:
     """Find the angle [rad] of each joint at the start of a trial, in the order of `Robot.joints`.
 
-    A joint's angle is that of ``task.start``, else of ``robot.posture``, else of the robot's posture at rest.
+    The angle of a joint is taken from ``task.start``, or else ``robot.posture``, or else the robot's posture at rest.
 
     Raises:
         ConfigError: If the robot's files cannot be read.
@@ -93,7 +93,7 @@ def find_locked_joints(config: Config) -> Mapping[str, float]:
 def full_description(config: Config) -> str:
     """Write the URDF text of the robot with its tool: all joints, visual and collision shapes, ``package://`` paths.
 
-    The hand has no collision shapes, as its fingers reach into the tool's handle.
+    The hand has no collision shapes, because its fingers reach into the tool's handle.
 
     Raises:
         ConfigError: If the robot's files cannot be read.
@@ -110,9 +110,9 @@ def full_description(config: Config) -> str:
 
 def _write_full(robot: Robot, tool: Tool) -> str:
     description = _read_description(robot)
-    description.append(_tool_link(tool, visual=True))
-    description.append(_tool_joint(tool, robot.hand, tool.mount))
-    return _text(description)
+    description.append(_make_tool_link(tool, visual=True))
+    description.append(_make_tool_joint(tool, robot.hand, tool.mount))
+    return _write_text(description)
 
 
 def touchable_bodies(config: Config) -> frozenset[str]:
@@ -131,23 +131,23 @@ def _list_links(robot: Robot) -> tuple[str, ...]:
 
 @lru_cache(maxsize=4)
 def joint_model(robot: Robot) -> pinocchio.Model:
-    """Build a model of all joints of a robot, without a tool; to be changed by nobody.
+    """Build a model of all joints of a robot, without a tool; callers must not change it.
 
     Raises:
         ConfigError: If the robot's files cannot be read, or lack something.
     """
-    # These raise our errors for what the files lack; pinocchio's parser would print its own words to the terminal.
+    # These raise our own errors if the files lack something; Pinocchio's parser would print its errors to the terminal.
     joint_limits(robot)
     _ = robot.rest_posture
     return _read_whole(robot)[1]
 
 
 def physics_description(config: Config) -> Description:
-    """Write a URDF of the robot with its tool in which every fixed or locked joint is merged away, except the tool's.
+    """Write a URDF of the robot with its tool, without fixed or locked joints, except the one that holds the tool.
 
-    A link carries the name of the link that its joint moves in the robot's URDF, and the mass, inertia and collision
-    shapes of everything that is rigidly attached to it. There are no visual shapes. Equal configurations give equal
-    bytes.
+    Links that such a joint connects become one link. It has the name of the link that the moving joint before it moves
+    in the robot's URDF, and mass, inertia and collision shapes of all of these links. There are no visual shapes. Equal
+    configurations give equal bytes.
 
     Raises:
         ConfigError: If the robot's files cannot be read.
@@ -157,24 +157,24 @@ def physics_description(config: Config) -> Description:
     source, whole = _read_whole(robot)
     model = lock_joints(whole, locked)
     joints = {joint.get("name"): joint for joint in source.iter("joint")}
-    names = [_root_link(source), *(_child(joints[name]) for name in model.names[1:])]
+    names = [_find_root_link(source), *(_find_child(joints[name]) for name in model.names[1:])]
 
     description = ElementTree.Element("robot", name=source.get("name", robot.name))
     for number, name in enumerate(names):
-        description.append(_link(name, model.inertias[number], _shapes(robot, source, model, number)))
+        description.append(_make_link(name, model.inertias[number], _collect_shapes(robot, source, model, number)))
     for number in range(1, model.njoints):
         joint = ElementTree.SubElement(description, "joint", name=model.names[number], type="revolute")
         ElementTree.SubElement(joint, "parent", link=names[model.parents[number]])
         ElementTree.SubElement(joint, "child", link=names[number])
-        joint.append(_origin(model.jointPlacements[number]))
+        joint.append(_make_origin(model.jointPlacements[number]))
         for tag in ("axis", "limit", "dynamics"):
-            # Copies, as writing the text indents each element of it, also in another thread.
+            # The elements are copied, because writing the text indents each element, perhaps in another thread.
             joint.extend(copy.deepcopy(joints[model.names[number]].findall(tag)))
     hand = model.frames[model.getFrameId(robot.hand, pinocchio.BODY)]
-    description.append(_tool_link(tool, visual=False))
-    description.append(_tool_joint(tool, names[hand.parentJoint], hand.placement * tool.mount))
+    description.append(_make_tool_link(tool, visual=False))
+    description.append(_make_tool_joint(tool, names[hand.parentJoint], hand.placement * tool.mount))
     moving = tuple(joint for joint in robot.joints if joint not in locked)
-    return Description(urdf=_text(description), moving=moving, locked=locked)
+    return Description(urdf=_write_text(description), moving=moving, locked=locked)
 
 
 def _read_description(robot: Robot) -> ElementTree.Element:
@@ -196,7 +196,7 @@ def _read_description(robot: Robot) -> ElementTree.Element:
         raise ConfigError(f"{path}: link {robot.hand} is missing")
     links, joints = ({element.get("name", "") for element in description.findall(kind)} for kind in ("link", "joint"))
     if shared := links & joints:
-        # Pinocchio has frames for both, and cannot tell which one is meant.
+        # Pinocchio has a frame for the joint and one for the link, and cannot tell which one is meant.
         raise ConfigError(
             f"{path}: a joint has the name of a link: {', '.join(sorted(shared))}", hint="rename the joint in a copy"
         )
@@ -205,18 +205,18 @@ def _read_description(robot: Robot) -> ElementTree.Element:
 
 @lru_cache(maxsize=4)
 def _read_whole(robot: Robot) -> tuple[ElementTree.Element, pinocchio.Model]:
-    """Read a robot's URDF, and build a model of all of its joints; both are to be changed by nobody.
+    """Read a robot's URDF, and build a model of all of its joints; callers must not change either.
 
-    They are kept, as every trial with other locked joints or another tool needs them, and reading takes 7 ms.
+    Both are cached, because each trial with other locked joints or another tool needs them, and reading takes 7 ms.
 
     Raises:
         ConfigError: If the robot's files cannot be read, or lack something.
     """
     source = _read_description(robot)
-    return source, _whole(robot, source)
+    return source, _build_model(robot, source)
 
 
-def _whole(robot: Robot, source: ElementTree.Element) -> pinocchio.Model:
+def _build_model(robot: Robot, source: ElementTree.Element) -> pinocchio.Model:
     try:
         model = pinocchio.buildModelFromXML(ElementTree.tostring(source, encoding="unicode"))
     except (ValueError, RuntimeError) as error:
@@ -241,8 +241,10 @@ def lock_joints(model: pinocchio.Model, locked: Mapping[str, float]) -> pinocchi
     return pinocchio.buildReducedModel(model, numbers, configuration)
 
 
-def _shapes(robot: Robot, source: ElementTree.Element, model: pinocchio.Model, joint: int) -> list[ElementTree.Element]:
-    """Collision shapes of all links that move with a joint, placed in its frame."""
+def _collect_shapes(
+    robot: Robot, source: ElementTree.Element, model: pinocchio.Model, joint: int
+) -> list[ElementTree.Element]:
+    """Collect the collision shapes of all links that move with a joint, placed in the frame of the joint."""
     shapes = []
     for link in source.iter("link"):
         frame = model.frames[model.getFrameId(link.get("name"), pinocchio.BODY)]
@@ -250,7 +252,7 @@ def _shapes(robot: Robot, source: ElementTree.Element, model: pinocchio.Model, j
             continue
         for original in link.findall("collision"):
             shape = ElementTree.Element("collision")
-            shape.append(_origin(frame.placement * _read_origin(original)))
+            shape.append(_make_origin(frame.placement * _read_origin(original)))
             geometry = ElementTree.SubElement(shape, "geometry")
             geometry.extend(copy.deepcopy(list(original.iterfind("geometry/*"))))
             for mesh in geometry.iter("mesh"):
@@ -260,44 +262,46 @@ def _shapes(robot: Robot, source: ElementTree.Element, model: pinocchio.Model, j
     return shapes
 
 
-def _link(name: str, body: pinocchio.Inertia, shapes: list[ElementTree.Element]) -> ElementTree.Element:
+def _make_link(name: str, body: pinocchio.Inertia, shapes: list[ElementTree.Element]) -> ElementTree.Element:
     link = ElementTree.Element("link", name=name)
     inertial = ElementTree.SubElement(link, "inertial")
-    inertial.append(_origin(pinocchio.SE3(np.eye(3), body.lever)))
-    ElementTree.SubElement(inertial, "mass", value=_number(body.mass))
+    inertial.append(_make_origin(pinocchio.SE3(np.eye(3), body.lever)))
+    ElementTree.SubElement(inertial, "mass", value=_format_number(body.mass))
     keys = {"ixx": (0, 0), "ixy": (0, 1), "ixz": (0, 2), "iyy": (1, 1), "iyz": (1, 2), "izz": (2, 2)}
-    ElementTree.SubElement(inertial, "inertia", {key: _number(body.inertia[place]) for key, place in keys.items()})
+    ElementTree.SubElement(
+        inertial, "inertia", {key: _format_number(body.inertia[place]) for key, place in keys.items()}
+    )
     link.extend(shapes)
     return link
 
 
-def _tool_link(tool: Tool, *, visual: bool) -> ElementTree.Element:
+def _make_tool_link(tool: Tool, *, visual: bool) -> ElementTree.Element:
     shapes = []
     for kind in ("visual", "collision") if visual else ("collision",):
         for box in tool.boxes:
             shape = ElementTree.Element(kind)
-            shape.append(_origin(box.placement))
+            shape.append(_make_origin(box.placement))
             geometry = ElementTree.SubElement(shape, "geometry")
-            ElementTree.SubElement(geometry, "box", size=" ".join(map(_number, box.size)))
+            ElementTree.SubElement(geometry, "box", size=" ".join(map(_format_number, box.size)))
             shapes.append(shape)
-    return _link(tool.link, tool.inertia, shapes)
+    return _make_link(tool.link, tool.inertia, shapes)
 
 
-def _tool_joint(tool: Tool, parent: str, placement: pinocchio.SE3) -> ElementTree.Element:
+def _make_tool_joint(tool: Tool, parent: str, placement: pinocchio.SE3) -> ElementTree.Element:
     joint = ElementTree.Element("joint", name=f"{tool.name}_joint", type="fixed")
     ElementTree.SubElement(joint, "parent", link=parent)
     ElementTree.SubElement(joint, "child", link=tool.link)
-    joint.append(_origin(placement))
+    joint.append(_make_origin(placement))
     return joint
 
 
-def _child(joint: ElementTree.Element) -> str:
+def _find_child(joint: ElementTree.Element) -> str:
     child = joint.find("child")
     return child.get("link", "") if child is not None else ""
 
 
-def _root_link(source: ElementTree.Element) -> str:
-    children = {_child(joint) for joint in source.iter("joint")}
+def _find_root_link(source: ElementTree.Element) -> str:
+    children = {_find_child(joint) for joint in source.iter("joint")}
     return next(name for link in source.iter("link") if (name := link.get("name", "")) not in children)
 
 
@@ -309,17 +313,17 @@ def _read_origin(element: ElementTree.Element) -> pinocchio.SE3:
     return pinocchio.SE3(pinocchio.rpy.rpyToMatrix(*rpy), np.array(xyz))
 
 
-def _origin(placement: pinocchio.SE3) -> ElementTree.Element:
+def _make_origin(placement: pinocchio.SE3) -> ElementTree.Element:
     angles = pinocchio.rpy.matrixToRpy(placement.rotation)
     return ElementTree.Element(
-        "origin", xyz=" ".join(map(_number, placement.translation)), rpy=" ".join(map(_number, angles))
+        "origin", xyz=" ".join(map(_format_number, placement.translation)), rpy=" ".join(map(_format_number, angles))
     )
 
 
-def _number(value: float) -> str:
+def _format_number(value: float) -> str:
     return repr(float(value))
 
 
-def _text(robot: ElementTree.Element) -> str:
+def _write_text(robot: ElementTree.Element) -> str:
     ElementTree.indent(robot)
     return ElementTree.tostring(robot, encoding="unicode", xml_declaration=True) + "\n"

@@ -1,4 +1,4 @@
-"""The torques that motions of a robot with its tool and a ball need."""
+"""Computes the torques that motions of a robot with its tool and a ball need."""
 
 from __future__ import annotations
 
@@ -20,9 +20,12 @@ Motion = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
 
 
 class Dynamics:
-    """Inverse dynamics of a robot, of all its joints or with some of them locked at angles [rad], which is faster.
+    """Inverse dynamics of a robot.
 
-    The model is that of all joints, without a tool.
+    Args:
+        robot: The robot.
+        model: Model of all its joints, without a tool.
+        locked: Angle [rad] of each joint that is locked, which makes computing faster; empty if none is.
     """
 
     def __init__(self, robot: Robot, model: pinocchio.Model, locked: Mapping[str, float]) -> None:
@@ -38,7 +41,7 @@ class Dynamics:
     def efforts(self, config: Config, tool: Tool, motion: Motion) -> NDArray[np.float64]:
         """Compute the torques that a motion of all joints needs, with tool and ball of a trial in the hand.
 
-        In the motion, locked joints rest where they are locked.
+        In the motion, locked joints must rest at the angles at which they are locked.
 
         Returns:
             [Nm], shape ``(n, n_joints)``, in the order of `Robot.joints`; 0 for locked joints.
@@ -49,13 +52,13 @@ class Dynamics:
         seat = np.array(tool.ball_seat(config.ball.radius_m))
         ball = pinocchio.Inertia.FromSphere(config.ball.mass_kg, config.ball.radius_m)
         load = tool.inertia + pinocchio.SE3(np.eye(3), seat).act(ball)
-        # The sum begins with the bare hand, because the load of the trial before is still in the model.
+        # The sum begins with the bare hand, because the model still holds the load of the previous trial.
         self._model.inertias[self._hand] = self._bare_hand + (self._hand_placement * tool.mount).act(load)
         self._model.gravity.linear = np.array([0.0, 0.0, -config.scene.gravity_mps2])
         positions, velocities, accelerations = (np.ascontiguousarray(array[:, self._columns]) for array in motion)
         rows = zip(positions, velocities, accelerations, strict=True)
         torques = np.array([pinocchio.rnea(self._model, self._data, *row) for row in rows])
         needed = np.zeros_like(motion[0])
-        # Inverse dynamics know no friction.
+        # Pinocchio's inverse dynamics leave out friction.
         needed[:, self._columns] = torques + self._damping * velocities
         return needed

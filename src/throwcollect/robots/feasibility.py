@@ -1,4 +1,4 @@
-"""Checks joint trajectories: the robot's limits, its collisions with itself, and a tool that holds the ball."""
+"""Checks joint trajectories: whether limits are kept, the robot is clear of itself, and the tool holds the ball."""
 
 from __future__ import annotations
 
@@ -24,16 +24,16 @@ _CHECKED_LEAST = 100
 _CLEARANCE_STEP_RAD = 0.02
 _POSITION_SLACK_RAD = 1e-6
 _LOWEST_WAY_OUT_RAD = -0.02
-"""A way out that goes down by less than this counts as level: the ball takes a second or more to leave on it."""
+"""A way out that goes down by less than this counts as level, because a ball takes a second or more to leave on it."""
 _SURELY = 1 - 1e-6
-"""A torque below this share of its limit is within it on any model: results of different models agree to 1e-12."""
+"""A torque below this share of its limit is within the limit by any model: results of models agree to 1e-12."""
 
 
 class Feasibility:
     """Checks joint trajectories against the limits of a robot.
 
-    One object serves all trials of a collection: each check sets posture, masses, gravity and limits of its trial, and
-    only a trial with another tool costs the time to rebuild its pairs.
+    One object serves all trials of a collection: each check sets posture, masses, gravity and limits of its trial. Only
+    a trial with another tool takes longer, because pairs of shapes are built anew.
 
     Raises:
         ConfigError: If the robot's files cannot be read, or lack something.
@@ -59,18 +59,18 @@ class Feasibility:
     def check(self, config: Config, trajectory: JointTrajectory) -> str | None:
         """Explain why the robot cannot do a trial with a trajectory.
 
-        The curve between the points is checked at 100 Hz and at 100 instants at least, for collisions whenever a joint
-        has gone on by 0.02 rad. Joints that the trajectory does not move rest at the trial's start posture. Torques are
-        those of inverse dynamics plus viscous friction; the tool and the ball count as part of the hand throughout,
-        also after the ball has left. The effort of locked joints is not limited, as they are simulated as rigid.
-        Angles are true ones (`robot.joint_offsets`), and motions have their true speed (`robot.speed_scale`).
+        The curve between the points is checked at 100 Hz and at 100 instants at least; for collisions, whenever a joint
+        has moved on by 0.02 rad. Joints that the trajectory does not move rest at the trial's start posture. Torques
+        are computed by inverse dynamics plus viscous friction; the tool and the ball count as part of the hand
+        throughout, even after the ball has left. The effort of locked joints is not limited, because they are simulated
+        as rigid. Angles are true ones (`robot.joint_offsets`), and motions have their true speed (`robot.speed_scale`).
         Collisions are those of the robot and the tool; the task judges what the ball hits. The tool has to move if the
         task throws, and to hold the ball in the start posture (see `Tool.way_out`).
 
         Returns:
-            None if it is feasible, else one sentence with joint or links, instant, value and limit: of the first kind
-            that is violated, in the order position, velocity, effort, collision, tool that rests, ball that does
-            not. Of limits, it tells the worst violation; of collisions, the first.
+            None if the trial is feasible. Otherwise one sentence with joint or links, instant, value and limit, about
+            the first of these checks that fails: position, velocity, effort, collision, a tool that has to move, a ball
+            that has to stay. For limits, it tells the worst violation; for collisions, the first one.
 
         Raises:
             ConfigError: If the ball does not fit the tool.
@@ -79,21 +79,21 @@ class Feasibility:
         joints, tool = self._robot.joints, self._tool_of(config)
         instants = max(_CHECKED_LEAST, math.ceil(trajectory.times[-1] * _CHECKED_HZ)) + 1
         times = np.linspace(0.0, trajectory.times[-1], instants)
-        motion = _whole_body(self._robot, trajectory, times, posture, config)
+        motion = _sample_whole_body(self._robot, trajectory, times, posture, config)
         if violation := self._find_violation(config, times, motion):
             return violation
         positions = motion[0]
-        rows = _spread(positions)
+        rows = _choose_rows(positions)
         if approach := self._clearance.first_approach(self._model_order(positions[rows])):
             return (
-                f"{' and '.join(approach.links)} {_gap(approach.distance_m)} at {times[rows[approach.index]]:.3f} s; "
-                f"they must stay {MARGIN_M * 1000:.3g} mm apart"
+                f"{' and '.join(approach.links)} {_describe_gap(approach.distance_m)} "
+                f"at {times[rows[approach.index]]:.3f} s; they must stay {MARGIN_M * 1000:.3g} mm apart"
             )
         # A throw whose tool never moves is a mistake in the configuration, and not a short throw.
         if config.task.throws and np.ptp(positions[:, self._carrying], axis=0).max() <= _POSITION_SLACK_RAD:
             carrying = ", ".join(joints[column] for column in self._carrying)
             return f"task.end moves no joint that carries the {tool.name}; these do: {carrying}"
-        return self._loss(config, posture)
+        return self._explain_loss(config, posture)
 
     def find_lowest(self, config: Config) -> tuple[str, float]:
         """Find the lowest link of the robot in the start posture: its name, and its height above the base [m]."""
@@ -107,14 +107,14 @@ class Feasibility:
         limits = self._limits
         # About the middle of its range, a joint has one limit in both directions.
         middle, half = (limits.upper + limits.lower) / 2, (limits.upper - limits.lower) / 2
-        if worst := _worst(positions - middle, half + _POSITION_SLACK_RAD):
+        if worst := _find_worst(positions - middle, half + _POSITION_SLACK_RAD):
             row, joint = worst
             side, limit = ("upper", limits.upper) if positions[worst] > middle[joint] else ("lower", limits.lower)
             return (
                 f"{joints[joint]} is at {positions[worst]:.4g} rad at {times[row]:.3f} s; "
                 f"its {side} limit is {limit[joint]:.4g} rad"
             )
-        if worst := _worst(velocities, limits.velocity):
+        if worst := _find_worst(velocities, limits.velocity):
             row, joint = worst
             return (
                 f"{joints[joint]} moves at {abs(velocities[worst]):.4g} rad/s at {times[row]:.3f} s; "
@@ -128,7 +128,7 @@ class Feasibility:
         if (shares_of(efforts, limit) <= _SURELY).all():
             return None
         efforts = self._dynamics.efforts(config, tool, motion)
-        if worst := _worst(efforts, limit):
+        if worst := _find_worst(efforts, limit):
             row, joint = worst
             return (
                 f"{joints[joint]} needs {abs(efforts[worst]):.4g} Nm at {times[row]:.3f} s; "
@@ -136,8 +136,8 @@ class Feasibility:
             )
         return None
 
-    def _loss(self, config: Config, posture: NDArray[np.float64]) -> str | None:
-        """Explain why the ball does not stay in the tool of the still robot."""
+    def _explain_loss(self, config: Config, posture: NDArray[np.float64]) -> str | None:
+        """Explain why the ball does not stay in the tool of the still robot; None if it stays."""
         pinocchio.forwardKinematics(self._model, self._data, self._model_order(posture))
         tool, radius = self._tool_of(config), config.ball.radius_m
         # The last row of a rotation into world is the vertical of the world, along the axes of the frame.
@@ -159,20 +159,20 @@ class Feasibility:
         return self._free_dynamics
 
     def _tool_of(self, config: Config) -> Tool:
-        """Return the tool of a trial; if it is another one than before, `_clearance` gets its shapes."""
+        """Return the tool of a trial; if it differs from that of the previous trial, `_clearance` gets its shapes."""
         if config.tool != self._tool_config:
             self._tool_config, self._tool = config.tool, tool_of(config.tool)
             self._clearance = Clearance(self._robot, self._model, self._tool)
         return self._tool
 
     def _model_order(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Reorder values of joints as the model has them; the last axis is that of the joints."""
+        """Put values of joints, along the last axis, into the order of the model."""
         ordered = np.empty_like(values)
         ordered[..., self._columns] = values
         return ordered
 
 
-def _whole_body(
+def _sample_whole_body(
     robot: Robot, trajectory: JointTrajectory, times: NDArray[np.float64], posture: NDArray[np.float64], config: Config
 ) -> Motion:
     """Sample the motion of all joints, each array of shape ``(n, n_joints)``, in the order of `Robot.joints`."""
@@ -180,27 +180,27 @@ def _whole_body(
     offsets, speed = joint_offsets(config)[columns], config.robot.speed_scale
     whole = tuple(np.tile(rest, (len(times), 1)) for rest in (posture, np.zeros_like(posture), np.zeros_like(posture)))
     position, velocity, acceleration = sample_quintic(trajectory, times)
-    # At another speed the same angles are passed, so each derivative by time has one more factor of it.
+    # At another speed, the joints pass the same angles, so each derivative by time has one more factor of the speed.
     for array, sampled in zip(whole, (position + offsets, velocity * speed, acceleration * speed**2), strict=True):
         array[:, columns] = sampled
     return whole[0], whole[1], whole[2]
 
 
-def _spread(positions: NDArray[np.float64]) -> NDArray[np.intp]:
+def _choose_rows(positions: NDArray[np.float64]) -> NDArray[np.intp]:
     """Choose rows between which some joint moves by `_CLEARANCE_STEP_RAD`, with the first and the last row."""
-    # The sum of the largest moves from row to row: slow parts of a motion need few checks.
+    # The largest moves from row to row are added up, so that slow parts of a motion need few checks.
     travel = np.cumsum(np.abs(np.diff(positions, axis=0)).max(axis=1))
     passed = np.diff(np.floor(travel / _CLEARANCE_STEP_RAD), prepend=0.0) > 0
     passed[-1] = True
     return np.append(0, np.flatnonzero(passed) + 1)
 
 
-def _worst(values: NDArray[np.float64], limits: NDArray[np.float64]) -> tuple[int, int] | None:
+def _find_worst(values: NDArray[np.float64], limits: NDArray[np.float64]) -> tuple[int, int] | None:
     """Find row and column of the largest magnitude over its limit; None if no limit is exceeded."""
     shares = shares_of(values, limits)
     row, column = np.unravel_index(int(np.argmax(shares)), shares.shape)
     return (int(row), int(column)) if shares[row, column] > 1 else None
 
 
-def _gap(distance_m: float) -> str:
+def _describe_gap(distance_m: float) -> str:
     return "overlap" if distance_m < 0 else f"are {distance_m * 1000:.1f} mm apart"

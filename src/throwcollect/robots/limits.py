@@ -56,7 +56,7 @@ def joint_limits(robot: Robot) -> JointLimits:
         except (KeyError, ValueError) as error:
             raise ConfigError(f"{path}: joint {name}: limit is not readable: {error}") from error
     table = np.array(rows)
-    # The result is cached, so all who ask for it have the same arrays.
+    # The result is cached, so all callers have the same arrays, and none may write to them.
     table.flags.writeable = False
     return JointLimits(*table.T)
 
@@ -64,8 +64,8 @@ def joint_limits(robot: Robot) -> JointLimits:
 def shares_of(values: NDArray[np.float64], limits: NDArray[np.float64]) -> NDArray[np.float64]:
     """Compute magnitudes over their limits [-], of the shape of the values, ``(..., n_joints)``.
 
-    A limit may be 0, as a URDF may have it for joints that never move: what is 0 is within it, all else is infinitely
-    far beyond.
+    A limit may be 0, because a URDF may have such limits for joints that never move. Then the share of a value of 0 is
+    0, and the share of any other value is infinite.
     """
     with np.errstate(divide="ignore", over="ignore"):
         shares: NDArray[np.float64] = np.divide(np.abs(values), limits, out=np.zeros_like(values), where=values != 0)

@@ -1,4 +1,4 @@
-"""Motors that follow their commands with a lag of the first order."""
+"""Computes how motors follow their commands with a lag of the first order."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The quintic curve between the points of a joint trajectory, as joint trajectory controllers follow it."""
+"""Computes the quintic curve between the points of a joint trajectory, as joint trajectory controllers follow it."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ def sample_quintic(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     """Compute positions, velocities and accelerations of a trajectory at given times.
 
-    Each segment is the polynomial of degree 5 that takes position, velocity and acceleration of both its points;
-    outside the trajectory the values are those of its nearest end.
+    Each segment is the polynomial of degree 5 that has the positions, velocities and accelerations of both its points.
+    Outside of the trajectory, the values are those at its nearest end.
 
     Args:
         trajectory: At least two points.
@@ -29,10 +29,10 @@ def sample_quintic(
     Raises:
         ValueError: If the trajectory has fewer than two points.
     """
-    coefficients, u, spans = _polynomials_at(trajectory, times)
+    coefficients, u, spans = _find_polynomials(trajectory, times)
     first = coefficients[1:] * _ORDERS[1:, np.newaxis, np.newaxis]
     second = first[1:] * _ORDERS[1:-1, np.newaxis, np.newaxis]
-    return _values(coefficients, u).T, (_values(first, u) / spans).T, (_values(second, u) / spans**2).T
+    return _evaluate(coefficients, u).T, (_evaluate(first, u) / spans).T, (_evaluate(second, u) / spans**2).T
 
 
 def sample_positions(trajectory: JointTrajectory, times: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -41,18 +41,18 @@ def sample_positions(trajectory: JointTrajectory, times: NDArray[np.float64]) ->
     Raises:
         ValueError: If the trajectory has fewer than two points.
     """
-    coefficients, u, _ = _polynomials_at(trajectory, times)
-    return _values(coefficients, u).T
+    coefficients, u, _ = _find_polynomials(trajectory, times)
+    return _evaluate(coefficients, u).T
 
 
-def _polynomials_at(
+def _find_polynomials(
     trajectory: JointTrajectory, times: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Find the segment at each time.
+    """Find the segment of the curve at each time.
 
     Returns:
-        Coefficients of its polynomials ``(6, n_joints, n)``, the place u in it from 0 to 1 and its length [s], both of
-        shape ``(n,)``.
+        Coefficients of the segment's polynomials ``(6, n_joints, n)``, the place u in the segment from 0 to 1, and the
+        length of the segment [s], both of shape ``(n,)``.
 
     Raises:
         ValueError: If the trajectory has fewer than two points.
@@ -75,7 +75,7 @@ def _polynomials_at(
     return np.ascontiguousarray(rows.T).reshape(*coefficients.shape[1:], len(times)), u, spans
 
 
-def _values(coefficients: NDArray[np.float64], u: NDArray[np.float64]) -> NDArray[np.float64]:
+def _evaluate(coefficients: NDArray[np.float64], u: NDArray[np.float64]) -> NDArray[np.float64]:
     """Evaluate polynomials in u, ``(n_joints, n)``; coefficients ``(n_orders, n_joints, n)``, lowest order first."""
     values: NDArray[np.float64] = coefficients[-1].copy()
     for coefficient in coefficients[-2::-1]:

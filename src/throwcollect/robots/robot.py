@@ -12,32 +12,34 @@ from types import MappingProxyType
 from throwcollect.errors import ConfigError
 
 
-# Caches are keyed by robots. With `eq` a robot would be hashed by its fields, of which mappings have no hash.
+# Robots are keys of caches. With `eq`, a robot would be hashed by its fields, but mappings among them have no hash.
 @dataclass(frozen=True, eq=False)
 class Robot:
     """A robot with a fixed base whose joints are all revolute, and the hand that holds the tool.
 
     Attributes:
-        name: Its name in configurations, such as ``talos``.
-        title: Its name in sentences, such as ``Talos``.
+        name: Name of the robot in configurations, such as ``talos``.
+        title: Name of the robot in sentences, such as ``Talos``.
         kind: Words before the title where a text first mentions the robot, such as ``the humanoid robot``; empty if
             the title says enough.
         controllers: Joint trajectory controller of each limb and its joints, in order.
         share: Returns the directory that ``package://`` paths of the description are relative to; raises `ConfigError`
-            if the package that brings it is not installed.
-        urdf: Path of the URDF in that directory, or an absolute one.
-        srdf: Path of the SRDF, likewise; it says which links may overlap, and holds the posture at rest.
+            if the package that brings this directory is not installed.
+        urdf: Path of the URDF in that directory, or an absolute path.
+        srdf: Path of the SRDF in that directory, or an absolute path. The SRDF says which links may overlap, and holds
+            the posture at rest.
         rest: Name of the SRDF's posture that joints have unless a configuration says otherwise.
         hand: Link that the tool is fixed to: the spoon's handle lies along -z of it, and the cup opens along +x.
-        open_hand: Prefix of the names of links that have no collision shapes, as the tool reaches into them.
+        open_hand: Prefix of the names of links that have no collision shapes, because the tool reaches into them.
         holding: Prefixes of the names of links that hold the tool and are not checked for collisions with it.
-        rigid: Prefix of the names of links for each group of links that only mimic joints move. Links of a group are
+        rigid: For each group of links that only mimic joints move, the prefix of the links' names. Links of a group are
             not checked for collisions with each other.
-        ros1_names: Name of each controller on the robot's ROS 1 software; empty if they are the same.
+        ros1_names: Name of each controller in the robot's ROS 1 software; empty if the names are the same.
         goal_tolerance_rad: Largest distance of each joint from the end of a trajectory whose goal has no tolerances
             of its own; 0 is not checked.
-        goal_time_s: Longest time after the end of such a trajectory in which it may get there; 0 waits for ever.
-        stopped_velocity_radps: Largest velocity that its controllers take for standing still.
+        goal_time_s: Longest time after the end of such a trajectory until the joint is within that distance; 0 waits
+            for ever.
+        stopped_velocity_radps: Largest velocity that the robot's controllers take for standing still.
     """
 
     name: str
@@ -102,7 +104,7 @@ class Robot:
 
     @cached_property
     def rest_posture(self) -> Mapping[str, float]:
-        """Angle [rad] of each joint in the posture at rest, in the order of `joints`; those that the SRDF omits are 0.
+        """Angle [rad] of each joint in the posture at rest, in the order of `joints`; 0 for joints that the SRDF omits.
 
         Raises:
             ConfigError: If the SRDF cannot be read or has no such posture.

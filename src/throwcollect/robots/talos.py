@@ -24,7 +24,7 @@ def _number_joints(limb: str, count: int) -> tuple[str, ...]:
 
 @cache
 def _find_share() -> Path:
-    # It is asked for with every mesh, and takes a third of a millisecond.
+    # The result is cached, because it is needed for every mesh, and takes a third of a millisecond.
     try:
         share = Path(str(distribution("example-robot-data").locate_file("cmeel.prefix/share")))
     except PackageNotFoundError as error:

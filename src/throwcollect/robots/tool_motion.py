@@ -1,4 +1,4 @@
-"""Position and velocity of the tool, computed from the measured joints."""
+"""Computes position and velocity of the tool from the measured joints."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from throwcollect.tools.tool import tool_of
 
 
 class ToolMotion:
-    """Position and velocity of the seat: the point of the tool in which a resting ball has its centre; world frame.
+    """Position and velocity of the seat in the world; the seat is the centre of a ball that rests in the tool.
 
     Raises:
         ConfigError: If the robot's files cannot be read, or the ball does not fit the tool.
@@ -29,7 +29,7 @@ class ToolMotion:
         self._base = np.array([0.0, 0.0, config.robot.base_height_m])
 
     def place(self, position: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Compute the position of the seat [m], shape ``(3,)``, from those of `Robot.joints` [rad]."""
+        """Compute the position of the seat [m], shape ``(3,)``, from positions of `Robot.joints` [rad]."""
         model = self._model
         pinocchio.forwardKinematics(model.model, model.data, (position + self._offsets)[model.order])
         hand = pinocchio.updateFramePlacement(model.model, model.data, model.hand)
@@ -63,7 +63,10 @@ _of_this_thread = threading.local()
 
 
 def _model_of(robot: Robot) -> _JointModel:
-    """Return this thread's model of a robot: making one takes a hundred times as long as using it, which changes it."""
+    """Return this thread's model of a robot.
+
+    Each thread keeps its own, because making a model takes a hundred times as long as using it, and using changes it.
+    """
     models: dict[Robot, _JointModel] = _of_this_thread.__dict__.setdefault("models", {})
     if robot not in models:
         models[robot] = _JointModel(robot)

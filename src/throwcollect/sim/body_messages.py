@@ -1,4 +1,4 @@
-"""States of bodies in ROS messages."""
+"""Translates states of bodies from ROS messages, and to them."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from throwcollect.sim.entities import WORLD_FRAME
 
 
 def body_state(pose: Pose, twist: Twist | None = None) -> BodyState:
-    """State that is given as messages; without a twist the body stands still."""
+    """Read a state from messages; without a twist, the body stands still."""
     position, orientation = pose.position, pose.orientation
     place = (position.x, position.y, position.z)
     turn = (orientation.x, orientation.y, orientation.z, orientation.w)
@@ -19,7 +19,7 @@ def body_state(pose: Pose, twist: Twist | None = None) -> BodyState:
 
 
 def entity_state(state: BodyState, now_ns: int) -> EntityState:
-    """simulation_interfaces/msg/EntityState of a state in the world at a time; accelerations are not measured."""
+    """Make a simulation_interfaces/msg/EntityState of a body at a time; accelerations are not measured."""
     message = EntityState()
     message.header.frame_id = WORLD_FRAME
     message.header.stamp.sec, message.header.stamp.nanosec = divmod(now_ns, 10**9)

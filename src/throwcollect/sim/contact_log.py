@@ -27,11 +27,11 @@ class ContactLog:
             self._open[body] = step
 
     def intervals(self, stamp_ns: Callable[[int], int]) -> tuple[Contact, ...]:
-        """All intervals so far, by start time, then by name; `stamp_ns` gives the time [ns] at the end of a step."""
+        """List all intervals by start time, then by name; `stamp_ns` gives the time [ns] at the end of a step."""
         ended = [(start, body, stamp_ns(end)) for start, body, end in self._closed]
         lasting = [(start, body, None) for body, start in self._open.items()]
         return tuple(
             Contact(body=body, start_ns=stamp_ns(start), end_ns=end_ns)
-            # Only start and body are compared, because an interval that lasts has None as its end, which has no order.
+            # Only start and body are compared: the end of an interval that lasts is None, which cannot be compared.
             for start, body, end_ns in sorted([*ended, *lasting], key=lambda interval: interval[:2])
         )

@@ -13,24 +13,28 @@ from throwcollect.sim.controller_messages import feedback_message, read_goal
 from throwcollect.sim.simulation import Simulation
 
 _RESULT_TIMEOUT_S = 10
-"""Simulated time for which a result can be asked for; rcl's default."""
+"""How long clients can ask for a result, in simulated time; rcl has the same default."""
 
 
 @dataclass
 class _Goal:
-    """A goal that was taken; its handle comes later."""
+    """A goal that the controller has taken; the action server gives its handle later."""
 
     result: Future
     handle: Any = None
     feedback: list[Any] = field(default_factory=list)
-    """Messages that wait for the handle."""
+    """Messages that cannot be sent before the handle is there."""
 
 
 class ControllerAction:
-    """Takes goals for a controller, by its name in the simulation, and sends feedback and results.
+    """Takes goals for a controller, and sends feedback and results.
 
-    With `aborts_refused`, goals that cannot be executed are accepted and then aborted with the reason, instead of being
-    rejected.
+    Args:
+        node: The controller's node.
+        simulation: The simulation.
+        controller: Name of the controller in the simulation.
+        aborts_refused: Whether goals that cannot be executed are accepted and then aborted with the reason, instead of
+            being rejected.
     """
 
     def __init__(self, node: Node, simulation: Simulation, controller: str, *, aborts_refused: bool) -> None:
@@ -41,7 +45,7 @@ class ControllerAction:
         self._count = 0
         self._published_ns = 0
         self._goals: dict[Hashable, _Goal] = {}
-        """The goals whose results have not been sent, by their identities in the simulation, the oldest first."""
+        """The goals whose results have not been sent, by their ids in the simulation, the oldest first."""
         name = f"{node.get_name()}/follow_joint_trajectory"
         self._feedback_topic = f"{name}/_action/feedback"
         self._server = ActionServer(
@@ -74,17 +78,17 @@ class ControllerAction:
     def owes_feedback(self) -> bool:
         """Whether feedback has subscribers, and enough simulated time has passed since the last message."""
         passed_ns = self._simulation.now_ns - self._published_ns
-        # After a reset the clock may be behind the last message, and feedback is due then, too.
+        # After a reset, the clock may show less than the time of the last message; feedback is due then, too.
         return passed_ns != 0 and not 0 < passed_ns < self._simulation.feedback_ns and self.watched
 
     def publish_feedback(self, state: ControllerState) -> None:
         """Send feedback on all goals."""
         passed_ns = self._simulation.now_ns - self._published_ns
-        # Feedback is due by a clock of its own, as slices of time need not end just then.
+        # Note when the feedback was due, which may be in the middle of a stretch, so that delays do not add up.
         self._published_ns += passed_ns - passed_ns % (self._simulation.feedback_ns or 1)
         feedback = feedback_message(state)
         for goal in self._goals.values():
-            # A goal that has ended gets no more feedback, even if it ended in the middle of the last slice.
+            # A goal that has ended gets no more feedback, even if it ended in the middle of the last stretch.
             if goal.result.done():
                 continue
             if goal.handle is None:
@@ -93,8 +97,8 @@ class ControllerAction:
                 goal.handle.publish_feedback(feedback)
 
     def _consider(self, request: FollowJointTrajectory.Goal) -> GoalResponse:
-        # The controller takes the goal here, because it alone can tell whether the goal is acceptable. Handles come in
-        # the same order, but perhaps after the next goal, after time has passed, or after the goal's own end.
+        # The controller takes the goal here, because only the controller can tell whether the goal is acceptable. The
+        # handles come in the same order, but perhaps after the next goal was taken, or after this goal has ended.
         refusal = self._simulation.submit(self._controller, self._count + 1, read_goal(request))
         if refusal is not None and not self._aborts_refused:
             return GoalResponse.REJECT
@@ -132,9 +136,9 @@ class ControllerAction:
         return FollowJointTrajectory.Result(error_code=int(result.error_code), error_string=result.error_string)
 
     def _find_key(self, handle: Any) -> Hashable | None:
-        uuid = _uuid(handle)
-        return next((key for key, goal in self._goals.items() if goal.handle and _uuid(goal.handle) == uuid), None)
+        uuid = _read_uuid(handle)
+        return next((key for key, goal in self._goals.items() if goal.handle and _read_uuid(goal.handle) == uuid), None)
 
 
-def _uuid(handle: Any) -> bytes:
+def _read_uuid(handle: Any) -> bytes:
     return bytes(bytearray(handle.goal_id.uuid))

@@ -1,4 +1,4 @@
-"""Messages of controllers, to and from the terms of `throwcollect.control`."""
+"""Translates messages of controllers to values of `throwcollect.control`, and back."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ _LONGEST_NS = 2**31 * _NS - 1
 
 
 def nanoseconds(time: Time | Duration) -> int:
-    """A builtin_interfaces Time or Duration in nanoseconds."""
+    """Convert a builtin_interfaces Time or Duration to nanoseconds."""
     return int(time.sec) * _NS + int(time.nanosec)
 
 
 def read_trajectory(message: JointTrajectory) -> Trajectory:
-    """Contents of a trajectory_msgs/msg/JointTrajectory."""
+    """Read the contents of a trajectory_msgs/msg/JointTrajectory."""
     stamp_ns = nanoseconds(message.header.stamp)
     return Trajectory(
         joint_names=tuple(message.joint_names),
@@ -38,7 +38,7 @@ def read_trajectory(message: JointTrajectory) -> Trajectory:
 
 
 def read_goal(message: FollowJointTrajectory.Goal) -> TrajectoryGoal:
-    """Contents of a FollowJointTrajectory goal; those that ros2_controllers ignores are ignored here too."""
+    """Read the contents of a FollowJointTrajectory goal, without the fields that ros2_controllers ignores."""
     return TrajectoryGoal(
         trajectory=read_trajectory(message.trajectory),
         path_tolerance=_read_tolerances(message.path_tolerance),
@@ -48,7 +48,7 @@ def read_goal(message: FollowJointTrajectory.Goal) -> TrajectoryGoal:
 
 
 def state_message(state: ControllerState) -> JointTrajectoryControllerState:
-    """A control_msgs/msg/JointTrajectoryControllerState."""
+    """Make a control_msgs/msg/JointTrajectoryControllerState."""
     message = JointTrajectoryControllerState(
         joint_names=list(state.joint_names),
         reference=_point_message(state.desired),
@@ -62,7 +62,7 @@ def state_message(state: ControllerState) -> JointTrajectoryControllerState:
 
 
 def feedback_message(state: ControllerState) -> FollowJointTrajectory.Feedback:
-    """Feedback of FollowJointTrajectory."""
+    """Make a feedback message of FollowJointTrajectory."""
     message = FollowJointTrajectory.Feedback(
         joint_names=list(state.joint_names),
         desired=_point_message(state.desired),
@@ -86,7 +86,7 @@ def _point_message(point: TrajectoryPoint) -> JointTrajectoryPoint:
         accelerations=point.accelerations,
         effort=point.effort,
     )
-    # A trajectory that was stamped decades ago can go on for longer than that.
+    # A trajectory with a stamp of decades ago can have been going on for longer than a message can hold.
     passed_ns = min(point.time_from_start_ns, _LONGEST_NS)
     message.time_from_start.sec, message.time_from_start.nanosec = divmod(passed_ns, _NS)
     return message

@@ -17,17 +17,17 @@ from throwcollect.sim.simulation import Simulation
 
 _SPEED = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 _STATES = QoSProfile(depth=100)
-"""Deep enough for all states of one slice of time, as they leave together."""
+"""Deep enough for all states of one stretch of time, because they leave together."""
 _REPEATED_S = 1.0
 
 
 class ControllerNode(Node):
-    """Offers one controller, by its name in the simulation, in the namespace of the simulation's node.
+    """Offers one controller in the namespace of the simulation's node.
 
     Attributes:
-        controller: That name.
-        face: Its parameters.
-        action: The action by which it is given goals.
+        controller: Name of the controller in the simulation.
+        face: The controller's parameters.
+        action: The action by which clients give the controller goals.
     """
 
     def __init__(self, parent: Node, simulation: Simulation, controller: str) -> None:
@@ -64,12 +64,12 @@ class ControllerNode(Node):
         return bool(self._states.get_subscription_count())
 
     def publish_state(self) -> None:
-        """Publish the controller's states since the last time, and the feedback of its goal, to subscribers."""
+        """Publish the controller's states since the last call, and feedback on its goals, if they have subscribers."""
         states = self._limb.pop_states()
         if not self.watched:
             return
         if self.wants_states and not (states or self._simulation.running):
-            # While time stands still no state is new, but a new subscriber has not seen the present one.
+            # While time stands still, no state is new, but a new subscriber has not seen the present state.
             states = [self._present_state()]
         for state in states:
             self._states.publish(state_message(state))
@@ -78,7 +78,7 @@ class ControllerNode(Node):
 
     def destroy_node(self) -> None:
         """Withdraw the node."""
-        # Loggers of Python live as long as the process, so this one would go on to write to a node that is gone.
+        # Python's loggers live as long as the process, so this logger would go on to write to a node that is gone.
         self._limb.controller.logger.removeHandler(self._log)
         super().destroy_node()
 
@@ -108,17 +108,17 @@ class ControllerNode(Node):
 
 
 class _LogHandler(logging.Handler):
-    """Passes a controller's log records on to the log of its node: of each repeated one, one a second."""
+    """Passes a controller's log records on to the log of its node, but a repeated record at most once per second."""
 
     def __init__(self, node: Node) -> None:
         super().__init__()
         self._node = node
-        self._told_s: dict[str, float] = {}
+        self._passed_on_s: dict[str, float] = {}
 
     def emit(self, record: logging.LogRecord) -> None:
         if (about := getattr(record, REPEATED, None)) is not None:
             now_s = time.monotonic()
-            if now_s < self._told_s.get(about, -math.inf) + _REPEATED_S:
+            if now_s < self._passed_on_s.get(about, -math.inf) + _REPEATED_S:
                 return
-            self._told_s[about] = now_s
+            self._passed_on_s[about] = now_s
         pass_on_log(self._node, record)

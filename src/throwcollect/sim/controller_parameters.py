@@ -23,14 +23,14 @@ _CHANGEABLE = {
     "cmd_timeout": "How long after the end of a trajectory the joints are stopped [s]; 0 never",
 }
 _LEAST_RATE_HZ = 0.1
-"""Least `action_monitor_rate`; no other number has a bound but 0."""
+"""Least `action_monitor_rate`; all other numbers must only not be negative."""
 
 
 class ParameterFace:
     """Declares the parameters of a limb's controller on its node, and hands changes on.
 
-    Changes hold for the next goal. The gains of ros2_controllers are left out, as controllers that command
-    positions have none. While the simulation's trial is leased, nothing is changed.
+    Changes hold for the next goal. The gains of ros2_controllers are left out, because controllers that command
+    positions have none. While the simulation's trial is leased, all changes are refused.
     """
 
     def __init__(self, node: Node, limb: LimbController, trial: PresentTrial) -> None:
@@ -51,7 +51,7 @@ class ParameterFace:
         node.add_post_set_parameters_callback(self._apply)
 
     def restore(self) -> None:
-        """Set back what clients have changed, for a trial that is simulated with the configured parameters."""
+        """Undo what clients have changed, so that the next trial is simulated with the configured parameters."""
         stray = {name: value for name, value in self._configured.items() if self._get_value(name) != value}
         if stray:
             self._node.set_parameters_atomically([Parameter(name, value=value) for name, value in stray.items()])
@@ -72,7 +72,7 @@ class ParameterFace:
         self._limb.controller.parameters = self._change(parameters)
 
     def _change(self, changes: list[Parameter]) -> ControllerParameters:
-        """The controller's parameters with new values for some ROS parameters that are declared.
+        """Make the controller's parameters anew, with new values for some of the declared ROS parameters.
 
         Raises:
             ConfigError: If the values are not valid.
@@ -96,13 +96,13 @@ class ParameterFace:
 
 
 def state_interfaces(parameters: ControllerParameters) -> tuple[str, ...]:
-    """Interfaces that are measured, for every joint of a controller."""
+    """Name the interfaces that are measured, for every joint of a controller."""
     return ("position", "velocity") if parameters.measures_velocity else ("position",)
 
 
 def _list_declared(parameters: ControllerParameters) -> Iterator[tuple[str, Any, str, bool]]:
-    """Name, value and description of each parameter, and whether it is read-only."""
-    # Clients of ros2_controllers look for all of these, also for those that have one value here, or no effect.
+    """List name, value and description of each parameter, and whether it is read-only."""
+    # Clients of ros2_controllers look for all of these, even for those that cannot be changed here or have no effect.
     yield "joints", list(parameters.joints), "Joint names of the system", True
     yield "command_interfaces", list(COMMAND_INTERFACES), "What is commanded to all joints", True
     yield "state_interfaces", list(state_interfaces(parameters)), "What is measured of all joints", True

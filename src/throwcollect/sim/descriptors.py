@@ -1,6 +1,6 @@
-"""Descriptors of ROS parameters, which editors of parameters show, from what the configuration says of its keys.
+"""Makes descriptors of ROS parameters, which editors of parameters show, from what the configuration says of its keys.
 
-A range of ROS includes its bounds. Where a bound itself is not allowed, or bounds depend on each other, the constraints
+A range in ROS includes its bounds. Where a bound itself is not allowed, or bounds depend on each other, the constraints
 in words say so, and the node refuses the value.
 """
 
@@ -18,14 +18,14 @@ _LARGEST_INTEGER = 2**63 - 1
 
 
 def floating_range(low: float | None, high: float | None) -> FloatingPointRange:
-    """A rcl_interfaces/msg/FloatingPointRange; without a bound it goes as far as finite numbers do."""
+    """Make a rcl_interfaces/msg/FloatingPointRange; without a bound, it goes as far as finite numbers do."""
     return FloatingPointRange(
         from_value=-_LARGEST if low is None else float(low), to_value=_LARGEST if high is None else float(high)
     )
 
 
 def integer_range(low: int | None, high: int | None) -> IntegerRange:
-    """A rcl_interfaces/msg/IntegerRange; without a bound it goes as far as 64 bits do."""
+    """Make a rcl_interfaces/msg/IntegerRange; without a bound, it goes as far as 64 bits do."""
     return IntegerRange(
         from_value=-_LARGEST_INTEGER - 1 if low is None else low,
         to_value=_LARGEST_INTEGER if high is None else high,
@@ -34,16 +34,16 @@ def integer_range(low: int | None, high: int | None) -> IntegerRange:
 
 
 def of_key(key: str, value: object, *, read_only: bool = False) -> ParameterDescriptor:
-    """Descriptor of the parameter that shows a dotted key; the type of its value decides the kind of range."""
+    """Make the descriptor of the parameter that shows a dotted key; the type of its value decides the kind of range."""
     parts = [int(part) if part.isdecimal() else part for part in key.split(".")]
     shape = shape_of(parts)
     descriptor = ParameterDescriptor(
-        description=_meaning(parts), additional_constraints=str(shape), read_only=read_only
+        description=_find_description(parts), additional_constraints=str(shape), read_only=read_only
     )
     number = next((option for option in shape.alternatives if option.node.get("type") in ("number", "integer")), None)
     if number is None:
         return descriptor
-    low, high = _bounds(number, whole=isinstance(value, int))
+    low, high = _find_bounds(number, whole=isinstance(value, int))
     if low is None and high is None:
         return descriptor
     if isinstance(value, float):
@@ -53,16 +53,19 @@ def of_key(key: str, value: object, *, read_only: bool = False) -> ParameterDesc
     return descriptor
 
 
-def _meaning(parts: list[str | int]) -> str:
-    """Description of a key, or of the key that holds it where it has none, as those of single joints."""
+def _find_description(parts: list[str | int]) -> str:
+    """Find the description of a key; keys without one, such as those of single joints, get that of the key above."""
     for length in range(len(parts), 0, -1):
         if text := shape_of(parts[:length]).node.get("description"):
             return re.sub(r"\s+", " ", text)
     return ""
 
 
-def _bounds(number: ValueShape, *, whole: bool) -> tuple[Any, Any]:
-    """Least and largest value, or the bound that neither reaches; None where there is no bound."""
+def _find_bounds(number: ValueShape, *, whole: bool) -> tuple[Any, Any]:
+    """Find least and largest value; for numbers that are not whole, perhaps bounds that are themselves not allowed.
+
+    Where there is no bound, it is None.
+    """
     node, step = number.node, int(whole)
     low, above = node.get("minimum"), node.get("exclusiveMinimum")
     high, below = node.get("maximum"), node.get("exclusiveMaximum")

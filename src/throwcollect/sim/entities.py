@@ -17,7 +17,7 @@ BALL = "ball"
 WORLD_FRAME = "world"
 _LARGEST_COORDINATE_M = 1e3
 _LARGEST_SPEED = 1e3
-"""Largest speed that a client may give a body [m/s, rad/s]: a faster one is soon too far away to be a number."""
+"""Largest speed that a client may give a body [m/s, rad/s]: a faster body would soon be too far away to be a number."""
 
 _NORM_TOLERANCE = 1e-3
 _MOST_SPAWNED = 200
@@ -44,7 +44,7 @@ class EntityInfo:
 
 
 class Entities:
-    """The entities of one world; that of the robot has the robot's name."""
+    """The entities of one world; the robot is an entity by its own name."""
 
     def __init__(self, world: World, robot: str) -> None:
         self._world = world
@@ -61,15 +61,15 @@ class Entities:
         return (BALL, self._robot, *self._world.spawned.names)
 
     def forget_infos(self) -> None:
-        """Restore the descriptions of ball and robot, and forget those of entities that are gone."""
+        """Restore the descriptions of ball and robot, and forget the descriptions of removed entities."""
         for name in [name for name in self._infos if name not in self._world.spawned]:
             del self._infos[name]
 
     def info(self, name: str) -> EntityInfo:
-        """The description of an entity.
+        """Return the description of an entity.
 
         Raises:
-            RequestError: ``RESULT_NOT_FOUND`` if there is none of that name.
+            RequestError: ``RESULT_NOT_FOUND`` if there is no entity of that name.
         """
         self._require(name)
         return self._infos.get(name) or self._first_infos[name]
@@ -92,10 +92,10 @@ class Entities:
         self._infos[name] = info
 
     def state(self, name: str) -> BodyState:
-        """Where an entity is and how it moves, in the world.
+        """Tell where an entity is and how it moves, in the world.
 
         Raises:
-            RequestError: ``RESULT_NOT_FOUND`` if there is none of that name.
+            RequestError: ``RESULT_NOT_FOUND`` if there is no entity of that name.
         """
         self._require(name)
         if name == BALL:
@@ -107,11 +107,11 @@ class Entities:
     def place(self, name: str, state: BodyState, *, frame: str, accelerates: bool) -> None:
         """Put an entity into a state that is given in some frame, as `in_world` takes it.
 
-        `accelerates` tells whether an acceleration was asked for as well.
+        `accelerates` tells whether the client asked for an acceleration as well.
 
         Raises:
-            RequestError: ``RESULT_NOT_FOUND`` if there is none of that name, ``INVALID_POSE`` if the pose makes no
-                sense, ``RESULT_OPERATION_FAILED`` if it cannot be moved, or not like that.
+            RequestError: ``RESULT_NOT_FOUND`` if there is no entity of that name, ``INVALID_POSE`` if the pose makes no
+                sense, ``RESULT_OPERATION_FAILED`` if the entity is fixed, or the twist is not possible.
         """
         self._require(name)
         if name == self._robot:
@@ -129,7 +129,7 @@ class Entities:
         self._world.spawned.engine_bodies(name).place(name, state)
 
     def in_world(self, state: BodyState, frame: str) -> BodyState:
-        """A state that is given in some frame: the world, or an entity; empty for the world.
+        """Convert a state from some frame to the world; a frame is an entity, or the world, which may be left empty.
 
         Velocities are along the axes of the frame, as seen from the world.
 
@@ -137,8 +137,8 @@ class Entities:
             RequestError: ``INVALID_POSE`` if the frame is not known or the pose makes no sense.
         """
         norm = math.hypot(*state.orientation_xyzw)
-        # The condition is written as `not ... <=`, here and below, because no comparison holds for NaN, which is
-        # refused so, too.
+        # The conditions here and below are written as `not ... <=`, so that they refuse NaN, too, for which no
+        # comparison holds.
         if not abs(norm - 1.0) <= _NORM_TOLERANCE:
             message = f"orientation {state.orientation_xyzw}: a quaternion of norm {norm:g}"
             raise RequestError("INVALID_POSE", message, expected="norm 1")
@@ -160,10 +160,10 @@ class Entities:
         return state
 
     def boxes(self, name: str) -> list[Box]:
-        """Boxes along the axes of the world that enclose an entity, one for each of its links.
+        """Find the boxes along the axes of the world that enclose an entity, one for each of its links.
 
         Raises:
-            RequestError: ``RESULT_NOT_FOUND`` if there is none of that name.
+            RequestError: ``RESULT_NOT_FOUND`` if there is no entity of that name.
         """
         self._require(name)
         if name == BALL:
@@ -173,10 +173,10 @@ class Entities:
         return self._world.spawned.engine_bodies(name).boxes(name)
 
     def bounds(self, name: str) -> Box | None:
-        """Box along the axes of an entity's own frame that encloses it; None if it has no shape.
+        """Find the box along the axes of an entity's own frame that encloses it; None if it has no shape.
 
         Raises:
-            RequestError: ``RESULT_NOT_FOUND`` if there is none of that name.
+            RequestError: ``RESULT_NOT_FOUND`` if there is no entity of that name.
         """
         if name in self._world.spawned:
             return _unite(self._world.spawned.engine_bodies(name).bounds(name))
@@ -201,8 +201,8 @@ class Entities:
         """Take an entity out of the world.
 
         Raises:
-            RequestError: ``RESULT_NOT_FOUND`` if there is none of that name, ``RESULT_OPERATION_FAILED`` if it was not
-                spawned.
+            RequestError: ``RESULT_NOT_FOUND`` if there is no entity of that name, ``RESULT_OPERATION_FAILED`` if it
+                was not spawned.
         """
         self._require(name)
         if name not in self._world.spawned:

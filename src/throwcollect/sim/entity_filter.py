@@ -1,4 +1,4 @@
-"""Which entities a client means: by name, category, tags and place (simulation_interfaces/msg/EntityFilters)."""
+"""Finds entities by name, category, tags and place, as a client asks (simulation_interfaces/msg/EntityFilters)."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _MOST_WANTED = 1000
 
 
 def select(entities: Entities, filters: EntityFilters) -> list[str]:
-    """Names of the entities that meet every condition of a filter, in order; a condition that is empty always holds.
+    """List the entities that meet every condition of a filter, in order; a condition that is empty always holds.
 
     Raises:
         RequestError: ``RESULT_FEATURE_UNSUPPORTED`` for a kind of bounds that is not known here,
@@ -34,7 +34,7 @@ def select(entities: Entities, filters: EntityFilters) -> list[str]:
         raise _senseless(f"no tags filter mode {tags.filter_mode}")
     has_enough = all if tags.filter_mode == TagsFilter.FILTER_MODE_ALL else any
     categories = {int(category.category) for category in filters.categories}
-    overlaps = _region(filters.bounds)
+    overlaps = _make_region_test(filters.bounds)
     pattern = _compile(filters.filter)
 
     def fits(name: str) -> bool:
@@ -49,8 +49,8 @@ def select(entities: Entities, filters: EntityFilters) -> list[str]:
     return [name for name in entities.names if fits(name)]
 
 
-def _region(bounds: Bounds) -> Callable[[Box], bool] | None:
-    """Test for boxes along the axes of the world that reach into a region; None if there are no bounds.
+def _make_region_test(bounds: Bounds) -> Callable[[Box], bool] | None:
+    """Make a test of whether a box along the axes of the world reaches into a region; None if there are no bounds.
 
     Raises:
         RequestError: As `select` does.

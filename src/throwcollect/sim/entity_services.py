@@ -44,12 +44,12 @@ class EntityServices:
 
     def _list_states(self, request: GetEntitiesStates.Request, response: GetEntitiesStates.Response) -> None:
         response.entities = select(self._entities, request.filters)
-        response.states = [self._state(name) for name in response.entities]
+        response.states = [self._read_state(name) for name in response.entities]
 
     def _get_state(self, request: GetEntityState.Request, response: GetEntityState.Response) -> None:
-        response.state = self._state(request.entity)
+        response.state = self._read_state(request.entity)
 
-    def _state(self, name: str) -> EntityState:
+    def _read_state(self, name: str) -> EntityState:
         return entity_state(self._entities.state(name), self._simulation.now_ns)
 
     def _set_state(self, request: SetEntityState.Request, _response: SetEntityState.Response) -> None:

@@ -11,7 +11,7 @@ from throwcollect.sim.trial_runner import TrialRunner
 from throwcollect.trial.lease import Lease
 
 _REMEMBERED = 1000
-"""Number of done leases that are remembered, because a list that was under way may still name them; none is as long."""
+"""Number of ended leases that are remembered, because a list sent earlier may still name them; no list is as long."""
 
 
 class LeaseQueue:
@@ -24,7 +24,7 @@ class LeaseQueue:
         self._done: deque[str] = deque(maxlen=_REMEMBERED)
 
     def replace(self, leases: Iterable[Lease]) -> None:
-        """Have these trials simulated in their order, and no others; one that runs goes on if it is among them."""
+        """Have these trials simulated in this order, and no others; the present trial goes on if it is among them."""
         pending = [lease for lease in leases if lease.token not in self._done]
         if self._running is not None and self._running.token not in {lease.token for lease in pending}:
             self._running = None
@@ -33,13 +33,13 @@ class LeaseQueue:
         self._waiting = deque(lease for lease in pending if lease.token != running)
 
     def clear(self) -> None:
-        """Forget all leases; the trial that runs goes on, and its episode belongs to none."""
+        """Forget all leases; the trial that runs goes on, but its episode belongs to no lease."""
         self._running = None
         self._waiting.clear()
         self._runner.release_lease()
 
     def begin_next(self) -> TrialRefusal | None:
-        """Begin the next trial if none runs; return the refusal of one that cannot begin."""
+        """Begin the next trial if none runs; return the refusal of a trial that cannot begin."""
         if self._running is not None or not self._waiting:
             return None
         lease = self._waiting.popleft()
@@ -52,11 +52,11 @@ class LeaseQueue:
         return None
 
     def hand_over(self) -> Delivery | TrialRefusal | None:
-        """The episode of the trial that has just ended, or its refusal; None if no trial has ended."""
+        """Return the episode of the trial that has just ended, or its refusal; None if no trial has ended."""
         try:
             delivery = self._runner.hand_over()
         except ThrowcollectError as error:
-            # Only episodes of leased trials are judged, and can so be refused.
+            # Only episodes of leased trials are judged, so only they can be refused.
             lease, self._running = self._running, None
             return self._refuse(lease, error) if lease else None
         # The episode of a trial that a client has set up by hand belongs to no lease.

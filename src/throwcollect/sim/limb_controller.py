@@ -1,4 +1,4 @@
-"""One limb: binds its joint trajectory controller to those of its joints that the physics moves."""
+"""Binds the joint trajectory controller of one limb to those of its joints that the physics moves."""
 
 from __future__ import annotations
 
@@ -30,14 +30,14 @@ _LOCKED_TOLERANCE_RAD = 1e-6
 class LimbController:
     """A controller bound to the joints of a world.
 
-    Joints that are locked are measured where they are locked, and goals that would move them are refused.
+    A locked joint is always measured at its locked angle, and goals that would move it are refused.
 
     Args:
         robot: The robot.
         limb: Name of one of its controllers.
         moving: The world's moving joints, in order.
         period_ns: Control period [ns].
-        config: How it answers its clients.
+        config: How the controller answers its clients.
     """
 
     def __init__(
@@ -68,7 +68,7 @@ class LimbController:
 
     @property
     def controller(self) -> JointTrajectoryController:
-        """The controller, in the state of the last reset or later."""
+        """The controller; a reset that was put off until the controller is used is done first."""
         self._wake()
         return self._controller
 
@@ -94,33 +94,33 @@ class LimbController:
             self._wake()
 
     def restore(self) -> None:
-        """Undo what clients have changed of the controller's parameters; its speed is set anew by `reset`."""
+        """Undo what clients have changed of the controller's parameters; `reset` does so with its speed."""
         if self._controller.parameters != self._configured:
             self._controller.parameters = self._configured
 
     def pop_results(self) -> tuple[GoalResult, ...]:
-        """Results of the goals that have ended since the last call, oldest first."""
+        """Return the results of the goals that have ended since the last call, oldest first."""
         return self._controller.pop_results()
 
     def pop_states(self) -> list[ControllerState]:
-        """States of the updates since the last call, oldest first, while the limb is watched."""
+        """Return the states of the updates since the last call, oldest first; there are some only if it is watched."""
         states, self._states = self._states, []
         return states
 
     def refuse_locked(self, trajectory: Trajectory) -> TrajectoryRefusal | None:
-        """Refuse a trajectory that would move joints which are locked."""
+        """Refuse a trajectory that would move a locked joint."""
         for column, joint in enumerate(trajectory.joint_names):
             if joint not in self._joints or self._joints.index(joint) in self._own:
                 continue
             held = self._posture[self._joints.index(joint)]
             for point in trajectory.points:
-                if wish := _tell_motion(point, column, held):
-                    text = f"{joint} is locked at {held:.6g} rad (robot.locked) and cannot {wish}"
+                if motion := _describe_motion(point, column, held):
+                    text = f"{joint} is locked at {held:.6g} rad (robot.locked) and cannot {motion}"
                     return self._controller.refuse(TrajectoryRefusal(ErrorCode.INVALID_GOAL, text))
         return None
 
     def measure(self, positions: Sequence[float], velocities: Sequence[float]) -> JointState:
-        """State of this limb's joints, given positions [rad] and velocities [rad/s] of the world's moving joints."""
+        """Make the state of this limb's joints from positions [rad] and velocities [rad/s] of all moving joints."""
         state = self._posture.copy()
         state[self._own] = [positions[index] for index in self._worlds]
         if not self._configured.measures_velocity:
@@ -159,12 +159,13 @@ class LimbController:
         self._points.append(np.stack([np.asarray(point) for point in points]))
 
     def collect_states(self) -> ControllerSamples:
-        """Set points kept by `keep_state` since the last reset."""
+        """Return the set points that `keep_state` has kept since the last reset."""
         table = np.array(self._points).reshape(-1, 4, len(self._joints))
         elapsed = np.array(self._elapsed_ns, dtype=np.int64)
         return ControllerSamples(elapsed, table[:, 0], table[:, 1], table[:, 2], table[:, 3])
 
     def _wake(self) -> None:
+        """Reset the controller now, if its reset was put off."""
         start_ns, self._start_ns = self._start_ns, None
         if start_ns is None:
             return
@@ -173,9 +174,9 @@ class LimbController:
         self._controller.scale_speed(self._speed)
 
 
-def _tell_motion(point: TrajectoryPoint, column: int, held: float) -> str:
-    """How a point would move a joint away from the angle [rad] at which it is held; nothing if it would not."""
-    # A field of the wrong size is left to the controller, which refuses it in the next check.
+def _describe_motion(point: TrajectoryPoint, column: int, held: float) -> str:
+    """Describe how a point would move a joint away from the angle [rad] at which it is held; empty if it would not."""
+    # A field of the wrong size is not judged here, because the controller refuses it in the next check.
     if column < len(point.positions):
         target = point.positions[column]
         return "" if abs(target - held) <= _LOCKED_TOLERANCE_RAD else f"go to {target:.6g} rad"
@@ -185,9 +186,9 @@ def _tell_motion(point: TrajectoryPoint, column: int, held: float) -> str:
 
 
 def _configure(robot: Robot, joints: tuple[str, ...], config: ControllersConfig) -> ControllerParameters:
-    """Parameters of a controller of some joints: the robot's, and how configurations have them stopped.
+    """Make the parameters of a controller from those of the robot, and from how the configuration has joints stopped.
 
-    The real Talos has no measured velocities, by which joints brake with ``hold: decelerate``.
+    With ``hold: decelerate``, joints brake by their measured velocities, which the real Talos does not have.
     """
     brakes = config.hold == "decelerate"
     deceleration = config.max_deceleration_radps2 if brakes else 0.0

@@ -1,4 +1,4 @@
-"""Triangle meshes of collision shapes: read with suspicion, as Bullet's own readers end the process on broken files."""
+"""Reads triangle meshes of collision shapes, and checks them, because Bullet's own readers crash on broken files."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ def read_mesh(path: Path) -> Triangles:
     """Read at least one triangle of an STL file, binary or text, or of an OBJ file; all numbers are finite.
 
     Raises:
-        RequestError: ``MISSING_ASSETS`` if there is no such file, ``UNSUPPORTED_ASSETS`` if its format is another, it
-            is too large or it is broken.
+        RequestError: ``MISSING_ASSETS`` if there is no such file, ``UNSUPPORTED_ASSETS`` if it has another format, is
+            too large or is broken.
     """
     check_mesh(path)
     read = _read_stl if path.suffix.lower() == ".stl" else _read_obj
@@ -47,8 +47,8 @@ def check_mesh(path: Path) -> None:
     """Check a mesh as far as that is possible without reading it.
 
     Raises:
-        RequestError: ``MISSING_ASSETS`` if there is no such file, ``UNSUPPORTED_ASSETS`` if its format is another or it
-            is too large.
+        RequestError: ``MISSING_ASSETS`` if there is no such file, ``UNSUPPORTED_ASSETS`` if it has another format or is
+            too large.
     """
     try:
         size = path.stat().st_size if path.is_file() else None
@@ -66,7 +66,7 @@ def check_mesh(path: Path) -> None:
 
 def _read_stl(content: bytes) -> Triangles:
     count = int.from_bytes(content[_HEADER - 4 : _HEADER], "little")
-    # The length decides, because titles of some binary files begin with `solid`, as all files in text do.
+    # The length tells a binary file, because some of them begin with `solid`, as all text files do.
     if len(content) >= _HEADER and len(content) == _HEADER + count * _RECORD:
         corners: Triangles = np.frombuffer(content, STL, count, _HEADER)["corners"]
         return corners
@@ -84,13 +84,13 @@ def _read_obj(content: bytes) -> Triangles:
             x, y, z = words[:3]
             vertices.append([float(x), float(y), float(z)])
         elif kind == b"f":
-            corners = [_obj_index(int(word.partition(b"/")[0]), len(vertices)) for word in words]
+            corners = [_find_index(int(word.partition(b"/")[0]), len(vertices)) for word in words]
             faces += [(corners[0], *pair) for pair in itertools.pairwise(corners[1:])]
     return np.array(vertices, np.float32).reshape(-1, 3)[np.array(faces, np.int64).reshape(-1, 3)]
 
 
-def _obj_index(number: int, vertices: int) -> int:
-    """Index of a vertex: OBJ counts from one, or from the last vertex so far backwards.
+def _find_index(number: int, vertices: int) -> int:
+    """Find the index of a vertex: OBJ counts vertices from 1, or backwards from -1 for the last vertex so far.
 
     Raises:
         ValueError: If there is no such vertex.

@@ -13,14 +13,14 @@ from throwcollect.robots.motor_lag import lag_behind
 class Motors:
     """Turns commands of the moving joints into targets of their motors, step by step.
 
-    A command is the position that a joint should have at the end of a step. A motor is given the position that it
-    should have at the beginning of the step, and the velocity that leads from there to the command.
+    A command is the position that a joint should have at the end of a step. A motor is given the position that the
+    joint should have at the beginning of the step, and the velocity that leads from there to the command.
 
     Args:
         start: Position that the joints hold before the first command [rad].
         hz: Physics steps per simulated second.
         delay_s: Time between a command and the motor acting on it [s].
-        lag_s: Time constant with which motors go after commands [s]; 0: at once.
+        lag_s: Time constant with which motors follow commands [s]; 0: at once.
     """
 
     def __init__(self, start: Sequence[float], *, hz: int, delay_s: float, lag_s: float) -> None:
@@ -28,7 +28,7 @@ class Motors:
         self._lag_s = lag_s
         delay = delay_s * self._hz
         self._fraction = delay % 1
-        # The commands that will still act: as many as the delay is long, and one more to interpolate from.
+        # The commands that have yet to act: one for each step of the delay, and one more to interpolate from.
         self._acting = np.tile(np.array(start, dtype=float), (int(delay) + 1, 1))
         self._targets = self._acting[:1]
         self._planned = self._acting
@@ -47,8 +47,8 @@ class Motors:
         """
         count = len(commands)
         self._planned = np.concatenate((self._acting, commands))
-        # `_planned` begins as many rows back as the delay has whole steps, so row i + 1 acts at the end of step i. What
-        # is left of the delay is a fraction of the way to the row before.
+        # `_planned` begins as many rows back as the delay has whole steps, so row i + 1 acts at the end of step i. The
+        # rest of the delay, a fraction of a step, moves the target towards the row before.
         targets = self._planned[1 : count + 1]
         if self._fraction:
             targets = (1 - self._fraction) * targets + self._fraction * self._planned[:count]
@@ -58,6 +58,6 @@ class Motors:
         return self._targets, np.diff(self._targets, axis=0) * self._hz
 
     def advance(self, steps: int) -> None:
-        """Go on by so many of the steps that were planned."""
+        """Go on by a number of the steps that were planned."""
         self._acting = self._planned[steps : steps + len(self._acting)]
         self._targets = self._targets[steps : steps + 1]

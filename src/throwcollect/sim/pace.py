@@ -1,4 +1,7 @@
-"""Keeping pace with real time, in slices so short that messages leave when things happen."""
+"""Keeps pace with real time, in stretches so short that messages leave when things happen.
+
+A *stretch* is the simulated time between two looks at messages.
+"""
 
 from __future__ import annotations
 
@@ -6,20 +9,20 @@ import math
 import time
 
 _SHORTEST_S = 0.004
-"""Shortest slice in real time: the work between two slices takes a millisecond."""
+"""Real time of the shortest stretch; it is well above the millisecond of work between two stretches."""
 _LONGEST_S = 0.05
-"""Longest slice in real time: messages wait for its end."""
+"""Real time of the longest stretch; it is short because messages wait for the end of a stretch."""
 _LATE_S = 0.05
-"""A delay up to this is made up for. After a longer one, such as a rest, the schedule begins anew."""
+"""Longest delay that is made up for. After a longer one, such as a rest, the schedule begins anew."""
 
 
 def longest_steps(factor: float, hz: int) -> int:
-    """Physics steps of the longest slice, at a factor [-] and a number of steps per simulated second."""
+    """Count the physics steps of the longest stretch, at a factor [-] and a number of steps per simulated second."""
     return max(1, round(_LONGEST_S * min(1.0, factor) * hz))
 
 
-def slice_steps(factor: float, hz: int, period: int, phase: int) -> int:
-    """Physics steps of one slice.
+def stretch_steps(factor: float, hz: int, period: int, phase: int) -> int:
+    """Count the physics steps of one stretch.
 
     Args:
         factor: Simulated over real time [-].
@@ -28,28 +31,29 @@ def slice_steps(factor: float, hz: int, period: int, phase: int) -> int:
         phase: Physics steps since the last sample.
 
     Returns:
-        The rest of the period, or of a multiple where periods are shorter than a slice can be; in slow motion less.
+        Steps until the next sample, or until a later one where the period is shorter than a stretch can be; in slow
+        motion, a stretch may end before the next sample.
     """
     periods = math.ceil(_SHORTEST_S * factor * hz / period)
     steps = min(periods * period, longest_steps(factor, hz))
-    # The steps since the last sample count as the beginning of the slice, so that it ends with a sample. In slow motion
-    # a slice may be no longer than these, and is taken in full.
+    # The steps since the last sample count as the beginning of the stretch, so that it ends with a sample. In slow
+    # motion, a whole stretch may be no longer than these steps; it is then taken in full, so that time goes on.
     return steps if steps <= phase else steps - phase
 
 
-def long_slice_steps(factor: float, hz: int, most_s: float) -> int:
-    """Physics steps of one slice while nobody listens, so that no message has to leave on time.
+def long_stretch_steps(factor: float, hz: int, most_s: float) -> int:
+    """Count the physics steps of one stretch while nobody listens, so that no message has to leave on time.
 
     Args:
         factor: Simulated over real time [-].
         hz: Physics steps per simulated second.
-        most_s: Longest simulated time of a slice [s].
+        most_s: Longest simulated time of a stretch [s].
     """
     return max(1, round(min(_LONGEST_S * factor, most_s) * hz))
 
 
 class Pace:
-    """Ends each slice on a schedule that goes on from slice to slice, so that delays do not add up."""
+    """Ends each stretch on a schedule that goes on from stretch to stretch, so that delays do not add up."""
 
     def __init__(self) -> None:
         self._factor = 0.0
@@ -57,11 +61,11 @@ class Pace:
         self._due_s = 0.0
 
     def wait(self, factor: float, *, began_s: float, since_ns: int, until_ns: int) -> None:
-        """Wait until a slice that has been simulated is due to end.
+        """Wait until a stretch that has been simulated is due to end.
 
         Args:
             factor: Simulated over real time [-].
-            began_s: Monotonic time at which the slice began [s].
+            began_s: Monotonic time at which the stretch began [s].
             since_ns: Simulated time at its beginning [ns].
             until_ns: Simulated time at its end [ns].
         """

@@ -36,7 +36,7 @@ class PresentTrial:
 
     Attributes:
         setup: The trial that the next reset prepares.
-        begun: The one that the last reset has prepared.
+        begun: The trial that the last reset has prepared.
         leased: Whether the trial belongs to a coordinator, until its episode is handed over; meanwhile no other client
             may change anything.
     """
@@ -48,12 +48,12 @@ class PresentTrial:
         self._goals: dict[str, GoalOutcome] = {}
 
     def set_up_nothing(self) -> None:
-        """End the lease, and have the next reset go back to the configuration."""
+        """End the lease, and let the next reset go back to the configuration."""
         self.leased = False
         self.setup = TrialSetup(NO_TRIAL, (), self._config)
 
     def begin(self) -> None:
-        """Take up the trial that is set up, and forget the goals of the one before."""
+        """Begin the trial that is set up, and forget the goals of the previous trial."""
         self.begun = self.setup
         self._goals = {}
 
@@ -63,7 +63,7 @@ class PresentTrial:
         return all(name in self._goals for name in self.begun.controllers)
 
     def require_free(self) -> None:
-        """Refuse what would change a leased trial.
+        """Refuse a request that would change a leased trial.
 
         Raises:
             RequestError: ``RESULT_INCORRECT_STATE`` while the simulation is leased.
@@ -92,5 +92,5 @@ class PresentTrial:
             self._goals[controller] = outcome
 
     def outcomes(self, controllers: Iterable[str]) -> tuple[GoalOutcome, ...]:
-        """Outcomes of the goals of these controllers, in their order."""
+        """Return the outcomes of the goals of these controllers, in their order."""
         return tuple(self._goals[name] for name in controllers if name in self._goals)

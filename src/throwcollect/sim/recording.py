@@ -30,12 +30,12 @@ def to_samples(
         rows: The samples.
         stamps_ns: Their simulated times [ns], shape ``(n_rows,)``.
         joints: All joints of the robot, in its order.
-        moving: The joints of each sample.
-        locked: Angle [rad] of each joint that is not in the samples.
-        offsets: How much farther each joint of the samples stands than its sensor shows [rad], shape ``(n_moving,)``.
+        moving: The joints that the samples hold.
+        locked: Angle [rad] of each joint that the samples do not hold.
+        offsets: True angle of each moving joint minus the angle that its sensor shows [rad], shape ``(n_moving,)``.
     """
     count, width = len(rows), 3 * len(moving) + BALL_NUMBERS
-    # Packing row by row takes a third of the time that arrays take to read as many objects.
+    # Packing row by row takes a third of the time in which NumPy makes an array of as many Python objects.
     pack = struct.Struct(f"{width}d").pack
     table = np.frombuffer(bytearray().join(pack(*row) for row in rows)).reshape(count, width)
     position, velocity, effort = np.zeros((3, count, len(joints)))

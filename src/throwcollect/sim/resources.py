@@ -1,4 +1,4 @@
-"""Finds what can be spawned: descriptions by their URIs, and the files that they refer to."""
+"""Finds the descriptions of what can be spawned by their URIs, and the files that they refer to."""
 
 from __future__ import annotations
 
@@ -26,17 +26,17 @@ def load_model(uri: str, text: str, robot: Robot) -> BodyModel:
     Args:
         uri: ``file://`` or ``package://`` URI of a URDF file.
         text: URDF text, which is used if there is no URI.
-        robot: The robot, beside whose description those of ``package://`` are.
+        robot: The robot; packages of ``package://`` are looked for where its description is installed.
 
     Raises:
-        RequestError: ``NO_RESOURCE`` if both are empty, ``RESULT_NOT_FOUND`` if there is no such file,
+        RequestError: ``NO_RESOURCE`` if URI and text are empty, ``RESULT_NOT_FOUND`` if there is no such file,
             ``UNSUPPORTED_FORMAT`` if it is not URDF; otherwise as `read_model` does.
     """
     if not uri:
         if not text:
             raise RequestError("NO_RESOURCE", "neither a URI nor a description was given")
         return read_model(text, lambda filename: read_mesh(_locate(filename, None, robot)))
-    path = _path(uri, robot, missing="RESULT_NOT_FOUND")
+    path = _resolve(uri, robot, missing="RESULT_NOT_FOUND")
     if path.suffix.lower() != ".urdf":
         raise RequestError("UNSUPPORTED_FORMAT", f"{uri:.255}: a file of type {path.suffix!r:.20}", expected="*.urdf")
     try:
@@ -58,14 +58,14 @@ def find_resources(sources: Sequence[str], robot: Robot) -> tuple[dict[str, str]
         robot: The robot.
 
     Returns:
-        The name that each description gives itself, by its URI, and what is wrong with each source that cannot be
-        searched.
+        The name that each description gives itself, by the URI of the description; and a sentence for each source that
+        cannot be searched, with the reason.
     """
     names = dict(_find_installed(robot))
     useless = []
     for source in sources:
         try:
-            directory = _path(source, robot, missing="RESULT_NOT_FOUND")
+            directory = _resolve(source, robot, missing="RESULT_NOT_FOUND")
             if not directory.is_dir():
                 raise RequestError("RESULT_NOT_FOUND", f"{source!r:.255}: no such directory")
             names |= _search(directory, Path.as_uri, robot)
@@ -87,12 +87,12 @@ def _find_installed(robot: Robot) -> Mapping[str, str]:
 
 
 def _package_of(robot: Robot) -> str:
-    """The directory of the robot's share that its description is in."""
+    """Name the package of the robot's description, which is a directory in the robot's share."""
     return robot.urdf.split("/", 1)[0]
 
 
 def _search(directory: Path, uri_of: Callable[[Path], str], robot: Robot) -> dict[str, str]:
-    """Names of the descriptions below a directory whose collision shapes are all there, by their URIs.
+    """Find the descriptions below a directory that can be spawned; return their names by their URIs.
 
     Raises:
         RequestError: ``RESULT_NOT_FOUND`` if there are too many files to search.
@@ -106,14 +106,22 @@ def _search(directory: Path, uri_of: Callable[[Path], str], robot: Robot) -> dic
         for path in (Path(parent, name) for name in files if name.endswith(".urdf")):
             try:
                 if path.is_file() and path.stat().st_size <= _LARGEST_FILE:
-                    names[uri_of(path)] = _spawnable_name(path, robot)
+                    names[uri_of(path)] = _read_name(path, robot)
             except (RequestError, OSError):
-                # What cannot be spawned is left out of the list. Who spawns it all the same is told why.
+                # A description that cannot be spawned is left out of the list. A client that tries to spawn it is told
+                # the reason.
                 continue
     return names
 
 
-def _spawnable_name(path: Path, robot: Robot) -> str:
+def _read_name(path: Path, robot: Robot) -> str:
+    """Read the name of a description, and check that it can be spawned.
+
+    Raises:
+        RequestError: If it cannot be spawned.
+        OSError: If it cannot be read.
+    """
+
     def check(filename: str) -> Triangles:
         check_mesh(_locate(filename, path.parent, robot))
         return np.empty((0, 3, 3), np.float32)
@@ -122,24 +130,26 @@ def _spawnable_name(path: Path, robot: Robot) -> str:
 
 
 def _locate(filename: str, directory: Path | None, robot: Robot) -> Path:
-    """File of a mesh, which may be relative to the directory of its description.
+    """Find the file of a mesh, whose name may be a path relative to the directory of its description.
 
     Raises:
-        RequestError: ``MISSING_ASSETS`` if nothing says what a relative path is relative to.
+        RequestError: ``MISSING_ASSETS`` if the path is relative, but the description lies in no directory; otherwise as
+            `_resolve` does.
     """
     if "://" in filename:
-        return _path(filename, robot, missing="MISSING_ASSETS")
+        return _resolve(filename, robot, missing="MISSING_ASSETS")
     if directory is None and not filename.startswith("/"):
         message = f"mesh {filename!r:.255}: a relative path means nothing in a description without a file"
         raise RequestError("MISSING_ASSETS", message, expected="package:// or file://")
     return (directory or Path("/")) / filename
 
 
-def _path(uri: str, robot: Robot, *, missing: str) -> Path:
-    """File that a URI means; packages are looked for in the share of the robot.
+def _resolve(uri: str, robot: Robot, *, missing: str) -> Path:
+    """Find the file that a URI means; packages are looked for in the share of the robot.
 
     Raises:
-        RequestError: ``UNSUPPORTED_FORMAT`` if it has another scheme, `missing` if its package is not known.
+        RequestError: ``UNSUPPORTED_FORMAT`` if the scheme is neither ``file`` nor ``package``, the reason `missing` if
+            it is no URI or there is no such package.
     """
     try:
         parts = urlsplit(uri)

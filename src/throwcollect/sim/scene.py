@@ -1,4 +1,4 @@
-"""Values for a physics engine, from a configuration."""
+"""Turns a configuration into values for a physics engine."""
 
 from __future__ import annotations
 
@@ -15,21 +15,21 @@ _OPENING = (1.0, 0.0, 0.0)
 
 
 def scene_of(config: Config, description: Description) -> Scene:
-    """The world of a trial, with the robot of a description."""
+    """Describe the world of a trial, with the robot of a description."""
     tool = tool_of(config.tool)
     return Scene(
         urdf=description.urdf,
         moving=description.moving,
         base_height_m=config.robot.base_height_m,
         tool=ToolLink(tool.link, tool.name, _OPENING),
-        # On a landing plane at height zero the trial ends before the ground could stop the ball.
+        # If the landing plane is at height zero, the trial ends before the ball could touch the ground.
         ground_is_solid=config.scene.landing_height_m > 0,
         ball_radius_m=config.ball.radius_m,
     )
 
 
 def physics_of(config: Config, moving: tuple[str, ...]) -> Physics:
-    """The numbers that the physics of a trial with these moving joints depends on."""
+    """Collect the numbers that the physics of a trial with these moving joints depends on."""
     robot = robot_of(config)
     efforts = joint_limits(robot).effort * config.robot.effort_scale
     return Physics(
@@ -47,5 +47,5 @@ def physics_of(config: Config, moving: tuple[str, ...]) -> Physics:
 
 
 def drag_of(config: Config) -> float:
-    """The air's force on the ball over the square of its speed [kg/m]."""
+    """Compute the air's force on the ball, divided by the square of the ball's speed [kg/m]."""
     return config.ball.drag_coefficient * config.scene.air_density_kgpm3 * math.pi * config.ball.radius_m**2 / 2

@@ -1,4 +1,4 @@
-"""Answers of the services of simulation_interfaces: a result code, and a sentence on errors."""
+"""Makes the answers of the services of simulation_interfaces: a result code, and a sentence if there is an error."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from throwcollect.errors import ConfigError, RequestError
 from throwcollect.ros.msg import Result
 
 Fill = Callable[[Any, Any], None]
-"""Fills a response: gets request and response."""
+"""Function of a request and a response that fills the response."""
 
 
 def answering(service: Any, fill: Fill) -> Callable[[Any, Any], Any]:
-    """Make the callback of a service, which fills the response, or answers with the error that `fill` raises."""
+    """Make the callback of a service: `fill` fills the response, or raises an error, with which the service answers."""
 
     def answer(request: Any, response: Any) -> Any:
         response.result.result = Result.RESULT_OK
@@ -36,9 +36,9 @@ _R = TypeVar("_R", bound=_WithResult)
 
 
 def refusal(response_type: type[_R], error: RequestError) -> _R:
-    """Response, or any other message with a ``result``, that gives the reason of an error.
+    """Make a response, or any other message with a ``result``, that gives the reason of an error.
 
-    A code that the message has of its own comes before one of the same name that all services have.
+    If the type of the message and all services have a result code of the same name, the code of the type is taken.
     """
     constants = response_type if hasattr(response_type, error.reason) else Result
     response = response_type()

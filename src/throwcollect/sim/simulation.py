@@ -20,15 +20,15 @@ from throwcollect.errors import RequestError, ThrowcollectError
 from throwcollect.robots.description import robot_of, start_posture
 from throwcollect.sim.entities import Entities
 from throwcollect.sim.limb_controller import LimbController
-from throwcollect.sim.pace import Pace, long_slice_steps, longest_steps, slice_steps
+from throwcollect.sim.pace import Pace, long_stretch_steps, longest_steps, stretch_steps
 from throwcollect.sim.present_trial import PresentTrial, TrialSetup
 from throwcollect.sim.world import World
 
-_SLICE_S = 0.5
+_STRETCH_S = 0.5
 """Simulated time between two looks at messages in a trial or in many steps: about 20 ms of real time."""
 
-_WATCHED_SLICE_S = 0.05
-"""Simulated time of such a slice while a client watches, and outside of trials: ros2_controllers' feedback period."""
+_WATCHED_STRETCH_S = 0.05
+"""Such a time while a client watches, and outside of trials: the period of feedback in ros2_controllers."""
 
 
 class StateCode(IntEnum):
@@ -54,9 +54,9 @@ class StepRequest:
     """Physics steps that a client wants while the clock stands still, and how far they have come.
 
     Attributes:
-        wanted: Number of steps.
-        taken: How many have been taken so far.
-        interruption: Why no more will be taken; None if nothing has interrupted them.
+        wanted: Number of steps that the client wants.
+        taken: Number of steps that have been taken so far.
+        interruption: Why no more steps will be taken; None if nothing has interrupted them.
     """
 
     wanted: int
@@ -73,7 +73,7 @@ class Simulation:
     """Steps one world as fast as it can while a run goes on.
 
     Raises:
-        ConfigError: If it does not describe a world.
+        ConfigError: If the configuration does not describe a world.
         WorkerError: If the physics engine does not start.
     """
 
@@ -97,7 +97,7 @@ class Simulation:
         self.real_time_factor = config.sim.real_time_factor
         self._results: list[tuple[str, GoalResult]] = []
         self._has_start = False
-        """Whether the world went on from a start state: the last reset of its state has not failed."""
+        """Whether the world has a start state to go on from, which it lacks after a reset of its state has failed."""
         self.reset()
 
     @property
@@ -111,22 +111,22 @@ class Simulation:
         return self._steps is not None or (self._running and self._has_start and self.state == StateCode.PLAYING)
 
     def lease(self, number: int, config: Config, goals: Mapping[str, TrajectoryGoal]) -> None:
-        """Begin a trial for a coordinator, with controllers as they are configured, which no other client may touch.
+        """Begin a trial for a coordinator, which no other client may touch, with controllers as they are configured.
 
-        The configuration has the trial's values; each controller that moves has a goal.
+        The configuration has the values of the trial; there is a goal for each controller that moves.
 
         Raises:
-            ConfigError: If there is no such start state.
+            ConfigError: If the start state of this configuration is not possible.
             ThrowcollectError: If a controller refuses its goal.
         """
-        # A leased trial takes no goals, so this one counts as leased only when its controllers have theirs.
+        # Controllers refuse goals during a lease, so this trial counts as leased only when they have their goals.
         self.trial.leased = False
         for limb in self.limbs.values():
             limb.restore()
         self.trial.setup = TrialSetup(number, tuple(goals), config)
         self.reset()
         for controller, goal in goals.items():
-            # Clients' goals are numbers, so no result of a lease's goal is taken for that of one of theirs.
+            # The id of a client's goal is a number. This id is none, so that no client gets the result of this goal.
             if (refusal := self.submit(controller, ("trial", number), goal)) is not None:
                 raise ThrowcollectError(f"trial {number}: {controller} refuses its goal: {refusal}")
         self.trial.leased = True
@@ -141,7 +141,7 @@ class Simulation:
 
         Raises:
             ConfigError: If there is no start state to go back to; the state is set all the same.
-            RequestError: ``RESULT_INCORRECT_STATE`` if it is to be stopped while it is leased.
+            RequestError: ``RESULT_INCORRECT_STATE`` if the simulation is to be stopped while it is leased.
         """
         if state == StateCode.STOPPED:
             self.trial.require_free()
@@ -154,12 +154,12 @@ class Simulation:
         """Go back to the start, in whole or in part.
 
         Args:
-            scope: ``STATE`` puts world and controllers into the start state of the trial that is set up, what was
-                spawned to where it was spawned. ``TIME`` puts the clock to the trial's start. Either aborts all goals;
-                only both together begin a trial. ``SPAWNED`` takes out of the world what was spawned.
+            scope: ``STATE`` puts world and controllers into the start state of the trial that is set up, and spawned
+                entities back to where they were spawned. ``TIME`` puts the clock to the trial's start. Either aborts
+                all goals; only both together begin a trial. ``SPAWNED`` takes spawned entities out of the world.
 
         Raises:
-            ConfigError: If there is no such state; the clock stands still until another reset succeeds.
+            ConfigError: If the start state is not possible; the clock stands still until another reset succeeds.
         """
         of_time, of_state, of_spawned = Scope.TIME in scope, Scope.STATE in scope, Scope.SPAWNED in scope
         if of_spawned:
@@ -189,12 +189,12 @@ class Simulation:
             limb.reset(start_ns, posture, speed=setup.config.robot.speed_scale)
         self._collect_results()
         self._command = np.array([posture[joint] for joint in self.world.moving])
-        # After a reset of a part, what follows is not the trial that a plan has drawn.
+        # After a reset of time or state alone, what follows is not the trial that the plan has drawn.
         self._in_trial = setup.number >= 0 and of_time and of_state
         self._published = 0
 
     def submit(self, controller: str, goal_id: Hashable, goal: TrajectoryGoal) -> TrajectoryRefusal | None:
-        """Give a goal to a controller, or refuse it; the run begins when the last awaited controller has its goal."""
+        """Give a goal to a controller, or refuse it; a run begins once all controllers that need a goal have one."""
         if (leased := self.trial.refusal) is not None:
             return leased
         limb = self.limbs[controller]
@@ -206,7 +206,7 @@ class Simulation:
         return refusal
 
     def cancel(self, controller: str, goal_id: Hashable) -> bool:
-        """Cancel a goal; return whether it was being executed, and may be cancelled."""
+        """Cancel a goal; return False if it was not being executed, or the simulation is leased."""
         if self.trial.leased:
             return False
         cancelled = self.observe(controller).cancel(goal_id)
@@ -214,7 +214,7 @@ class Simulation:
         return cancelled
 
     def follow(self, controller: str, trajectory: Trajectory) -> TrajectoryRefusal | None:
-        """Let a controller follow a trajectory that is no goal, or refuse it; a run begins unless goals are awaited."""
+        """Let a controller follow a trajectory that is no goal, or refuse it; a run begins unless a goal is missing."""
         if (leased := self.trial.refusal) is not None:
             return leased
         limb = self.limbs[controller]
@@ -225,24 +225,24 @@ class Simulation:
         return refusal
 
     def advance(self, *, watched: bool) -> None:
-        """Run for a slice of time, or until the run ends; it ends on time where a real-time factor asks for it.
+        """Run for a stretch of time, or until the run ends; with a real-time factor, take as much time as it says.
 
-        The slice has to be short if a client listens (`watched`).
+        The stretch has to be short if a client listens (`watched`).
         """
         began_s, since_ns, factor = time.monotonic(), self.now_ns, self.real_time_factor
-        # A long slice costs the least. A short one lets messages be sent in between, which only watching clients need.
-        slice_s = _SLICE_S if (self._in_trial or self._steps) and not (watched or factor) else _WATCHED_SLICE_S
-        steps = max(1, round(slice_s * self.config.sim.physics_hz))
+        # Long stretches cost the least. Short ones let messages be sent in between, which only watching clients need.
+        stretch_s = _STRETCH_S if (self._in_trial or self._steps) and not (watched or factor) else _WATCHED_STRETCH_S
+        steps = max(1, round(stretch_s * self.config.sim.physics_hz))
         if (request := self._steps) is not None:
             request.taken += self.step(min(steps, request.wanted - request.taken))
             if request.is_over:
                 self._steps = None
             return
         if factor and self.trial.leased and not watched:
-            # Every slice costs time besides physics, so there are as few as requests can wait for.
-            steps = long_slice_steps(factor, self.config.sim.physics_hz, _SLICE_S)
+            # Every stretch costs time besides physics, so stretches are as long as requests can wait.
+            steps = long_stretch_steps(factor, self.config.sim.physics_hz, _STRETCH_S)
         elif factor:
-            steps = slice_steps(factor, self.config.sim.physics_hz, self._stride, self.world.steps % self._stride)
+            steps = stretch_steps(factor, self.config.sim.physics_hz, self._stride, self.world.steps % self._stride)
         self.step(steps)
         # A trial ends when its rules say so; a motion by hand, when all joints have come to rest.
         if self._in_trial and self.world.end_reason is not None:
@@ -255,7 +255,7 @@ class Simulation:
 
     @property
     def feedback_ns(self) -> int:
-        """Simulated time that passes between two messages of feedback where slices are shorter than that [ns]."""
+        """Simulated time between two messages of feedback [ns]; 0 to send feedback after every stretch."""
         if not self.real_time_factor or self.state != StateCode.PLAYING:
             return 0
         return longest_steps(self.real_time_factor, self.config.sim.physics_hz) * self._period_ns
@@ -288,7 +288,7 @@ class Simulation:
             self._interrupt_steps("cancelled")
 
     def step(self, steps: int) -> int:
-        """Take physics steps, fewer if the trial ends, or a goal outside of a trial; return how many were taken."""
+        """Take physics steps, fewer if the trial ends, or outside of trials a goal; return how many were taken."""
         if not self._in_trial:
             self.world.forget_samples()
         remaining = steps
@@ -300,21 +300,21 @@ class Simulation:
         return steps - remaining
 
     def pop_results(self) -> list[tuple[str, GoalResult]]:
-        """Controllers and results of the goals that have ended since the last call, oldest first."""
+        """Return controllers and results of the goals that have ended since the last call, oldest first."""
         results, self._results = self._results, []
         return results
 
     def fresh_samples(self) -> Samples:
-        """Samples recorded since the last call."""
+        """Return the samples that were recorded since the last call."""
         first, self._published = self._published, self.world.recorded
         return self.world.samples(first)
 
     def last_sample(self) -> Samples:
-        """The sample that was recorded last."""
+        """Return the sample that was recorded last."""
         return self.world.samples(self.world.recorded - 1)
 
     def episode(self) -> tuple[EpisodeHeader, Samples, Mapping[str, ControllerSamples]] | None:
-        """The recording of a trial that has ended, given out once; None before that, and until the next trial ends."""
+        """Return the recording of a trial that has ended, only once; None while there is no such recording."""
         if not self._in_trial or self.world.end_reason is None:
             return None
         self._in_trial = self.trial.leased = False
@@ -329,14 +329,14 @@ class Simulation:
         )
         states = {}
         if self._keeps_states:
-            # The last sample came after the last look, so no controller has seen it yet.
+            # The last sample was recorded after controllers looked at the measured state for the last time.
             self._look(self.limbs.values())
             self._collect_results()
             states = {name: limb.collect_states() for name, limb in self.limbs.items()}
         return header, samples, states
 
     def observe(self, controller: str) -> JointTrajectoryController:
-        """A controller, once it has seen the present state of its joints, which its `state` and `query` need."""
+        """Return a controller after it has seen the present state of its joints, which its `state` and `query` need."""
         limb = self.limbs[controller]
         limb.controller.observe(limb.measure(*self.world.joints()))
         return limb.controller
@@ -347,7 +347,7 @@ class Simulation:
         for limb in self.limbs.values():
             limb.watched = limb in self._watched
             if not limb.watched:
-                # Whoever watches this limb later must not get states of before.
+                # A client that watches this limb later must not get states from before that.
                 limb.pop_states()
 
     def _interrupt_steps(self, reason: str) -> None:

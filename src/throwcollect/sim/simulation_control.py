@@ -1,4 +1,4 @@
-"""The standard services of simulators, simulation_interfaces 1.5, on top of a `Simulation`."""
+"""Offers the standard services of simulators, simulation_interfaces 1.5, for a `Simulation`."""
 
 from __future__ import annotations
 
@@ -37,8 +37,8 @@ _FEATURES = (
     "STEP_SIMULATION_ACTION",
     "SPAWNING_ENTITIES",
 )
-_OF_BODIES = frozenset({"SPAWNING", "DELETING", "SPAWNING_RESOURCE_STRING", "SPAWNABLES", "SPAWNING_ENTITIES"})
-"""Features of engines that take further bodies."""
+_NEED_BODIES = frozenset({"SPAWNING", "DELETING", "SPAWNING_RESOURCE_STRING", "SPAWNABLES", "SPAWNING_ENTITIES"})
+"""Features that need an engine which takes further bodies."""
 
 _FORMATS = ("urdf",)
 _WHOLE_SCOPES = (ResetSimulation.Request.SCOPE_DEFAULT, ResetSimulation.Request.SCOPE_ALL)
@@ -64,7 +64,7 @@ class SimulationControl:
         self, _request: GetSimulatorFeatures.Request, response: GetSimulatorFeatures.Response
     ) -> GetSimulatorFeatures.Response:
         takes_bodies = self._simulation.world.engine.bodies is not None
-        names = [name for name in _FEATURES if takes_bodies or name not in _OF_BODIES]
+        names = [name for name in _FEATURES if takes_bodies or name not in _NEED_BODIES]
         response.features.features = [getattr(Features, name) for name in names]
         response.features.spawn_formats = list(_FORMATS) if takes_bodies else []
         response.features.custom_info = (

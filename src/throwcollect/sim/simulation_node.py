@@ -49,25 +49,25 @@ _EPISODE = "episode"
 NUMBER, CONTROLLERS = "trial.number", "trial.controllers"
 """Parameters that set up a trial by hand."""
 _NO_CONTROLLERS = [""]
-"""An empty list, whose type nobody could tell, is written like this."""
+"""Value of the parameter for no controllers; a list with nothing in it would not tell the type of its elements."""
 _LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 _SAMPLED = QoSProfile(depth=100)
 _WHOLE = QoSProfile(history=HistoryPolicy.KEEP_ALL)
-"""No episode is dropped; each reaches every subscriber, however slow."""
+"""For episodes: none is dropped, and each reaches every subscriber, however slow."""
 
 _IDLE_S = 0.1
-"""Longest wait for messages. Signals take effect after it, because their handlers must not disturb a busy executor."""
+"""Longest wait for messages. Signals take effect after the wait: their handlers must not disturb a busy executor."""
 
 _REPEAT_S = 0.02
-"""Real time between two messages on a topic of samples while time stands still, as between the robot's joint states."""
+"""Real time between two messages on a topic of samples while time stands still; joint states of the robot have it."""
 
 _FACTOR = "sim.real_time_factor"
 DESCRIPTION = "robot_description"
-"""Named as the parameter of ROS' robot_state_publisher."""
+"""Name of the parameter by which clients change what viewers draw; robot_state_publisher of ROS has the same name."""
 _NOT_RECORDED = (_FACTOR, DESCRIPTION)
 """Parameters that change nothing that is recorded, so clients may set them during a trial.
 
-A lower real-time factor waits for the end of the trial, as the coordinator would think that the simulation hangs."""
+A real-time factor so low that the coordinator would think that the simulation hangs is refused during a trial."""
 _NO_LIMIT = 0.0
 _FACTORS = f"a number from {SLOWEST} to {FASTEST}, or 0 for no limit"
 _HIDDEN = (Effect.PLAN, Effect.RUN)
@@ -75,10 +75,10 @@ _HIDDEN = (Effect.PLAN, Effect.RUN)
 
 
 class SimulationNode(Node):
-    """Serves one simulation, with all names in one namespace: ``/<name>`` unless another one is given.
+    """Serves one simulation, with all names in one namespace, by default ``/<name>``.
 
     Raises:
-        ConfigError: If the namespace is that of another simulation.
+        ConfigError: If another simulation has this namespace.
     """
 
     def __init__(self, name: str, simulation: Simulation, *, namespace: str | None = None) -> None:
@@ -86,7 +86,7 @@ class SimulationNode(Node):
         self._require_own_namespace()
         self._simulation = simulation
         config = simulation.config
-        # The simulation is the source of its time, so the clock is set and not subscribed to.
+        # The simulation makes its own time, so the node sets its clock and does not subscribe to one.
         provide_time(self)
         self._runner = TrialRunner(simulation)
         self._description = self._runner.channels.robot
@@ -96,7 +96,7 @@ class SimulationNode(Node):
         self._leases = LeaseQueue(self._runner)
         self._live = [
             (topic, self.create_publisher(get_message(topic.type_name), topic.name.lstrip("/"), _SAMPLED))
-            for topic in Channels(_everything(config), self._description).recorded.values()
+            for topic in Channels(_record_all_topics(config), self._description).recorded.values()
         ]
         self._controllers = {name: ControllerNode(self, simulation, name) for name in simulation.limbs}
         self._manager = ControllerManager(self, simulation)
@@ -110,7 +110,7 @@ class SimulationNode(Node):
         self._requested: tuple[Lease, ...] = ()
         SimulationControl(self, simulation)
         self._stepping = Stepping(self, simulation)
-        # Episodes come last: a coordinator that sees their publisher takes the whole simulation for ready.
+        # This publisher comes last: a coordinator that sees it takes the whole simulation for ready.
         self._episodes = self.create_publisher(UInt8MultiArray, _EPISODE, _WHOLE)
 
     @property
@@ -147,7 +147,7 @@ class SimulationNode(Node):
         for controller in self._subscribed:
             controller.publish_state()
         if (handed := self._leases.hand_over()) is not None:
-            # The next trial begins before the last one leaves, so that no client can reach a controller in between.
+            # The next trial begins before the episode is sent, so that no client can reach a controller in between.
             self._begin_next()
             self._episodes.publish(pack(handed, self._signer))
         self._stepping.follow_up()
@@ -156,11 +156,11 @@ class SimulationNode(Node):
         """Refuse the namespace of another simulation, because clients could not tell the two apart.
 
         Raises:
-            ConfigError: If there is another one.
+            ConfigError: If there is another simulation.
         """
         others = {info.node_name for info in self.get_publishers_info_by_topic(_EPISODE)} - {self.get_name()}
         if others:
-            # The names are read before the node is destroyed, because rclpy has none afterwards.
+            # The names are read before the node is destroyed, because in rclpy it has none afterwards.
             name, namespace = self.get_name(), self.get_namespace()
             self.destroy_node()
             raise ConfigError(
@@ -184,17 +184,17 @@ class SimulationNode(Node):
         self._publish_steps(samples)
 
     def _repeats(self) -> bool:
-        """Whether to publish the last sample once more: robots go on to publish their state while they rest."""
+        """Say whether to publish the last sample once more, as robots go on to publish their state while they rest."""
         return self._rests and time.monotonic() - self._published_at >= _REPEAT_S
 
     @property
     def _rests(self) -> bool:
-        """Whether time stands still for lack of work; not in a collection, which publishes each sample once."""
+        """Whether time stands still for lack of work; never during a trial, of which each sample is published once."""
         simulation = self._simulation
         return simulation.state == StateCode.PLAYING and not simulation.running and simulation.trial.begun.number < 0
 
     def _publish_steps(self, samples: Samples) -> None:
-        """Publish the time after steps of a paused simulation, which may end between two samples."""
+        """Publish the time after the steps of a paused simulation, because they may end between two samples."""
         simulation = self._simulation
         self._published_ns = int(samples.stamps_ns[-1]) if len(samples) else self._published_ns
         if simulation.state != StateCode.PAUSED or simulation.now_ns == self._published_ns:
@@ -224,7 +224,7 @@ class SimulationNode(Node):
             self._latched.append(publisher)
 
     def _declare_description(self) -> None:
-        """Declare the parameter by which viewers are given another description to draw."""
+        """Declare the parameter by which a client gives viewers another description to draw."""
         about = "URDF that viewers draw; only what is seen may differ from that of the configuration."
         self.declare_parameter(DESCRIPTION, self._description, ParameterDescriptor(description=about))
         (self._described,) = (topic for topic in self._latched if topic.topic_name.endswith(DESCRIPTION))
@@ -261,14 +261,14 @@ class SimulationNode(Node):
         self.add_post_set_parameters_callback(self._take_leases)
 
     def _set_up(self, parameters: list[Parameter]) -> SetParametersResult:
-        """Take over parameters: leases begin their trials at once, others take effect with the next reset."""
+        """Check parameters and take them over; leases begin their trials at once, others take effect with a reset."""
         values = {parameter.name: parameter.value for parameter in parameters}
         try:
             self._check_factor(values.get(_FACTOR, _NO_LIMIT))
             if DESCRIPTION in values:
                 check_appearance(self._description, values[DESCRIPTION])
             if values.get(LEASES):
-                # Trials begin in `_take_leases` only, because a callback that is asked after this one may still refuse
+                # Trials begin only in `_take_leases`, because a callback that is called after this one may still refuse
                 # the parameters.
                 self._requested = self._read_leases(values)
             elif not self._restoring:
@@ -280,11 +280,11 @@ class SimulationNode(Node):
         return SetParametersResult(successful=True)
 
     def _read_leases(self, values: Mapping[str, Any]) -> tuple[Lease, ...]:
-        """Read and check what a coordinator asks for.
+        """Read and check the leases that a coordinator sends.
 
         Raises:
             ConfigError: If a lease is for another simulation, or is not signed with the key of this run.
-            DatasetError: If they cannot be read.
+            DatasetError: If the leases cannot be read.
         """
         if len(values) > 1:
             raise ConfigError(f"{LEASES}: is set alone, not with {next(name for name in values if name != LEASES)}")
@@ -295,7 +295,7 @@ class SimulationNode(Node):
         return leases
 
     def _take_leases(self, parameters: list[Parameter]) -> None:
-        """Begin the trials that a coordinator has asked for; parameters that clients have set do not count for them."""
+        """Begin the trials that a coordinator has asked for, and undo what clients have set."""
         if not any(parameter.name == LEASES and parameter.value for parameter in parameters):
             return
         self._leases.replace(self._requested)
@@ -344,11 +344,11 @@ class SimulationNode(Node):
             raise ConfigError(f"{_FACTOR}: should be {expected}, got {factor:g}")
 
     def _hangs(self, factor: float) -> bool:
-        """Whether a coordinator would take a simulation with this factor for one that hangs."""
+        """Say whether the factor is so low that a coordinator would think that the simulation hangs."""
         return _NO_LIMIT < factor < self._simulation.config.sim.slowest_factor
 
     def _restore_parameters(self) -> None:
-        """Go back to what is configured, and from slow motion, in case a client has set something else."""
+        """Undo what clients have changed of the parameters; of the real-time factor, only slow motion is undone."""
         for controller in self._controllers.values():
             controller.face.restore()
         configured = {NUMBER: NO_TRIAL, CONTROLLERS: _NO_CONTROLLERS, **self._physics}
@@ -356,7 +356,7 @@ class SimulationNode(Node):
         if self._hangs(self._get_value(_FACTOR)):
             stray[_FACTOR] = self._simulation.config.sim.real_time_factor or _NO_LIMIT
         if stray:
-            # Setting parameters calls `_set_up` again, which must not prepare a trial by hand from these.
+            # Setting parameters calls `_set_up` again, which must not prepare a trial by hand from these parameters.
             self._restoring = True
             try:
                 self.set_parameters([Parameter(key, value=value) for key, value in stray.items()])
@@ -367,7 +367,7 @@ class SimulationNode(Node):
         return self.get_parameter(key).value
 
 
-def _everything(config: Config) -> Config:
-    """The configuration with all topics recorded that have a message for every sample."""
+def _record_all_topics(config: Config) -> Config:
+    """Change the configuration so that all topics that have a message for every sample are recorded."""
     record = config.record.model_copy(update={"topics": ["joint_states", "ball/odometry", "tf", "clock"]})
     return config.model_copy(update={"record": record})

@@ -19,11 +19,11 @@ from throwcollect.sim.simulation import Simulation
 from throwcollect.sim.simulation_node import SimulationNode
 
 _made: list[Simulation] = []
-"""The simulation that `make_ahead` has made; empty if there is none."""
+"""The simulation that `make_ahead` has made, until `run` takes it."""
 
 
 def make_ahead(config: Config) -> None:
-    """Make the simulation that `run` takes in processes that are forked off this one, if its engine can be forked.
+    """Make a simulation, if its engine can be forked; processes that are forked off this one then `run` it.
 
     Raises:
         ConfigError: As `Simulation`.
@@ -34,7 +34,7 @@ def make_ahead(config: Config) -> None:
 
 
 def _take(config: Config) -> Simulation:
-    """Take the simulation that was made ahead if it is one of this configuration, or else make one.
+    """Take the simulation that was made ahead if it has this configuration, or else make one.
 
     Raises:
         ConfigError: As `Simulation`.
@@ -51,12 +51,12 @@ def _take(config: Config) -> Simulation:
 def run(config: Path, *, name: str, namespace: str | None = None) -> None:
     """Serve one simulation until SIGTERM, SIGINT or SIGHUP, or until a client sets its state to quitting.
 
-    It reads messages between slices of a running trial; otherwise the process sleeps until one arrives.
+    While a trial runs, the process reads messages between two stretches; otherwise it sleeps until a message arrives.
 
     Args:
         config: YAML file of the collection.
         name: Name of the node.
-        namespace: Its namespace; None for the root where `run.root_namespace` says so, otherwise ``/<name>``.
+        namespace: Namespace of the node; None for the root if `run.root_namespace` says so, otherwise ``/<name>``.
 
     Raises:
         ConfigError: If the configuration or the namespace cannot be used.
@@ -85,7 +85,7 @@ def run(config: Path, *, name: str, namespace: str | None = None) -> None:
     for number in stop_signals():
         signal.signal(number, stop)
     check_answers(node, executor)
-    # The present objects stay until the end, so the garbage collector need not go through them again and again.
+    # The objects made so far stay until the end, so the garbage collector need not go through them again and again.
     gc.freeze()
     heartbeat = Heartbeat()
     print(ready_line(name), flush=True)

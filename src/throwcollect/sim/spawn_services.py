@@ -1,4 +1,4 @@
-"""Services that put new entities into the world, and that list descriptions for that."""
+"""Services that put new entities into the world, and that list the descriptions that can be spawned."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ class SpawnServices:
             response.result.error_message = f"{failed} of {len(results)} entities were not spawned; see their results"
 
     def _spawn(self, wish: SpawnWish | SpawnEntity.Request, resource: Resource | SpawnEntity.Request) -> str:
-        """Put a new entity into the world and return its name; a wish that cannot be met changes nothing.
+        """Put a new entity into the world and return its name; a request that cannot be met changes nothing.
 
         Raises:
             RequestError: ``NAME_INVALID``, ``NAME_NOT_UNIQUE``, ``NAMESPACE_INVALID``, ``INVALID_POSE``, the reasons of
@@ -96,13 +96,13 @@ class SpawnServices:
             raise RequestError("NAME_NOT_UNIQUE", f"there is an entity {name!r}", hint="allow_renaming")
 
     def _find_free_name(self, wish: str) -> str:
-        """A name that no entity has: the one that is wished for, or that with a number."""
+        """Find a name that no entity has: the wanted name, or the wanted name with a number."""
         stem = re.sub(r"[^A-Za-z0-9_]", "_", wish[:_LONGEST_NAME]) if not _NAME.fullmatch(wish) else wish
         stem = stem or "entity"
         taken = {WORLD_FRAME, *self._entities.names}
         if stem not in taken:
             return stem
-        # An underscore and three digits have room: there are never more than 200 entities beside ball and robot.
+        # An underscore and three digits are enough, because there are at most 200 entities beside ball and robot.
         return next(name for number in count(1) if (name := f"{stem[: _LONGEST_NAME - 4]}_{number}") not in taken)
 
     def _list_spawnables(self, request: GetSpawnables.Request, response: GetSpawnables.Response) -> None:

@@ -25,7 +25,7 @@ class SpawnedBodies:
         return tuple(self._spawned)
 
     def add(self, name: str, model: BodyModel, start: BodyState) -> None:
-        """Put a body into the world, under a name that no other body has; of its state only the pose matters.
+        """Put a body into the world, under a name that no other body has; only the pose of `start` matters.
 
         Raises:
             RequestError: ``RESULT_FEATURE_UNSUPPORTED`` if the engine takes no bodies, ``RESOURCE_PARSE_ERROR`` if it
@@ -37,7 +37,7 @@ class SpawnedBodies:
     def remove(self, name: str) -> None:
         """Take a body out of the world."""
         del self._spawned[name]
-        # The world has lost it if loading it anew has failed.
+        # The body is no longer in the world if loading the world anew has failed.
         if name in self._bodies:
             self._bodies.remove(name)
 
@@ -47,17 +47,17 @@ class SpawnedBodies:
             self.remove(name)
 
     def load(self) -> None:
-        """Put back where they were spawned all bodies that the world has lost, as it does when it is loaded."""
+        """Put bodies that are missing from the world, because it was loaded anew, back to where they were spawned."""
         for name, (model, start) in self._spawned.items():
             if name not in self._bodies:
                 self._bodies.add(name, model, start)
 
     def model(self, name: str) -> BodyModel:
-        """The model of a body."""
+        """Return the model of a body."""
         return self._spawned[name][0]
 
     def engine_bodies(self, name: str) -> Bodies:
-        """The bodies of the engine, among which is the one of this name.
+        """Return the bodies of the engine, which include the one of this name.
 
         Raises:
             RequestError: ``RESULT_INCORRECT_STATE`` if no world is loaded.

@@ -1,4 +1,4 @@
-"""Stepping through a paused simulation: a service that answers at the end, and an action with feedback."""
+"""Steps through a paused simulation: by a service that answers at the end, and by an action with feedback."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _MOST_STEPS = 100_000
 class Stepping:
     """Offers service and action under relative names, so that they stand in the simulation's namespace.
 
-    Steps are taken by the loop of the simulation's process, slice by slice, so that other requests are answered
+    Steps are taken by the loop of the simulation's process, stretch by stretch, so that other requests are answered
     meanwhile.
     """
 
@@ -28,7 +28,8 @@ class Stepping:
         self._node = node
         self._simulation = simulation
         self._awaited: list[tuple[StepRequest, Future, Any | None]] = []
-        self._told = 0
+        self._reported = 0
+        """Number of steps of the present request that feedback has covered."""
         node.create_service(StepSimulation, "step_simulation", self._step)
         self._server = ActionServer(
             node,
@@ -39,7 +40,7 @@ class Stepping:
         )
 
     def follow_up(self) -> None:
-        """Send feedback and results to clients that wait for steps; call it after each slice."""
+        """Send feedback and results to clients that wait for steps; call it after each stretch."""
         for awaited in list(self._awaited):
             request, future, handle = awaited
             if handle is not None:
@@ -81,12 +82,12 @@ class Stepping:
         """Wait until steps have been taken.
 
         Raises:
-            RequestError: If they cannot be taken, or not all of them.
+            RequestError: If the steps, or some of them, cannot be taken.
         """
         request = self._simulation.request_steps(int(steps))
         if request.is_over:
             return
-        self._told = 0
+        self._reported = 0
         future = Future()
         self._awaited.append((request, future, handle))
         await future
@@ -95,8 +96,8 @@ class Stepping:
             raise RequestError("RESULT_OPERATION_FAILED", message)
 
     def _publish_feedback(self, request: StepRequest, handle: Any) -> None:
-        """Send feedback for every step, as the action promises, if it has subscribers."""
-        first, self._told = self._told + 1, request.taken
+        """Send feedback for every step, as the action promises, if feedback has subscribers."""
+        first, self._reported = self._reported + 1, request.taken
         if self._node.count_subscribers(f"{_ACTION}/_action/feedback"):
             for completed in range(first, request.taken + 1):
                 remaining = request.wanted - completed

@@ -49,15 +49,18 @@ class TrialRunner:
         self._begun: _Begun | None = None
 
     def begin(self, trial: int, values: Mapping[str, float], *, token: str = "") -> None:
-        """Begin a trial; its controllers get the goals that its configuration makes.
+        """Begin a trial, and give its controllers the goals that follow from its configuration.
 
-        The values replace those of the configuration, by dotted key; the token is that of its lease, if it has one.
+        Args:
+            trial: Number of the trial.
+            values: Values by dotted key, which replace the values of the configuration.
+            token: Token of the trial's lease; empty if it has none.
 
         Raises:
-            ConfigError: If the values make no motion, or no start state.
+            ConfigError: If no motion or no start state follows from the values.
             ThrowcollectError: If a controller refuses its goal.
         """
-        # A trial that cannot begin must leave nothing behind that the next episode could be judged by.
+        # If this trial cannot begin, the next episode must not be judged by what is left of an earlier trial.
         self._begun = None
         config = with_values(self._simulation.config, values)
         trajectory = trajectory_of(config)
@@ -65,7 +68,7 @@ class TrialRunner:
         self._begun = _Begun(trajectory, token)
 
     def release_lease(self) -> None:
-        """Take its lease from the trial that runs: its episode is not judged, and names no lease."""
+        """Take the lease away from the trial that runs, so that its episode is not judged and names no lease."""
         self._begun = None
 
     def drop(self) -> None:
@@ -74,11 +77,13 @@ class TrialRunner:
         self._simulation.end_lease()
 
     def hand_over(self) -> Delivery | None:
-        """The episode of a trial that has ended, given out once, and judged if `begin` began it; None if there is none.
+        """Return the episode of a trial that has ended, only once; None if there is none.
+
+        The episode is judged if `begin` began the trial.
 
         Raises:
-            ThrowcollectError: If it has numbers that are not finite, which no dataset may have.
-            MemberError: If its task is of another package and fails.
+            ThrowcollectError: If the episode has numbers that are not finite, which no dataset may have.
+            MemberError: If the task comes from another package and fails.
         """
         ended = self._simulation.episode()
         if ended is None:
@@ -88,7 +93,7 @@ class TrialRunner:
         trial = self._simulation.trial
         config = trial.begun.config
         if begun is not None:
-            # What clients set up by hand later begins with the configuration, and not with the values of this trial.
+            # A trial that a client sets up later starts from the configuration, and not from the values of this trial.
             trial.set_up_nothing()
         conditions = Conditions(
             build=build_digest(config.sim.engine),
@@ -98,21 +103,21 @@ class TrialRunner:
             lease=begun.token if begun else "",
         )
         table = self._encoder.lay_out(samples, states)
-        # The records are judged, as by every reader of the dataset: they hold velocities in the ball's frame.
+        # The samples are judged as readers of the dataset see them: recorded velocities are in the ball's frame.
         result = self._judge(config, begun.trajectory, table.samples, header) if begun else ""
         state = RecordedChunk(self._encoder.compress(table), hashlib.sha256(table.contents).hexdigest())
         episode = Episode(header, state)
         return Delivery(episode, result, conditions.to_json())
 
     def _judge(self, config: Config, trajectory: JointTrajectory, samples: Samples, header: EpisodeHeader) -> str:
-        """The result of a trial in JSON.
+        """Judge a trial; return its result in JSON.
 
         Raises:
-            ThrowcollectError: If its samples hold numbers that are not finite.
-            MemberError: If its task is of another package and fails.
+            ThrowcollectError: If the samples hold numbers that are not finite.
+            MemberError: If the task comes from another package and fails.
         """
         if (infinite := next(find_infinite_columns(samples), None)) is not None:
             raise ThrowcollectError(f"trial {header.trial}: {infinite}")
-        # A result of a wrong kind is a fault of the task as well; it is found where the result is written.
+        # Writing finds results of a wrong kind. They are a fault of the task, too, so writing stands in this block.
         with explain_failure("tasks", config.task.name, f"judge trial {header.trial}"):
             return self._columns.to_json(task_of(config).judge(samples, header, trajectory))

@@ -1,7 +1,7 @@
 """Reads URDF of robots and objects from untrusted files, checks it, and writes it anew for the physics engine.
 
-Bullet ends its process on some descriptions and guesses on others. So it sees only what was understood here: links with
-mass and inertia, collision shapes, joints that form a tree.
+Some descriptions make Bullet end its process, and others make it guess. So Bullet gets only what was understood here:
+links with mass and inertia, collision shapes, joints that form a tree.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from throwcollect.errors import RequestError
 from throwcollect.sim.mesh import Triangles
 
 _MOST_LINKS = 128
-"""As many as Bullet takes."""
+"""Bullet takes no more links."""
 
 _MOST_TRIANGLES = 400_000
 _LONGEST_TEXT = 4 * 2**20
@@ -32,7 +32,7 @@ _LEAST_MASS_KG = 1e-3
 _LEAST_RADIUS_OF_GYRATION_M = 1e-3
 _LEAST_AXIS = 1e-3
 _ROUNDING = 0.1
-"""Share of the largest principal moment by which another one may be negative; descriptions are rounded like that."""
+"""How negative a principal moment may be, as a share of the largest one; the numbers of descriptions are rounded."""
 
 _LARGEST_SHARE = 0.999
 
@@ -45,17 +45,17 @@ def read_model(content: str | bytes, read_mesh: Callable[[str], Triangles]) -> B
 
     Args:
         content: URDF text, or the bytes of a file.
-        read_mesh: Triangles of a mesh by its ``filename``; may raise a `RequestError`.
+        read_mesh: Reads the triangles of a mesh by its ``filename``; may raise a `RequestError`.
 
     Raises:
-        RequestError: ``RESOURCE_PARSE_ERROR`` if it is malformed, ``UNSUPPORTED_FORMAT`` if it is no URDF,
+        RequestError: ``RESOURCE_PARSE_ERROR`` if the description is malformed, ``UNSUPPORTED_FORMAT`` if it is no URDF,
             ``UNSUPPORTED_ASSETS`` if its meshes are too large; whatever `read_mesh` raises.
     """
     return _Reader(_parse(content), read_mesh).read()
 
 
 class _NoDoctype(ElementTree.TreeBuilder):
-    """Builds trees of documents that define no entities, which a few lines can blow up to gigabytes."""
+    """Builds trees of documents without entities: with entities, a few lines can grow to gigabytes."""
 
     def doctype(self, name: str, pubid: str | None, system: str | None) -> None:
         """Refuse a document type declaration.
@@ -98,20 +98,20 @@ class _Reader:
     def read(self) -> BodyModel:
         masses: dict[str, float] = {}
         for link in self._root.findall("link"):
-            name = _name(link)
+            name = _read_name(link)
             if name in masses:
                 raise _malformed(f"link {name} is there twice")
-            masses[name] = _mass(link)
+            masses[name] = _read_mass(link)
         if not 1 <= len(masses) <= _MOST_LINKS:
             raise _malformed(f"{len(masses)} links; 1 to {_MOST_LINKS} can be simulated")
-        joints = [_joint(joint) for joint in self._root.findall("joint")]
+        joints = [_read_joint(joint) for joint in self._root.findall("joint")]
         rigid = _find_rigid_links(masses, joints)
         # URDF has no word for a body that is attached to the world: such a description calls its root `world`, or gives
         # it no mass.
         is_fixed = rigid[0] == "world" or sum(masses[link] for link in rigid) == 0
         robot = ElementTree.Element("robot", name="entity")
         for link in self._root.findall("link"):
-            robot.append(self._link(link, masses[_name(link)], exact=is_fixed and _name(link) in rigid))
+            robot.append(self._write_link(link, masses[_read_name(link)], exact=is_fixed and _read_name(link) in rigid))
         robot.extend(joint.element for joint in joints)
         # Bullet reads lines of bounded length.
         ElementTree.indent(robot)
@@ -120,39 +120,41 @@ class _Reader:
         meshes = tuple(self._meshes.values())
         return BodyModel(self._root.get("name", ""), text, meshes, joints=movable, is_fixed=is_fixed)
 
-    def _link(self, link: ElementTree.Element, mass: float, *, exact: bool) -> ElementTree.Element:
-        clean = ElementTree.Element("link", name=_name(link))
+    def _write_link(self, link: ElementTree.Element, mass: float, *, exact: bool) -> ElementTree.Element:
+        clean = ElementTree.Element("link", name=_read_name(link))
         inertial = ElementTree.SubElement(clean, "inertial")
         if (given := link.find("inertial")) is not None:
-            inertial.append(_origin(given, of=link))
+            inertial.append(_write_origin(given, of=link))
         ElementTree.SubElement(inertial, "mass", value=repr(max(mass, _LEAST_MASS_KG)))
-        ElementTree.SubElement(inertial, "inertia", _inertia(link, max(mass, _LEAST_MASS_KG)))
+        ElementTree.SubElement(inertial, "inertia", _write_inertia(link, max(mass, _LEAST_MASS_KG)))
         for collision in link.findall("collision"):
-            # Meshes that never move are taken as they are, all others as their convex hulls.
+            # Meshes that never move keep their shape; all others become their convex hulls.
             shape = ElementTree.SubElement(clean, "collision", {"concave": "yes"} if exact else {})
-            shape.append(_origin(collision, of=link))
-            ElementTree.SubElement(shape, "geometry").append(self._geometry(collision, link))
+            shape.append(_write_origin(collision, of=link))
+            ElementTree.SubElement(shape, "geometry").append(self._write_geometry(collision, link))
         return clean
 
-    def _geometry(self, collision: ElementTree.Element, link: ElementTree.Element) -> ElementTree.Element:
+    def _write_geometry(self, collision: ElementTree.Element, link: ElementTree.Element) -> ElementTree.Element:
         shape = next(iter(collision.findall("geometry/*")), None)
         if shape is None:
-            raise _malformed(f"link {_name(link)}: a collision without geometry")
+            raise _malformed(f"link {_read_name(link)}: a collision without geometry")
         if shape.tag == "mesh":
-            number = self._mesh(shape.get("filename", ""))
-            scale = _numbers(shape, "scale", 3, of=link, default=[1.0] * 3)
+            number = self._number_mesh(shape.get("filename", ""))
+            scale = _read_numbers(shape, "scale", 3, of=link, default=[1.0] * 3)
             if not all(scale):
-                raise _malformed(f"link {_name(link)}: the scale of a mesh should not be 0")
-            return ElementTree.Element("mesh", filename=f"{number}.stl", scale=_text(scale))
+                raise _malformed(f"link {_read_name(link)}: the scale of a mesh should not be 0")
+            return ElementTree.Element("mesh", filename=f"{number}.stl", scale=_format_numbers(scale))
         if shape.tag not in _SIZES:
-            raise _malformed(f"link {_name(link)}: unknown shape {shape.tag:.40}; known: {', '.join(_SIZES)}, mesh")
-        sizes = {key: _numbers(shape, key, 3 if key == "size" else 1, of=link) for key in _SIZES[shape.tag]}
+            raise _malformed(
+                f"link {_read_name(link)}: unknown shape {shape.tag:.40}; known: {', '.join(_SIZES)}, mesh"
+            )
+        sizes = {key: _read_numbers(shape, key, 3 if key == "size" else 1, of=link) for key in _SIZES[shape.tag]}
         if any(size <= 0 for values in sizes.values() for size in values):
-            raise _malformed(f"link {_name(link)}: sizes of a {shape.tag} should be above 0")
-        return ElementTree.Element(shape.tag, {key: _text(values) for key, values in sizes.items()})
+            raise _malformed(f"link {_read_name(link)}: sizes of a {shape.tag} should be above 0")
+        return ElementTree.Element(shape.tag, {key: _format_numbers(values) for key, values in sizes.items()})
 
-    def _mesh(self, filename: str) -> int:
-        """Number of a mesh, which is read when the description first names it.
+    def _number_mesh(self, filename: str) -> int:
+        """Find the number of a mesh, and read the mesh when the description first names it.
 
         Raises:
             RequestError: ``UNSUPPORTED_ASSETS`` if all meshes together are too large.
@@ -165,7 +167,7 @@ class _Reader:
 
 
 class _Joint(NamedTuple):
-    """One joint; its element is as it is written for the physics engine."""
+    """One joint; `element` is what is written for the physics engine."""
 
     name: str
     kind: str
@@ -174,18 +176,18 @@ class _Joint(NamedTuple):
     element: ElementTree.Element
 
 
-def _mass(link: ElementTree.Element) -> float:
+def _read_mass(link: ElementTree.Element) -> float:
     mass = link.find("inertial/mass")
     if mass is None:
         return 0.0
-    (value,) = _numbers(mass, "value", 1, of=link)
+    (value,) = _read_numbers(mass, "value", 1, of=link)
     if value < 0:
-        raise _malformed(f"link {_name(link)}: mass should not be negative, got {value:g} kg")
+        raise _malformed(f"link {_read_name(link)}: mass should not be negative, got {value:g} kg")
     return value
 
 
-def _joint(joint: ElementTree.Element) -> _Joint:
-    name = _name(joint)
+def _read_joint(joint: ElementTree.Element) -> _Joint:
+    name = _read_name(joint)
     kind = joint.get("type", "")
     if kind not in ("fixed", "revolute", "continuous", "prismatic"):
         raise _malformed(f"joint {name}: joints of type {kind!r:.40} are not simulated")
@@ -197,14 +199,14 @@ def _joint(joint: ElementTree.Element) -> _Joint:
             raise _malformed(f"joint {name}: it has no {end}")
         ElementTree.SubElement(clean, end, link=link)
         ends[end] = link
-    clean.append(_origin(joint, of=joint))
+    clean.append(_write_origin(joint, of=joint))
     if kind != "fixed":
         _add_motion(clean, joint)
     return _Joint(name, kind, ends["parent"], ends["child"], clean)
 
 
 def _find_rigid_links(links: Collection[str], joints: Sequence[_Joint]) -> list[str]:
-    """The root of the tree of links, and then all links that are rigidly connected to it.
+    """Find the root of the tree of links, and then all links that are rigidly connected to it.
 
     Raises:
         RequestError: ``RESOURCE_PARSE_ERROR`` if the joints do not connect all links to one tree.
@@ -224,10 +226,10 @@ def _find_rigid_links(links: Collection[str], joints: Sequence[_Joint]) -> list[
     roots = [link for link in links if link not in carriers]
     if len(roots) > 1:
         raise _malformed(f"links {roots[0]} and {roots[1]} are not connected")
-    # Without a root each link hangs on another one, and the sorter below finds the ring.
+    # Without a root, each link hangs on another link, and the sorter below finds the ring.
     rigid = roots
     try:
-        # Parents come before what they carry.
+        # Parents come before the links that they carry.
         for link in TopologicalSorter({child: [joint.parent] for child, joint in carriers.items()}).static_order():
             if link in carriers and carriers[link].kind == "fixed" and carriers[link].parent in rigid:
                 rigid.append(link)
@@ -244,28 +246,28 @@ def _add_motion(clean: ElementTree.Element, joint: ElementTree.Element) -> None:
     """
     name = clean.get("name")
     axis_element, limit = joint.find("axis"), joint.find("limit")
-    axis = [1.0, 0.0, 0.0] if axis_element is None else _numbers(axis_element, "xyz", 3, of=joint)
+    axis = [1.0, 0.0, 0.0] if axis_element is None else _read_numbers(axis_element, "xyz", 3, of=joint)
     if (length := float(np.linalg.norm(axis))) < _LEAST_AXIS:
         raise _malformed(f"joint {name}: its axis {axis} has no direction")
-    ElementTree.SubElement(clean, "axis", xyz=_text([value / length for value in axis]))
+    ElementTree.SubElement(clean, "axis", xyz=_format_numbers([value / length for value in axis]))
     if limit is None and clean.get("type") != "continuous":
         raise _malformed(f"joint {name}: it has no limit")
     if limit is not None:
-        # Some descriptions write infinity where there is no limit. `_text` makes the largest number of it that an
-        # engine gets.
-        values = {key: _numbers(limit, key, 1, of=joint, default=[0.0], largest=math.inf)[0] for key in _LIMITS}
+        # Some descriptions write infinity where there is no limit. `_format_numbers` replaces it by the largest number
+        # that an engine gets.
+        values = {key: _read_numbers(limit, key, 1, of=joint, default=[0.0], largest=math.inf)[0] for key in _LIMITS}
         if values["lower"] > values["upper"] or values["effort"] < 0 or values["velocity"] < 0:
             raise _malformed(f"joint {name}: its limits contradict each other: {values}")
-        ElementTree.SubElement(clean, "limit", {key: _text([value]) for key, value in values.items()})
+        ElementTree.SubElement(clean, "limit", {key: _format_numbers([value]) for key, value in values.items()})
     if (dynamics := joint.find("dynamics")) is not None:
-        (damping,) = _numbers(dynamics, "damping", 1, of=joint, default=[0.0])
+        (damping,) = _read_numbers(dynamics, "damping", 1, of=joint, default=[0.0])
         ElementTree.SubElement(clean, "dynamics", damping=repr(max(damping, 0.0)))
 
 
 _LIMITS = ("lower", "upper", "effort", "velocity")
 
 
-def _name(element: ElementTree.Element) -> str:
+def _read_name(element: ElementTree.Element) -> str:
     name = element.get("name", "")
     if not (1 <= len(name) <= _LONGEST_NAME and name.isprintable()):
         raise _malformed(
@@ -274,7 +276,7 @@ def _name(element: ElementTree.Element) -> str:
     return name
 
 
-def _numbers(
+def _read_numbers(
     element: ElementTree.Element,
     key: str,
     count: int,
@@ -292,30 +294,30 @@ def _numbers(
         values = []
     if len(values) != count or not all(abs(value) <= largest for value in values):
         wanted = "a number" if count == 1 else f"{count} numbers"
-        raise _malformed(f"{of.tag} {_name(of)}: {element.tag} {key} should be {wanted}, got {text!r:.80}")
+        raise _malformed(f"{of.tag} {_read_name(of)}: {element.tag} {key} should be {wanted}, got {text!r:.80}")
     return values
 
 
-def _origin(element: ElementTree.Element, *, of: ElementTree.Element) -> ElementTree.Element:
+def _write_origin(element: ElementTree.Element, *, of: ElementTree.Element) -> ElementTree.Element:
     origin = element.find("origin")
     clean = ElementTree.Element("origin")
     for key in ("xyz", "rpy"):
-        values = [0.0] * 3 if origin is None else _numbers(origin, key, 3, of=of, default=[0.0] * 3)
-        clean.set(key, _text(values))
+        values = [0.0] * 3 if origin is None else _read_numbers(origin, key, 3, of=of, default=[0.0] * 3)
+        clean.set(key, _format_numbers(values))
     return clean
 
 
-def _inertia(link: ElementTree.Element, mass: float) -> dict[str, str]:
+def _write_inertia(link: ElementTree.Element, mass: float) -> dict[str, str]:
     least = mass * _LEAST_RADIUS_OF_GYRATION_M**2
     matrix: NDArray[np.float64] = np.zeros((3, 3))
     if (given := link.find("inertial/inertia")) is not None:
         for key, (row, column) in _INERTIA.items():
-            (matrix[row, column],) = (matrix[column, row],) = _numbers(given, key, 1, of=link, default=[0.0])
+            (matrix[row, column],) = (matrix[column, row],) = _read_numbers(given, key, 1, of=link, default=[0.0])
     moments, axes = np.linalg.eigh(matrix)
     if moments[0] < -max(least, _ROUNDING * moments[2]):
-        raise _malformed(f"link {_name(link)}: its inertia is not positive: principal moment {moments[0]:g} kg m²")
+        raise _malformed(f"link {_read_name(link)}: its inertia is not positive: principal moment {moments[0]:g} kg m²")
     possible = np.maximum(moments, least)
-    # No body has a moment larger than the other two together; Bullet would drop the inertia altogether.
+    # No body has a moment larger than the other two together. Given such a moment, Bullet would drop the whole inertia.
     possible[2] = min(possible[2], _LARGEST_SHARE * (possible[0] + possible[1]))
     if (possible != moments).any():
         matrix = axes * possible @ axes.T
@@ -325,5 +327,5 @@ def _inertia(link: ElementTree.Element, mass: float) -> dict[str, str]:
 _INERTIA = {"ixx": (0, 0), "ixy": (0, 1), "ixz": (0, 2), "iyy": (1, 1), "iyz": (1, 2), "izz": (2, 2)}
 
 
-def _text(values: list[float]) -> str:
+def _format_numbers(values: list[float]) -> str:
     return " ".join(repr(min(max(value, -_LARGEST_NUMBER), _LARGEST_NUMBER)) for value in values)

@@ -46,7 +46,7 @@ class World(Observer):
     A trial ends with a sample, so that the recorded samples enclose the crossing.
 
     Args:
-        config: Configuration of the first trial; of all trials, the engine is that of this one.
+        config: Configuration of the first trial; it names the engine of all trials.
 
     Attributes:
         engine: The physics engine.
@@ -89,7 +89,7 @@ class World(Observer):
             raise
 
     def close(self) -> None:
-        """Free the world; it cannot be used afterwards."""
+        """Free what the engine holds; the world cannot be used afterwards."""
         self.engine.close()
 
     @property
@@ -105,8 +105,8 @@ class World(Observer):
     def reset(self, trial: Config, *, start_ns: int = 0) -> None:
         """Put the world into the start state of a trial and record it as the first sample.
 
-        Cheap if the trial has the physics and the start posture of the one before; otherwise the ball settles anew,
-        and if the robot, its tool, or what is locked has changed, all is loaded anew.
+        This is cheap if the trial has the physics and the start posture of the previous trial. Otherwise the ball
+        settles anew, and if the robot, its tool, or the locked joints have changed, everything is loaded anew.
 
         Args:
             trial: Configuration of the trial.
@@ -115,10 +115,10 @@ class World(Observer):
         Raises:
             ConfigError: If the ball falls through the tool, or the robot's files cannot be read.
         """
-        # Only the names count of `task.end`, because they say which joints are locked.
+        # Of `task.end`, only the names of joints count, because they say which joints are locked.
         key = (trial.robot, trial.tool, trial.ball, trial.scene, trial.sim, trial.task.start, tuple(trial.task.end))
         if key != self._start_key or not self.engine.is_as_loaded:
-            # If this fails, the next trial must not take the present state for its start state.
+            # If settling fails, the next trial must not take the present state for its start state.
             self._start_key = None
             self._settle(trial)
             self._start_key = key
@@ -135,7 +135,7 @@ class World(Observer):
         self._begin(start_ns, self._settled.sample)
 
     def restart_clock(self, start_ns: int) -> None:
-        """Count steps, samples and contacts anew, and time from `start_ns` [ns]; the present state stays as it is."""
+        """Begin a new record at time `start_ns` [ns], without steps and contacts; the present state stays as it is."""
         now = self.engine.state
         # A body that was removed since the last step does not press on the ball any more.
         self._touching = now.touching
@@ -156,7 +156,7 @@ class World(Observer):
             return 0
         first, self._first_step = self.steps, self.steps
         self._stops_at_end = stop_at_end
-        # Commands are what sensors should show, and motors go by true angles.
+        # Commands are angles that sensors should show, but motors follow true angles.
         self._targets, velocities = self._motors.plan(commands + self._offsets)
         steps = Steps(
             self._targets,
@@ -183,33 +183,33 @@ class World(Observer):
         return self._stops_at_end and self.end_reason is not None
 
     def samples(self, first: int = 0) -> Samples:
-        """Recorded samples as arrays, from number `first` on; those that are forgotten are left out."""
+        """Return recorded samples as arrays, from number `first` on; forgotten samples are left out."""
         first = max(first, self._forgotten)
         steps = np.arange(first, self.recorded, dtype=np.int64) * self._stride
-        # Each stamp is divided once, because a period may be no whole number of nanoseconds, and sums of it would
-        # drift.
+        # Each stamp is computed from its step, because sums of periods would drift: a period may be no whole number of
+        # nanoseconds.
         stamps = self._start_ns + steps * NS_PER_S // self._hz
         rows = self._rows[first - self._forgotten :]
         return to_samples(rows, stamps, self._joints, self.moving, self._locked, self._offsets)
 
     def forget_samples(self) -> None:
-        """Drop the recorded samples but the last two, so that a world can go on for ever; their numbers stay."""
-        # `_judge` compares the last two.
+        """Drop all recorded samples but the last two, so that a world can go on for ever; numbers of samples stay."""
+        # `_judge` compares the last two samples.
         self._forgotten += len(self._rows[:-2])
         self._rows = self._rows[-2:]
 
     def contacts(self) -> tuple[Contact, ...]:
-        """All intervals in which something pressed on the ball, by start time."""
+        """List all intervals in which something pressed on the ball, by start time."""
         return self._contacts.intervals(self._stamp_ns)
 
     def joints(self) -> tuple[Sample, Sample]:
-        """Position [rad] and velocity [rad/s] of each moving joint now, as its sensor shows them."""
+        """Measure the position [rad] and the velocity [rad/s] of each moving joint now, as its sensor shows them."""
         count, sample = len(self.moving), self.engine.state.sample
         shown = tuple((np.array(sample[:count]) - self._offsets).tolist()) if self._offsets.any() else sample[:count]
         return shown, sample[count : 2 * count]
 
     def posture(self) -> Mapping[str, float]:
-        """Position of each joint of the robot now [rad], as its sensor shows it."""
+        """Measure the position of each joint of the robot now [rad], as its sensor shows it."""
         return {**self._locked, **dict(zip(self.moving, self.joints()[0], strict=True))}
 
     @property
@@ -219,7 +219,7 @@ class World(Observer):
 
     @property
     def ball(self) -> BodyState:
-        """The ball now; when set before the first step, the start state is recorded anew."""
+        """The ball now; if it is set before the first step, the start state is recorded anew."""
         return ball_of(self.engine.state.sample)
 
     @ball.setter
@@ -244,7 +244,7 @@ class World(Observer):
 
     def _settle(self, trial: Config) -> None:
         """Let the ball come to rest in the tool of the still robot, and keep that state."""
-        description = self._description(trial)
+        description = self._describe(trial)
         try:
             self.engine.load(scene_of(trial, description))
             self.moving, self._locked = description.moving, description.locked
@@ -257,19 +257,18 @@ class World(Observer):
             seat = tool.ball_seat(trial.ball.radius_m)
             self.engine.configure(physics_of(trial, self.moving))
             self.engine.rest(self._start, seat)
-            # One step is always taken, because contact forces and motor torques are those of the last step.
+            # At least one step is taken, because contact forces and motor torques are known only after a step.
             steps = max(1, round(trial.sim.settle_s * trial.sim.physics_hz))
             targets, velocities = self._make_motors(trial).plan(np.tile(self._start, (steps, 1)))
-            # The first sample would be due one step after the end, so there is none.
+            # The first sample is due one step after the last step, so no sample is recorded.
             self.engine.run(Steps(targets, velocities, first_sample=steps + 1, stride=1), Observer())
             self._settled = self.engine.state
         finally:
-            # This happens after an error, too: loading may have emptied the world, and what clients have spawned stays
-            # in it.
+            # This happens after an error, too: spawned bodies belong in the world, and loading may have removed them.
             self.spawned.load()
 
-    def _description(self, trial: Config) -> Description:
-        """The robot's description for a trial; that of the trial before is kept while it is the same."""
+    def _describe(self, trial: Config) -> Description:
+        """Describe the robot for a trial; the description of the previous trial is kept while it is the same."""
         key = (trial.tool, find_locked_joints(trial))
         if self._described is None or self._described[0] != key:
             self._described = key, physics_description(trial)
@@ -280,7 +279,7 @@ class World(Observer):
         return Motors(self._start, hz=sim.physics_hz, delay_s=sim.command_delay_s, lag_s=robot.motor_lag_s)
 
     def _record_start(self) -> None:
-        # The motor torques are those of the settled state, because engines have none before the first step.
+        # The motor torques are taken from the settled state, because engines have none before the first step.
         self._rows = [(*self._start_joints, *self.engine.state.sample[-BALL_NUMBERS:])]
         self._forgotten = 0
 
@@ -288,7 +287,7 @@ class World(Observer):
         return self._start_ns + step * NS_PER_S // self._hz
 
     def _judge(self, target: Sequence[float]) -> EndReason | None:
-        """Reason for which the trial ends with the sample just recorded; None if it goes on."""
+        """Find the reason for which the trial ends with the sample just recorded; None if the trial goes on."""
         before, now = self._rows[-2:]
         if now[BALL_HEIGHT] < self._landing_height <= before[BALL_HEIGHT] and self._tool not in self._contacts.bodies:
             return "landed"

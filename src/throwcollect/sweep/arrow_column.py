@@ -1,4 +1,4 @@
-"""Makes and reads Arrow columns without what Arrow would import for it, which costs each process processor time.
+"""Makes and reads Arrow columns without the packages that Arrow would import for it, which take each process some time.
 
 `pyarrow.array` imports pandas wherever that is installed, which takes 0.3 s, and nothing here uses pandas. Most methods
 of columns import `pyarrow.compute`, which takes 0.05 s.
@@ -25,8 +25,8 @@ def make_column(values: Sequence[Any] | NDArray[Any], kind: pa.DataType) -> pa.A
     """Make the column that ``pyarrow.array(values, kind)`` makes.
 
     Args:
-        values: Numbers or texts; None for null. An array must have exactly the kind and holds no nulls; texts in an
-            array are bytes of one length.
+        values: Numbers or texts; None for null. If it is an array, its elements must be exactly of that kind, without
+            nulls; its texts are bytes of one length.
         kind: ``int64``, ``uint64``, ``float64`` or ``string``.
 
     Raises:
@@ -91,7 +91,7 @@ def find_range(column: pa.ChunkedArray) -> tuple[float, float] | None:
         return None
     whole = column.combine_chunks()
     numbers = read_numbers(whole)[read_validity(whole)]
-    # As Arrow does, these leave out NaN, which may stand in tables of others.
+    # Like Arrow, these functions leave out NaN, which may stand in tables that others have written.
     return np.fmin.reduce(numbers).item(), np.fmax.reduce(numbers).item()
 
 

@@ -1,4 +1,4 @@
-"""An inverse model of throws, which is learned during a collection: from a landing place to parameters."""
+"""An inverse model of throws, which leads from a landing place to parameters and is learned during a collection."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from throwcollect.sweep.neighbours import Neighbours
 from throwcollect.sweep.rows import Rows
 
 _BASES = 8
-"""Number of landed throws near a goal from which steps towards it begin."""
+"""Number of landed throws near a landing place at which steps towards this place begin."""
 _NEIGHBOURS_PER_PARAMETER = 3
 _RIDGE = 1e-3
 """Ridge of the linear models, as a share of the mean square spread of the neighbours along a parameter."""
 _LEAST = 1e-300
-"""Smallest ridge; it keeps a model solvable whose neighbours are all the same point."""
+"""Smallest ridge; with it, a model can be solved even if all its neighbours are the same point."""
 _DAMPING_BINS = 0.1
 """Error in the target [bins] that a step may leave in order to be smaller."""
 _LONGEST_STEP = 0.3
@@ -27,17 +27,21 @@ _NOISE = 0.02
 _FAILURE_NEIGHBOURS = 8
 """Number of ended throws near a proposal from which the probability that it lands is estimated."""
 _PROGRESS = 0.7
-"""A proposal is promising if its predicted distance from its goal is at most this share of the smallest so far."""
+"""A proposal is promising if its predicted distance from its goal is at most this share of the smallest one so far."""
 _CLOSE_BINS = 0.5
 """A proposal within this distance of its goal is promising, too."""
 _FAILURE_BINS = 2.0
-"""A proposal that certainly fails counts as one that lands so many bins away from its goal."""
+"""A proposal that certainly fails counts as if it landed so many bins farther away from its goal."""
 
 
 class InverseModel:
     """Proposes parameters by local linear models around throws that landed.
 
-    Parameters are places in the unit cube, targets are in bins; the arguments are the numbers of them.
+    Parameters are places in the unit cube, and targets are in bins.
+
+    Args:
+        parameters: Number of parameters.
+        targets: Number of targets.
     """
 
     def __init__(self, parameters: int, targets: int) -> None:
@@ -50,9 +54,9 @@ class InverseModel:
         """Take in further throws, in order of trials.
 
         Args:
-            tried: Their parameters, shape ``(n_throws, n_parameters)``.
-            landed: True for those that landed, shape ``(n_throws,)``.
-            places: Landing places of these, shape ``(n_landed, n_targets)``.
+            tried: Parameters of the throws, shape ``(n_throws, n_parameters)``.
+            landed: True for each throw that landed, shape ``(n_throws,)``.
+            places: Landing places of the throws that landed, shape ``(n_landed, n_targets)``.
         """
         self._success.append(landed)
         self._all.append(tried)
@@ -61,7 +65,7 @@ class InverseModel:
 
     @property
     def usable(self) -> bool:
-        """Say whether enough throws have landed to make a model of so many parameters."""
+        """Whether enough throws have landed to make a model of so many parameters."""
         landed, parameters = self._landed.points.shape
         return bool(landed >= parameters + 2)
 
@@ -84,8 +88,8 @@ class InverseModel:
             randomness: Source of the noise.
 
         Returns:
-            Places in the unit cube, shape ``(n_proposals, n_parameters)``; and True for promising ones: predicted to
-            land at their goal, or clearly nearer to it than any throw before.
+            Places in the unit cube, shape ``(n_proposals, n_parameters)``; and True for each promising one: the ball is
+            predicted to land at its goal, or clearly nearer to it than any ball before.
         """
         flat = goals.reshape(-1, goals.shape[-1])
         # Several goals share bases, so the model around each base is made once.
@@ -93,20 +97,20 @@ class InverseModel:
         distinct, which = np.unique(bases, return_inverse=True)
         # NumPy before version 2 returns a flat array.
         which = which.reshape(bases.shape)
-        slopes, inverses = self._linear_models(distinct)
+        slopes, inverses = self._fit_linear_models(distinct)
         slope, inverse = slopes[which], inverses[which]
         start, landing, goal = self._landed.points[bases], self._landings.points[bases], flat[:, np.newaxis]
-        step = _product(inverse, goal - landing)
+        step = _multiply(inverse, goal - landing)
         length = np.sqrt((step**2).sum(axis=-1, keepdims=True))
         # A linear model says little about places far from its neighbours.
         step *= _LONGEST_STEP / np.maximum(length, _LONGEST_STEP)
         along = _ALONG_NOISE * randomness.standard_normal(step.shape)
-        # This takes away the part of the noise that moves the landing, by the model.
-        along -= _product(inverse, _product(slope, along))
+        # This takes away the part of the noise that, by the model, moves the landing.
+        along -= _multiply(inverse, _multiply(slope, along))
         ends = start + step + along + _NOISE * randomness.standard_normal(step.shape)
         # `spread` takes places below 1.
         ends = np.clip(ends, 0.0, 1.0 - 1e-9)
-        missing = landing + _product(slope, ends - start) - goal
+        missing = landing + _multiply(slope, ends - start) - goal
         error = np.sqrt((missing**2).sum(axis=-1))
         near = self._all.find(ends.reshape(-1, ends.shape[-1]), _FAILURE_NEIGHBOURS)[1]
         failing = 1.0 - self._success.all[near].mean(axis=-1).reshape(error.shape)
@@ -116,8 +120,8 @@ class InverseModel:
         chosen: NDArray[np.float64] = ends.reshape(len(goals), -1, ends.shape[-1])[proposals, best]
         return chosen, promising.reshape(len(goals), -1)[proposals, best]
 
-    def _linear_models(self, bases: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Find the slopes of landings over parameters around throws that landed, and the damped inverses of them.
+    def _fit_linear_models(self, bases: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Find the slopes of landings over parameters around throws that landed, and damped inverses of these slopes.
 
         Returns:
             Shapes ``(n_bases, n_targets, n_parameters)`` and ``(n_bases, n_parameters, n_targets)``.
@@ -134,10 +138,10 @@ class InverseModel:
         ridge = _RIDGE * np.trace(spread, axis1=1, axis2=2) / dimensions + _LEAST
         ridged = spread + ridge[:, np.newaxis, np.newaxis] * np.eye(dimensions)
         slopes = np.swapaxes(solve(ridged, matmul(transposed, caused)), 1, 2)
-        # The damped inverse is S'(SS' + d² I)⁻¹: as the bracket is symmetric, the transpose of a solution.
+        # The damped inverse is S'(SS' + d² I)⁻¹, the transpose of a solution, because the bracket is symmetric.
         damped = matmul(slopes, np.swapaxes(slopes, 1, 2)) + _DAMPING_BINS**2 * np.eye(slopes.shape[1])
         return slopes, np.swapaxes(solve(damped, slopes), 1, 2)
 
 
-def _product(matrices: NDArray[np.float64], vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+def _multiply(matrices: NDArray[np.float64], vectors: NDArray[np.float64]) -> NDArray[np.float64]:
     return matmul(matrices, vectors[..., np.newaxis])[..., 0]

@@ -1,4 +1,4 @@
-"""Nearest neighbours among points; appending points does not sort all of them again."""
+"""Finds nearest neighbours among points, to which points can be appended without sorting all of them again."""
 
 from __future__ import annotations
 
@@ -14,15 +14,16 @@ from throwcollect.sweep.rows import Rows
 spatial = lazily("scipy.spatial")
 
 _FEW = 1 << 16
-"""Most points of the smallest tree, which is made again whenever points are appended; that takes some milliseconds."""
+"""Most points of the smallest tree. It is made again whenever points are appended, which takes some milliseconds."""
 _GROWTH = 8
 
 
 class Neighbours:
-    """Points in order, and a search for those that are near a place.
+    """Points in order, and a search for the points that are near a place.
 
-    They lie in a few trees of consecutive points, each several times as large as the next one: when points are
-    appended, most often the smallest tree alone is made again. The number of points alone determines the trees.
+    The points lie in a few trees of consecutive points, each several times as large as the next one: when points are
+    appended, most often only the smallest tree is made again. Which trees there are depends only on the number of
+    points.
     """
 
     def __init__(self, dimensions: int) -> None:
@@ -38,24 +39,24 @@ class Neighbours:
         """Append points, shape ``(n_added, n_dimensions)``."""
         self._points.append(points)
         known, self._trees = self._trees, {}
-        for first, stop in _spans(len(self.points)):
+        for first, stop in _list_spans(len(self.points)):
             tree = known.get((first, stop))
             self._trees[first, stop] = spatial.cKDTree(self.points[first:stop]) if tree is None else tree
 
     def find(self, places: NDArray[np.float64], count: int) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-        """Find the points that are nearest to some places; of equally near ones in different trees, the first.
+        """Find the points that are nearest to some places; the first of equally near points in different trees.
 
         Args:
             places: Shape ``(n_places, n_dimensions)``.
             count: Number of points to find for each place.
 
         Returns:
-            Their distances, nearest first, and their indices; both of shape ``(n_places, count)``, or with as many
-            columns as there are points.
+            Their distances, nearest first, and their indices; both of shape ``(n_places, count)``, with fewer columns
+            if there are fewer points.
         """
         distances, indices = [], []
         for (first, stop), tree in self._trees.items():
-            # With numbers of neighbours in place of how many, SciPy keeps the second axis for a single neighbour, too.
+            # Given the list 1, 2, ... in place of the number of neighbours, SciPy keeps the second axis even for one.
             far, which = tree.query(places, range(1, min(count, stop - first) + 1))
             distances.append(far)
             indices.append(which + first)
@@ -67,8 +68,8 @@ class Neighbours:
         return np.take_along_axis(far, nearest, axis=1), np.take_along_axis(which, nearest, axis=1)
 
 
-def _spans(count: int) -> Iterator[tuple[int, int]]:
-    """List the first point of each tree and the one behind its last point, the largest tree first."""
+def _list_spans(count: int) -> Iterator[tuple[int, int]]:
+    """List the number of the first point of each tree, and the number after its last point, the largest tree first."""
     size = _FEW
     while size * _GROWTH <= count:
         size *= _GROWTH

@@ -1,4 +1,4 @@
-"""Parquet files of a dataset: equal tables give equal bytes, and reading is safe for files of strangers."""
+"""Parquet files of a dataset: equal tables give equal bytes, and files of strangers can be read safely."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def encode_pieces(table: Any, put: Callable[[bytes], object]) -> None:
     """
     import pyarrow.parquet as pq
 
-    # Where a column was cut into pieces must not show in the bytes.
+    # The bytes must not depend on where a column was cut into pieces.
     pq.write_table(table.combine_chunks(), _Sink(put), compression="zstd", write_page_checksum=True)
 
 
@@ -64,7 +64,7 @@ def read_parquet(path: Path) -> Any:
 
 @contextmanager
 def open_parquet(path: Path) -> Iterator[Any]:
-    """Open a Parquet file; an error of Arrow inside of the ``with`` block counts as damage of the file.
+    """Open a Parquet file; an error of Arrow inside the ``with`` block counts as damage of the file.
 
     Yields:
         A `pyarrow.parquet.ParquetFile`, whose values are not validated yet.
@@ -101,8 +101,8 @@ def open_parquet(path: Path) -> Iterator[Any]:
             yield file
     except (OSError, ValueError, MemoryError, pa.ArrowException) as error:
         # Names and texts with invalid bytes raise one of these errors, too, at the latest when they are validated.
-        raise DatasetError(f"is damaged: {_first_line(error)}", path=path) from error
+        raise DatasetError(f"is damaged: {_read_first_line(error)}", path=path) from error
 
 
-def _first_line(error: BaseException) -> str:
+def _read_first_line(error: BaseException) -> str:
     return str(error).partition("\n")[0] or type(error).__name__

@@ -1,4 +1,4 @@
-"""The plan: every trial of a collection with its values, seed and hash, written down before anything runs."""
+"""The plan: every trial of a collection with its values, seed and digest, written before anything runs."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ _MISNUMBERED = "the trials are not numbered from 0 without gaps"
 ROUND_TRIALS = 64
 """Number of trials in a round, by which a plan grows."""
 FIRST_TRIALS = 2 * ROUND_TRIALS
-"""Number of trials in the rounds that depend on no result."""
+"""Number of trials in the first rounds, which depend on no result."""
 
 Check = Callable[[Config], str | None]
 """Explains why a trial with this configuration cannot be run; None if it can."""
@@ -43,12 +43,12 @@ Check = Callable[[Config], str | None]
 
 @dataclass(frozen=True)
 class Plan:
-    """The trials of a collection, or those of one of its slices, in order and without gaps.
+    """The trials of a collection, or of one of its slices, in order and without gaps.
 
     Attributes:
         config: Configuration that the trials vary.
-        trials: At least one; the first one has number 0 unless they are a slice.
-        slice: Which slice they are; None if they are the whole plan.
+        trials: At least one trial; the first trial has number 0 unless this is a slice.
+        slice: Which slice this is; None for the whole plan.
     """
 
     config: Config
@@ -123,7 +123,7 @@ class Plan:
         metadata = {_FORMAT_KEY: _FORMAT, _CONFIG_KEY: config_digest(self.config)}
         if self.slice is not None:
             metadata[_SLICE_KEY] = str(self.slice)
-        schema = _schema(self.keys, trials.target_names).with_metadata(metadata)
+        schema = _make_schema(self.keys, trials.target_names).with_metadata(metadata)
         return encode_table(make_table(columns, schema))
 
     @classmethod
@@ -131,7 +131,7 @@ class Plan:
         """Read a plan that was written for a configuration.
 
         Args:
-            path: File that `write` wrote; rounds that were added since lie beside it.
+            path: File that `write` wrote; rounds that were added later lie beside it.
             config: The configuration; its section `run` may differ.
             slice: Slice to cut out of the plan of the file; None for all of it.
 
@@ -147,7 +147,11 @@ class Plan:
             keys = tuple(name for name in columns if not is_target(name))
             targets = tuple(name for name in columns if is_target(name))
             version = metadata.get(_FORMAT_KEY, b"none").decode(errors="replace")
-            if version != _FORMAT or not file.schema_arrow.equals(_schema(keys, targets)) or not file.metadata.num_rows:
+            if (
+                version != _FORMAT
+                or not file.schema_arrow.equals(_make_schema(keys, targets))
+                or not file.metadata.num_rows
+            ):
                 raise DatasetError(
                     "not a plan that this version reads",
                     path=path,
@@ -156,7 +160,7 @@ class Plan:
                 )
             if metadata.get(_CONFIG_KEY, b"") != config_digest(config).encode():
                 raise ForeignPlanError("the plan belongs to another configuration", path=path)
-            # The digest above covers the configuration alone, so somebody may have changed the columns.
+            # The digest above covers only the configuration, so somebody may have changed the columns.
             for key in keys:
                 if reason := reason_not_sweepable(config, key):
                     raise DatasetError(f"is damaged: column {key!r}: {reason}", path=path)
@@ -169,7 +173,7 @@ class Plan:
                 return cls(config, trials, Slice.parse(stored.decode(errors="replace")))
             except ConfigError as error:
                 raise DatasetError(f"is damaged: {error.message}", path=path) from error
-        # Only a slice begins later than with trial 0.
+        # Only a slice may begin with a trial other than 0.
         if trials.first:
             raise DatasetError(_MISNUMBERED, path=path)
         read_rounds(path, trials)
@@ -178,9 +182,10 @@ class Plan:
 
 
 def make_plan(config: Config, *, check: Check | None = None, directory: Path | None = None) -> Plan:
-    """Draw all trials of a sweep in this process; of one that grows, its first two rounds (see `rounds`).
+    """Draw all trials of a sweep in this process; for a plan that grows, its first two rounds (see `rounds`).
 
-    Benchmarks and tests make their plans by it; `coordinator.prepare.draw_plan` makes large ones in several processes.
+    Benchmarks and tests make their plans with this function; `coordinator.prepare.draw_plan` makes large plans in
+    several processes.
 
     Raises:
         PlanError: If the sweep has no point, or every trial is refused.
@@ -194,7 +199,7 @@ def make_plan(config: Config, *, check: Check | None = None, directory: Path | N
 
 
 def draw_first_points(config: Config, *, directory: Path) -> Points:
-    """Draw the points of all trials that are known before anything runs; of a plan that grows, of its first two rounds.
+    """Draw the points of all trials that are known before anything runs; for a plan that grows, its first two rounds.
 
     A relative `sweep.file` starts at `directory`.
 
@@ -209,13 +214,13 @@ def draw_first_points(config: Config, *, directory: Path) -> Points:
 def make_trials(config: Config, points: Points, *, first: int = 0) -> Trials:
     """Make trials of points, with numbers from `first` on; none of them is refused."""
     count = len(points.values)
-    seeds = np.fromiter((_seed(config.seed, number) for number in range(first, first + count)), np.uint64, count)
+    seeds = np.fromiter((_make_seed(config.seed, number) for number in range(first, first + count)), np.uint64, count)
     digests = trial_digests(config, points, seeds)
     return Trials(points, seeds, digests, first=first)
 
 
-def _seed(root: int, number: int) -> int:
-    # The seed of a trial depends on no other trial, so a plan can be made longer, or in parts.
+def _make_seed(root: int, number: int) -> int:
+    # The seed of a trial does not depend on other trials, so a plan can grow, or be made in parts.
     return int(np.random.SeedSequence(root, spawn_key=(number,)).generate_state(1, np.uint64)[0])
 
 
@@ -236,9 +241,9 @@ def check_some_left(trials: Trials) -> None:
     reasons = list(trials.refused.values())
     if len(reasons) < len(trials):
         return
-    # Reasons that differ only in their numbers count as one, and the first of them is shown.
+    # Reasons that differ only in their numbers are of one kind, of which the first reason is shown.
     kinds = [blank_numbers(reason) for reason in reasons]
-    # A dictionary keeps the last reason of a kind, which in reversed order is the first one.
+    # A dictionary keeps the last reason of each kind, so the order is reversed.
     examples = dict(zip(reversed(kinds), reversed(reasons), strict=True))
     listed = [f"{count} × {examples[kind]}" for kind, count in Counter(kinds).most_common(_MOST_REASONS)]
     raise PlanError(
@@ -248,16 +253,16 @@ def check_some_left(trials: Trials) -> None:
 
 
 def _read_trials(file: Any, keys: tuple[str, ...], targets: tuple[str, ...], path: Path) -> Trials:
-    """Read the trials of an open plan in batches, as Arrow's memory for all rows is several times that of the trials.
+    """Read the trials of an open plan in batches, because all rows at once take Arrow several times as much memory.
 
     Raises:
-        DatasetError: If the numbers have gaps, or a digest is none.
+        DatasetError: If the numbers of the trials have gaps, or a digest is no SHA-256.
     """
     trials: Trials | None = None
     for rows in file.iter_batches(_ROWS_AT_ONCE):
         rows.validate(full=True)
         first = rows["trial"][0].as_py()
-        more = _trials_of(rows, keys, targets, first, path)
+        more = _make_trials_of(rows, keys, targets, first, path)
         if trials is None:
             trials = more
         elif first != trials.numbers.stop:
@@ -269,7 +274,7 @@ def _read_trials(file: Any, keys: tuple[str, ...], targets: tuple[str, ...], pat
     return trials
 
 
-def _trials_of(rows: Any, keys: tuple[str, ...], targets: tuple[str, ...], first: int, path: Path) -> Trials:
+def _make_trials_of(rows: Any, keys: tuple[str, ...], targets: tuple[str, ...], first: int, path: Path) -> Trials:
     from throwcollect.sweep.arrow_column import nan_where_null, read_numbers
 
     numbers = np.arange(first, first + len(rows))
@@ -291,7 +296,7 @@ def _trials_of(rows: Any, keys: tuple[str, ...], targets: tuple[str, ...], first
     )
 
 
-def _schema(keys: Sequence[str], targets: Sequence[str]) -> Any:
+def _make_schema(keys: Sequence[str], targets: Sequence[str]) -> Any:
     import pyarrow as pa
 
     kinds = {"trial": pa.int64(), "digest": pa.string(), "seed": pa.uint64(), "refused": pa.string()}

@@ -1,4 +1,4 @@
-"""Points from a CSV or Parquet file: one row per trial, dotted keys as columns, and columns of targets."""
+"""Reads points from a CSV or Parquet file: one row per trial, dotted keys as columns, and columns of targets."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ from throwcollect.wording import format_count
 
 _MOST_PROBLEMS = 20
 _UNNAMED_INDEX = re.compile(r"__index_level_\d+__")
-"""Columns in which pandas keeps row numbers after rows were removed; an index with a name of its own may be a key."""
+"""Columns in which pandas keeps row numbers after rows were removed; an index that has a name may be a key."""
 
 
 @dataclass(frozen=True)
 class _Rows:
-    """The rows that hold only numbers, the line or row number of each of them, and the problems of the others."""
+    """The rows that hold only numbers, the line or row number of each of them, and the problems of all other rows."""
 
     points: Points
     numbers: NDArray[np.intp]
@@ -43,8 +43,8 @@ def read_points(path: Path, config: Config) -> Points:
         config: Configuration with the keys that the columns name; its task declares the columns of targets.
 
     Raises:
-        ConfigError: If the file cannot be read, or its columns or values cannot be used; it holds all problems, or
-            the first 20.
+        ConfigError: If the file cannot be read, or its columns or values cannot be used; the error holds all problems,
+            or the first 20.
     """
     readers = {".csv": _read_csv, ".parquet": _read_parquet}
     if path.suffix not in readers:
@@ -90,16 +90,16 @@ def _read_csv(path: Path, config: Config) -> _Rows:
     rows: list[list[float]] = []
     lines: list[int] = []
     try:
-        # Spreadsheets write a byte order mark, and `csv` wants line ends as they are.
+        # Spreadsheets write a byte order mark, hence the encoding; `csv` wants line ends as they are, hence `newline`.
         with path.open(encoding="utf-8-sig", newline="") as file:
             reader = csv.reader(file)
-            # Lines without any cell count nowhere, before the header as well as below.
+            # Empty lines are skipped, before the header as well as below it.
             names = tuple(name.strip() for name in next(filter(None, reader), []))
             _check_columns(names, path, config, line=reader.line_num)
             for cells in reader:
                 if not cells:
                     continue
-                row, wrong = _row(names, cells, path, reader.line_num)
+                row, wrong = _read_row(names, cells, path, reader.line_num)
                 problems += wrong
                 if not wrong:
                     rows.append(row)
@@ -116,7 +116,7 @@ def _read_csv(path: Path, config: Config) -> _Rows:
     return _Rows(_make_points(names, values, config), np.array(lines), problems)
 
 
-def _row(names: tuple[str, ...], cells: list[str], path: Path, line: int) -> tuple[list[float], list[Problem]]:
+def _read_row(names: tuple[str, ...], cells: list[str], path: Path, line: int) -> tuple[list[float], list[Problem]]:
     """Read the numbers of a row, NaN for targets that it leaves out."""
     if problem := explain_wrong_count(cells, len(names)):
         return [], [Problem(problem, "", path, line)]
@@ -133,11 +133,11 @@ def _row(names: tuple[str, ...], cells: list[str], path: Path, line: int) -> tup
 
 
 def explain_wrong_count(cells: Sequence[str], columns: int) -> str:
-    """Say that a row of a CSV file has more or fewer values than there are columns; empty if it has as many."""
+    """Explain that a row of a CSV file has more or fewer values than there are columns; empty if it has as many."""
     if len(cells) == columns:
         return ""
     sentence = f"should have {format_count(columns, 'value')}, got {len(cells)}"
-    # A decimal comma makes two cells of a number, neither of which has a point.
+    # A decimal comma divides a number into two cells, neither of which has a point.
     if len(cells) > columns and not any("." in cell for cell in cells):
         sentence += "; if a comma belongs to a number, decimals are written with a point, as in 1.5"
     return sentence
@@ -168,7 +168,7 @@ def _read_parquet(path: Path, config: Config) -> _Rows:
         column = table[field.name]
         if not (pa.types.is_floating(field.type) or pa.types.is_integer(field.type)):
             problems.append(Problem(f"should be a column of numbers, got {field.type}", field.name, path))
-            # Without this column no row has a whole target; to report all rows for that would repeat the problem.
+            # Without this column, no row has a whole target. Reporting that of each row would repeat this problem.
             good &= not is_target(field.name)
             continue
         valid = column.is_valid().to_numpy()
@@ -217,7 +217,7 @@ def _find_target_problems(rows: _Rows, path: Path, config: Config) -> Iterator[P
         value = targets.values[row, column]
         yield _of_row(f"{sentence}, got {value}", targets.names[column], path, int(rows.numbers[row]))
     there = ~np.isnan(targets.values)
-    # Rows differ in few ways, so each way is checked once, however many rows there are.
+    # Few combinations of targets occur, so each combination is checked once, however many rows have it.
     for pattern in np.unique(there, axis=0):
         names = [name for name, has in zip(targets.names, pattern.tolist(), strict=True) if has]
         wrong = config.task.find_wrong_targets(names)
@@ -237,14 +237,14 @@ def _find_value_problems(rows: _Rows, path: Path, config: Config) -> Iterator[Pr
     if not len(rows.numbers):
         return
     for key, column in zip(rows.points.keys, rows.points.values.T, strict=True):
-        # The allowed values of a key are an interval, so if the extreme values are allowed, all are.
-        if not _refusals(config, key, np.array([column.min(), column.max()])):
+        # The allowed values of a key are an interval, so if the least and the largest value are allowed, all are.
+        if not _find_refusals(config, key, np.array([column.min(), column.max()])):
             continue
-        for row, sentence in _refusals(config, key, column):
+        for row, sentence in _find_refusals(config, key, column):
             yield _of_row(sentence, key, path, int(rows.numbers[row]))
 
 
-def _refusals(config: Config, key: str, column: NDArray[np.float64]) -> list[tuple[int, str]]:
+def _find_refusals(config: Config, key: str, column: NDArray[np.float64]) -> list[tuple[int, str]]:
     refusals: list[tuple[int, str]] = []
     for row, value in enumerate(column.tolist()):
         try:

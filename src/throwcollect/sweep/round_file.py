@@ -1,7 +1,7 @@
-"""Rounds that were added to a plan since its file was written; they lie beside it until it is written again as a whole.
+"""Keeps rounds that were added to a plan beside the plan's file, until that file is written again as a whole.
 
 The file ``plan.rounds.part`` has a line of JSON for each round, so adding one costs the same however long the plan is.
-A line without a line end is incomplete, because its writer was killed; no trial of it has begun.
+A line without a line end is incomplete, because its writer was killed; none of its trials has begun.
 """
 
 from __future__ import annotations
@@ -20,15 +20,15 @@ from throwcollect.sweep.trials import DIGEST_BYTES, Trials
 
 
 def rounds_path(plan: Path) -> Path:
-    """Name the file of the rounds that the file of a plan does not have yet."""
+    """Name the file of the rounds that are not yet in the file of a plan."""
     return plan.with_name(f"{plan.stem}.rounds.part")
 
 
 def append_round(plan: Path, trials: Trials) -> None:
-    """Add a round, which follows the trials on disk, to a plan, whole or not at all; then it survives a power cut.
+    """Add a round, which follows the trials on disk, to a plan, whole or not at all; it then survives a power cut.
 
     Raises:
-        DatasetError: If it cannot be written.
+        DatasetError: If the round cannot be written.
     """
     path = rounds_path(plan)
     line = {
@@ -40,7 +40,8 @@ def append_round(plan: Path, trials: Trials) -> None:
     }
     try:
         exists = is_there(path)
-        # No incomplete line can be at the end: who opens a dataset first takes such a file into the plan.
+        # No incomplete line can be at the end: whoever opens a dataset takes an existing file of rounds into the plan
+        # first.
         descriptor = open_regular(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND)
         try:
             write_all(descriptor, json.dumps(line).encode() + b"\n")
@@ -55,10 +56,12 @@ def append_round(plan: Path, trials: Trials) -> None:
 
 
 def read_rounds(plan: Path, trials: Trials) -> None:
-    """Append the rounds that lie beside the file of a plan to the trials that this file has; skip those among them.
+    """Append the rounds that lie beside the file of a plan to `trials`, which were read from the file.
+
+    Rounds that are in the file already are skipped.
 
     Raises:
-        DatasetError: If a round is damaged, or does not begin where the one before it ends.
+        DatasetError: If a round is damaged, or does not begin where the previous one ends.
     """
     path = rounds_path(plan)
     if not is_there(path):
@@ -67,15 +70,15 @@ def read_rounds(plan: Path, trials: Trials) -> None:
         with open(open_regular(path), "rb") as lines:
             for number, line in enumerate(lines, 1):
                 if line.endswith(b"\n"):
-                    _take(line, trials, path, number)
+                    _append_line(line, trials, path, number)
     except OSError as error:
         raise unreadable(path, error) from error
 
 
-def _take(line: bytes, trials: Trials, path: Path, number: int) -> None:
+def _append_line(line: bytes, trials: Trials, path: Path, number: int) -> None:
     try:
         added = _parse(line, trials.keys)
-        # A process that wrote the whole plan, and was killed before it removed this file, has left rounds that it has.
+        # If a process wrote the whole plan and was killed before it removed this file, the plan has the rounds already.
         if added.numbers.stop > trials.numbers.stop:
             trials.extend(added)
     except (ValueError, KeyError, TypeError, OverflowError, RecursionError) as error:
@@ -86,7 +89,7 @@ def _parse(line: bytes, keys: tuple[str, ...]) -> Trials:
     """Read the trials of a line.
 
     Raises:
-        ValueError: If `append_round` did not write it; other errors that `_take` catches are possible, too.
+        ValueError: If `append_round` did not write the line; or another error that `_append_line` catches.
     """
     entry = json.loads(line)
     count = len(entry["seeds"])

@@ -1,8 +1,8 @@
 """Rounds of 64 trials, by which a plan grows while it is collected.
 
-The configuration and the results of rounds up to r - 2 determine whether there is a round r, and its trials. All these
-rounds have ended by then, so the order in which results arrive does not matter; and while the last trials of a round
-end, simulations are busy with the next one. The first two rounds depend on no results.
+The configuration and the results of rounds up to r - 2 determine whether there is a round r, and its trials. Round r is
+drawn only when all these rounds have ended, so the order in which results arrive does not matter; and while the last
+trials of a round end, simulations are busy with the next round. The first two rounds depend on no results.
 """
 
 from __future__ import annotations
@@ -26,11 +26,11 @@ if TYPE_CHECKING:
 
 _FIRST_ROUNDS = FIRST_TRIALS // ROUND_TRIALS
 _TOLERANCE = 1e-9
-"""Values that are drawn again on another machine may differ in their last bits; relative, absolute where near 0."""
+"""Values that are drawn again on another machine may differ in their last bits; relative, but absolute near 0."""
 
 
 def find_same(planned: NDArray[np.float64], drawn: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Find the values of a plan that are drawn again the same; all three arrays have one shape."""
+    """Find the values of a plan that are the same when they are drawn again; all three arrays have one shape."""
     return np.isclose(planned, drawn, rtol=_TOLERANCE, atol=_TOLERANCE)
 
 
@@ -45,7 +45,7 @@ class Rounds:
         self._points = draw_points(config, directory=Path())
         self._wanted = config.until.wanted if config.until else None
         self._success = config.task.success
-        self._sampler = _target_sampler(config)
+        self._sampler = _make_target_sampler(config)
         targets = self._sampler.dimensions if self._sampler else 0
         self._values = Rows(np.empty((0, len(self._points.keys))))
         self._places = Rows(np.empty((0, targets)))
@@ -69,15 +69,15 @@ class Rounds:
 
     @property
     def over(self) -> bool:
-        """No trial will follow."""
+        """Whether no trial will follow."""
         if self.planned >= self.limit:
             return True
-        # Only the rounds that are decisive count, or the end would depend on which results have arrived by now.
+        # Only decisive rounds count, because otherwise the end would depend on which results have arrived by now.
         return self._wanted is not None and self._decisive > 0 and self.due and self._succeeded_in_ended >= self._wanted
 
     @property
     def due(self) -> bool:
-        """All results that the next trials depend on are known."""
+        """Whether all results that the next trials depend on are known."""
         decisive = self._decisive
         while self._ended < decisive:
             trials = slice(self._ended * ROUND_TRIALS, (self._ended + 1) * ROUND_TRIALS)
@@ -90,11 +90,11 @@ class Rounds:
     @property
     def _decisive(self) -> int:
         """Number of rounds whose results determine the next trials."""
-        # The next round is number `planned // ROUND_TRIALS`, and the results of all up to two before it determine it.
+        # The next round has the number r = `planned // ROUND_TRIALS`, and rounds 0 to r - 2 determine it.
         return max(0, self.planned // ROUND_TRIALS - 1)
 
     def add(self, trials: Trials) -> None:
-        """Take in trials of the plan, which follow those that were taken in before."""
+        """Take in trials of the plan, which follow the trials that were taken in before."""
         self._values.append(trials.values)
         self._places.append(np.full((len(trials), self._places.all.shape[1]), np.nan))
         self._waiting += bytes(number not in trials.refused for number in trials.numbers)
@@ -111,7 +111,7 @@ class Rounds:
             self._places.all[number] = self._sampler.place(values, result)
 
     def draw(self) -> Points:
-        """Draw the points of the next trials, to the end of their round, as `due` and not `over` allow.
+        """Draw the points of the next trials, to the end of their round; call it only if `due` and not `over`.
 
         The sampler of `sweep.target` learns from round to round, so each round from the third on has to be drawn once,
         and in order.
@@ -127,10 +127,10 @@ class Rounds:
         return self._points.values[number * ROUND_TRIALS : (number + 1) * ROUND_TRIALS]
 
 
-def _target_sampler(config: Config) -> TargetSampler | None:
+def _make_target_sampler(config: Config) -> TargetSampler | None:
     if config.sweep.target is None:
         return None
-    # Importing scipy.spatial takes about a second: only plans that need it do so, and before the collection begins.
+    # Importing scipy.spatial takes about a second, so only plans that need it do so, and before the collection begins.
     from throwcollect.sweep.target_sampler import TargetSampler
 
     return TargetSampler(config, config.sweep.target, first=_FIRST_ROUNDS)

@@ -1,4 +1,4 @@
-"""An array that grows by rows and copies those that it has only seldom."""
+"""An array that grows by rows, and seldom copies the rows that it already has."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ _Element = TypeVar("_Element", bound=np.generic)
 
 
 class Rows(Generic[_Element]):
-    """Rows of an array; on average, the cost of appending depends on the number of appended rows alone.
+    """Rows of an array; on average, the cost of appending depends only on the number of appended rows.
 
     Args:
-        rows: The first rows, shape ``(n_rows, ...)``; never written to.
+        rows: The first rows, shape ``(n_rows, ...)``; this array is never written to.
     """
 
     def __init__(self, rows: NDArray[_Element]) -> None:
@@ -23,7 +23,7 @@ class Rows(Generic[_Element]):
 
     @property
     def all(self) -> NDArray[_Element]:
-        """All rows, shape ``(n_rows, ...)``; the array stays as it is when others are appended."""
+        """All rows, shape ``(n_rows, ...)``; the returned array does not change when rows are appended."""
         return self._room[: self._count]
 
     def append(self, rows: NDArray[Any]) -> None:

@@ -1,4 +1,4 @@
-"""Samplers, which draw points from declared ranges; all randomness comes from the root seed."""
+"""Draws points from the declared ranges of parameters; all randomness comes from the root seed."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ _TRIALS_PER_SUCCESS = 10
 """Most trials per wanted success, for configurations with `until` and without `trials`."""
 
 UnitSampler = Callable[[int, int, np.random.Generator], NDArray[np.float64]]
-"""Number of points, number of keys, randomness → points of the unit cube, shape ``(n_trials, n_keys)``."""
+"""Draws points of the unit cube, shape ``(n_trials, n_keys)``, given both numbers and the source of randomness."""
 
 
 def draw_points(config: Config, *, directory: Path) -> Points:
     """Draw the points of all trials; for a plan that grows, as many as it may reach.
 
-    The first points of `uniform` and `sobol` do not depend on the number of points, so more trials keep those that
-    exist. In a `grid`, the last key varies fastest. A relative `sweep.file` starts at `directory`.
+    The first points of `uniform` and `sobol` do not depend on the number of points, so trials stay the same when their
+    number is raised. In a `grid`, the last key varies fastest. A relative `sweep.file` starts at `directory`.
 
     Raises:
         PlanError: If nothing is swept, or `trials` does not fit the sampler.
@@ -45,7 +45,7 @@ def draw_points(config: Config, *, directory: Path) -> Points:
             expected="at least one key, such as task.duration_s: {min: 0.9, max: 1.3}",
         )
     if sweep.sampler == "grid":
-        return _grid(sweep.parameters, config.trials)
+        return _draw_grid(sweep.parameters, config.trials)
     trials = config.trials
     if trials is None and config.until is not None:
         trials = _TRIALS_PER_SUCCESS * config.until.wanted
@@ -57,13 +57,13 @@ def draw_points(config: Config, *, directory: Path) -> Points:
     return Points(tuple(sweep.parameters), np.column_stack(columns))
 
 
-def _uniform(count: int, dimensions: int, randomness: np.random.Generator) -> NDArray[np.float64]:
+def _draw_uniform(count: int, dimensions: int, randomness: np.random.Generator) -> NDArray[np.float64]:
     return randomness.random((count, dimensions))
 
 
-def _latin_hypercube(count: int, dimensions: int, randomness: np.random.Generator) -> NDArray[np.float64]:
-    """Draw points so that each of `count` equal strips along each key holds one; they are the points of SciPy."""
-    # SciPy's samplers draw from a generator that they spawn, and not from the one that they are given.
+def _draw_latin_hypercube(count: int, dimensions: int, randomness: np.random.Generator) -> NDArray[np.float64]:
+    """Draw points so that each of `count` equal strips along each key holds one; SciPy draws the same points."""
+    # SciPy's samplers spawn a generator from the one that they are given, and draw from the spawned one.
     (own,) = randomness.spawn(1)
     places = own.uniform(size=(count, dimensions))
     strips = np.tile(np.arange(1, count + 1), (dimensions, 1))
@@ -72,7 +72,7 @@ def _latin_hypercube(count: int, dimensions: int, randomness: np.random.Generato
     return np.asarray((strips.T - places) / count)
 
 
-def _sobol(count: int, dimensions: int, randomness: np.random.Generator) -> NDArray[np.float64]:
+def _draw_sobol(count: int, dimensions: int, randomness: np.random.Generator) -> NDArray[np.float64]:
     if dimensions > MOST_DIMENSIONS:
         raise PlanError(
             [Problem(f"{dimensions} keys are swept", key="sweep.parameters")],
@@ -83,9 +83,9 @@ def _sobol(count: int, dimensions: int, randomness: np.random.Generator) -> NDAr
 
 
 UNIT_SAMPLERS = MappingProxyType[str, UnitSampler](
-    {"uniform": _uniform, "latin_hypercube": _latin_hypercube, "sobol": _sobol}
+    {"uniform": _draw_uniform, "latin_hypercube": _draw_latin_hypercube, "sobol": _draw_sobol}
 )
-"""Samplers that fill the unit cube, by the name they have in `sweep.sampler`."""
+"""Samplers that fill the unit cube, by their names in `sweep.sampler`."""
 
 
 def spread(parameter: Parameter, unit: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -117,34 +117,34 @@ def places(parameter: Parameter, values: NDArray[np.float64]) -> NDArray[np.floa
     return np.clip((values - low) / (high - low), 0, 1)
 
 
-def _grid(parameters: dict[str, Parameter], trials: int | None) -> Points:
-    size = math.prod(len(key.values) if isinstance(key, Values) else _count(key) for key in parameters.values())
+def _draw_grid(parameters: dict[str, Parameter], trials: int | None) -> Points:
+    size = math.prod(len(key.values) if isinstance(key, Values) else _require_count(key) for key in parameters.values())
     if trials is None and size > MOST_TRIALS:
         raise PlanError(
             [Problem(f"the grid has {size} points", key="sweep.parameters")], expected=f"at most {MOST_TRIALS}"
         )
     places = np.arange(_check_count(trials, size))
     columns = []
-    # The number of a point is read like one with a digit for each key, the last key being the lowest digit.
+    # The number of a point is read as digits, one for each key; the last key is the lowest digit.
     for parameter in reversed(parameters.values()):
-        axis = _axis(parameter)
+        axis = _list_grid_values(parameter)
         columns.append(axis[places % len(axis)])
         places //= len(axis)
     return Points(tuple(parameters), np.column_stack(columns[::-1]))
 
 
-def _axis(parameter: Parameter) -> NDArray[np.float64]:
+def _list_grid_values(parameter: Parameter) -> NDArray[np.float64]:
     if isinstance(parameter, Values):
         return np.array(parameter.values)
     if parameter.scale == "linear":
-        return np.linspace(parameter.min, parameter.max, _count(parameter))
-    axis = spread(parameter, np.linspace(0, 1, _count(parameter)))
-    # The exponential of a logarithm is not always the very number.
+        return np.linspace(parameter.min, parameter.max, _require_count(parameter))
+    axis = spread(parameter, np.linspace(0, 1, _require_count(parameter)))
+    # The exponential of a number's logarithm is not always exactly that number.
     axis[[0, -1]] = parameter.min, parameter.max
     return axis
 
 
-def _count(parameter: Range) -> int:
+def _require_count(parameter: Range) -> int:
     if parameter.count is None:
         raise ValueError("a range without count has no grid points")
     return parameter.count

@@ -14,7 +14,7 @@ class Slice:
     """One of several slices, which together are the plan, in order; written as ``INDEX/COUNT``.
 
     Attributes:
-        index: From 0.
+        index: Place of the slice among all slices, from 0.
         count: Number of slices.
     """
 
@@ -29,7 +29,7 @@ class Slice:
         """Read the text of a slice.
 
         Raises:
-            ConfigError: If it is no such text, or the index is not below the count.
+            ConfigError: If the text is not INDEX/COUNT, or the index is not below the count.
         """
         match = re.fullmatch(r"(\d{1,9})/(\d{1,9})", text, re.ASCII)
         if match is None:
@@ -46,7 +46,7 @@ class Slice:
         return tuple(cls(index, count) for index in range(count))
 
     def trials_of(self, trials: int, *, trials_per_shard: int) -> range:
-        """List the numbers of its trials in a plan of `trials`; two slices of a plan differ by at most one shard.
+        """Find the numbers of the slice's trials in a plan of `trials`; slices of a plan differ by at most one shard.
 
         Raises:
             ConfigError: If there are fewer shards than slices.

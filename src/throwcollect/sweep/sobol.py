@@ -1,7 +1,7 @@
-"""Scrambled Sobol sequences: points that fill the unit cube more evenly than random ones.
+"""Draws scrambled Sobol sequences: points that fill the unit cube more evenly than random points.
 
-They are the points of `scipy.stats.qmc.Sobol`, bit for bit, which a test compares. With this code a plan depends on no
-version of SciPy, whose statistics take longer to import than everything else that a command needs.
+`scipy.stats.qmc.Sobol` draws the same points, bit for bit; a test compares them. With this code, plans do not depend on
+the version of SciPy, whose statistics take longer to import than everything else that a command needs.
 """
 
 from __future__ import annotations
@@ -33,11 +33,11 @@ def draw_sobol(count: int, dimensions: int, randomness: np.random.Generator) -> 
     """
     places = np.arange(BITS, dtype=np.uint32)
     shift = _pack(randomness.integers(2, size=(dimensions, BITS), dtype=np.uint32), places)
-    # A triangular matrix with ones on its diagonal can be inverted, so that scrambled points stay evenly spread.
+    # A triangular matrix with ones on its diagonal can be inverted, so scrambled points stay evenly spread.
     below = np.tril(randomness.integers(2, size=(dimensions, BITS, BITS), dtype=np.uint32), -1)
     matrices = _pack(below + np.eye(BITS, dtype=np.uint32), places[::-1])
-    numbers = _multiply(matrices, _direction_numbers(dimensions))
-    # In Gray code, neighbours differ in one bit: the lowest one that is set in the index of the second one.
+    numbers = _multiply(matrices, _compute_direction_numbers(dimensions))
+    # In Gray code, two neighbours differ in one bit: the lowest bit that is set in the index of the second neighbour.
     index = np.arange(1, count)
     flipped = np.frexp(index & -index)[1] - 1
     points = np.empty((count, dimensions))
@@ -56,20 +56,20 @@ def _pack(bits: NDArray[np.uint32], places: NDArray[np.uint32]) -> NDArray[np.ui
 
 
 def _multiply(matrices: NDArray[np.uint32], numbers: NDArray[np.uint32]) -> NDArray[np.uint32]:
-    """Multiply numbers, as columns of bits with the highest first, by matrices of bits, whose rows are packed alike.
+    """Multiply matrices of bits by numbers, which are columns of bits with the highest first; rows are packed alike.
 
     Args:
         matrices: Shape ``(dimensions, BITS)``.
         numbers: Shape ``(dimensions, count)``.
     """
     common = matrices[:, None, :] & numbers[:, :, None]
-    # This folds each number onto its lowest bit, which is then the parity of its bits: the sum of products modulo 2.
+    # This folds each number onto its lowest bit, which becomes the parity of all bits: the sum of products modulo 2.
     for half in (16, 8, 4, 2, 1):
         common ^= common >> np.uint32(half)
     return _pack(common & np.uint32(1), np.arange(BITS, dtype=np.uint32)[::-1])
 
 
-def _direction_numbers(dimensions: int) -> NDArray[np.uint32]:
+def _compute_direction_numbers(dimensions: int) -> NDArray[np.uint32]:
     """Compute direction numbers, shape ``(dimensions, BITS)``, by the recurrence of Bratley and Fox (1988)."""
     # The first coordinate has no polynomial in the table: its numbers before the shift are all 1 (van der Corput).
     numbers = np.ones((dimensions, BITS), dtype=np.int64)

@@ -12,13 +12,13 @@ from throwcollect.config.sweep import LANDING_HEIGHT, TargetConfig
 from throwcollect.tasks.throw.throw_result import ThrowResult
 
 NOWHERE = -1
-"""Number of no cell."""
+"""Stands in place of the number of a cell where there is no cell."""
 
 _TIE = 1e-6
 """Cells whose scores differ by less count as equal."""
 _MOST_DOUBLINGS = 60
 _DOUBT = 4
-"""A doubt counts as so many misses."""
+"""One doubt counts as this many misses."""
 
 
 class Cells:
@@ -68,7 +68,7 @@ class Cells:
 
 
 class Thinness:
-    """Chooses cells to throw at: each time the one with the lowest score.
+    """Chooses cells to throw at, each time the cell with the lowest score.
 
     The score of a cell is the number of throws that have landed in it or are planned, plus penalties for cells that
     seem out of reach: ``2^(missed - 1) - 1``, so that each further miss doubles the wait for the next try, and the
@@ -78,7 +78,7 @@ class Thinness:
     Args:
         landed: Throws that landed in each cell, shape ``(n_cells,)``.
         asked: Planned throws at each cell whose results are not known yet.
-        missed: Throws at each cell that landed elsewhere or not at all, since the last landing in it.
+        missed: Throws at each cell that landed elsewhere or not at all, since the last landing in this cell.
         away: Distance of each cell's centre from the nearest landing [bins].
         randomness: Decides between cells with equal scores.
     """
@@ -94,12 +94,12 @@ class Thinness:
     ) -> None:
         self._missed = missed
         self._doubted = np.zeros(len(missed), dtype=np.bool_)
-        self._score = landed + asked + _futile(missed) + np.maximum(away - 1, 0) ** 2
-        # Whole throws count 1, so this decides between equal scores and never between others.
+        self._score = landed + asked + _penalise(missed) + np.maximum(away - 1, 0) ** 2
+        # A throw counts 1, so this small number decides only between equal scores.
         self._score += _TIE * randomness.permutation(len(missed)) / len(missed)
 
     def take(self, count: int) -> NDArray[np.int64]:
-        """Choose `count` cells, one after the other; each counts as planned at once."""
+        """Choose `count` cells, one after the other; a throw at a chosen cell counts as planned from then on."""
         taken = np.empty(count, dtype=np.int64)
         for index in range(count):
             taken[index] = np.argmin(self._score)
@@ -107,20 +107,21 @@ class Thinness:
         return taken
 
     def doubt(self, cells: NDArray[np.int64]) -> NDArray[np.bool_]:
-        """Give back chosen cells without a promising throw; from now on each counts as missed `_DOUBT` times more.
+        """Give back chosen cells without a promising throw; from then on each counts as missed `_DOUBT` times more.
 
         Returns:
-            True for cells that are given back: `take` may choose a cell again after a doubt, which then keeps it.
+            True for cells that are given back. A cell is given back only once: if `take` chooses it again, it stays
+            chosen.
         """
         fresh = ~self._doubted[cells]
-        # A cell may be here more than once, and `-=` would count it once.
+        # A cell may be listed more than once, and `-=` would subtract only once.
         np.subtract.at(self._score, cells[fresh], 1)
         doubted = np.unique(cells[fresh])
         self._doubted[doubted] = True
-        self._score[doubted] += _futile(self._missed[doubted] + _DOUBT) - _futile(self._missed[doubted])
+        self._score[doubted] += _penalise(self._missed[doubted] + _DOUBT) - _penalise(self._missed[doubted])
         return fresh
 
 
-def _futile(missed: NDArray[np.int64]) -> NDArray[np.float64]:
-    # Powers of two by `ldexp` are exact on all machines; the bound keeps them finite.
+def _penalise(missed: NDArray[np.int64]) -> NDArray[np.float64]:
+    # `ldexp` computes exact powers of two on all machines; the bound keeps them finite.
     return np.ldexp(1.0, np.clip(missed - 1, 0, _MOST_DOUBLINGS)) - 1

@@ -19,11 +19,11 @@ from throwcollect.tasks.throw.throw_result import ThrowOutcome, ThrowResult
 _RANDOMNESS = 0
 """First number of the spawn keys of rounds, which have two numbers; those of trials have one."""
 _GOALS = 3
-"""Number of random places in a cell for each throw; it aims at the one to which it is predicted to come nearest."""
+"""Number of random places in a cell for each throw; it aims at the place to which it is predicted to come nearest."""
 
 
 class TargetSampler:
-    """Draws round after round, each from the results of rounds up to two before it.
+    """Draws round after round, round r from the results of rounds up to r - 2.
 
     The points are a pure function of the configuration and these results: a new sampler that gets the same results from
     the first round on draws the same points. `first` is the number of the first round that it draws.
@@ -39,10 +39,10 @@ class TargetSampler:
         self._aims = np.full(first * ROUND_TRIALS, NOWHERE)
         """Cells of the throws whose results `draw` does not know yet."""
         self._known = 0
-        """Number of trials whose results it knows."""
+        """Number of trials whose results `draw` knows."""
         self._landed = np.zeros(self._cells.count, dtype=np.int64)
         self._missed = np.zeros(self._cells.count, dtype=np.int64)
-        """For each cell, throws at it that landed elsewhere or not at all since the last landing in it."""
+        """For each cell, how many throws at it landed elsewhere or not at all, since the last landing in it."""
 
     @property
     def dimensions(self) -> int:
@@ -62,10 +62,10 @@ class TargetSampler:
 
         Args:
             otherwise: Points to return while too few throws have landed, shape ``(n_trials, n_parameters)``: a whole
-                round or, if it is the last one, as many trials as it has.
-            tried: Values of the trials of all rounds but the latest, shape ``(n_tried, n_parameters)``; they begin with
-                those of the previous call.
-            ended: The result of `place` for each of them, shape ``(n_tried, n_targets)``.
+                round, or fewer trials if it is the last round.
+            tried: Values of the trials of all rounds but the latest, shape ``(n_tried, n_parameters)``; the first rows
+                are those of the previous call.
+            ended: The result of `place` for each of these trials, shape ``(n_tried, n_targets)``.
 
         Returns:
             Values in the units of the parameters, shape ``(n_trials, n_parameters)``.
@@ -73,14 +73,14 @@ class TargetSampler:
         key = (_RANDOMNESS, self._next_round)
         randomness = np.random.default_rng(np.random.SeedSequence(self._seed, spawn_key=key))
         self._next_round += 1
-        self._learn(self._unit(tried[self._known :]), ended[self._known :])
+        self._learn(self._to_unit_cube(tried[self._known :]), ended[self._known :])
         if not self._model.usable:
             self._aims = np.append(self._aims, np.full(ROUND_TRIALS, NOWHERE))
             return otherwise
-        thinness = self._thinness(randomness)
+        thinness = self._score_cells(randomness)
         aims = np.empty(0, dtype=np.int64)
         unit = np.empty((0, tried.shape[1]))
-        # Cells without a promising throw are given back once, so the loop ends: the second time, they keep theirs.
+        # The loop ends, because a cell without a promising throw is given back only once; then its throw is taken.
         while len(aims) < ROUND_TRIALS:
             cells = thinness.take(ROUND_TRIALS - len(aims))
             corners = self._cells.corners(cells)[:, np.newaxis]
@@ -92,7 +92,7 @@ class TargetSampler:
             unit = np.append(unit, proposed[~given_back], axis=0)
         self._aims = np.append(self._aims, aims)
         columns = [spread(parameter, unit[:, i]) for i, parameter in enumerate(self._parameters.values())]
-        # A short round has the first points of a whole one, so that later calls can complete it.
+        # A short round has the first points of a whole round, so that a plan can be made longer later.
         return np.column_stack(columns)[: len(otherwise)]
 
     def _learn(self, tried: NDArray[np.float64], ended: NDArray[np.float64]) -> None:
@@ -109,8 +109,8 @@ class TargetSampler:
                 self._landed[cell] += 1
                 self._missed[cell] = 0
 
-    def _thinness(self, randomness: np.random.Generator) -> Thinness:
-        """Make the current scores of the cells; `randomness` decides between equal ones."""
+    def _score_cells(self, randomness: np.random.Generator) -> Thinness:
+        """Make the current scores of the cells; `randomness` decides between equal scores."""
         cells = self._cells.count
         return Thinness(
             landed=self._landed,
@@ -120,5 +120,5 @@ class TargetSampler:
             randomness=randomness,
         )
 
-    def _unit(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _to_unit_cube(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         return np.column_stack([places(each, values[:, i]) for i, each in enumerate(self._parameters.values())])

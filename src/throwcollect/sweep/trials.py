@@ -1,4 +1,4 @@
-"""Trials as a plan holds them: in columns of some 80 bytes per trial, from which single trials are made on demand."""
+"""Holds the trials of a plan in columns of some 80 bytes per trial, from which single trials are made on demand."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ class Trial:
     """One numbered point of the sweep.
 
     Attributes:
-        number: From 0.
+        number: Number of the trial in its plan, from 0.
         values: Value of each swept dotted key, in the key's unit.
         seed: Seed for anything random in the trial, from the root seed and the number; fits uint64.
         digest: SHA-256 in hex over everything that determines the trial's samples.
-        refused: Why the trial is not run, or None.
-        target: Place where it should end, by column; empty if it has none. The simulation does not depend on it.
+        refused: Why the trial is not run; None if it is run.
+        target: Place where the trial should end, by column; empty if it has none. The simulation does not depend on it.
     """
 
     number: int
@@ -118,16 +118,16 @@ class Trials(Sequence[Trial]):
     @overload
     def __getitem__(self, which: slice) -> Trials: ...
     def __getitem__(self, which: int | slice) -> Trial | Trials:
-        """Return the trial at a position, or those of a slice without gaps.
+        """Return the trial at a position, or the trials of a Python slice without gaps.
 
         Raises:
-            IndexError: If there are not so many.
+            IndexError: If there is no trial at that position.
             ValueError: If the slice has gaps.
         """
         # A range takes negative positions and slices, and raises the IndexError.
         chosen = self.numbers[which]
         if isinstance(chosen, int):
-            return self._trial(chosen)
+            return self._make_trial(chosen)
         if chosen.step != 1:
             raise ValueError(f"trials have no gaps: {which}")
         rows = slice(chosen.start - self.first, chosen.stop - self.first)
@@ -135,7 +135,7 @@ class Trials(Sequence[Trial]):
         return Trials(self.points[rows], self.seeds[rows], self.digests[rows], first=chosen.start, refused=refused)
 
     def __iter__(self) -> Iterator[Trial]:
-        return map(self._trial, self.numbers)
+        return map(self._make_trial, self.numbers)
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Trials):
@@ -157,7 +157,8 @@ class Trials(Sequence[Trial]):
         """Append trials.
 
         Raises:
-            ValueError: If they do not begin where these end, vary other keys, or have other columns of targets.
+            ValueError: If the others do not begin where these trials end, vary other keys, or have other columns of
+                targets.
         """
         names = (others.keys, others.target_names)
         if others.first != self.numbers.stop or names != (self.keys, self.target_names):
@@ -174,7 +175,7 @@ class Trials(Sequence[Trial]):
         refused = {number: reason for number, reason in pairs if reason is not None}
         return Trials(self.points, self.seeds, self.digests, first=self.first, refused=refused)
 
-    def _trial(self, number: int) -> Trial:
+    def _make_trial(self, number: int) -> Trial:
         row = number - self.first
         values = dict(zip(self.keys, self.values[row].tolist(), strict=True))
         digest = self.digests[row].tobytes().hex()

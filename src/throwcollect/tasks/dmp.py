@@ -1,4 +1,4 @@
-"""Discrete dynamic movement primitives in joint space: from weights to a trajectory, and from a motion to weights.
+"""Turns weights of discrete dynamic movement primitives in joint space into a trajectory, and a motion into weights.
 
 With goal g and time constant tau, each joint y follows::
 
@@ -63,7 +63,7 @@ def dmp_trajectory(
     origin = np.array([start[joint] for joint in end])
     goal = np.array(list(end.values()))
     times = np.arange(2 + math.ceil(_HORIZON_TAU * duration_s * points_hz)) / points_hz
-    # What overflows is refused below.
+    # Numbers that overflow are refused below.
     with np.errstate(all="ignore"):
         motion = roll_out(times, start=origin, goal=goal, weights=weights, tau=duration_s, family=family)
     positions, velocities, accelerations = motion
@@ -129,16 +129,16 @@ def roll_out(
     halves = np.arange(2.0 * substeps * (len(times) - 1) + 1) * (spacing / (2 * substeps))
     phase = exp(-family.alpha_x / tau * halves)
     forcing = matmul(basis(phase, count=family.basis_functions, alpha_x=family.alpha_x), weights.T)
-    # With the state (y - g, tau y') and the step in units of tau the system is linear and constant.
+    # With the state (y - g, tau y') and the step in units of tau, the system is linear and constant.
     system = np.array([[0.0, 1.0], [-(family.alpha_z**2) / 4, -family.alpha_z]])
     step = system * (spacing / tau / substeps)
     square = matmul(step, step)
     cube, fourth = matmul(square, step), matmul(square, square)
     unit = np.eye(2)
-    # On a linear system, Runge-Kutta is the Taylor polynomial of the matrix exponential to the fourth order.
+    # For a linear system, the method of Runge-Kutta is the Taylor polynomial of the matrix exponential to order four.
     transition = unit + step + square / 2 + cube / 6 + fourth / 24
-    # These are the effects on the state of the forcing term at the beginning, the middle and the end of a step. It
-    # pushes the second number of the state alone, hence the last column.
+    # These are the effects on the state of the forcing term at the beginning, the middle and the end of a step. The
+    # forcing term pushes only the second number of the state, hence the last column.
     inputs = np.stack([unit + step + square / 2 + cube / 4, 4 * unit + 2 * step + square / 2, unit], axis=1)[..., 1]
     samples = np.stack([forcing[:-1:2], forcing[1::2], forcing[2::2]], axis=1)
     drive = matmul(inputs * (spacing / tau / substeps / 6), samples)
@@ -148,11 +148,11 @@ def roll_out(
         y, z = state
         return yy * y + yz * z + push[0], zy * y + zz * z + push[1]
 
-    # One joint after the other in plain numbers: for two numbers each, arrays are slower.
+    # The joints are computed one after the other in plain numbers, because arrays of two numbers would be slower.
     drives = zip(drive.transpose(2, 0, 1).tolist(), (start - goal).tolist(), strict=True)
     states = np.array([list(accumulate(pushes, following, initial=(offset, 0.0))) for pushes, offset in drives])
     offsets, speeds = np.moveaxis(states[:, ::substeps], (0, 1, 2), (2, 1, 0))
-    # This is the equation for tau z', in which y - g and z are the two numbers of the state.
+    # This is the equation for tau z'; y - g and z are the two numbers of the state.
     push = forcing[:: 2 * substeps] - family.alpha_z * (family.alpha_z / 4 * offsets + speeds)
     return goal + offsets, speeds / tau, push / tau**2
 
@@ -164,7 +164,7 @@ def basis(phase: NDArray[np.float64], *, count: int, alpha_x: float) -> NDArray[
     """
     centres, variances = kernels(count=count, alpha_x=alpha_x)
     exponents = (phase[:, None] - centres) ** 2 / (-2 * variances)
-    # Far from all centres every psi underflows, but their ratios do not: this makes the largest one 1.
+    # Far from all centres, every psi would underflow, but only their ratios matter, so this makes the largest psi 1.
     psi = exp(exponents - exponents.max(axis=1, keepdims=True))
     weighted: NDArray[np.float64] = psi * (phase / psi.sum(axis=1))[:, None]
     return weighted
@@ -197,7 +197,7 @@ def fit_dmp(
         positions: [rad], shape ``(n, n_joints)``.
         velocities: [rad/s], shape ``(n, n_joints)``.
         accelerations: [rad/s²], shape ``(n, n_joints)``.
-        basis_functions: Number of basis functions of each joint.
+        basis_functions: Number of basis functions for each joint.
     """
     family = DynamicMovementPrimitive(family="dmp", basis_functions=basis_functions)
     alpha_z, tau = family.alpha_z, times[-1]

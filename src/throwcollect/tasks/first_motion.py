@@ -20,23 +20,23 @@ Motion = tuple[Mapping[str, float], Mapping[str, float], float]
 """Angles at the start and at the end, by joint [rad], and the time in between [s]."""
 
 _STROKE_RAD = 0.4
-"""How far each joint moves, where its limits let it."""
+"""How far each joint moves if its limits allow it [rad]."""
 _LEAST_RAD = 0.02
-"""A joint that may not move by so much is left at rest."""
+"""A joint that may not move by this angle stays at rest [rad]."""
 _SWEPT = 1.5
-"""A joint that moves by 1 rad may move by so much [rad], as the end of one joint is swept."""
+"""A joint that moves by 1 rad must be allowed to move by this angle [rad], because the end of one joint is swept."""
 _MARGIN_RAD, _MARGIN_SHARE = 0.05, 0.05
-"""Distance from the limits of a position, as measured joints go a little further than commanded: an angle, and a share
-of the range at most."""
+"""Distance of commanded positions from their limits, because measured positions go a little further: the angle, or the
+share of the range if that is less."""
 _SPEED_SHARE = 0.95
-"""Share of the limit of a velocity, likewise."""
+"""Share of its velocity limit that a joint may use, for the same reason."""
 
 
 def find_first_motion(robot: str, task: str) -> Motion:
     """Find a motion: the default of the task or, if that is for another robot, a short one from the posture at rest.
 
-    The short one keeps the limits of positions and velocities, also where the joint that moves most goes half as far
-    again; neither torques nor collisions are looked at. Robot and task are given by their names.
+    The short motion keeps the limits of positions and velocities, even if a joint goes half as far again; neither
+    torques nor collisions are looked at. Robot and task are given by their names.
 
     Raises:
         ConfigError: If the robot's files cannot be read, or none of its joints may move.
@@ -49,16 +49,16 @@ def find_first_motion(robot: str, task: str) -> Motion:
 
 
 def _describe_motion(robot: str, task: str, **motion: Mapping[str, float]) -> Config:
-    """The configuration of a motion; what is not given is the default of the task."""
+    """Make the configuration of a motion; whatever is not given is the default of the task."""
     values = {"name": "throws", "robot": {"name": robot}, "task": {"name": task, **motion}}
     return Config.model_validate(values, context=robot)
 
 
 def _find_short_motion(name: str, task: str) -> TaskConfig:
-    """Find a motion of all joints that may move, each as far as its limits let it.
+    """Find a motion of all joints that may move, each by `_STROKE_RAD`, or as far as its limits allow.
 
     Raises:
-        ConfigError: If none of them may, or the robot's files cannot be read.
+        ConfigError: If no joint may move, or the robot's files cannot be read.
     """
     robot: Robot = load_member("robots", name)
     limits = joint_limits(robot)
@@ -89,7 +89,7 @@ def _find_short_motion(name: str, task: str) -> TaskConfig:
 
 
 def _find_speeds(robot: str, joints: Sequence[str], task: str) -> NDArray[np.float64]:
-    """Highest speed of each joint for each radian that it moves, in the default time of the task [1/s]."""
+    """Find the highest speed of each joint per radian that it moves, in the default time of the task [1/s]."""
     start, end = dict.fromkeys(joints, 0.0), dict.fromkeys(joints, _STROKE_RAD)
     trajectory = trajectory_of(_describe_motion(robot, task, start=start, end=end))
     speeds: NDArray[np.float64] = np.abs(trajectory.velocities).max(axis=0) / _STROKE_RAD

@@ -1,4 +1,4 @@
-"""The ball in free flight, step by step as the physics computes it."""
+"""Computes the free flight of the ball, step by step as the physics engine does."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from throwcollect.config.schema import Config
 def ballistic_positions(
     position: NDArray[np.float64], velocity: NDArray[np.float64], *, steps: int, config: Config
 ) -> NDArray[np.float64]:
-    """Compute the way of one ball in free flight.
+    """Compute the path of one ball in free flight.
 
     Args:
         position: Ball centre at the start [m], shape ``(3,)``.
-        velocity: At the start [m/s], shape ``(3,)``.
+        velocity: Velocity of the ball at the start [m/s], shape ``(3,)``.
         steps: Number of physics steps.
         config: Gravity, air, ball and physics rate.
 
@@ -27,7 +27,7 @@ def ballistic_positions(
     dt, gravity_mps2 = 1 / config.sim.physics_hz, config.scene.gravity_mps2
     drag_per_m = _drag_per_m(config)
     if drag_per_m == 0:
-        # These sums run from the first row to the last, as those of the loop below, so the bits are the same.
+        # Like the loop below, these sums run from the first row to the last, so the bits are the same.
         velocities = np.full((steps + 1, 3), [0.0, 0.0, -gravity_mps2 * dt])
         velocities[0] = velocity
         moves = np.add.accumulate(velocities) * dt
@@ -53,7 +53,7 @@ def ballistic_steps(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Compute positions and velocities of many balls, each of shape ``(n, 3)``, after some steps of free flight.
 
-    The arithmetic and the arguments are those of `ballistic_positions`.
+    Arithmetic and arguments are as in `ballistic_positions`.
     """
     dt, drag_per_m = 1 / config.sim.physics_hz, _drag_per_m(config)
     gravity = np.array([0.0, 0.0, -config.scene.gravity_mps2])

@@ -1,4 +1,4 @@
-"""Measures of the joints in an episode that every task has, and the reasons in them for which a trial fails."""
+"""Measures the joints in an episode, for any task, and finds the reasons for which joints make a trial fail."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from throwcollect.units import NS_PER_S
 
 _SLACK = 1e-3
 _AT_LIMIT = 1 - _SLACK
-# The numbers are those of action_msgs/msg/GoalStatus.
+# The numbers are constants of action_msgs/msg/GoalStatus.
 _FAILED_GOALS = {5: "canceled", 6: "aborted"}
 
 
@@ -35,8 +35,8 @@ def measure_joints(
     robot = robot_of(config)
     limits = joint_limits(robot)
     effort_limits = limits.effort * config.robot.effort_scale
-    velocity_peak = _peak(shares_of(np.abs(samples.velocity).max(axis=0), limits.velocity), robot.joints)
-    effort_peak = _peak(shares_of(np.abs(samples.effort).max(axis=0), effort_limits), robot.joints)
+    velocity_peak = _find_peak(shares_of(np.abs(samples.velocity).max(axis=0), limits.velocity), robot.joints)
+    effort_peak = _find_peak(shares_of(np.abs(samples.effort).max(axis=0), effort_limits), robot.joints)
     # A sum is not finite if any of its terms is not.
     if not math.isfinite(velocity_peak.share + effort_peak.share + samples.position.sum()):
         return None
@@ -48,12 +48,12 @@ def measure_joints(
     desired = sample_positions(trajectory, (samples.stamps_ns - start_ns) / NS_PER_S).T
     errors = np.abs(measured - desired).max(axis=1)
     saturated = 0.0
-    # In most trials no torque gets to its limit, and the samples need not be searched.
+    # In most trials, no torque reaches its limit, and the samples need not be searched.
     if effort_peak.share >= _AT_LIMIT:
         saturated = float((shares_of(samples.effort, effort_limits) >= _AT_LIMIT).any(axis=1).mean())
     return replace(
         result,
-        position_peak=_peak(positions, trajectory.joints),
+        position_peak=_find_peak(positions, trajectory.joints),
         velocity_peak=velocity_peak,
         effort_peak=effort_peak,
         effort_saturated_share=saturated,
@@ -62,7 +62,7 @@ def measure_joints(
 
 
 def explain_failed_goal(header: EpisodeHeader) -> str | None:
-    """Say which controller did not carry out its trajectory, and why; None if all did."""
+    """Say which controller did not carry out its trajectory, and why; None if all controllers did."""
     for goal in header.goals:
         if goal.status in _FAILED_GOALS:
             detail = f": {goal.error_string}" if goal.error_string else f" with error code {goal.error_code}"
@@ -71,11 +71,11 @@ def explain_failed_goal(header: EpisodeHeader) -> str | None:
 
 
 def explain_violation(result: Result) -> str | None:
-    """Say which joint violated a limit; None if none did.
+    """Say which joint violated a limit; None if no joint did.
 
-    The measured position or velocity of a joint may not exceed its limit, and its torque may not reach it. Limits count
-    with a tolerance of 0.1 % (of half the range, for positions). Held joints may rest at the end of their range, so
-    positions count for the moving joints only, velocities and torques for all.
+    The measured position or velocity of a joint may not exceed its limit, and its torque may not reach its limit.
+    Limits have a tolerance of 0.1 % (of half the range, for positions). Joints that do not move may rest at the end of
+    their range, so positions are checked only for moving joints, but velocities and torques for all joints.
     """
     if (peak := result.position_peak) and peak.share > 1 + _SLACK:
         return f"{peak.joint} left its range: {peak.share:.3f} of the way from its middle to its limit"
@@ -89,6 +89,6 @@ def explain_violation(result: Result) -> str | None:
     return None
 
 
-def _peak(shares: NDArray[np.float64], joints: tuple[str, ...]) -> Peak:
+def _find_peak(shares: NDArray[np.float64], joints: tuple[str, ...]) -> Peak:
     column = int(shares.argmax())
     return Peak(joint=joints[column], share=float(shares[column]))

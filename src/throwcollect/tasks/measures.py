@@ -13,8 +13,8 @@ class BallState:
 
     Attributes:
         time_s: Time since the start of the trial [s].
-        position: Centre [m].
-        velocity: [m/s].
+        position: Centre of the ball [m].
+        velocity: Velocity of the ball [m/s].
     """
 
     time_s: float
@@ -24,10 +24,10 @@ class BallState:
 
 @dataclass(frozen=True)
 class Peak:
-    """Largest value of a kind during a trial.
+    """Largest value of one quantity, of all joints during a trial.
 
     Attributes:
-        joint: Joint that had it.
+        joint: Joint that had the value.
         share: Value over limit [-]; 1 is at the limit.
     """
 

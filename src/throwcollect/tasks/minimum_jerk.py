@@ -17,8 +17,8 @@ def minimum_jerk_trajectory(
 ) -> JointTrajectory:
     """Compute points on ``q(t) = q0 + (q1 - q0) s((t/T)^gamma)``, ``s(x) = 10x³ - 15x⁴ + 6x⁵``, and their derivatives.
 
-    Near the start the motion grows as ``t^(3 gamma)``, so its acceleration as ``t^(3 gamma - 2)``: it rises from zero
-    when gamma is above 2/3, and would be unbounded below, which the configuration does not allow.
+    Near the start, the motion grows as ``t^(3 gamma)``, so its acceleration grows as ``t^(3 gamma - 2)``: it rises from
+    zero if gamma is above 2/3. It would be unbounded for a smaller gamma, which the configuration does not allow.
 
     Args:
         start: Angle [rad] of at least each joint of `end`.
@@ -33,8 +33,8 @@ def minimum_jerk_trajectory(
     u = times / duration_s
     x = power(u, gamma)
     path = x * x * x * (10 + x * (6 * x - 15))
-    # These are the derivatives of s(u^gamma) by u. Powers of u are drawn together, because u^(gamma - 1) alone may be
-    # infinite at the start.
+    # These are the derivatives of s(u^gamma) by u. Powers of u are combined into one, because u^(gamma - 1) alone may
+    # be infinite at the start.
     speed = 30 * gamma * power(u, exponent + 1) * (1 - x) ** 2
     acceleration = 30 * gamma * power(u, exponent) * (1 - x) * ((3 * gamma - 1) * (1 - x) - 2 * gamma * x)
     origin = np.array([start[joint] for joint in end])
@@ -54,8 +54,8 @@ def minimum_jerk_trajectory(
 def point_times(duration_s: float, *, points_hz: float) -> NDArray[np.float64]:
     """List the times of evenly spaced points and of the end.
 
-    A point that would come less than a tenth of the spacing before the end is left out, as nearly coincident points
-    make the curve between them ill-conditioned.
+    A point that would come less than a tenth of the spacing before the end is left out, because the curve between two
+    points that nearly coincide is ill-conditioned.
 
     Returns:
         Times [s] from 0 to exactly `duration_s`, strictly increasing, shape ``(n_points,)`` with at least two.

@@ -25,8 +25,8 @@ class Outcome(str, Enum):
 class Result:
     """Outcome and measures of a trial; a measure is None where there is nothing to measure.
 
-    Tasks derive their own results from it and declare the fields that they add with their columns, which say what each
-    measure is (`tasks.result_columns`).
+    Tasks derive their own results from this class. Each field that a task adds declares its columns of the table, which
+    say what the measure is (`tasks.result_columns`).
 
     Attributes:
         outcome: How the trial ended.
@@ -55,7 +55,7 @@ class ResultColumns(Generic[AnyResult]):
     """Writes the results of a task into the columns of a table, and reads them from there.
 
     Attributes:
-        columns: First those of the measures that the task adds, then those that all tasks have.
+        columns: First the columns of the measures that the task adds, then the columns that all tasks have.
     """
 
     def __init__(self, results: type[AnyResult], joints: Sequence[str], *, tool: str) -> None:
@@ -71,7 +71,7 @@ class ResultColumns(Generic[AnyResult]):
         )
 
     def write(self, result: AnyResult) -> dict[str, object]:
-        """Make the values of all columns, by name; None where there is nothing."""
+        """Make the values of all columns, by name; None where nothing was measured."""
         values: dict[str, object] = {}
         for name, columns, declared in self._fields:
             value = getattr(result, name)
@@ -87,7 +87,7 @@ class ResultColumns(Generic[AnyResult]):
         """Read the text that `to_json` writes.
 
         Raises:
-            DatasetError: If the text is anything else.
+            DatasetError: If `to_json` did not write the text.
         """
         try:
             row = json.loads(text)

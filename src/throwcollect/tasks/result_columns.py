@@ -1,4 +1,4 @@
-"""Columns of the table of throws: each field of a result declares its own once, for writing and for reading.
+"""Columns of the table of throws: each field of a result declares its columns once, for writing and for reading.
 
 A field of a result declares its columns by the function that makes it::
 
@@ -25,10 +25,10 @@ class Column:
     """A column of the table.
 
     Attributes:
-        name: Its name.
-        kind: Kind of its values: numbers, whole numbers, or text; null where there is nothing.
+        name: Name of the column.
+        kind: Kind of its values: numbers, whole numbers, or text; null where nothing was measured.
         description: One sentence, with units.
-        later: Datasets of earlier versions lack this column.
+        later: Whether datasets of earlier versions lack this column.
     """
 
     name: str
@@ -38,7 +38,7 @@ class Column:
 
 
 class Columns(ABC):
-    """The columns of one field of a result, by default a single one; all are null where the field is None."""
+    """The columns of one field of a result, by default a single column; all are null where the field is None."""
 
     @abstractmethod
     def declare(self, name: str, joints: Sequence[str]) -> list[Column]:
@@ -49,7 +49,7 @@ class Columns(ABC):
         return (value,)
 
     def join(self, values: Sequence[Any], joints: Sequence[str]) -> Any:
-        """Make the field's value of the columns' values, none of which is null."""
+        """Make the field's value from the columns' values, none of which is null."""
         return values[0]
 
 
@@ -59,7 +59,7 @@ class Number(Columns):
 
     Attributes:
         description: One sentence, with the unit.
-        later: Datasets of earlier versions lack this column.
+        later: Whether datasets of earlier versions lack this column.
     """
 
     kind: ClassVar[Literal["number", "count"]] = "number"
@@ -111,14 +111,14 @@ def ball_columns(name: str) -> list[str]:
 
 
 def join_ball(values: Sequence[float]) -> BallState:
-    """Make a state of the values of its columns."""
+    """Make a state of the ball from the values of its columns."""
     time_s, x, y, z, vx, vy, vz = values
     return BallState(time_s, (x, y, z), (vx, vy, vz))
 
 
 @dataclass(frozen=True)
 class SpinColumns(Columns):
-    """An angular velocity of the ball: ``<field>_x_radps`` and so on. Datasets of earlier versions lack it.
+    """An angular velocity of the ball: ``<field>_x_radps`` and so on. Datasets of earlier versions lack these columns.
 
     Attributes:
         when: The instant, as the end of a sentence.
@@ -198,7 +198,7 @@ class JointColumns(Columns):
 
 
 def measured(columns: Columns) -> Any:
-    """Make a field of a result that stands in these columns, and is None where there is nothing to measure."""
+    """Make a field of a result that is stored in these columns, and is None where there is nothing to measure."""
     return field(default=None, metadata={_DECLARED: columns})
 
 

@@ -1,4 +1,4 @@
-"""Writes the configuration that `throwcollect init` offers to begin with: a few keys, and comments on them."""
+"""Writes the configuration with which `throwcollect init` lets users begin: a few keys, and comments on them."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ POINTS = "throws.csv"
 """The list of points that the sampler `list` reads, beside the configuration."""
 
 _NARROW_RAD = 0.2
-"""Range to either side in which the last angle of a joint is swept, and no more than half of its motion."""
+"""The last angle of a joint is swept by this angle to either side, but by no more than half of the joint's motion."""
 
 
 def samplers() -> list[str]:
-    """Names of all samplers."""
+    """List the names of all samplers."""
     return root().child("sweep").child("sampler").choices
 
 
@@ -49,14 +49,14 @@ def make_starter(robot: str, task: str, sampler: str) -> dict[str, str]:
         f"task.end.{joint}": (round(end[joint] - half_rad, 3), round(end[joint] + half_rad, 3)),
         "task.duration_s": (duration_s, round(1.3 * duration_s, 3)),
     }
-    texts = {str(DEFAULT_CONFIG): "".join(f"{line}\n" for line in _lines(robot, task, sampler, motion, ranges))}
+    texts = {str(DEFAULT_CONFIG): "".join(f"{line}\n" for line in _write_lines(robot, task, sampler, motion, ranges))}
     if sampler == "list":
         rows = zip(*((low, (low + high) / 2, high) for low, high in ranges.values()), strict=True)
         texts[POINTS] = "\n".join([",".join(ranges), *(",".join(f"{value:g}" for value in row) for row in rows), ""])
     return texts
 
 
-def _lines(
+def _write_lines(
     robot: str, task: str, sampler: str, motion: Motion, ranges: Mapping[str, tuple[float, float]]
 ) -> Iterator[str]:
     start, end, duration_s = motion
@@ -67,19 +67,19 @@ def _lines(
     yield "seed: 1 # everything that is random follows from it"
     yield ""
     yield "robot:"
-    yield f"  name: {robot} # {_choices(names_of('robots'))}"
+    yield f"  name: {robot} # {_list_choices(names_of('robots'))}"
     yield "task:"
-    yield f"  name: {task} # {_choices(names_of('tasks'))}"
+    yield f"  name: {task} # {_list_choices(names_of('tasks'))}"
     yield f"  duration_s: {duration_s:g} # how long the motion takes"
     yield f"  start: {value_as_yaml(dict(start))}"
     yield f"  end: {value_as_yaml(dict(end))} # the joints that move"
-    yield from (f"  {line}" for line in _own_keys(load_member("tasks", task)))
+    yield from (f"  {line}" for line in _write_own_keys(load_member("tasks", task)))
     if not has_wheel("pybullet"):
         yield "sim:"
         yield "  engine: mujoco # bullet, the default, has no wheel for this Python"
     yield ""
     yield "sweep: # what varies from trial to trial: any number of any section, by its dotted key"
-    yield f"  sampler: {sampler} # {_choices(samplers())}"
+    yield f"  sampler: {sampler} # {_list_choices(samplers())}"
     if sampler == "list":
         yield f"  file: {POINTS} # one row a trial, one column a key"
         return
@@ -89,13 +89,13 @@ def _lines(
         yield f"    {key}: {{min: {low:g}, max: {high:g}{', count: 10' if count and number else count}}}"
 
 
-def _own_keys(section: type[TaskConfig]) -> Iterator[str]:
-    """Write the keys that a task has beside those of every task, with their defaults, and what they mean."""
+def _write_own_keys(section: type[TaskConfig]) -> Iterator[str]:
+    """Write the keys that only this task has, with their defaults, and what they mean."""
     for key, node in section.model_json_schema()["properties"].items():
         if key not in TaskConfig.model_fields and "default" in node:
             meaning = node.get("description", "").partition("\n\n")[0].replace("\n", " ").rstrip(".")
             yield f"{key}: {value_as_yaml(node['default'])}{f' # {meaning}' if meaning else ''}"
 
 
-def _choices(names: Iterable[str]) -> str:
+def _list_choices(names: Iterable[str]) -> str:
     return f"one of {', '.join(names)}"

@@ -21,11 +21,11 @@ from throwcollect.tasks.result import LIMIT_VIOLATED, LOST, TRACKING_FAILED, Any
 
 @dataclass(frozen=True)
 class Failure:
-    """The reason for which a trial is no success.
+    """Why a trial is no success.
 
     Attributes:
-        outcome: The outcome that it has instead.
-        reason: The reason in one sentence.
+        outcome: The outcome that the trial has instead.
+        reason: The reason, in one sentence.
     """
 
     outcome: Outcome
@@ -39,8 +39,8 @@ class Task(ABC, Generic[AnyResult]):
     from this class.
 
     Attributes:
-        outcomes: All its outcomes.
-        results: Class of its results, whose fields are declared with their columns of the table.
+        outcomes: All outcomes of the task.
+        results: Class of the task's results, whose fields declare their columns of the table.
         reasons: Description of the column of reasons, one sentence.
         report: ``module:function``, imported when a report is made: a function that takes a `Dataset` and its
             `Outcomes` and returns a `TaskReport` with sections to add; empty if there are none.
@@ -56,7 +56,7 @@ class Task(ABC, Generic[AnyResult]):
 
     @property
     def columns(self) -> ResultColumns[AnyResult]:
-        """The columns of its results, in the table of a collection of this configuration."""
+        """The columns of the task's results, in the table of a collection of this configuration."""
         return ResultColumns(self.results, tuple(self.config.task.end), tool=self.config.tool.name)
 
     def trajectory(self) -> JointTrajectory:
@@ -67,7 +67,7 @@ class Task(ABC, Generic[AnyResult]):
             `task.start`, the last one at rest and exactly at `task.end`.
 
         Raises:
-            ConfigError: If the trajectory family has no usable motion for these parameters: a DMP that does not settle.
+            ConfigError: If the family has no usable motion for these parameters, such as a DMP that does not settle.
         """
         task = self.config.task
         end = {joint: task.end[joint] for joint in robot_of(self.config).joints if joint in task.end}
@@ -81,7 +81,7 @@ class Task(ABC, Generic[AnyResult]):
     def judge(self, samples: Samples, header: EpisodeHeader, trajectory: JointTrajectory) -> AnyResult:
         """Find the outcome and the measures of one trial.
 
-        The first of these that holds is the outcome; everything that can be measured is measured in any case:
+        The first of these outcomes that holds counts; everything that can be measured is measured in any case:
 
         1. ``tracking_failed``: a sample is not finite (then nothing is measured), or a goal was canceled or aborted.
         2. The failure that the task itself finds (see `assess`).
@@ -107,7 +107,7 @@ class Task(ABC, Generic[AnyResult]):
 
     @abstractmethod
     def assess(self, result: AnyResult, samples: Samples, header: EpisodeHeader) -> tuple[AnyResult, Failure | None]:
-        """Add the measures that only this task has, and say what kept a trial from success.
+        """Add the measures that only this task has, and find what kept a trial from success.
 
         Args:
             result: A success, with the measures of the joints.
@@ -134,7 +134,7 @@ def trajectory_of(config: Config) -> JointTrajectory:
 
     Raises:
         ConfigError: If there is no usable motion for these parameters.
-        MemberError: If the task is of another package and fails.
+        MemberError: If the task comes from another package and fails.
     """
     with explain_failure("tasks", config.task.name, "plan its motion"):
         return task_of(config).trajectory()

@@ -19,7 +19,7 @@ class Box:
 
     Attributes:
         size: Edge lengths [m].
-        placement: Pose of the box (its frame lies at its centre, along its edges) in the tool's frame.
+        placement: Pose of the box in the tool's frame; the frame of the box lies at its centre, along its edges.
     """
 
     size: tuple[float, float, float]
@@ -27,17 +27,17 @@ class Box:
 
 
 class Tool(ABC):
-    """A tool; in the frame of its link, the cup opens along +x, and the rest is its own choice.
+    """A tool; in the frame of its link, the cup must open along +x, and all else is up to the tool.
 
     Attributes:
-        name: Name by which contacts with it are recorded, such as ``spoon``; its link is ``<name>_link``.
+        name: Name by which contacts with the tool are recorded, such as ``spoon``; its link is ``<name>_link``.
     """
 
     name: str
 
     @property
     def link(self) -> str:
-        """Name of its link in descriptions."""
+        """Name of the tool's link in descriptions."""
         return f"{self.name}_link"
 
     @property
@@ -48,12 +48,12 @@ class Tool(ABC):
     @property
     @abstractmethod
     def boxes(self) -> tuple[Box, ...]:
-        """The boxes that it consists of."""
+        """The boxes that the tool consists of."""
 
     @property
     @abstractmethod
     def inertia(self) -> pinocchio.Inertia:
-        """Its inertia, in its frame."""
+        """Inertia of the tool, in its frame."""
 
     @property
     @abstractmethod
@@ -63,7 +63,7 @@ class Tool(ABC):
     @property
     @abstractmethod
     def depth_m(self) -> float:
-        """Depth of the cup below that opening [m]."""
+        """Depth of the cup below the opening [m]."""
 
     @abstractmethod
     def ball_seat(self, radius: float) -> tuple[float, float, float]:
@@ -78,14 +78,14 @@ class Tool(ABC):
 
     @abstractmethod
     def way_out(self, radius: float, up: NDArray[np.float64]) -> float:
-        """Find the slope of the lowest way on which a ball can leave the cup when it does not move.
+        """Find the slope of the lowest way on which a ball can leave the cup while the cup does not move.
 
         Args:
             radius: Radius of the ball [m].
             up: Unit vector against gravity in the tool's frame, shape ``(3,)``.
 
         Returns:
-            [rad]; above zero the way climbs and the ball stays, below zero it goes down.
+            Slope [rad]; above zero, the way climbs and the ball stays; below zero, it goes down.
         """
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 
 def choose_trials(trials: Sequence[int], *, count: int, seed: int) -> list[int]:
-    """At most `count` of the trials, in their order, by the root seed of the collection."""
+    """Choose at most `count` of the trials, by the root seed of the collection, and keep their order."""
     if count >= len(trials):
         return list(trials)
     picked = np.random.default_rng(seed).choice(len(trials), size=count, replace=False)

@@ -1,7 +1,7 @@
-"""The conditions that an episode was simulated under: worked out twice, and compared.
+"""The conditions that an episode was simulated under, which are worked out twice and compared.
 
-The coordinator works the conditions of a trial out from the plan, the simulation from what it really used. An episode
-whose conditions differ does not belong to the plan, for whatever reason.
+The coordinator works out the conditions of a trial from the plan, and the simulation from what it has really used. An
+episode whose conditions differ does not belong to the plan, for whatever reason.
 """
 
 from __future__ import annotations
@@ -30,8 +30,8 @@ class Conditions:
         build: Digest of sources, engine and model (`build.build_digest`).
         settings: Digest of the keys of the collection's configuration that concern the simulation.
         values: Values of the trial that replace those of the configuration, by dotted key.
-        trajectory: Digest of the joint trajectory that its controllers were given.
-        lease: Token of the lease that it was simulated for; empty if for none.
+        trajectory: Digest of the joint trajectory that the controllers were given.
+        lease: Token of the lease that the trial was simulated for; empty if there was no lease.
     """
 
     build: str
@@ -41,11 +41,11 @@ class Conditions:
     lease: str
 
     def to_json(self) -> str:
-        """The conditions in JSON; equal ones give equal text."""
+        """Write the conditions in JSON; equal conditions give equal text."""
         return json.dumps(asdict(self), sort_keys=True)
 
     def differences(self, expected: Conditions) -> Iterator[str]:
-        """One phrase for each difference from the conditions that were expected."""
+        """Describe each difference from the expected conditions in a phrase."""
         if self.lease != expected.lease:
             yield "it was not simulated for this lease"
         if self.build != expected.build:
@@ -71,7 +71,7 @@ def conditions_from_json(text: str) -> Conditions:
     """Read what `Conditions.to_json` writes.
 
     Raises:
-        DatasetError: If the text is anything else.
+        DatasetError: If `Conditions.to_json` did not write the text.
     """
     try:
         return _CONDITIONS.validate_json(text, strict=True)
@@ -91,19 +91,19 @@ class Settings:
         physics = set(sweepable_keys(config, Effect.PHYSICS))
         self._physics = [(leaf.name, leaf.name.split("."), leaf.value) for leaf in keys if leaf.name in physics]
         heeded = {leaf.name: leaf.value for leaf in keys if leaf.key.effect in _EFFECTS_IN_DIGEST}
-        # Which joints move decides which are simulated as rigid; where they go, the trajectory says.
+        # Of `task.end`, only the names count: they decide which joints are locked. The angles are in the trajectory.
         heeded["task.end"] = sorted(config.task.end)
         lines = [f"{key}={json.dumps(value)}" for key, value in sorted(heeded.items())]
         self.digest = hashlib.sha256("\n".join(lines).encode()).hexdigest()
 
     def find_replaced(self, trial: Config) -> dict[str, float]:
-        """Values of a trial's configuration that replace those of the collection, by dotted key."""
-        values = ((key, _value(trial, path), configured) for key, path, configured in self._physics)
+        """Find the values of a trial's configuration that replace values of the collection's, by dotted key."""
+        values = ((key, _get_value(trial, path), configured) for key, path, configured in self._physics)
         return {key: float(value) for key, value, configured in values if value != configured}
 
 
-def _value(config: Config, path: Sequence[str]) -> Any:
-    """The value of a key; `leaves` would take ten times as long, in every trial."""
+def _get_value(config: Config, path: Sequence[str]) -> Any:
+    """Look up the value of a key; for each trial, `leaves` would take ten times as long."""
     holder: Any = config
     for part in path:
         holder = holder[part] if isinstance(holder, dict) else getattr(holder, part)

@@ -23,14 +23,14 @@ LEASES = "trial.leases"
 
 @dataclass(frozen=True)
 class Lease:
-    """A trial for one simulation.
+    """A signed note that gives one trial to one simulation.
 
     Attributes:
         simulation: Namespace of the simulation, such as ``/sim_0``.
         trial: Number of the trial.
         values: Values of the trial that replace those of the configuration, by dotted key.
         nonce: Random text by which two leases of the same trial differ.
-        signature: The coordinator's, over all of these.
+        signature: Signature of the coordinator over all other attributes.
     """
 
     simulation: str
@@ -46,17 +46,17 @@ class Lease:
         return replace(unsigned, signature=signer.sign(unsigned._text))
 
     def is_signed(self, signer: Signer) -> bool:
-        """Whether it was signed with the key of this run."""
+        """Whether the lease was signed with the key of this run."""
         return signer.has_signed(self.signature, self._text)
 
     @property
     def token(self) -> str:
-        """Text by which this lease is told from all others."""
+        """Text that no other lease has."""
         return f"{self.nonce}.{self.signature}"
 
     @cached_property
     def _text(self) -> bytes:
-        # The values are sorted, because the same ones in another order must have the same signature.
+        # The values are sorted, because the same values in another order must have the same signature.
         return json.dumps([self.nonce, self.simulation, self.trial, sorted(self.values.items())]).encode()
 
 
@@ -64,7 +64,7 @@ _LEASES = TypeAdapter(tuple[Lease, ...])
 
 
 def leases_to_json(leases: Iterable[Lease]) -> str:
-    """A list of leases in JSON."""
+    """Write a list of leases in JSON."""
     return _LEASES.dump_json(tuple(leases)).decode()
 
 
@@ -72,7 +72,7 @@ def leases_from_json(text: str) -> tuple[Lease, ...]:
     """Read what `leases_to_json` writes.
 
     Raises:
-        DatasetError: If the text is anything else.
+        DatasetError: If `leases_to_json` did not write the text.
     """
     try:
         return _LEASES.validate_json(text, strict=True)

@@ -301,7 +301,7 @@ ELSEWHERE = {
     "F2": (CONTROLLERS, "test_steps_advance_a_trajectory_by_as_many_periods"),
     "F3": (TRAJECTORIES, "test_a_reset_right_after_a_goal_aborts_it"),
     "F5": (CONTROLLERS, "test_after_a_reset_the_start_posture_is_held"),
-    "F6": ("tests/unit/sim/test_limb_controller.py", "test_a_result_comes_at_the_same_time_in_slices_and_in_steps"),
+    "F6": ("tests/unit/sim/test_limb_controller.py", "test_a_result_comes_at_the_same_time_in_stretches_and_in_steps"),
     "G1": ("tests/integration/test_graph.py", "test_a_controller_has_the_topics_services_and_action_of_the_real_one"),
     "G2": ("tests/integration/test_play_motion.py", "test_motions_of_the_real_robot_are_played"),
     "G4": ("tests/integration/test_play_motion.py", "test_joint_states_have_velocity_and_effort_of_every_joint"),

@@ -192,12 +192,12 @@ def test_the_unit_of_a_column_follows_from_its_name(column: str, unit: str) -> N
 @pytest.fixture
 def with_csv(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """The package of `tests/plugins/csv_export` is installed."""
-    for cached in (members._table, load_member):
+    for cached in (members._find_members, load_member):
         cached.cache_clear()
     monkeypatch.syspath_prepend(PLUGINS)
     yield
     monkeypatch.undo()
-    members._table.cache_clear()
+    members._find_members.cache_clear()
 
 
 @pytest.mark.usefixtures("with_csv")

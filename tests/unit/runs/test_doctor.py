@@ -62,7 +62,7 @@ def test_doctor_examines_robots_of_other_packages_and_notes_failures(
     places = {"planar_arm": "planar_arm.robot:PLANAR_ARM", "absent": "not_there:ARM", "lost": f"{__name__}:LOST_ARM"}
     points = EntryPoints(EntryPoint(name, place, group) for name, place in places.items())
     monkeypatch.setattr(members, "entry_points", lambda **_: points)
-    members._table.cache_clear()
+    members._find_members.cache_clear()
     checks = {check.name: check for check in examine(tmp_path)}
     found = {name: (checks[f"robot {name}"].status, checks[f"robot {name}"].finding) for name in places}
     assert found["planar_arm"] == ("ok", f"the planar arm, {PLUGINS / 'planar_arm' / 'planar_arm.urdf'}")
@@ -71,7 +71,7 @@ def test_doctor_examines_robots_of_other_packages_and_notes_failures(
     assert "the robot lost of an unknown package cannot describe itself: OSError: the disk" in found["lost"][1]
     assert (checks["robot"].status, checks["robot"].finding.partition(" of ")[0]) == ("ok", "Talos")
     monkeypatch.undo()
-    members._table.cache_clear()
+    members._find_members.cache_clear()
 
 
 def backends(directory: Path) -> dict[str, tuple[str, str]]:

@@ -43,9 +43,9 @@ def added(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     (package / "entry_points.txt").write_text(f"[throwcollect.runtimes]\ncluster = {__name__}:Cluster\n")
     monkeypatch.syspath_prepend(tmp_path)
     importlib.invalidate_caches()
-    members._table.cache_clear()
+    members._find_members.cache_clear()
     yield
-    members._table.cache_clear()
+    members._find_members.cache_clear()
 
 
 def test_every_runtime_of_the_table_is_valid_in_a_configuration() -> None:

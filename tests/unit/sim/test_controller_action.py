@@ -49,7 +49,7 @@ def action(simulation: Simulation, monkeypatch: pytest.MonkeyPatch) -> Controlle
 
 
 def advance(simulation: Simulation, action: ControllerAction) -> None:
-    """Advance by a slice of 50 ms, and send the feedback that follows."""
+    """Advance by a stretch of 50 ms, and send the feedback that follows."""
     assert action.watched
     simulation.advance(watched=True)
     for _, result in simulation.pop_results():
@@ -58,15 +58,15 @@ def advance(simulation: Simulation, action: ControllerAction) -> None:
         action.publish_feedback(simulation.observe(ARM).state(simulation.now_ns))
 
 
-@pytest.mark.parametrize("slices_before", [0, 1, 3])
+@pytest.mark.parametrize("stretches_before", [0, 1, 3])
 def test_a_goal_with_a_late_handle_gets_all_its_feedback(
-    slices_before: int, simulation: Simulation, action: ControllerAction
+    stretches_before: int, simulation: Simulation, action: ControllerAction
 ) -> None:
     server: Any = action._server
     assert server.consider(goal(ARM, 1.0, arm_right_4_joint=-1.7)) is GoalResponse.ACCEPT
     handle = Handle(1)
     for number in range(5):
-        if number == slices_before:
+        if number == stretches_before:
             server.accept(handle)
         advance(simulation, action)
     assert handle.told == [50, 100, 150, 200, 250]
@@ -84,7 +84,7 @@ def test_a_goal_that_ended_before_its_handle_gets_only_its_own_feedback(
     server.accept(first)
     server.accept(second)
     advance(simulation, action)
-    # The first goal ends with the update after the second came, and a slice of time with a goal.
+    # The first goal ends with the update after the second came, and a stretch of time with a goal.
     assert (first.told, second.told) == ([50], [52, 102])
 
 

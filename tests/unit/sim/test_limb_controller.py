@@ -66,7 +66,7 @@ def test_the_configuration_can_make_joints_brake_when_a_goal_is_cancelled() -> N
 
 
 @pytest.mark.parametrize("seconds", [0.1, 0.7])
-def test_a_result_comes_at_the_same_time_in_slices_and_in_steps(seconds: float) -> None:
+def test_a_result_comes_at_the_same_time_in_stretches_and_in_steps(seconds: float) -> None:
     ends = []
     for go_on in (lambda world: world.advance(watched=False), lambda world: world.step(1)):
         world, results = simulation(), []

@@ -1,9 +1,9 @@
-"""Time slices: simulated time goes on at real time times a factor."""
+"""Stretches of simulated time: time goes on at real time times a factor."""
 
 import pytest
 
 from throwcollect.sim import pace
-from throwcollect.sim.pace import Pace, long_slice_steps, slice_steps
+from throwcollect.sim.pace import Pace, long_stretch_steps, stretch_steps
 
 
 class Clock:
@@ -31,7 +31,7 @@ def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
     [
         (1.0, 500, 2, 2),  # a sample every 4 ms
         (1.0, 1000, 10, 10),
-        (1.0, 10000, 1, 40),  # no slice is shorter than 4 ms of real time
+        (1.0, 10000, 1, 40),  # no stretch is shorter than 4 ms of real time
         (5.0, 500, 2, 10),
         (5.0, 1000, 100, 50),  # nor longer than 50 ms
         (0.1, 500, 2, 2),
@@ -39,31 +39,31 @@ def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
         (1000.0, 500, 2, 25),
     ],
 )
-def test_the_length_of_a_time_slice_follows_from_factor_rate_and_sample_period(
+def test_the_length_of_a_stretch_follows_from_factor_rate_and_sample_period(
     factor: float, hz: int, period: int, steps: int
 ) -> None:
-    assert slice_steps(factor, hz, period, 0) == steps
+    assert stretch_steps(factor, hz, period, 0) == steps
 
 
 @pytest.mark.parametrize(("factor", "steps"), [(1.0, 25), (0.2, 5), (0.001, 1), (5.0, 125), (1e300, 250)])
-def test_without_listeners_a_time_slice_is_as_long_as_requests_can_wait(factor: float, steps: int) -> None:
-    assert long_slice_steps(factor, 500, 0.5) == steps
+def test_without_listeners_a_stretch_is_as_long_as_requests_can_wait(factor: float, steps: int) -> None:
+    assert long_stretch_steps(factor, 500, 0.5) == steps
 
 
-def test_a_time_slice_ends_with_the_sample_period() -> None:
-    assert slice_steps(1.0, 500, 5, 3) == 2
-    assert slice_steps(0.001, 500, 5, 3) == 1
+def test_a_stretch_ends_with_the_sample_period() -> None:
+    assert stretch_steps(1.0, 500, 5, 3) == 2
+    assert stretch_steps(0.001, 500, 5, 3) == 1
 
 
 def run(pace: Pace, clock: Clock, *, since_ns: int, work_s: float, factor: float = 1.0) -> float:
-    """A slice of 4 ms that takes some work; real time of its end [s]."""
+    """A stretch of 4 ms that takes some work; real time of its end [s]."""
     began_s = clock.now
     clock.now += work_s
     pace.wait(factor, began_s=began_s, since_ns=since_ns, until_ns=since_ns + 4_000_000)
     return clock.now
 
 
-def test_time_spent_between_slices_does_not_add_up(clock: Clock) -> None:
+def test_time_spent_between_stretches_does_not_add_up(clock: Clock) -> None:
     keeper, ends = Pace(), []
     for number in range(100):
         clock.now += 0.001
@@ -71,7 +71,7 @@ def test_time_spent_between_slices_does_not_add_up(clock: Clock) -> None:
     assert ends[-1] - ends[0] == pytest.approx(99 * 0.004)
 
 
-def test_a_time_slice_that_took_too_long_is_caught_up_with(clock: Clock) -> None:
+def test_a_stretch_that_took_too_long_is_caught_up_with(clock: Clock) -> None:
     keeper = Pace()
     first = run(keeper, clock, since_ns=0, work_s=0.0)
     assert run(keeper, clock, since_ns=4_000_000, work_s=0.010) == pytest.approx(first + 0.010)
@@ -95,6 +95,6 @@ def test_after_a_rest_or_a_reset_pace_is_kept_from_the_present_time(
     )
 
 
-def test_a_time_slice_in_slow_motion_takes_longer(clock: Clock) -> None:
+def test_a_stretch_in_slow_motion_takes_longer(clock: Clock) -> None:
     began_s = clock.now
     assert run(Pace(), clock, since_ns=0, work_s=0.0, factor=0.1) == pytest.approx(began_s + 0.040)

@@ -91,7 +91,7 @@ def test_a_trial_yields_its_episode_once_and_with_the_results_of_its_goals(simul
     assert simulation.episode() is None
 
 
-def test_the_same_trial_gives_the_same_samples_however_it_is_sliced(simulation: Simulation) -> None:
+def test_the_same_trial_gives_the_same_samples_however_it_is_divided(simulation: Simulation) -> None:
     trial(simulation)
     run(simulation)
     whole = simulation.episode()
@@ -99,12 +99,12 @@ def test_the_same_trial_gives_the_same_samples_however_it_is_sliced(simulation: 
     simulation.state = StateCode.PAUSED
     for steps in (1, 2, 77, 3, 400, 1000):
         simulation.step(steps)
-    sliced = simulation.episode()
+    divided = simulation.episode()
     assert whole is not None
-    assert sliced is not None
-    assert whole[0] == sliced[0]
+    assert divided is not None
+    assert whole[0] == divided[0]
     for name, column in vars(whole[1]).items():
-        assert np.array_equal(column, getattr(sliced[1], name)), name
+        assert np.array_equal(column, getattr(divided[1], name)), name
 
 
 def test_joints_are_at_the_trajectory_when_their_sample_is_taken(simulation: Simulation) -> None:
@@ -189,7 +189,7 @@ def test_while_paused_steps_advance_the_clock_exactly(simulation: Simulation) ->
     assert simulation.now_ns == 10 * 10**9 // CONFIG.sim.physics_hz
 
 
-def test_requested_steps_are_taken_slice_by_slice(simulation: Simulation) -> None:
+def test_requested_steps_are_taken_stretch_by_stretch(simulation: Simulation) -> None:
     simulation.set_state(StateCode.PAUSED)
     request = simulation.request_steps(60)
     assert simulation.running
@@ -322,7 +322,7 @@ def test_a_real_time_factor_holds_the_clock_back(simulation: Simulation) -> None
 
 
 @pytest.mark.parametrize(("leased", "watched", "samples"), [(True, False, 12), (True, True, 1), (False, False, 1)])
-def test_a_leased_trial_without_listeners_advances_in_long_slices(
+def test_a_leased_trial_without_listeners_advances_in_long_stretches(
     simulation: Simulation, *, leased: bool, watched: bool, samples: int
 ) -> None:
     if leased:

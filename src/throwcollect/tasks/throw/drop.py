@@ -18,21 +18,21 @@ from throwcollect.units import NS_PER_S
 _LEAST_SHARE = 0.25
 """Least speed of a throwing spoon, over the speed of a fall through the depth of its cup [-]: 0.20 m/s by default.
 
-A ball leaves a still spoon by its weight alone with 0.41 m/s at least (0.52 of that fall); so below this threshold it
-owes more of its speed to its weight than to the spoon. Of 143 balls that landed after simulated motions from random
-postures that hold the ball, 43 had left at a share below 0.03, most of them after the arm had come to rest; above,
-shares spread evenly. Sampled throws of the configurations that come with the product are above 0.9.
+A ball leaves a still spoon by its weight alone with 0.41 m/s at least (0.52 of that fall); so below this threshold, the
+ball owes more of its speed to its weight than to the spoon. Of 143 balls that landed after simulated motions from
+random postures that hold the ball, 43 had left at a share below 0.03, most of them after the arm had come to rest; the
+shares of the others spread evenly above that. Sampled throws of the product's own configurations are above 0.9.
 
 The energy that the ball gains is no criterion: it was up to 4.3 J/kg when a still spoon lost the ball after lifting it,
-and down to -2.1 J/kg when the ball was thrown with 1.8 m/s in a downward swing.
+and as low as -2.1 J/kg when the ball was thrown with 1.8 m/s in a downward swing.
 """
 
 
 def find_early_loss(samples: Samples, header: EpisodeHeader, *, config: Config) -> str | None:
     """Explain why a trial began without a ball in the tool; None if the ball was in the tool.
 
-    A ball that does not press on the tool at the start may be on a small bounce: it counts as in the tool if it is no
-    farther than the rim's radius from the place where it rests, and touches the tool later.
+    A ball that does not press on the tool at the start may be bouncing a little: it counts as in the tool if it is no
+    farther than the rim's radius from the place where it would rest, and touches the tool later.
     """
     held = [contact.start_ns for contact in header.contacts if contact.body == config.tool.name]
     if held and min(held) > header.start_ns:
@@ -50,9 +50,9 @@ def find_early_loss(samples: Samples, header: EpisodeHeader, *, config: Config) 
 def explain_drop(samples: Samples, header: EpisodeHeader, release: BallState, *, config: Config) -> str | None:
     """Explain why a ball that left the tool was not thrown by it; None if it was thrown.
 
-    The tool threw the ball if it moved in the direction that the ball then took, at a quarter or more of the speed of a
-    fall through the depth of the cup. When the tool brakes, the ball still has to roll over its rim; so the highest
-    speed of the tool counts during the time that the ball, at its own speed, needs for the radius of the rim.
+    The tool threw the ball if the tool moved in the direction that the ball then took, at a quarter or more of the
+    speed of a fall through the depth of the cup. When the tool brakes, the ball still has to roll over the rim. So the
+    highest speed counts that the tool had while the ball, at its own speed, covered the radius of the rim.
     """
     speed = math.hypot(*release.velocity)
     direction = [part / (speed or 1.0) for part in release.velocity]
@@ -62,7 +62,7 @@ def explain_drop(samples: Samples, header: EpisodeHeader, release: BallState, *,
     last = min(int(np.searchsorted(samples.stamps_ns, release_ns)), len(samples) - 1)
     tool = ToolMotion(config)
     fastest = -math.inf
-    # The search goes backwards, because most throws are told by the last samples before the release.
+    # The search goes backwards, because the last samples before the release are enough to recognise most throws.
     for row in range(last, -1, -1):
         velocity = tool.velocity(samples.position[row], samples.velocity[row]).tolist()
         fastest = max(fastest, add_up(map(operator.mul, direction, velocity)))

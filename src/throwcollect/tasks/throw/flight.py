@@ -1,4 +1,4 @@
-"""The ball between release and landing: its states between samples, and its distance from a ballistic flight."""
+"""Computes the ball between release and landing: states between samples, and the distance from a ballistic flight."""
 
 from __future__ import annotations
 
@@ -16,20 +16,20 @@ from throwcollect.tasks.throw.throw_config import throw_section
 from throwcollect.units import NS_PER_S
 
 BALLISTIC_TOLERANCE_M = 1e-9
-"""A recorded flight and the computed one differ by rounding, below 1e-12 m; the smallest kick moves a ball by more."""
+"""A recorded flight differs by rounding from the computed one, by less than 1e-12 m; any kick moves a ball by more."""
 
 
 @dataclass(frozen=True)
 class Flight:
     """The ball from its release on: a knot at the release, then one for each later sample.
 
-    Between knots the ball is on the cubic that has position and velocity of both; velocity is taken as linear there,
-    which ballistic motion makes exact.
+    Between two knots, the ball is on the cubic that has position and velocity of both knots. Its velocity is taken as
+    linear between the knots, which is exact for ballistic motion without drag.
 
     Attributes:
-        times: Since the start of the trial [s], shape ``(n_knots,)``.
+        times: Time of each knot since the start of the trial [s], shape ``(n_knots,)``.
         positions: Ball centre in world [m], shape ``(n_knots, 3)``.
-        velocities: In world [m/s], shape ``(n_knots, 3)``.
+        velocities: Velocity of the ball in world [m/s], shape ``(n_knots, 3)``.
     """
 
     times: NDArray[np.float64]
@@ -37,7 +37,7 @@ class Flight:
     velocities: NDArray[np.float64]
 
     def state_at(self, time_s: float, *, knot: int) -> BallState:
-        """Interpolate the ball at a time between a knot, which is not the last one, and the next."""
+        """Interpolate the ball at a time between a knot, which must not be the last one, and the next knot."""
         before, after = self.times[knot : knot + 2].tolist()
         span = after - before
         u = (time_s - before) / span
@@ -52,7 +52,7 @@ class Flight:
         return BallState(time_s, (x, y, z), (vx, vy, vz))
 
     def knot_state(self, knot: int) -> BallState:
-        """Ball at a knot."""
+        """Return the state of the ball at a knot."""
         (x, y, z), (vx, vy, vz) = self.positions[knot].tolist(), self.velocities[knot].tolist()
         return BallState(float(self.times[knot]), (x, y, z), (vx, vy, vz))
 
@@ -60,7 +60,7 @@ class Flight:
         """Find the first downward crossing of a height [m] by the ball's centre.
 
         Returns:
-            The knot before it and the ball at that instant; None without a crossing.
+            The knot before the crossing, and the ball at that instant; None if there is no crossing.
         """
         above = self.positions[:, 2] - height
         crossings = np.flatnonzero((above[:-1] >= 0) & (above[1:] < 0))
@@ -71,7 +71,7 @@ class Flight:
         z0, z1 = map(float, above[knot : knot + 2])
         m0, m1 = (float(speed) * span for speed in self.velocities[knot : knot + 2, 2])
         # These are the coefficients, by powers of u, of the height on the cubic of `state_at`.
-        u = _root((2 * z0 - 2 * z1 + m0 + m1, -3 * z0 + 3 * z1 - 2 * m0 - m1, m0, z0))
+        u = _find_root((2 * z0 - 2 * z1 + m0 + m1, -3 * z0 + 3 * z1 - 2 * m0 - m1, m0, z0))
         return knot, self.state_at(float(self.times[knot]) + u * span, knot=knot)
 
     def apex(self, knots: int) -> BallState:
@@ -125,8 +125,8 @@ def release_of(contacts: tuple[Contact, ...], *, tool: str, gap_s: float) -> int
     """Find the instant at which the ball left the tool [ns].
 
     Returns:
-        End of the first contact with the tool that no other one follows within `gap_s`; None if the ball never was
-        in the tool or never left it. The gap after the last contact may be cut short by the end of the record.
+        End of the first contact with the tool after which no other contact with it begins within `gap_s`; None if the
+        ball never was in the tool or never left it. The end of the record may cut short the gap after the last contact.
     """
     held = sorted((contact for contact in contacts if contact.body == tool), key=lambda contact: contact.start_ns)
     for number, contact in enumerate(held, start=1):
@@ -183,7 +183,7 @@ def flight_residual(samples: Samples, header: EpisodeHeader, *, config: Config) 
     return float(np.sqrt(x * x + y * y + z * z).max())
 
 
-def _root(cubic: tuple[float, float, float, float]) -> float:
+def _find_root(cubic: tuple[float, float, float, float]) -> float:
     """Find the root in (0, 1] of a cubic in u, highest power first, that is at least 0 at 0 and negative at 1."""
     a, b, c, d = cubic
     low, high = 0.0, 1.0
@@ -195,8 +195,8 @@ def _root(cubic: tuple[float, float, float, float]) -> float:
         else:
             high = u
         slope = (3 * a * u + 2 * b) * u + c
-        # Newton's method is used where it stays in the interval that holds the root. Elsewhere the interval is halved,
-        # which alone comes to the end of double precision in 60 rounds.
+        # Newton's method is used where it stays in the interval that holds the root. Elsewhere the interval is halved;
+        # 60 halvings alone would come to the end of double precision.
         newton = u - value / slope if slope else math.inf
         following = newton if low < newton < high else (low + high) / 2
         if abs(following - u) < 1e-15:

@@ -78,7 +78,7 @@ def throw_section(task: TaskConfig) -> ThrowConfig:
     """Return the section of a task, which has to be a throw.
 
     Raises:
-        ConfigError: If it is another task's.
+        ConfigError: If the section belongs to another task.
     """
     if not isinstance(task, ThrowConfig):
         raise ConfigError([Problem(f"should be 'throw', got {task.name!r}", key="task.name")])

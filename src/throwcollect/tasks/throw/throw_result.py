@@ -13,7 +13,7 @@ class ThrowOutcome(Outcome):
     """How a throw ended."""
 
     LANDED = "landed"
-    """Thrown, and crossed the landing plane without touching the robot, within all limits."""
+    """The ball was thrown, and crossed the landing plane without touching the robot; all limits were kept."""
     NOT_RELEASED = "not_released"
     """The ball never left the tool for good."""
     DROPPED = "dropped"
@@ -23,9 +23,9 @@ class ThrowOutcome(Outcome):
     SELF_HIT = "self_hit"
     """The ball touched a link of the robot after its release."""
     LIMIT_VIOLATED = "limit_violated"
-    """Landed, but a joint left its position or velocity limits or saturated its effort."""
+    """The ball landed, but a joint left its position or velocity limits or saturated its effort."""
     TIMEOUT = "timeout"
-    """Released, but it did not cross the landing plane in time."""
+    """The ball was released, but did not cross the landing plane in time."""
     TRACKING_FAILED = "tracking_failed"
     """A controller did not carry out its trajectory, or the simulation diverged."""
     LOST = "lost"
@@ -36,8 +36,8 @@ class ThrowOutcome(Outcome):
 class ThrowResult(Result):
     """Outcome and measures of a throw; the columns say what each measure is.
 
-    The apex lies between release and landing, or the end of the record. The ball lands when its lowest point crosses
-    the landing plane. See `flight.flight_residual` for `ballistic_residual_m`.
+    The apex lies between the release and the landing, or the end of the record if there is no landing. The ball lands
+    when its lowest point crosses the landing plane. See `flight.flight_residual` for `ballistic_residual_m`.
     """
 
     release: BallState | None = measured(BallColumns("when it left the {tool}"))

@@ -1,4 +1,4 @@
-"""The task of throwing: from recorded samples and contacts to an outcome and its numbers."""
+"""The task of throwing: finds outcome and measures of a throw from its recorded samples and contacts."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ class ThrowTask(Task[ThrowResult]):
     """The arm swings from start to end, and the ball leaves the tool when the tool brakes.
 
     Between ``tracking_failed`` and ``limit_violated`` (see `Task.judge`) come these outcomes; the first one that
-    holds counts. Everything that can be measured is measured in any case, so a throw that landed keeps its landing
-    under any outcome:
+    holds counts. Everything that can be measured is measured in any case, so a throw that landed has a landing whatever
+    its outcome is:
 
     1. ``dropped``: the ball was not in the tool at the start.
     2. ``not_released``: no contact with the tool ended for at least `task.recatch_gap_s` or to the end of the record.
@@ -37,9 +37,9 @@ class ThrowTask(Task[ThrowResult]):
        again; the first touch decides.
     5. ``timeout``: the ball's lowest point did not cross the landing plane downwards after the release.
 
-    Release, apex and landing lie between samples: positions on the cubic through the positions and velocities of both
-    neighbours, velocities linear between them. Below a low landing plane, the ground may press on the ball before the
-    sample after the landing; then a computed state of free flight replaces that sample.
+    Release, apex and landing are interpolated between samples: positions are on the cubic through the positions and
+    velocities of both neighbours, and velocities are linear between them. If the landing plane is low, the ground may
+    press on the ball before the sample after the landing; then a computed state of free flight replaces that sample.
     """
 
     outcomes = ThrowOutcome
@@ -59,16 +59,16 @@ class ThrowTask(Task[ThrowResult]):
             if impacts := [contact.start_ns for contact in header.contacts if contact.body == "ground"]:
                 flight = without_impact(flight, (min(impacts) - header.start_ns) / NS_PER_S, config=config)
             result = self._measure_flight(result, flight)
-            touched = self._touches(header, release_ns, result.landing.time_s if result.landing else math.inf)
+            touched = self._list_touches(header, release_ns, result.landing.time_s if result.landing else math.inf)
             result = replace(
                 result,
                 recontacts=len(touched),
                 release_spin=spin_after(samples, release_ns),
                 ballistic_residual_m=flight_residual(samples, header, config=config),
             )
-        return result, self._failure(result, samples, header, touched)
+        return result, self._find_failure(result, samples, header, touched)
 
-    def _failure(
+    def _find_failure(
         self, result: ThrowResult, samples: Samples, header: EpisodeHeader, touched: list[Contact]
     ) -> Failure | None:
         tool = self.config.tool.name
@@ -89,8 +89,8 @@ class ThrowTask(Task[ThrowResult]):
             return Failure(ThrowOutcome.TIMEOUT, reason)
         return None
 
-    def _touches(self, header: EpisodeHeader, release_ns: int, end_s: float) -> list[Contact]:
-        """List the contacts between release and landing: those with the tool that began then, all with the robot."""
+    def _list_touches(self, header: EpisodeHeader, release_ns: int, end_s: float) -> list[Contact]:
+        """List the contacts with the robot between release and landing; contacts with the tool must have begun then."""
 
         def counts(contact: Contact) -> bool:
             if contact.body == "ground" or (contact.start_ns - header.start_ns) / NS_PER_S >= end_s:
@@ -105,7 +105,7 @@ class ThrowTask(Task[ThrowResult]):
         release = flight.knot_state(0)
         crossing = flight.landing(self.config.scene.landing_height_m + self.config.ball.radius_m)
         last, landing = crossing or (len(flight.times) - 1, None)
-        speed, elevation = _direction(release)
+        speed, elevation = _compute_direction(release)
         return replace(
             result,
             release=release,
@@ -114,11 +114,11 @@ class ThrowTask(Task[ThrowResult]):
             apex=flight.apex(last + 1),
             landing=landing,
             flight_time_s=landing.time_s - release.time_s if landing else None,
-            hit_angle_rad=-_direction(landing)[1] if landing else None,
+            hit_angle_rad=-_compute_direction(landing)[1] if landing else None,
         )
 
 
-def _direction(ball: BallState) -> tuple[float, float]:
+def _compute_direction(ball: BallState) -> tuple[float, float]:
     """Compute the speed [m/s] and the elevation of the direction of flight above the horizontal [rad]."""
     vx, vy, vz = ball.velocity
     level = math.hypot(vx, vy)

@@ -44,7 +44,7 @@ class Spoon(Tool):
 
     @cached_property
     def boxes(self) -> tuple[Box, ...]:
-        """The handle, then the walls of the cup.
+        """The handle, and then the walls of the cup.
 
         The inner faces of the walls touch the cone from outside, so a ball that rests in the cup touches all of them.
         """
@@ -57,7 +57,7 @@ class Spoon(Tool):
         middle = np.array([config.cup_depth_m / 2, (config.cup_rim_radius_m + config.cup_floor_radius_m) / 2, 0.0])
         inner_face = pinocchio.SE3(pinocchio.rpy.rpyToMatrix(0.0, 0.0, lean), middle)
         wall = inner_face * pinocchio.SE3(np.eye(3), np.array([0.0, config.wall_thickness_m / 2, 0.0]))
-        # As wide as the rim, as narrower walls would leave gaps there; further down they overlap outside the cup alone.
+        # Narrower walls would leave gaps at the rim. Further down, these walls overlap, but only outside the cup.
         width = 2 * config.cup_rim_radius_m * math.tan(math.pi / config.cup_walls)
         turns = (
             pinocchio.SE3(pinocchio.rpy.rpyToMatrix(2 * math.pi * number / config.cup_walls, 0.0, 0.0), np.zeros(3))
@@ -68,9 +68,9 @@ class Spoon(Tool):
 
     @property
     def inertia(self) -> pinocchio.Inertia:
-        """Its inertia in ``spoon_link``, its mass spread evenly over the volume of its boxes."""
-        # `add_up` is used, because `sum` rounds otherwise from Python 3.12 on, and the bytes of a throw depend on the
-        # inertia.
+        """Inertia of the spoon in ``spoon_link``, with its mass spread evenly over the volume of its boxes."""
+        # `add_up` is used, because from Python 3.12 on `sum` rounds in another way, and the bytes of a throw depend on
+        # the inertia.
         density = self._config.mass_kg / add_up(math.prod(box.size) for box in self.boxes)
         total = pinocchio.Inertia.Zero()
         for box in self.boxes:
@@ -90,14 +90,14 @@ class Spoon(Tool):
             required = f"it must be above tool.cup_floor_radius_m = {floor}"
             raise ConfigError([Problem(f"{problem}; {required}", "ball.radius_m")])
         length, angle = self._slant
-        # A ball on the walls touches them at this distance from the cup's axis. Beyond the rim, or below the floor, it
-        # lies on that edge instead.
+        # A ball on the walls touches them at a distance of `radius * cos(angle)` from the cup's axis. If that is beyond
+        # the rim, or below the floor, the ball lies on the edge of the rim or of the floor instead.
         if radius * math.cos(angle) > rim:
             height = depth + math.sqrt(radius**2 - rim**2)
         elif radius * math.cos(angle) < floor:
             height = math.sqrt(radius**2 - floor**2)
         else:
-            # Seen from the side, the centre is as far from the wall, a straight line, as the radius is long.
+            # Seen from the side, the wall is a straight line, and the centre is away from it by the radius.
             height = (radius * length - floor * depth) / (rim - floor)
         return (height, 0.0, float(self._cup.translation[2]))
 
@@ -106,19 +106,19 @@ class Spoon(Tool):
 
         For the upright cup, this is the tilt in the worst direction up to which it holds the ball.
 
-        A ball that rests on the walls leaves between two of them, so that it touches both all the way, or neither. On a
-        way that climbs it stays whatever its friction is, because it rolls. In 628 simulated postures with 14 kinds of
-        cup and ball, every ball that touched nothing but the spoon stayed above 0.00 rad, and left below -0.01 rad.
+        A ball that rests on the walls leaves between two of them, and touches both walls all the way, or neither. If
+        the way climbs, the ball stays whatever its friction is, because it rolls. In 628 simulated postures with 14
+        kinds of cup and ball, every ball that touched only the spoon stayed above 0.00 rad, and left below -0.01 rad.
         """
         config = self._config
         _, lean = self._slant
-        # The edges of floor and rim hold a ball that lies on them as walls along its surface would.
+        # A ball that lies on the edge of floor or rim is held as if by walls along its surface.
         sine = min(max(math.cos(lean), config.cup_floor_radius_m / radius), config.cup_rim_radius_m / radius)
-        # Along the edge between two walls the way is less steep than up a wall.
+        # The way along the edge between two walls is less steep than the way up a wall.
         steepness = math.tan(math.asin(min(sine, 1.0))) * math.cos(math.pi / config.cup_walls)
         along, across, sideways = map(float, up)
         # One way out leads along each edge between two walls. Its direction has the lengths `steepness` along the axis
-        # and 1 across it, so the component along `up` is by how much it climbs.
+        # and 1 across it, so its component along `up` tells by how much it climbs.
         climbs = []
         for number in range(config.cup_walls):
             turn = math.pi * (2 * number + 1) / config.cup_walls
