@@ -38,8 +38,8 @@ class Growth:
 
     If an earlier collection has left a plan, only its first two rounds follow from the configuration alone. All later
     rounds follow from results, too, and trials that were lost may have other results when they are run again. So these
-    rounds are drawn again. A round that comes out differently is given up if it was planned before all results were known
-    that it depends on. If all were known, other versions of libraries make the difference, and the round stays.
+    rounds are drawn again. A round that comes out differently is given up if it was planned before all results were
+    known that it depends on. If all were known, other versions of libraries make the difference, and the round stays.
 
     Args:
         plan: The plan so far.

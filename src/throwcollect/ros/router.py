@@ -29,7 +29,7 @@ from throwcollect.run_key import RunKey
 DEFAULT_LISTEN = "tcp/127.0.0.1:7447"
 """Reachable from this host alone, at the port that nodes connect to by default."""
 
-_SLICE_S = 0.5
+_LOOK_S = 0.5
 
 _PORT_ATTEMPTS = 5
 
@@ -132,7 +132,7 @@ def serve(listen: str = DEFAULT_LISTEN, key_directory: Path | None = None) -> No
         while True:
             heartbeat.beat()
             with suppress(Empty):
-                stop.get(timeout=_SLICE_S)
+                stop.get(timeout=_LOOK_S)
                 return
 
 

@@ -11,7 +11,7 @@ from throwcollect.ros.middleware import Middleware
 
 _ANSWER_S = 10.0
 _AGAIN_S = 1.0
-_SLICE_S = 0.05
+_LOOK_S = 0.05
 
 
 def check_answers(node: ros.Node, executor: ros.Executor) -> None:
@@ -36,7 +36,7 @@ def check_answers(node: ros.Node, executor: ros.Executor) -> None:
             if now >= asked_at + _AGAIN_S:
                 asked_at = now
                 answers.append(client.call_async(service.Request()))
-            ros.spin_some(executor, timeout_sec=_SLICE_S)
+            ros.spin_some(executor, timeout_sec=_LOOK_S)
     finally:
         node.destroy_client(client)
 
