@@ -1,6 +1,6 @@
 """Begins runs in processes of their own, which also make the plan, so that a client does not have to wait for it.
 
-Such a run has a record from its first moment, in which also an error of its preparation is written.
+Such a run has a record from its first moment. If its preparation fails, the error is written into that record, too.
 """
 
 from __future__ import annotations
@@ -79,7 +79,7 @@ def begin_run(
         run: Id of the run; None makes a new one.
         origin: The request of a client; None if no client asks.
         kind: Kind of the run.
-        resumed: Whether the directory holds a dataset with which the run goes on.
+        resumed: Whether the run continues the dataset that the directory holds.
 
     Raises:
         ConflictError: If there is a run of that id.
@@ -154,7 +154,7 @@ def _begin(opened: OpenRun, record: RunRecord, order: bytes, lay_out: Callable[[
         logs = Path(record.logs)
         logs.mkdir(exist_ok=True)
         lay_out()
-        # The process can handle signals only after a second; one that asks it to stop has to wait until then.
+        # The process needs a second until it can handle signals; a request to stop stays blocked until then.
         before = signal.pthread_sigmask(signal.SIG_BLOCK, stop_signals())
         try:
             process = opened.start_process("begin", logs, stdin=subprocess.PIPE)
@@ -180,8 +180,8 @@ def _begin(opened: OpenRun, record: RunRecord, order: bytes, lay_out: Callable[[
 def carry_out(run: str, lock: int, order: bytes, *, onlooker: Onlooker, interruptions: Callable[[], int]) -> None:
     """Prepare and launch a run in the process that `begin_run` or `begin_container` has started.
 
-    This process has inherited the locked file, and was sent the order. Signals that ask it to stop are blocked until
-    here; from now on, `interruptions` counts them.
+    This process has inherited the locked file and received the order. Signals that ask it to stop were blocked until
+    it called this function; from now on, `interruptions` counts them.
 
     Raises:
         ThrowcollectError: If the run fails; the error is written into the record, too.
@@ -193,7 +193,8 @@ def carry_out(run: str, lock: int, order: bytes, *, onlooker: Onlooker, interrup
         launch_container(opened, CONTAINER_ORDERS.validate_json(order), onlooker=onlooker, interruptions=interruptions)
         return
     log = NodeLogs(Path(opened.record.logs)).path(LAUNCHER)
-    # Whatever fails before the launch, what was made for it is removed, after the error is in the record.
+    # If anything fails before the launch, the error is written into the record, and then the files of the run are
+    # removed.
     with ExitStack() as made:
         try:
             prepare = _prepare_session if opened.record.kind == "session" else _prepare_collection
@@ -205,7 +206,7 @@ def carry_out(run: str, lock: int, order: bytes, *, onlooker: Onlooker, interrup
                 return
             made.enter_context(prepared)
             _move_log(log, NodeLogs(Path(prepared.record.logs)).path(LAUNCHER))
-            # The last steps of the preparation do not ask, and may have taken long.
+            # The last steps of the preparation do not check for a request to stop, and may have taken long.
             planner.end_if_asked()
         except ThrowcollectError as error:
             end = datetime.now(timezone.utc)
@@ -218,7 +219,10 @@ def carry_out(run: str, lock: int, order: bytes, *, onlooker: Onlooker, interrup
 
 
 class _Planner(Onlooker):
-    """Writes into the record how far the plan is, gives it up if somebody asks to stop, and passes all else on."""
+    """Writes the progress of the plan into the record, ends the planning if somebody asks to stop, passes all else on.
+
+    It is the onlooker of the preparation, and passes on to the onlooker of the run.
+    """
 
     def __init__(self, run: OpenRun, onlooker: Onlooker, interruptions: Callable[[], int]) -> None:
         self._onlooker = onlooker
@@ -244,7 +248,7 @@ class _Planner(Onlooker):
         self.end_if_asked()
         if trials >= MANY_TRIALS and time.monotonic() >= self._write_at:
             self._write_at = time.monotonic() + _WRITE_PLANNING_S
-            # The plan goes on; whoever cannot write the record is told of it when the plan is made.
+            # If the record cannot be written, planning goes on; the first write after the plan reports the error.
             with suppress(ConfigError):
                 self._run.update(planning=Planning(checked, trials))
 
@@ -252,20 +256,20 @@ class _Planner(Onlooker):
         """End the preparation if somebody has asked to stop.
 
         Raises:
-            Interrupted: If so.
+            Interrupted: If somebody has.
         """
         if self._interruptions():
             raise Interrupted("stopped before any node was started")
 
 
 def _move_log(before: Path, after: Path) -> None:
-    """Move the launcher's log to the logs of the nodes, whose directory is there by now, and go on printing there.
+    """Move the launcher's log to the logs of the nodes, whose directory exists by now, and print into it from then on.
 
     Raises:
         WorkerError: If the new log cannot be written.
     """
     try:
-        # Nothing is moved if this process prints elsewhere than into the launcher's log, as into a terminal.
+        # If this process prints somewhere else, such as into a terminal, there is no log to move.
         if before == after or not os.path.samestat(os.fstat(1), before.stat()):
             return
         after.parent.mkdir(exist_ok=True)
@@ -312,7 +316,7 @@ def _prepare_session(records: Records, run: OpenRun, order: Order, onlooker: Onl
         choice = choose(config, say=onlooker.say, warn=onlooker.warn)
         simulations = choice.runtime.simulations(config)
         run.update(runtime=choice.name, middleware=choice.middleware, simulations=simulations)
-        # As for a collection, this shows errors before the run is launched.
+        # Making a host shows errors before the run is launched, as `prepare_run` does for a collection.
         choice.runtime.host(run.place, config, warn=onlooker.warn).close()
         return PreparedRun(records, run, config, directory, onlooker=onlooker, runtime=choice.runtime)
 

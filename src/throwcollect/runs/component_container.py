@@ -44,9 +44,9 @@ def check_order(order: ContainerOrder) -> None:
     """Refuse an order that would fail at once.
 
     Raises:
-        NotFoundError: If the run that the container is to join is not there.
+        NotFoundError: If the run that the container is to join does not exist.
         ConflictError: If that run has ended, or has no router to join.
-        ConfigError: If a mount or a network is not there or must not be used, or the container cannot join that run.
+        ConfigError: If a mount or a network does not exist or must not be used, or the container cannot join that run.
         WorkerError: If no engine answers, or it does not have the image.
         MissingExtraError: If the package that asks the engine is not installed.
     """

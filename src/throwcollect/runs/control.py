@@ -30,13 +30,13 @@ _STOP_S = 60.0
 _GRACE_S = 3.0
 _FORCE_S = 10.0
 _ANSWER_S = 10.0
-"""The router and then the nodes may each take this long: a router may be starting again, a launcher ending nodes."""
+"""Time for the router to answer, and then for the nodes: the router may be restarting, the launcher ending nodes."""
 
 
 def stop(run: Run, *, keep_on: Callable[[], bool] = lambda: True) -> Run:
-    """Drain a run: the trials that run are finished and written, no other is started, and all nodes end.
+    """Drain a run: running trials are finished and written, no further trial is started, and all nodes end.
 
-    This function waits for the end of the run as long as `keep_on` returns true, and returns the run as it is then.
+    This function waits until the run ends or `keep_on` returns false, and returns the run as it is then.
 
     Raises:
         ConfigError: If the run has ended, or its record cannot be read.
@@ -57,9 +57,9 @@ def stop(run: Run, *, keep_on: Callable[[], bool] = lambda: True) -> Run:
 def down(named: str | Run | None, *, volumes: bool = False) -> tuple[str, list[str]]:
     """End all nodes of a run, by force if need be, and forget the run; a dataset in a directory stays.
 
-    It is named as for `find_run_to_change`, or by the id of a run that has no record, but of which a runtime holds
-    containers. None takes the only run of the current directory that lives, or whose launcher died. A volume that holds
-    the dataset is removed only if `volumes` is true.
+    `named` is a run, or a name that `find_run_to_change` accepts, or the id of a run without a record whose containers
+    a runtime still holds. None takes the only run of the current directory that lives, or whose launcher died. A volume
+    that holds the dataset is removed only if `volumes` is true.
 
     Returns:
         Id of the run, and names of the containers, networks and volumes that were removed.
@@ -77,7 +77,7 @@ def down(named: str | Run | None, *, volumes: bool = False) -> tuple[str, list[s
     else:
         run = named if named in held else id_of(records, named)
     record: RunRecord | None = None
-    # A run whose record is damaged can be removed, too; only its launcher's process id is not known then.
+    # A run whose record is damaged can be removed, too, but without the record its launcher's process id is unknown.
     with suppress(ConfigError):
         record = records.get(run).record
     if record is not None:
@@ -117,7 +117,9 @@ def scale(run: Run, simulations: int) -> None:
 
 
 def set_parameter(run: Run, nodes: Sequence[str], name: str, value: float | str) -> list[SetParametersResult]:
-    """Set a parameter of several nodes of a run, named with their namespaces, at the same time; the answer of each.
+    """Set a parameter of several nodes of a run at the same time, and return the answer of each node.
+
+    `nodes` are full names, with their namespaces.
 
     Raises:
         WorkerError: If the router or a node does not answer.
@@ -181,9 +183,9 @@ def _end_launcher(records: Records, record: RunRecord) -> None:
 
 
 def _signal(records: Records, record: RunRecord, number: signal.Signals) -> None:
-    """Send a signal to a launcher, but never to another process that has got its process id later."""
+    """Send a signal to a launcher, but never to another process to which its process id was given later."""
     with suppress(ProcessLookupError):
-        # The order counts: if the run lives after the descriptor was opened, the descriptor names its launcher.
+        # The descriptor is opened before `lives` is called: if the run still lives then, it is the launcher's.
         process = os.pidfd_open(record.launcher)
         try:
             if records.lives(record.run):

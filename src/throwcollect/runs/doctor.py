@@ -67,7 +67,7 @@ def _check_memory() -> Check:
 
 
 def _check_engine(name: str) -> Check:
-    """Check a physics engine; a missing one is a problem only if no other engine that simulates contacts is there."""
+    """Check a physics engine; a missing one is a problem only if no other one is installed."""
     package = PACKAGES[name]
     if is_installed(package.module):
         return Check(package.module, "ok", version(package.distribution))
@@ -77,7 +77,7 @@ def _check_engine(name: str) -> Check:
 
 
 def _check_robot(name: str) -> Check:
-    """Check the description of a robot; without that of another package, collections with others still run."""
+    """Check the description of a robot; only Talos is required, as collections with it run without other robots."""
     is_own = name == TALOS.name
     check = "robot" if is_own else f"robot {name}"
     try:

@@ -48,7 +48,7 @@ class Event:
         return self.node is not None and self.event in _ALARMING
 
     def __str__(self) -> str:
-        """The event for people."""
+        """The event in words, for people."""
         details = [self.reason.partition("\n")[0] if self.reason else None]
         details += [format_count(self.simulations, "simulation") if self.simulations is not None else None]
         details += [f"exit code {self.exit_code}" if self.exit_code else None, self.handle and self.handle[:12]]

@@ -34,12 +34,12 @@ class Look:
 
 
 def follow(run: Run, *, keep_on: Callable[[], bool] = lambda: True) -> Iterator[Look]:
-    """Look at a run several times a second until it ends, or `keep_on` refuses to go on.
+    """Look at a run several times a second until it ends, or `keep_on` returns false.
 
     A program may follow several runs at once.
 
     Yields:
-        A look; the last one shows a run that has ended or died, unless `keep_on` refused.
+        A look; the last one shows a run that has ended or died, unless `keep_on` returned false.
 
     Raises:
         ConfigError: If the record of the run vanishes or cannot be read.
@@ -55,7 +55,7 @@ def follow(run: Run, *, keep_on: Callable[[], bool] = lambda: True) -> Iterator[
         while run.status == "running" and keep_on():
             reports.clear()
             listener.spin(run.connection, _POLL_S)
-            # The launcher writes an event before the record, so after the last record all events are there.
+            # The launcher writes events before the record, so the last record is read before the last events.
             run = run.now()
             happened = tuple(event for event, _ in _new_events(events, run))
             yield Look(run, reports[-1] if reports else None, happened)
@@ -87,7 +87,7 @@ def read_logs(
 ) -> Iterator[tuple[str, str, int]]:
     """Read the logs of these nodes of a run; of all nodes if none is named.
 
-    With `follow`, it goes on with new lines until the run ends, or `keep_on` refuses to.
+    With `follow`, this function goes on with new lines until the run ends, or `keep_on` returns false.
 
     Yields:
         The name of a node, a line that it printed, and the length of the longest name so far.
@@ -113,7 +113,7 @@ def read_logs(
 
 
 def read_events(run: Run, *, keep_on: Callable[[], bool] = lambda: True) -> Iterator[tuple[Event, str]]:
-    """Read the events of a run, from its start until it ends or `keep_on` refuses to go on.
+    """Read the events of a run, from its start until it ends or `keep_on` returns false.
 
     Yields:
         An event, and the line of JSON in which it is written.
@@ -128,10 +128,10 @@ def read_events(run: Run, *, keep_on: Callable[[], bool] = lambda: True) -> Iter
 
 def _new_events(tail: Tail, run: Run) -> Iterator[tuple[Event, str]]:
     """The events of a run that were written since the last call, and the line of each."""
-    # Events and logs of a run that is begun in the background have another place once its plan is made.
+    # A run that is begun in the background moves its events and logs to another directory once its plan is made.
     tail.path = _events_of(run)
     for line in tail.lines():
-        # Where a dataset is resumed, the file has the events of earlier runs, too.
+        # If the run resumes a dataset, the file has the events of earlier runs, too.
         if (event := parse(line)) is not None and event.run == run.id:
             yield event, line
 

@@ -30,9 +30,9 @@ _ANSWER_S = 15.0
 """Time in which the router, and then the launcher, has to answer."""
 _POLL_S = 0.1
 _SILENT_S = 120.0
-"""If no report arrives for this long, the run is taken to be over. A network that fails may be back before."""
+"""If no report arrives for this long, the run counts as over. A shorter silence may be a failure of the network."""
 _OVER_S = 5.0
-"""The same for a run whose last trial has ended."""
+"""The same time, for a run whose last trial has ended."""
 
 
 def join_run(
@@ -42,9 +42,9 @@ def join_run(
     onlooker: Onlooker = SILENT,
     interruptions: Callable[[], int] = lambda: 0,
 ) -> None:
-    """Simulate trials of a run that another machine has begun, and of which `word` is the token, until it is over.
+    """Simulate trials of a run that another machine has begun, until the run is over; `word` is the token of the run.
 
-    If somebody asks to stop, as `interruptions` counts, other simulations do the running trials again.
+    If somebody asks to stop, which `interruptions` counts, simulations of other machines do the running trials again.
 
     Raises:
         ConfigError: If the word is no token, or this machine would compute other throws.
@@ -81,7 +81,7 @@ def _simulate(
         supervisor.start()
         while not reports.over and not interruptions():
             listener.spin(connection, _POLL_S)
-            # There is no main node on this machine, whose end would be the first value.
+            # The first value is the end of the main node, which is on another machine.
             _, news = supervisor.poll()
             for line in news:
                 onlooker.warn(line)

@@ -41,9 +41,9 @@ def launch(
 ) -> Summary | None:
     """Launch a prepared run until its last trial has ended, or go on with a run whose launcher died.
 
-    A run that collects no dataset goes on until the user stops it. The end of the run is written into its record, and
-    the run and the runtime are closed; a runtime is given if it has begun something for the run. `interruptions` tells
-    how often the user has asked to stop: the first time, running trials are still finished.
+    A run that collects no dataset goes on until the user stops it. This function writes the end of the run into its
+    record, and closes the run and the runtime. `runtime` is the one that has begun something for the run; None if none
+    has. `interruptions` tells how often the user has asked to stop: the first time, running trials are still finished.
 
     Returns:
         The summary of the dataset, whose outcomes tell whether trials are lost; None if the run collects none.
@@ -81,14 +81,14 @@ def launch_host(
     """
     session = _Session(run, onlooker, interruptions)
     place = run.place
-    # Errors that are no `ThrowcollectError` leave these values, so that the record tells an end in any case.
+    # If another error than a `ThrowcollectError` is raised, the record gets these values, so it always tells an end.
     code, summary = 1, None
     failure: RunFailure | None = RunFailure("internal error")
     host: Host | None = None
     try:
         host = make_host(place)
         with hold_lock(place.directory, alone=False):
-            # What an earlier launcher has written of its nodes and its router does not hold any more.
+            # The nodes and the endpoint in the record may be those of an earlier launcher, and are outdated.
             run.update(launcher=os.getpid(), nodes=(), endpoint=None, stopping=False)
             info = host.collect(session)
             summary = None if info is None else Summary(**vars(info), open=is_open)
@@ -101,11 +101,11 @@ def launch_host(
     finally:
         if end is not None:
             end()
-        # Without a host, nobody has looked for containers of an earlier launcher, so what the record says still holds.
+        # Without a host, nobody has looked for containers of an earlier launcher, so `left` in the record still holds.
         left = run.record.left if host is None else not host.cleared
         if left:
             onlooker.warn(f"containers of this run may be left: {command('down', '--run', run.run)} ends them")
-        # Before the lock is released, the end has to be in the record; the run would look dead in between.
+        # The end is written into the record before the lock is released; otherwise the run would look dead in between.
         session.end(code, failure, summary, left=left)
         run.close()
 
@@ -126,7 +126,7 @@ class _Session:
         self._failed = False
 
     def update(self, progress: Progress) -> None:
-        # It is written together with the next change.
+        # The progress is written together with the next change of the nodes.
         self._progress = progress
         self._onlooker.update(progress)
 
@@ -182,7 +182,7 @@ class _Session:
 
 
 def launch_inherited(run: str, lock: int, *, onlooker: Onlooker, interruptions: Callable[[], int]) -> None:
-    """Launch a prepared run in the process that `start_launcher` has started, which has inherited the locked file.
+    """Launch a prepared run in this process, which `start_launcher` has started, and which inherited the locked file.
 
     Raises:
         ThrowcollectError: As `launch`, or if the record or the configuration cannot be read.
@@ -195,7 +195,7 @@ def launch_inherited(run: str, lock: int, *, onlooker: Onlooker, interruptions: 
 def start_launcher(records: Records, opened: OpenRun, *, interruptions: Callable[[], int]) -> Run:
     """Launch a prepared run in a process of its own, and return when its nodes are started.
 
-    If the user asks to stop, the launcher is asked, and waited for.
+    If the user asks to stop, this function asks the launcher to stop, and waits until it has ended.
 
     Raises:
         ConfigError: If the record cannot be read.
@@ -216,7 +216,7 @@ def start_launcher(records: Records, opened: OpenRun, *, interruptions: Callable
             forwarded = interruptions()
             process.terminate()
         nodes = run.record.nodes
-        # After a request to stop, the nodes may still come up, but the caller is to learn how the run ends.
+        # After a request to stop, this waits for the end even if all nodes start, to tell the caller how the run ended.
         if nodes and all(node.handle for node in nodes) and not forwarded:
             return run
         time.sleep(_POLL_S)

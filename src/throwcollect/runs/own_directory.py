@@ -29,7 +29,7 @@ def make_own_directory(prefix: str) -> Iterator[Path]:
     path = Path(tempfile.mkdtemp(prefix=prefix))
     try:
         with ExitStack() as held:
-            with suppress(OSError):  # on a file system without locks, other processes do not remove it either
+            with suppress(OSError):  # without locks, other processes cannot hold this directory either, so it stays
                 held.enter_context(_hold(path))
             for other in path.parent.glob(f"{prefix}*"):
                 if other != path:
@@ -55,7 +55,7 @@ def _hold(directory: Path) -> Iterator[None]:
     Raises:
         OSError: If the path is no directory, another process holds the lock, or the file system has no locks.
     """
-    # Everybody may write to /tmp, so a link may lie at this path that leads into a directory of this user.
+    # Everybody may write to /tmp, so somebody may have put a link at this path, to a directory of this user.
     descriptor = os.open(directory, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
     try:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)

@@ -28,11 +28,11 @@ from throwcollect.runtimes.ports import reserve_port
 from throwcollect.wording import command, format_count
 
 if TYPE_CHECKING:
-    # This import takes long; it happens only once the runtime has begun, so that both run at the same time.
+    # This import takes long; it is made after the runtime has begun its work, so that both run at the same time.
     from throwcollect.sweep.plan import Plan
 
 MANY_TRIALS = 1000
-"""A plan of this many trials takes seconds, so the user is told before."""
+"""A plan of this many trials takes seconds, so the user is told before it is made."""
 
 
 @dataclass(frozen=True)
@@ -42,13 +42,13 @@ class RunRequest:
     Attributes:
         sweep_directory: Directory of the configuration's file, in which lists of trials are looked for.
         directory: Directory of the dataset.
-        started: Time at which it was asked for.
-        plan: The plan, if the directory holds a dataset with which the run goes on; None for a new dataset.
+        started: Time of the request.
+        plan: The plan of the dataset that the run continues; None for a new dataset.
         processes: Number of processes that may check the trials of a large plan.
         ahead: Whether the runtime begins what it can before there is a plan, for `PreparedRun.collect`.
         origin: The request of a client; None if a command or a program asks.
-        begun: The runtime that has begun what it can, if it has by now; see `choice.begin`.
-        choice: The runtime, if it is chosen by now.
+        begun: The runtime that has begun what it can; None if it has not yet. See `runtime_choice.begin`.
+        choice: The runtime; None if it is not chosen yet.
     """
 
     config: Config
@@ -118,11 +118,11 @@ def resume(
     onlooker: Onlooker = SILENT,
     run: OpenRun | None = None,
 ) -> PreparedRun | None:
-    """Prepare to go on with a dataset that an earlier collection did not finish.
+    """Prepare a run that continues a dataset that an earlier collection did not finish.
 
     Args:
         directory: Directory of the dataset.
-        config: File with its configuration; None takes the configuration that lies in the directory.
+        config: The configuration's file; None takes the configuration that lies in the directory.
         overrides: Keys to change, as for `prepare`.
         processes: Number of processes that may check the trials of a larger plan, as for `prepare`.
         check: Whether the files of a finished dataset are compared byte for byte, and not only by their sizes.
@@ -167,16 +167,16 @@ def resume(
 def _read_stored(
     places: ExitStack, config: str | os.PathLike[str] | None, directory: Path, overrides: Sequence[str]
 ) -> Config:
-    """Read the configuration to go on with; errors within `places` name places of its file.
+    """Read the configuration of a dataset to continue; until `places` is closed, errors name places of its file.
 
     Raises:
-        ConfigError: If it cannot be used.
-        DatasetError: If that of the dataset is damaged.
+        ConfigError: If the configuration cannot be used.
+        DatasetError: If the configuration in the dataset is damaged.
     """
     try:
         return places.enter_context(load_locating_errors(Path(config or config_path(directory)), overrides))
     except ConfigError as error:
-        # A problem without a place in a file is one of the overrides, which another file would not help.
+        # A problem without a place in a file is a problem of the overrides, which another file would not solve.
         if config or all(problem.path is None for problem in error.problems):
             raise
         refuse_damaged_config(directory, error)
@@ -185,7 +185,7 @@ def _read_stored(
 
 
 def _plan_again(request: RunRequest, onlooker: Onlooker, *, check: bool) -> RunRequest | None:
-    """Make the plan to go on with, and choose the runtime; None if every trial has ended.
+    """Make the plan of a dataset to continue, and choose the runtime; None if every trial has ended.
 
     Raises:
         ConfigError: If the configuration is another one than that of the dataset, or cannot be used.
@@ -195,7 +195,7 @@ def _plan_again(request: RunRequest, onlooker: Onlooker, *, check: bool) -> RunR
     from throwcollect.coordinator.resume import has_all_trials, resume
 
     def choose_runtime() -> None:
-        # A finished dataset has to stay one where nothing can be simulated.
+        # This fails before anything is written if nothing can be simulated here, so a finished dataset stays finished.
         nonlocal request
         request = _choose_runtime(request, onlooker)
 
@@ -215,10 +215,10 @@ def _plan_again(request: RunRequest, onlooker: Onlooker, *, check: bool) -> RunR
 
 
 def _choose_runtime(request: RunRequest, onlooker: Onlooker) -> RunRequest:
-    """Choose the runtime of a run that goes on with a dataset.
+    """Choose the runtime of a run that continues a dataset.
 
     Raises:
-        ConfigError: If the dataset would be in a volume, from which a collection cannot go on.
+        ConfigError: If the dataset would be in a volume, where a collection cannot be continued.
         WorkerError: If the runtime that is asked for cannot be used.
     """
     config = request.config
@@ -240,17 +240,17 @@ def _take_over(
 ) -> PreparedRun | None:
     """Take over the run whose containers collect into a directory without a launcher; None if there is no such run.
 
-    Its own configuration goes on to hold.
+    The run keeps its own configuration.
 
     Raises:
-        ConfigError: If the run collects with another configuration, or another process takes it over.
+        ConfigError: If the configuration of the run is another one, or another process takes the run over.
     """
     if (left := find_left_in(records, directory, own=own)) is None:
         return None
     from throwcollect.coordinator.prepare import make_self_contained
 
     kept = read_config(left.place.directory)
-    # In a dataset, `sweep.file` names the copy of the list of trials that lies there.
+    # In a dataset's configuration, `sweep.file` names the copy of the list of trials that lies in the dataset.
     if kept.without_run() != make_self_contained(config).without_run():
         raise ConfigError(
             f"{left.record.directory}: run {left.id} collects into it, with another configuration",
@@ -259,7 +259,7 @@ def _take_over(
     run = records.take(left.id)
     if run is None:
         raise busy_error(left.record)
-    # If this launcher dies, too, the containers are still there.
+    # `left` is true from now on: if this launcher dies, too, the containers still exist.
     run.update(ended=None, exit_code=None, failure=None, left=True)
     fate = "died" if left.status == "died" else "given up"
     onlooker.say(f"run {run.run}: its launcher had {fate}; it goes on where its containers are")
@@ -269,7 +269,7 @@ def _take_over(
 def prepare_run(
     records: Records, request: RunRequest, onlooker: Onlooker, *, run: OpenRun | None = None
 ) -> PreparedRun:
-    """Prepare a run, a new one if None is given; if that fails, all files that were made here are removed.
+    """Prepare a run, a new one if `run` is None; if that fails, all files that this function made are removed.
 
     Raises:
         ConfigError: If the sweep, the directory or the port cannot be used.
@@ -286,8 +286,8 @@ def prepare_run(
             undo.callback(run.forget)
         # The plan may take minutes, so a port that is taken is reported before it is made.
         reserve_port(config.run).close()
-        # A runtime may take minutes to get an image, so it is chosen after all other checks. Only where a volume is
-        # named it comes first, as it decides whether the dataset goes there.
+        # A runtime may take minutes to get an image, so it is chosen after all other checks. If the configuration names
+        # a volume, the runtime is chosen first, because it decides whether the dataset goes into the volume.
         volume = config.containers.volume
         choice = request.choice
         if volume and choice is None:
@@ -298,12 +298,12 @@ def prepare_run(
         is_new = not directory.exists()
         plan = plan or _make_plan(request, directory, onlooker)
         held.enter_context(hold_lock(directory, alone=False))
-        # The files of a resumed dataset were there before, so only a new plan is removed.
+        # A resumed dataset had its files before this run, so they are removed only if the plan is new.
         if request.plan is None:
             undo.callback(_remove_plan, directory, is_new=is_new)
         choice = choice or choose(config, say=onlooker.say, warn=onlooker.warn, begun=begun)
         record = _record(run, request, choice, directory, volume)
-        # A host looks for image, mounts, networks and ports when it is made, so errors show before the run is launched.
+        # A host checks image, mounts, networks and ports when it is made, so errors show before the run is launched.
         choice.runtime.host(record.place(run.key), config, warn=onlooker.warn).close()
         run.write(record)
         _warn_of_company(config, choice.middleware, onlooker)

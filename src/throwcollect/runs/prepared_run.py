@@ -29,7 +29,7 @@ class PreparedRun:
 
     Args:
         runtime: The runtime, if it has begun something for the run; else None.
-        held: Keeps others from the directory until the launcher, which may be another process, does so itself.
+        held: Holds the lock of the directory until the launcher, which may be another process, holds it itself.
         undo: Removes what was made for the run, if it is not launched.
     """
 
@@ -62,7 +62,7 @@ class PreparedRun:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self._over = self._over or "was given up when its block was left"
-        # Others are kept from the directory until the files that were made in it are gone.
+        # The directory stays locked until the files that were made in it are removed.
         with self._held:
             self._undo.close()
             self._run.close()
@@ -110,13 +110,13 @@ class PreparedRun:
         summary = launch(
             self._run, self.config, onlooker=self._onlooker, interruptions=interruptions, runtime=self._runtime
         )
-        # Only `background` begins runs without a dataset, which have no summary, and takes none.
+        # Runs without a dataset have no summary. Only `background` prepares those, and it does not use the result.
         return cast(Summary, summary)
 
     def start(self, *, interruptions: Callable[[], int] = lambda: 0) -> Run:
         """Launch the run in a process of its own, which outlives this one, and return when its nodes are started.
 
-        If the user asks to stop, as `interruptions` counts, the launcher is asked, and waited for.
+        If the user asks to stop, which `interruptions` counts, this method asks the launcher to stop, and waits for it.
 
         Raises:
             ConflictError: If the run was launched already, or given up.
@@ -127,15 +127,15 @@ class PreparedRun:
 
         self._hand_over()
         if self._runtime is not None:
-            # The launcher, as another process, cannot use what the runtime has begun in this one.
+            # The launcher is another process, and cannot use the things that the runtime has begun in this one.
             self._runtime.close()
         return start_launcher(self._records, self._run, interruptions=interruptions)
 
     def _hand_over(self) -> None:
-        """Hand the run over to its launcher, which answers for it and writes its end, so that nothing is removed here.
+        """Hand the run over to its launcher, which writes its end; from then on, this object removes no files.
 
         Raises:
-            ConflictError: If that was done already, or the run was given up.
+            ConflictError: If the run was launched already, or given up.
         """
         if self._over:
             raise ConflictError(

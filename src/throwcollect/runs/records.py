@@ -92,7 +92,7 @@ class Run:
 
     @property
     def nodes(self) -> tuple[NodeState, ...]:
-        """The nodes, as far as they can still run: processes of a launcher that died have ended with it."""
+        """The nodes that can still run; none if the launcher died and they were its processes, as these end with it."""
         return self.record.nodes if self.status != "died" or _may_outlive(self.record) else ()
 
     @property
@@ -185,7 +185,7 @@ class OpenRun:
 
     def forget(self) -> None:
         """Remove the record and the files of the run, but no dataset in a directory, and release the lock."""
-        # The record goes first and the lock last, so that nobody finds or takes a run of which only a part is there.
+        # The record is removed first and the lock is released last: nobody finds or takes a half-removed run.
         for path in (self._runs / f"{self.run}.json", self._runs / f"{self.run}.lock"):
             with suppress(OSError):
                 path.unlink()
@@ -204,7 +204,7 @@ class Records:
         self._runs = state_directory() / "runs"
         try:
             self._runs.mkdir(mode=0o700, exist_ok=True)
-            # Others may read the directory above if the user has named it; they must not read the records.
+            # If the user has named the directory above, others may be allowed to read it, but not the records.
             self._runs.chmod(0o700)
         except OSError as error:
             raise unusable(self._runs, error) from error
@@ -212,7 +212,7 @@ class Records:
     def new(self, name: str, *, run: str | None = None) -> OpenRun:
         """Make a new run, with a key but without a record yet; forget runs that ended a week ago.
 
-        If no id is given, one is made that begins with `name`, that of the collection.
+        If no id is given, this makes one that begins with `name`, the name of the collection.
 
         Raises:
             ConflictError: If there is a run of that id.
@@ -256,7 +256,7 @@ class Records:
         deadline = time.monotonic() + _LOCK_PATIENCE_S
         while True:
             try:
-                # The file is made if need be, because `down` also takes runs of which only containers are known.
+                # The file is made if it does not exist, because `down` also takes runs that left only containers.
                 lock = os.open(path, os.O_RDWR | os.O_CREAT, 0o600)
             except OSError as error:
                 raise unusable(path, error) from error
@@ -264,7 +264,8 @@ class Records:
                 given_up.callback(os.close, lock)
                 with suppress(BlockingIOError, FileNotFoundError):
                     fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                    # Whoever had the lock may have forgotten the run, and another process made the file anew.
+                    # The last holder of the lock may have removed the file, and another process made a new one; then
+                    # this lock is of no use.
                     if os.path.samestat(os.fstat(lock), path.stat()):
                         given_up.pop_all()
                         return OpenRun(self._runs, run, lock)
@@ -283,7 +284,8 @@ class Records:
             NotFoundError: If it has no record.
             ConfigError: If the record is damaged or of another version.
         """
-        # The lock is looked at first, because a launcher writes the end of the run before it releases the lock.
+        # A launcher writes the end of the run before it releases the lock. So the lock is checked before the record
+        # is read; otherwise a run that ends in between would look dead.
         lives = self.lives(run)
         return Run(_read(self._runs / f"{run}.json"), lives, _key(self._runs, run), self)
 
@@ -292,10 +294,10 @@ class Records:
         return self._read_all(self.ids())
 
     def into(self, directory: Path) -> list[Run]:
-        """Runs that collect, or have collected, into a directory and no volume; the latest last."""
-        # Records have the real path; those of earlier versions the path as it was given.
+        """Runs that collect, or have collected, into a directory, and not into a volume; the latest last."""
+        # A record holds the real path; a record of an earlier version holds the path as the user gave it.
         names = {os.path.realpath(directory), str(directory.absolute())}
-        # There may be thousands of records, so only those are parsed that hold the directory's name.
+        # There may be thousands of records, so only those that contain the directory's name are parsed.
         written = [to_json(name) for name in names]
 
         def names_it(run: str) -> bool:
@@ -314,7 +316,7 @@ class Records:
         return sorted(runs, key=lambda run: run.record.started)
 
     def read_change_ns(self, run: str) -> int | None:
-        """Time of the last change of a run's record, in nanoseconds of the file system's clock; None if it is gone."""
+        """Time of the last change of a run's record, in ns of the file system's clock; None without a record."""
         try:
             return (self._runs / f"{run}.json").stat().st_mtime_ns
         except OSError:
@@ -328,17 +330,17 @@ class Records:
         before = datetime.now(timezone.utc) - _REMEMBERED
 
         def may_be_old(run: str) -> bool:
-            """Whether a record was written long ago, which its file tells without being read."""
+            """Whether a record was written long ago, by the time of its file, so that the record need not be read."""
             changed_ns = self.read_change_ns(run)
             return changed_ns is not None and changed_ns / NS_PER_S <= before.timestamp()
 
         for run in self._read_all(filter(may_be_old, self.ids())):
             record = run.record
-            # As long as nodes outlive their launcher, only this record tells what they are.
+            # The record of a run whose nodes may outlive its launcher is kept: nothing else describes these nodes.
             over = run.status == "ended" or (run.status == "died" and not _may_outlive(record))
             if over and (record.ended or record.started) <= before and (opened := self.take(record.run)) is not None:
                 opened.forget()
-        # Whoever is killed while the plan is made leaves a key and no record. The lock is as old as the key.
+        # A process that is killed while it makes the plan leaves a lock and a key of the same age, but no record.
         for lock in self._runs.glob("*.lock"):
             with suppress(FileNotFoundError):
                 unrecorded = lock.stat().st_mtime <= before.timestamp() and not lock.with_suffix(".json").exists()
@@ -347,7 +349,7 @@ class Records:
 
 
 def _may_outlive(record: RunRecord) -> bool:
-    """Whether nodes of a run may outlive its launcher; assumed of a runtime that is not installed here."""
+    """Whether nodes of a run may outlive its launcher; true also if its runtime is not installed here."""
     try:
         return bool(record.runtime) and get_runtime(record.runtime).outlives_launcher
     except ConfigError:

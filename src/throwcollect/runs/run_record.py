@@ -46,7 +46,7 @@ class RunFailure:
         return cls(error.message, error.expected, error.evidence, error.hint)
 
     def error(self, exit_code: int | None) -> ThrowcollectError:
-        """The error, as it was raised; the exit code of the run tells its class."""
+        """The error as it was raised; the exit code of the run determines its class."""
         kind = next((kind for kind in _KINDS if kind.exit_code == exit_code), ThrowcollectError)
         error = kind(self.message)
         error.expected, error.evidence, error.hint = self.expected, self.evidence, self.hint

@@ -1,4 +1,4 @@
-"""Finds the run that a user names, and runs whose nodes are still there after their launcher has died."""
+"""Finds the run that a user names, and runs whose nodes still exist although their launcher has died."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ _MOST_LISTED = 5
 
 
 def find_run_to_change(records: Records, named: str | None, *, command: str, died: bool = False) -> Run:
-    """Find the run that a command is to change, whose name without its option ``--run`` is `command`.
+    """Find the run that a command is to change; `command` is its name without the option ``--run``, for hints.
 
-    The user names it as for `id_of`. None takes the only run that lives, or with `died` whose launcher died, and that
-    belongs to the current directory, because it was begun there or its dataset lies below.
+    The user names the run as for `id_of`. None takes the only run that lives (with `died`, also one whose launcher
+    died) and that belongs to the current directory, because it was begun there or its dataset lies below.
 
     Raises:
         ConfigError: If there is no such run, or more than one, or the only one belongs to another directory.
@@ -55,8 +55,8 @@ def find(named: str | os.PathLike[str]) -> Run:
 def find_run_to_watch(records: Records, named: str | None, *, say: Callable[[str], object]) -> Run:
     """Find the run that a command is to look at, and `say` which it is if it belongs to another directory.
 
-    The user names it as for `id_of`. None takes the only run that lives, or else the latest run, of the current
-    directory; if no run belongs to that, of any directory.
+    The user names the run as for `id_of`. None takes the only run of the current directory that lives, or else the
+    latest run of that directory. If no run belongs to the current directory, those of all directories are considered.
 
     Raises:
         ConfigError: If there is no such run, or more than one.
@@ -95,10 +95,10 @@ def _origin(run: Run) -> str:
 
 
 def id_of(records: Records, named: str) -> str:
-    """Find the id of the run that a user names by its id, the beginning of that, or the directory of the dataset.
+    """Find the id of the run that a user names by its id, the beginning of its id, or the directory of the dataset.
 
-    Of several runs with the same beginning, the only one that lives is meant. Which one of several that live, or of
-    several that are over, would be a guess.
+    If several ids begin alike, the user means the only run of them that lives. If none of them lives, or more than one,
+    this raises an error, because choosing one would be a guess.
 
     Raises:
         ConfigError: If there is no such run, or more than one.
@@ -140,15 +140,15 @@ def _find_only_living(records: Records, ids: Sequence[str], named: str) -> str:
 
 
 def _list(runs: Sequence[Run]) -> str:
-    """The ids of the latest runs, of which the last is the latest, and how many there are besides."""
+    """The ids of the latest of these runs, the latest first, and the number of all others."""
     more = len(runs) - _MOST_LISTED
     return ", ".join(run.id for run in runs[: -_MOST_LISTED - 1 : -1]) + (f" and {more} more" if more > 0 else "")
 
 
 def find_left_in(records: Records, directory: Path, *, own: str | None = None) -> Run | None:
-    """Find a run that collects, or has collected, into a directory, and whose nodes are still there without a launcher.
+    """Find a run that collects, or has collected, into a directory, and whose nodes still exist without a launcher.
 
-    The run that this process prepares, whose id is `own`, is not looked at.
+    The run that this process prepares, whose id is `own`, is left out.
 
     Raises:
         ConfigError: If a run whose launcher lives collects into the directory.
@@ -173,7 +173,7 @@ def find_left_in(records: Records, directory: Path, *, own: str | None = None) -
 
 
 def busy_error(record: RunRecord) -> ConflictError:
-    """The error that a run collects into a directory."""
+    """The error that a run already collects into the directory."""
     return ConflictError(
         f"{record.directory}: run {record.run} collects into it",
         hint=f"{command('wait', '--run', record.run)} follows it",
@@ -188,7 +188,7 @@ def describe_death(run: Run) -> WorkerError:
             f"run {run.id}: its launcher died, but the dataset is complete: {run.place.dataset}", hint=hint
         )
     what = f"run {run.id}: its launcher died"
-    # No runtime is chosen before there is a plan, and no trial has run before.
+    # A runtime is chosen after the plan is made, so a run with neither has simulated no trial.
     is_planned = run.record.runtime != "" or config_path(run.place.directory).is_file()
     if run.record.kind == "collection" and is_planned:
         what = f"{what}; finished throws are in {run.place.dataset}"
@@ -200,20 +200,20 @@ def describe_death(run: Run) -> WorkerError:
 def has_complete_dataset(run: Run) -> bool:
     """Whether nothing is left to collect into the directory of a run.
 
-    A later run may have gone on with what this one left, so the dataset is asked unless this run has completed it.
+    A later run may have continued the dataset. So the dataset itself is examined, unless this run has completed it.
     """
     if run.record.kind != "collection" or run.status == "running":
         return False
     if run.record.exit_code == 0:
         return True
-    # This imports what reads tables, which takes a while and is rarely needed.
+    # This imports the libraries that read tables, which takes a while and is rarely needed.
     from throwcollect.coordinator.resume import is_complete
 
     return run.record.volume is None and is_complete(run.place.directory)
 
 
 def require_living(run: Run) -> RunRecord:
-    """The record of a run, which has to live.
+    """Check that a run lives, and return its record.
 
     Raises:
         ConflictError: If the run has ended.
@@ -227,5 +227,5 @@ def require_living(run: Run) -> RunRecord:
 
 
 def find_held_runs() -> dict[str, tuple[str, HeldRun]]:
-    """Find all runs of which some runtime holds nodes or a network: by id, the name of the runtime and the run."""
+    """Find all runs of which a runtime holds nodes or a network; by the id of a run, the runtime's name and the run."""
     return {held.run_id: (name, held) for name in names_of("runtimes") for held in get_runtime(name).find_held()}

@@ -23,13 +23,13 @@ class RuntimeChoice:
 
 
 def begin(config: Config) -> RuntimeChoice | None:
-    """Let the runtime that the run will most likely have begin what it can before there is a plan.
+    """Let the runtime that the run will most likely have begin all work that needs no plan.
 
     Returns:
-        The runtime, to be handed to `choose` and to be closed in any case; None if no runtime seems to be there.
+        The runtime, for `choose`, which the caller has to close in any case; None if no runtime seems to be available.
 
     Raises:
-        ConfigError: If rclpy is asked for, and is not there, or there is no such runtime.
+        ConfigError: If the configuration asks for rclpy, which is not installed, or for an unknown runtime.
         MissingExtraError: If the runtime needs a package that is not installed.
     """
     middleware = choose_middleware(config.run.ros)
@@ -46,12 +46,12 @@ def choose(
 ) -> RuntimeChoice:
     """Choose the runtime that a configuration asks for, and make sure that it can be used.
 
-    With ``auto``, that is containers where there is an engine for them. rclpy is used where it is installed. `say` is
-    told what is chosen, and before that what is done to get it; `warn` of what may be wrong, such as an image that was
-    made from other sources. `begun` is what `begin` returned.
+    With ``auto``, nodes are containers if an engine for them is available. rclpy is used where it is installed. `say`
+    gets a line for each step that takes long, such as pulling an image, and then the choice. `warn` gets a line for
+    everything that may be wrong, such as an image that was made from other sources. `begun` is what `begin` returned.
 
     Raises:
-        ConfigError: If rclpy is asked for, and is not there, or there is no such runtime.
+        ConfigError: If the configuration asks for rclpy, which is not installed, or for an unknown runtime.
         MissingExtraError: If the runtime needs a package that is not installed.
         WorkerError: If the runtime that is asked for cannot be used.
     """

@@ -76,7 +76,7 @@ def collect_slice(
     attempt = make_attempt(directory, slice, scratch=scratch)
     create(attempt, plan)
     take_recordings(earlier, attempt)
-    # The copies in a scratch directory lie on the disk of one machine, so that only the earlier attempts are safe.
+    # A scratch directory lies on the disk of this machine, which may be lost, so then the earlier attempts are kept.
     if scratch is None:
         remove_stopped(earlier)
     onlooker.say(f"slice {slice}: trials {plan.trials.first} to {plan.trials.numbers[-1]}")
@@ -98,7 +98,7 @@ def collect_slice(
 
 
 def _keep_recordings(attempt: Path, earlier: Sequence[Path], directory: Path, slice: Slice) -> None:
-    """Move the recordings of an attempt that is over from the scratch directory into that of the dataset.
+    """Move the recordings of an attempt that is over from the scratch directory into the directory of the dataset.
 
     The next attempt may run on another machine, which does not see the scratch directory of this one.
     """
@@ -176,4 +176,4 @@ def check_closed(config: Config) -> None:
         ConfigError: If the run would be open.
     """
     if config.run.open:
-        raise ConfigError([Problem("should be false, as nodes of a cluster are there for many", key="run.open")])
+        raise ConfigError([Problem("should be false, as many users share the nodes of a cluster", key="run.open")])

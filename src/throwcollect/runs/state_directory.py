@@ -15,7 +15,7 @@ STATE_VARIABLE = "THROWCOLLECT_STATE"
 
 
 def state_directory() -> Path:
-    """Path of the directory, which is made if it is not there.
+    """Path of the directory, which is made if it does not exist.
 
     By default it lies in the directory for temporary files, because ``XDG_RUNTIME_DIR`` vanishes at the last logout.
 
@@ -55,7 +55,7 @@ def unusable(path: Path, error: OSError) -> ConfigError:
 
 
 def is_locked(path: Path) -> bool:
-    """Whether a process holds the lock of a file, which it does as long as it lives.
+    """Whether a process holds the lock of a file, as a launcher does as long as it lives.
 
     Unlike a process id, a lock cannot outlive its process or pass to another one. This function takes the lock for a
     moment to find out.
@@ -65,7 +65,7 @@ def is_locked(path: Path) -> bool:
     except OSError:
         return False
     try:
-        # The lock is shared, so that two processes that look at the same time do not take each other for the launcher.
+        # A shared lock is enough to find out, and two processes that do so at once do not hinder each other.
         fcntl.flock(lock, fcntl.LOCK_SH | fcntl.LOCK_NB)
     except BlockingIOError:
         return True

@@ -49,7 +49,7 @@ class JoinToken:
         try:
             if data == word.strip():
                 raise ValueError(word)
-            # `encode` leaves out the padding, without which Python does not decode.
+            # `encode` leaves out the padding, but `b64decode` demands it.
             text = base64.b64decode(data + "=" * (-len(data) % 4), altchars=b"-_", validate=True)
             token = _JSON.validate_json(text)
             bytes.fromhex(token.secret)
