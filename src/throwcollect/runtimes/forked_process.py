@@ -1,4 +1,4 @@
-"""A process that is forked off this one and begins anew, but with the modules that are imported already."""
+"""A process that is forked off this one and starts like a new one, but has the modules that this one has imported."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class ForkedProcess:
 
     def __init__(self, work: Callable[[], object], *, environment: Mapping[str, str], kept: int) -> None:
         for stream in (sys.stdout, sys.stderr):
-            # Otherwise the forked process would write the content of the buffer once more.
+            # Otherwise the forked process would write the content of the stream's buffer a second time.
             stream.flush()
         parent = os.getpid()
         self.pid = os.fork()
@@ -43,12 +43,12 @@ class ForkedProcess:
         self.send_signal(signal.SIGKILL)
 
     def wait(self) -> int:
-        """Wait for the end of the process, and tell it as `subprocess.Popen.returncode` does; call this only once."""
+        """Wait for the end of the process, and return a code like `subprocess.Popen.returncode`; may be called once."""
         return os.waitstatus_to_exitcode(os.waitpid(self.pid, 0)[1])
 
 
 def _do(work: Callable[[], object], parent: int, environment: Mapping[str, str], kept: int) -> None:
-    """Work, and end this process in any case: the functions that called this one belong to the parent."""
+    """Call `work`, then always end this process, because the functions that called this one belong to the parent."""
     code = 1
     try:
         _start_afresh(parent, environment, kept)
@@ -67,9 +67,9 @@ def _start_afresh(parent: int, environment: Mapping[str, str], kept: int) -> Non
 
     die_with_parent(parent)
     os.setsid()
-    # A node that is forked off this process later runs these functions at its end, and those here are the parent's.
+    # The registered functions are the parent's. Nodes that are forked off this process would run them at their end.
     atexit._clear()
-    # As after `exec`, handlers are gone, and signals that were ignored are still ignored.
+    # As after `exec`, handlers are removed, and signals that were ignored are still ignored.
     for number in signal.valid_signals():
         if callable(signal.getsignal(number)):
             signal.signal(number, signal.SIG_DFL)
@@ -83,7 +83,7 @@ def _start_afresh(parent: int, environment: Mapping[str, str], kept: int) -> Non
     for stream in (0, 1, 2):
         os.dup2(nowhere, stream)
     for opened in map(int, os.listdir("/proc/self/fd")):
-        # One of these descriptors was that of the listed directory, and is closed by now.
+        # Listing the directory opened one of these descriptors, which is closed by now.
         with suppress(OSError):
             if opened > 2 and opened != kept:
                 os.close(opened)

@@ -21,7 +21,7 @@ SOURCES_LABEL = "throwcollect.sources"
 VERSION_LABEL = "org.opencontainers.image.version"
 """Label with the version of the sources in an image."""
 UNKNOWN = "unknown"
-"""Content of a label that was not set."""
+"""Content of a label that has no value."""
 
 _PACKAGE = Path(__file__).parents[1]
 """Directory of this package."""
@@ -58,7 +58,7 @@ def digest_sources(root: Path) -> str:
         inside = path.relative_to(root)
         if path.is_file() and not any(map(_LEFT_OUT.fullmatch, inside.parts)):
             content = path.read_bytes()
-            # The zero byte and the length keep lists of files apart that have the same bytes in a row.
+            # Without the zero byte and the length, different lists of files could give the same sequence of bytes.
             digest.update(f"{inside.as_posix()}\0{len(content)}\0".encode() + content)
     return digest.hexdigest()
 
@@ -66,7 +66,7 @@ def digest_sources(root: Path) -> str:
 def are_others(sources: str | None) -> bool:
     """Whether an image with this label was made from other sources than those of this package's clone.
 
-    Without a label, or without a clone, nobody can tell, so the answer is no.
+    Without a label or a clone, this cannot be found out, and the answer is no.
     """
     try:
         root = source_root()
@@ -76,12 +76,12 @@ def are_others(sources: str | None) -> bool:
 
 
 def check_wheelhouse(root: Path, wheelhouse: Path | None, *, ros: bool) -> None:
-    """Make sure that a directory of wheels holds some; None takes them from the package index.
+    """Make sure that a directory holds wheels; None takes them from the package index.
 
-    With `ros`, the wheels of genuine ROS 2 must be there, too, some of which are in no package index.
+    With `ros`, it also has to hold the wheels of genuine ROS 2, some of which no package index has.
 
     Raises:
-        ConfigError: If it does not hold them.
+        ConfigError: If the directory lacks wheels.
     """
     if wheelhouse is None:
         return
@@ -103,7 +103,7 @@ def write_context(archive: IO[bytes], root: Path, wheelhouse: Path | None) -> No
     def entry(info: tarfile.TarInfo) -> tarfile.TarInfo | None:
         info.uid = info.gid = 0
         info.uname = info.gname = ""
-        # Whoever runs the image reads them, whatever the umask was when the clone was made.
+        # Any user may run the image, and has to be able to read the files, whatever the umask of the clone was.
         info.mode = 0o755 if info.mode & 0o100 else 0o644
         return None if _LEFT_OUT.fullmatch(Path(info.name).name) else info
 
@@ -125,7 +125,7 @@ def find_revision(root: Path) -> str | None:
 
 
 def find_address(root: Path) -> str | None:
-    """Address at which others find the sources, without the name and the password that it may hold in the clone."""
+    """Address at which others find the sources, without the user name and the password that git may have in it."""
     origin = _git(root, "remote", "get-url", "origin") or ""
     if short := _SSH_ADDRESS.fullmatch(origin):
         return f"ssh://{short[1]}/{short[2]}"

@@ -83,7 +83,7 @@ class InProcess:
                 raise Interrupted(message, hint=self._place.way_on)
 
             def wait() -> None:
-                """Wait for the trials that are simulated again, for a moment.
+                """Wait for a moment for the process that simulates some trials again.
 
                 Raises:
                     Interrupted: If somebody has asked twice to stop.

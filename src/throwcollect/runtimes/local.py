@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from throwcollect.dataset.summary import Info
 
 _KILLED_S = 5.0
-"""Time in which a process ends that got SIGKILL."""
+"""Time that a process has to end after SIGKILL."""
 
 
 class LocalRuntime(Runtime):
@@ -46,8 +46,8 @@ class LocalRuntime(Runtime):
     def begin(self, config: Config, middleware: Middleware) -> None:
         """Start to import the libraries of nodes; see `Runtime.begin`."""
         self._server = _make_server(middleware)
-        # Genuine ROS 2 reads its settings from the environment when it is loaded. If this process has loaded it, forked
-        # nodes would have the settings of this process.
+        # Genuine ROS 2 reads its settings from the environment when it is loaded. If this process has loaded it, nodes
+        # that are forked off this process would have the settings of this process.
         self._server.begin(config, fork=may_be_forked() and middleware.backend == "embedded")
 
     def close(self) -> None:
@@ -121,7 +121,7 @@ class LocalNodes(NodeHost):
         Raises:
             WorkerError: If the process cannot be started or its log cannot be written.
         """
-        # The router binds the port by itself. Until now, the reservation has kept other processes from it.
+        # Until now, this process has reserved the port, so that no other process takes it. The router needs it now.
         if node.name == ROUTER and self._reserved is not None:
             self._reserved.close()
         try:
@@ -159,7 +159,7 @@ class LocalNodes(NodeHost):
 
     def stop(self, names: Sequence[str], *, grace_s: float = 3.0) -> None:
         """See `NodeHost.stop`."""
-        # All nodes are told first, so that they end at the same time, within one time of grace.
+        # All nodes get the signal first, so that they end at the same time and share one grace period.
         for name in names:
             self.signal(name, signal.SIGTERM)
         deadline = time.monotonic() + grace_s

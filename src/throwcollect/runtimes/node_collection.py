@@ -1,6 +1,6 @@
-"""Drives a run with nodes from their start to their end: keeps them alive, listens to them, scales and stops them.
+"""Drives a run with nodes from its start to its end: keeps the nodes alive, listens to them, scales and stops them.
 
-The launcher does so as the node ``/launcher``; setting its integer parameter ``simulations`` scales the run.
+The launcher is the node ``/launcher`` meanwhile; setting its integer parameter ``simulations`` scales the run.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ MOST_SIMULATIONS = 256
 
 _POLL_S = 0.1
 _LAST_POLL_S = 0.005
-"""The same when all known trials have ended, after which the coordinator ends, too, and the user waits for that."""
+"""The time between polls once all known trials have ended: the coordinator ends soon, and the user waits for that."""
 _MEET_S = 12.0
 """Nodes that are ready usually see each other within a second; after this time, something is wrong."""
 
@@ -124,7 +124,7 @@ class NodeCollection:
                 return None
             self._session.say("interrupted: finishing the running trials; once more ends at once")
             end = self._supervisor.drain(hurry=lambda: self._session.interruptions() > 1)
-        # The last report of the coordinator may have arrived while its end was awaited.
+        # While this process waited for the end of the coordinator, its last report may have arrived.
         self._listen()
         return end
 
@@ -145,7 +145,7 @@ class NodeCollection:
 
     def _report(self, progress: Progress) -> None:
         self._session.update(progress)
-        # Nobody waits for this process now, as the simulations have work.
+        # This is a good time for imports: the simulations are busy, and nobody waits for this process.
         if progress.ended and not self._ready_for_the_end:
             self._ready_for_the_end = True
             _get_ready_for_the_end(self._host.config)
@@ -162,7 +162,7 @@ class NodeCollection:
         """Start all nodes again if they do not see each other, which at times happens on DDS.
 
         Raises:
-            WorkerError: If they do not see each other after that either, as the run would never come to its end.
+            WorkerError: If they still do not see each other after that, because the run would never end.
         """
         states = self._supervisor.states()
         ready = any(state.status == "running" for state in states if state.name not in (ROUTER, COORDINATOR))
@@ -174,7 +174,7 @@ class NodeCollection:
             return
         if not self._started_again:
             self._started_again = True
-            # The new nodes have as much time again, which begins with the first report of the new coordinator.
+            # The new nodes get the same time to meet, from the first report of the new coordinator on.
             self._apart_since = math.inf
             self._session.warn("the coordinator does not see the simulations; all of them are started again")
             self._supervisor.replace([state.name for state in states if state.name != ROUTER])
@@ -192,12 +192,12 @@ class NodeCollection:
         offer_scaling(node, self._simulations, self._want, most=most)
 
     def _want(self, simulations: int) -> None:
-        # `_follow` scales the run, so that the client that set the parameter does not wait for nodes to end.
+        # `_follow` scales the run later, so that the client that sets the parameter does not wait for nodes to end.
         self._wanted = simulations
 
 
 def _get_ready_for_the_end(config: Config) -> None:
-    """Import and remember what the summary of the dataset needs, so that it comes soon after the last trial."""
+    """Import modules and fill caches for the summary of the dataset, so that it comes soon after the last trial."""
     importlib.import_module("throwcollect.dataset.inspect")
     # The text of the dataset's ``config.yaml``, and the units of its columns.
     compose(dump_yaml(config))

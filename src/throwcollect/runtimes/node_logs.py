@@ -16,7 +16,7 @@ from throwcollect.heartbeat import ready_line
 
 _TAIL_LINES = 40
 _FULL_BYTES = 64 * 1024
-"""A disk with less free space counts as full: a write may have failed because it was larger than the free space."""
+"""A disk with less free space counts as full, because a write that was larger than the free space may have failed."""
 _ORDER = {"launcher": 0, "router": 1, "coordinator": 2}
 """These nodes come first in lists; the simulations follow, sorted by number."""
 
@@ -29,12 +29,12 @@ class NodeLogs:
         self._earlier_bytes: dict[str, int] = {}
 
     def skip_earlier(self) -> None:
-        """Leave what is in the files by now out of `tail` and `said_ready`: nodes of an earlier run printed it."""
+        """From now on, let `tail` and `said_ready` skip what is in the files: nodes of an earlier run printed it."""
         for name in self.files():
             self.skip(name)
 
     def skip(self, name: str) -> None:
-        """Leave what a node has printed so far out as well: another one of the same name may come."""
+        """Skip what a node has printed so far, too, because a new node of the same name may be started."""
         if (path := self.path(name)).is_file():
             self._earlier_bytes[name] = path.stat().st_size
 
@@ -57,7 +57,7 @@ class NodeLogs:
     def files(self) -> dict[str, Path]:
         """The existing log files by the names of their nodes: launcher, router, coordinator, then simulations."""
         paths = {path.stem: path for path in self._directory.glob("*.log")}
-        # The length of the name puts sim_10 behind sim_9.
+        # Names are sorted by their length first, so that sim_10 comes after sim_9.
         names = sorted(paths, key=lambda name: (_ORDER.get(name, len(_ORDER)), len(name), name))
         return {name: paths[name] for name in names}
 
@@ -65,20 +65,20 @@ class NodeLogs:
         """Whether a simulation has ever printed that it is ready for trials."""
         try:
             with self._open(name) as log:
-                # A file is a sequence of its lines, so only a whole line counts, and not a quotation of it.
+                # `in` compares whole lines of the file, so a line that only quotes the announcement does not count.
                 return f"{ready_line(name)}\n" in log
         except OSError:
             return False
 
     def _open(self, name: str) -> TextIO:
-        """Open the log of a node behind what is left out."""
+        """Open the log of a node, at the end of the part that is skipped."""
         log = self.path(name).open(encoding="utf-8", errors="replace")
         log.seek(self._earlier_bytes.get(name, 0))
         return log
 
 
 class Tail:
-    """Reads a file that grows, and need not exist yet, line by line; it may move to another path meanwhile."""
+    """Reads a growing file line by line; the file need not exist yet, and may move to another path meanwhile."""
 
     def __init__(self, path: Path) -> None:
         self.path = path

@@ -1,8 +1,8 @@
 """A process that imports the libraries of nodes once, and forks all nodes.
 
-A process that imports the libraries itself takes most of a second of processor time for that. A forked node has them at
-once, and shares their memory with the other nodes. It is still a process of its own, which can be killed, stopped,
-bound to a core and examined like any other.
+Importing the libraries takes most of a second of processor time. A forked node has them at once, and shares their
+memory with the other nodes. It is still a process of its own, which can be killed, stopped, bound to a core and
+examined like any other.
 
 `NodeServer` is the launcher's side. `serve` is the side of the process that forks; it returns in each forked node.
 """
@@ -81,9 +81,9 @@ class ForkedNode:
 
 
 class NodeServer:
-    """Has nodes forked by a process of its own, which has this environment, and so have all nodes.
+    """Lets a process of its own fork nodes; `environment` is the environment of that process and so of all nodes.
 
-    If that process dies, its nodes die, and the next node has a new one.
+    If that process dies, its nodes die with it, and a new process is started for the next node.
     """
 
     def __init__(self, environment: Mapping[str, str]) -> None:
@@ -98,8 +98,8 @@ class NodeServer:
     def begin(self, config: Config, *, fork: bool = False) -> None:
         """Start the process that forks, so that the first node waits less for imports.
 
-        It computes once what all nodes of this configuration need. With `fork`, it is forked off this process, which
-        spares it the imports that this one has done.
+        That process computes once what all nodes of this configuration need. With `fork`, it is forked off this
+        process, and so need not repeat the imports that this process has made.
         """
         with contextlib.suppress(OSError), open(os.devnull, "wb") as nowhere:
             connection = self._launch(self._fork) if fork else self._connect(nowhere)
@@ -110,9 +110,9 @@ class NodeServer:
     def start(
         self, arguments: Sequence[str], *, log: BinaryIO, core: int | None, environment: Mapping[str, str]
     ) -> ForkedNode:
-        """Start a node, a `throwcollect` command with these arguments and these further environment variables.
+        """Start a node: a `throwcollect` command with these arguments and these further environment variables.
 
-        It prints to the log, and is bound to a processor core unless that is None.
+        The node prints to `log`, and is bound to the processor core `core` unless that is None.
 
         Raises:
             OSError: If the node cannot be started.
@@ -122,14 +122,14 @@ class NodeServer:
             self._silent = False
             with contextlib.suppress(OSError):
                 return self._request(request, log)
-            # The process that `begin` started had no log for its error; its successor writes the error into this one.
+            # The process that `begin` started had no log for an error. A new process writes the error into this log.
             self.close()
         return self._request(request, log)
 
     def take_end(self, pid: int, *, patience_s: float = 0.0) -> int | None:
-        """How a node ended, as `subprocess.Popen.returncode` tells it, and forget the node; None while it runs.
+        """Return how a node ended, like `subprocess.Popen.returncode`, and forget the node; None while it runs.
 
-        If no node has ended, this waits for the end of any, but no longer than `patience_s` [s].
+        If no node has ended, this waits for the end of any node, but no longer than `patience_s` [s].
         """
         self._read(patience_s)
         return self._ends.pop(pid, None)
@@ -152,14 +152,14 @@ class NodeServer:
         return ForkedNode(self, pid)
 
     def _connect(self, log: BinaryIO) -> socket.socket:
-        """The socket to the process, which is started if it does not run; errors of its start go to the log."""
+        """Return the socket to the process; start the process if it does not run, with errors printed to `log`."""
         if self._socket is not None:
             return self._socket
         return self._launch(partial(self._start_program, log))
 
     def _launch(self, start: Callable[[socket.socket], subprocess.Popen[bytes] | ForkedProcess]) -> socket.socket:
         """Start the process with one end of a new connection, and return the other end."""
-        # Sockets of this kind keep messages apart, as datagrams do, but also tell when the other end is closed.
+        # Sockets of this type keep messages apart, as datagram sockets do, but also tell when the other end is closed.
         here, there = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         # A copy of the other end that stayed open here would hide that the process has ended.
         with there:
@@ -199,10 +199,10 @@ class NodeServer:
         raise OSError(f"the process that nodes are forked from has not answered for {self._answer_s:g} s")
 
     def _read(self, timeout_s: float) -> list[dict[str, int]]:
-        """Read messages of the process, for which it has this time [s]; ends of nodes are kept for `take_end`."""
+        """Read messages of the process, waiting for `timeout_s` [s] at most; keep ends of nodes for `take_end`."""
         messages: list[dict[str, int]] = []
         if self._process is not None:
-            # Somebody may have stopped this process together with the nodes; then nobody would report ends of nodes.
+            # Somebody may have stopped the process together with the nodes. It has to run to report ends of nodes.
             self._process.send_signal(signal.SIGCONT)
         while self._socket is not None and select.select([self._socket], [], [], timeout_s)[0]:
             try:
@@ -230,16 +230,17 @@ def serve(connection: socket.socket) -> list[str]:
     Returns:
         In each node, the arguments of the node; in the process that forks, this function does not return.
     """
-    # `select` goes on waiting after a signal (PEP 475), so each signal also writes a byte here, which wakes it.
+    # `select` goes on waiting after a signal (PEP 475). So each signal also writes a byte to `wake`, which ends that.
     awake, wake = socket.socketpair()
     for end in (awake, wake):
         end.setblocking(False)
     signal.set_wakeup_fd(wake.fileno(), warn_on_full_buffer=False)
     # Python writes a signal to the wakeup descriptor only if the signal has a handler.
     signal.signal(signal.SIGCHLD, lambda *_: None)
-    # The garbage collector would write to the pages of all objects, and nodes could not share them any more.
+    # The garbage collector would write to the memory pages of all objects, which nodes could then no longer share.
     gc.freeze()
-    # The only other thread is that of Arrow's allocator, which can be forked. From 3.12 on, Python warns of any thread.
+    # Since 3.12, Python warns if a process with threads forks. The only other thread here is that of Arrow's allocator,
+    # with which forking is safe.
     warnings.filterwarnings("ignore", "This process .* is multi-threaded", DeprecationWarning)
     server = os.getpid()
     while True:
@@ -252,15 +253,16 @@ def serve(connection: socket.socket) -> list[str]:
         packet, logs, _, _ = socket.recv_fds(connection, _MESSAGE_BYTES, 1)
         if not packet:
             sys.exit()
-        # Only the request for a node has a log file with it.
+        # A request for a node comes with a log file. Any other message is a configuration to prepare for.
         if not logs:
             _prepare_for(json.loads(packet)["configuration"])
             gc.freeze()
             continue
-        # The node may be asked to stop before it has run at all, and Python forgets signals that come while it forks.
+        # A signal may ask the node to stop before it runs. Python loses signals during a fork, so they are blocked.
         held = signal.pthread_sigmask(signal.SIG_BLOCK, stop_signals())
         if (pid := os.fork()) == 0:
-            # The node is killed without notice: the coordinator could not wait for router and simulations anyway.
+            # SIGKILL gives the node no time to finish, but a coordinator could not finish without router and
+            # simulations anyway.
             die_with_parent(server)
             for end in (connection, awake, wake):
                 end.close()
@@ -278,13 +280,13 @@ def serve(connection: socket.socket) -> list[str]:
 def _report_ends(connection: socket.socket) -> None:
     """Tell the launcher of all nodes that have ended."""
     with contextlib.suppress(ChildProcessError):
-        # One SIGCHLD may stand for several ended processes, because the kernel keeps no second one while it is pending.
+        # One SIGCHLD may stand for several ended processes, because the kernel does not queue a second one.
         while (ended := os.waitpid(-1, os.WNOHANG))[0]:
             _send(connection, ended=ended[0], code=os.waitstatus_to_exitcode(ended[1]))
 
 
 def _send(connection: socket.socket, **message: int) -> None:
-    # A launcher that is gone has closed its end, which `serve` sees when it reads next.
+    # If the launcher has ended, its end of the connection is closed, which `serve` notices when it reads next.
     with contextlib.suppress(OSError):
         connection.send(json.dumps(message).encode())
 
@@ -313,7 +315,7 @@ def _run(connection: socket.socket) -> None:
     arguments = serve(connection)
     _show("throwcollect", *arguments)
     sys.argv[1:] = arguments
-    # If this process was forked off a command, the module is there already, and `runpy` would warn.
+    # If this process was forked off a command, the module is imported already, and `runpy` would warn about that.
     sys.modules.pop("throwcollect.__main__", None)
     try:
         runpy.run_module("throwcollect", run_name="__main__", alter_sys=True)
@@ -324,7 +326,7 @@ def _run(connection: socket.socket) -> None:
 
 
 def _show(module: str, *arguments: str) -> None:
-    """Let `ps` show the command of this process, and not that of the process off which it was forked."""
+    """Let `ps` show the command of this process instead of the command of the process that forked it."""
     import setproctitle
 
     setproctitle.setproctitle(" ".join([sys.executable, "-m", module, *arguments]))
@@ -333,9 +335,9 @@ def _show(module: str, *arguments: str) -> None:
 def _leave(code: int) -> NoReturn:
     """End this process without the usual end of the interpreter, which writes to all memory that nodes share.
 
-    Nodes have closed their files and sessions before. Zenoh leaves files of such a process in /dev/shm, which the next
-    process removes that ends as usual: the launcher. Nodes on genuine ROS 2 do not end in this way, because its
-    libraries clean up after the end of the interpreter.
+    Nodes have closed their files and sessions before. Zenoh leaves files of such a process in /dev/shm; the next
+    process that ends as usual, which is the launcher, removes them. Nodes on genuine ROS 2 do not end in this way,
+    because its libraries clean up after the end of the interpreter.
     """
     # `multiprocessing` ends its forked processes in the same way.
     atexit._run_exitfuncs()

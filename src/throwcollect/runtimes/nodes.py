@@ -149,7 +149,7 @@ class NodeHost(ABC):
 
     @abstractmethod
     def start(self, node: NodeSpec) -> None:
-        """Start a node, of whose name none runs, or begin to; if the start fails later, `exits` reports it.
+        """Start a node, or begin to start it, if no node of its name runs; a start that fails later appears in `exits`.
 
         Raises:
             WorkerError: If the node cannot be started.
@@ -180,7 +180,7 @@ class NodeHost(ABC):
         return self.logs.said_ready(name)
 
     def forget_readiness(self, name: str) -> None:
-        """Take note that a node is gone for good, so that another one of its name counts as not ready yet."""
+        """Take note that a node has ended for good, so that a new node of the same name does not count as ready."""
         self.logs.skip(name)
 
     def log_tail(self, name: str) -> str:

@@ -29,7 +29,7 @@ class RunListener:
         on_progress: Is called with every report, within `spin`.
         name: Name of the node; by default a unique and hidden one.
         reports: Whether the run has a coordinator, which reports.
-        on_connect: Is called with the node whenever that is made anew.
+        on_connect: Is called with the node whenever the node is made, which happens at each reconnection.
     """
 
     def __init__(
@@ -60,9 +60,9 @@ class RunListener:
             self._node = None
 
     def spin(self, connection: Connection | None, seconds: float) -> None:
-        """Wait for a report, or for the router, so many seconds at most.
+        """Wait for a report, or for the router, for at most this number of seconds.
 
-        The connection is the present way into the run; None while its router has no address.
+        `connection` is the present way into the run; None while its router has no address.
 
         Raises:
             ConfigError: If the key of the run cannot be read.
@@ -81,7 +81,7 @@ class RunListener:
         self._context = ros.Context()
         try:
             ros.init(context=self._context, connection=connection)
-        # This is a `ThrowcollectError`, too, but another attempt would not help against it.
+        # A `ConfigError` is a `ThrowcollectError`, too, but another attempt would fail in the same way.
         except ConfigError:
             raise
         except ThrowcollectError:

@@ -19,7 +19,7 @@ from throwcollect.run_key import RunKey
 from throwcollect.wording import command
 
 if TYPE_CHECKING:
-    # Records of runs import this module, and should not wait for these.
+    # Records of runs import this module, and should not wait for these imports.
     from throwcollect.config.schema import Config
     from throwcollect.coordinator.progress import Progress
     from throwcollect.dataset.summary import Info
@@ -194,15 +194,15 @@ class Runtime(ABC):
 
     @abstractmethod
     def host(self, place: Place, config: Config, *, warn: Callable[[str], None]) -> Host:
-        """Make the host of a run, which starts nothing yet; `warn` is told in one line of long waits.
+        """Make the host of a run, which starts nothing yet; `warn` gets a line of text about each long wait.
 
         Raises:
-            ConfigError: If the router's port is taken, or something that the configuration asks for is not there.
+            ConfigError: If the router's port is taken, or the configuration asks for something that does not exist.
             WorkerError: If this machine does not have the runtime.
         """
 
     def begin(self, config: Config, middleware: Middleware) -> None:
-        """Begin whatever takes long and needs no plan, for a host to use; this process can join the middleware."""
+        """Begin all work for a host that takes long and needs no plan; `middleware` is that of this process."""
         return
 
     def close(self) -> None:
@@ -216,21 +216,22 @@ class Runtime(ABC):
     def prepare(
         self, config: Config, middleware: Middleware, *, say: Callable[[str], None], warn: Callable[[str], None]
     ) -> Middleware:
-        """Make sure that this machine can do a run, even if that takes minutes; this process can join the middleware.
+        """Make sure that this machine can do a run, even if that takes minutes.
 
-        `say` is told in one line before anything that takes long, and `warn` of what may be wrong.
+        `middleware` is that of this process. `say` gets a line of text before anything that takes long, and `warn` gets
+        a line about anything that may be wrong.
 
         Returns:
             The middleware that will carry the messages of the nodes.
 
         Raises:
             WorkerError: If the runtime cannot be used.
-            ConfigError: If the configuration asks for something that is not there.
+            ConfigError: If the configuration asks for something that this machine does not have.
             MissingExtraError: If simulations run on this Python, and it lacks the physics engine.
         """
         require_engine(config.sim.engine)
         if config.sim.engine not in PACKAGES:
-            # One of another package may be broken, which would be told by every simulation, and late.
+            # An engine of another package may be broken. Otherwise every simulation would report that, and later.
             load_member("engines", config.sim.engine)
         return middleware
 
@@ -247,7 +248,7 @@ class Runtime(ABC):
         return []
 
     def is_left(self, run: str) -> bool:
-        """Whether the runtime holds nodes of a run whose launcher is gone.
+        """Whether the runtime holds nodes of a run whose launcher has ended.
 
         Raises:
             WorkerError: If the runtime does not answer in time.
@@ -255,12 +256,12 @@ class Runtime(ABC):
         return False
 
     def remove(self, run: str, *, volumes: bool) -> list[str]:
-        """Remove whatever the runtime holds of a run; a volume with its dataset only if `volumes` is true.
+        """Remove everything that the runtime holds of a run, but a volume with its dataset only if `volumes` is true.
 
         Returns:
             Names of the containers, networks and volumes that were removed.
 
         Raises:
-            WorkerError: If something could not be removed, after everything else was.
+            WorkerError: If something could not be removed; everything else is removed first.
         """
         return []

@@ -19,7 +19,7 @@ _LONGEST_BACKOFF_S = 10.0
 _CLOSING_S = 7.0
 """Time for the coordinator to write its files once the running trials have ended or were dropped."""
 _FROZEN_S = 3.0
-"""Somebody may stop a node to look at it; after this time the node counts as lost."""
+"""A node that is stopped for this long counts as lost. A shorter stop is allowed: somebody may examine the node."""
 
 _RESTARTS_BEFORE_READY = 1
 """A simulation that was never ready is started again only this often, because further attempts rarely help."""
@@ -79,7 +79,7 @@ class Supervisor:
         self.host.stop(removed)
         for name in removed:
             self.host.forget_readiness(name)
-        # Where no simulation that was ready is left, the deadline of an earlier start would be over at once.
+        # If no simulation that was ready is left, the new ones need a new deadline: the old one may have passed.
         if not self._ready:
             self._start_deadline = time.monotonic() + self._run.start_timeout_s
         for name in self._roster:
@@ -98,11 +98,11 @@ class Supervisor:
         """
         end = None
         news = self._end_frozen()
-        # This comes before ends are taken, because a simulation that was ready once may be started again more often.
+        # Readiness is noted before ends are handled: a simulation that was ready once may be restarted more often.
         self._ready |= {name for name in self._expendables if name not in self._ready and self.host.ready(name)}
         for node in self.host.exits():
             if node.name not in self._roster:
-                # An earlier launcher, from which the node was taken over, had already removed it from the roster.
+                # The node was taken over from an earlier launcher, which had already removed it from the roster.
                 continue
             self._last_end[node.name] = node.reason
             is_main = self._roster[node.name].role is NodeRole.MAIN
@@ -127,7 +127,7 @@ class Supervisor:
         return [self._state(name) for name in self._roster]
 
     def replace(self, hung: Iterable[str]) -> None:
-        """Kill the nodes that hang now, so that they are started again, unless the last call has done that already."""
+        """Kill the nodes that hang, so that they are started again, except those that the last call has killed."""
         known, self._hung = self._hung, frozenset(hung)
         for name in self._hung - known:
             self.host.signal(name, signal.SIGKILL)
@@ -194,7 +194,7 @@ class Supervisor:
         return news
 
     def _schedule_restart(self, node: NodeExit) -> bool:
-        """Plan the next start of a node that ended, or give the node up; whether it will be started again."""
+        """Plan the next start of a node that ended, or give the node up; return whether it will be started again."""
         count = self._restarts.get(node.name, 0)
         worked = self._roster[node.name].role is not NodeRole.EXPENDABLE or node.name in self._ready
         if count >= (self._run.restarts if worked else min(_RESTARTS_BEFORE_READY, self._run.restarts)):
@@ -206,10 +206,10 @@ class Supervisor:
         return True
 
     def _check_hope(self) -> None:
-        """See that the run can go on.
+        """Check that the run can go on.
 
         Raises:
-            WorkerError: If it cannot: see `poll`.
+            WorkerError: If it cannot, for one of the reasons that `poll` lists.
         """
         hint = "throwcollect logs shows what the nodes said"
         names = self._expendables
@@ -227,7 +227,8 @@ class Supervisor:
                 hint=hint,
             )
         if not self._ready and not any(map(self.host.handle, names)):
-            # No container of a simulation runs yet, so the engine is slow. The host has a time limit for the engine.
+            # No container of a simulation runs yet, so the engine is slow. The host has a time limit for the engine, so
+            # this deadline begins anew.
             self._start_deadline = time.monotonic() + self._run.start_timeout_s
         if names and not self._ready and time.monotonic() > self._start_deadline:
             raise WorkerError(
@@ -239,8 +240,8 @@ class Supervisor:
 
 def _killed(node: NodeExit) -> bool:
     """Whether a signal ended a node: no node itself returns such an exit code."""
-    # A process has minus the number of the signal, a container 128 plus the number. 130 stands for SIGINT there, and is
-    # also what an interrupted node returns.
+    # A killed process has minus the number of the signal as its exit code, a container 128 plus the number. In a
+    # container, 130 would be SIGINT, but a node that was interrupted also returns 130 by itself, so it does not count.
     return node.code is not None and (node.code < 0 or node.code > Interrupted.exit_code)
 
 

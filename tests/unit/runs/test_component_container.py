@@ -168,5 +168,5 @@ def test_a_container_cannot_join_a_run_that_it_cannot_reach(tmp_path: Path, monk
     with pytest.raises(ConfigError, match="is on Fast DDS"):
         find_way("talos", "local", fast_dds, SPEC)
     monkeypatch.setenv("DOCKER_HOST", "tcp://far.example:2376")
-    with pytest.raises(ConfigError, match="is of processes of this machine"):
+    with pytest.raises(ConfigError, match="its nodes are processes of this machine"):
         find_way("talos", "local", Connection("tls/127.0.0.1:7447", RunKey(tmp_path)), SPEC)

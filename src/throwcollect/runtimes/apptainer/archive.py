@@ -19,7 +19,7 @@ _COMPRESSIONS = {b"\x1f\x8b": "gzip", b"\x28\xb5": "zstd"}
 """How a layer is compressed, by its first two bytes; most engines save layers as they are."""
 _PIECE_BYTES = 1 << 20
 _DAMAGED = (tarfile.TarError, EOFError, LookupError, TypeError, AttributeError, ValueError)
-"""Errors that reading raises if a file is no archive, or holds no image."""
+"""Errors that `check_archive` gets while reading, if a file is no archive or holds no image."""
 
 
 def check_archive(archive: Path) -> None:
@@ -33,7 +33,7 @@ def check_archive(archive: Path) -> None:
         with tarfile.open(archive) as files:
             images = _read_json(files, "manifest.json")
             configs = [_read_json(files, image["Config"]) for image in images]
-        # `[None]` stands for an image without an entry point. In that of ROS 2, a script comes before the command.
+        # `[None]` stands for an image without an entry point. The image with ROS 2 starts a script before the command.
         entry_points = [config["config"].get("Entrypoint") or [None] for config in configs]
     except (FileNotFoundError, IsADirectoryError) as error:
         raise ConfigError(f"{archive}: {error.strerror}", hint=_HINT) from error
@@ -50,8 +50,8 @@ def check_archive(archive: Path) -> None:
 def unpack_archive(archive: Path, directory: Path) -> None:
     """Unpack the image of an archive into a new directory, in the layout of OCI, which Apptainer converts fastest.
 
-    It would compress the layers of an archive, only to unpack them again, which takes four times as long as all the
-    rest. Those of such a directory it takes as they are.
+    Given an archive, Apptainer would compress its layers, only to unpack them again, which takes four times as long as
+    the rest of the conversion. It takes the layers of such a directory as they are.
 
     Raises:
         ConfigError: If the archive is damaged.
@@ -80,7 +80,7 @@ def unpack_archive(archive: Path, directory: Path) -> None:
 
 
 def _store(file: IO[bytes], blobs: Path) -> dict[str, str | int]:
-    """Copy a file to where its digest names it, and return what refers to it there."""
+    """Copy a file to the path that its digest gives, and return digest and size, by which a manifest refers to it."""
     new, digest, size = blobs / "new", hashlib.sha256(), 0
     with new.open("wb") as copy:
         while piece := file.read(_PIECE_BYTES):

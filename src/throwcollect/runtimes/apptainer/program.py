@@ -39,8 +39,8 @@ def find_program() -> str:
 def call(what: str, *arguments: str, cwd: Path | None = None, places: Mapping[str, Path] = _NO_PLACES) -> str:
     """Run Apptainer, and return what it prints; the message begins with `what` if it fails.
 
-    `places` has directories for Apptainer by the end of the variable that names them, such as ``TMPDIR``; variables
-    that the user has set come first.
+    `places` has directories for Apptainer, by the end of the name of the environment variable that Apptainer reads,
+    such as ``TMPDIR``; a variable that the user has set is left as it is.
 
     Raises:
         WorkerError: If Apptainer is not installed, or fails.

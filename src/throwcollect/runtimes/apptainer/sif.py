@@ -49,8 +49,8 @@ def make_sif(
     """Make a SIF, by default from the image of these sources, or without an engine from the clone itself.
 
     An existing SIF is replaced when the new one is complete. `image` names another image of the engine, which is pulled
-    if the engine does not have it; `archive` is that of an image, as `docker save` writes it. `base` and `wheelhouse`
-    are as for `docker.image.build`.
+    if the engine does not have it; `archive` is a file with an image, as `docker save` writes it. `base` and
+    `wheelhouse` are as for `docker.image.build`.
 
     Returns:
         Size of the file [B].
@@ -61,7 +61,7 @@ def make_sif(
         DatasetError: If a file cannot be written or read.
         MissingExtraError: If an image of an engine is named, and the package that asks the engine is not installed.
     """
-    # Saving or building an image takes minutes, so a missing Apptainer is reported before.
+    # Saving or building an image takes minutes, so a missing Apptainer is reported before that.
     find_program()
     with _replacing(output) as new, _working() as work:
         if archive is not None:
@@ -79,7 +79,7 @@ def make_sif(
 
 
 def _is_engine_there(image: str | None, say: Callable[[str], None]) -> bool:
-    """Whether an engine answers; if an image is named, that no engine answers is an error."""
+    """Whether an engine answers; if `image` names an image, a missing engine is an error."""
     try:
         with explain_missing():
             from throwcollect.runtimes.docker.docker_engine import connect
@@ -104,7 +104,7 @@ def _convert(archive: Path, new: Path, work: Path, say: Callable[[str], None]) -
     try:
         unpack_archive(archive, work / _UNPACKED)
         if archive.parent == work:
-            # Apptainer writes two more copies of the image, which need the room that this one takes.
+            # Apptainer writes two more copies of the image, and may need the disk space of this one.
             archive.unlink()
     except OSError as error:
         hint = _HINTS[_NO_SPACE] if error.errno == errno.ENOSPC else None
@@ -186,11 +186,11 @@ def _replacing(output: Path) -> Iterator[Path]:
     try:
         if output.is_dir() or (output.exists() and not is_sif(output)):
             raise ConfigError(f"{output}: is there and no SIF, so it is not replaced", hint="choose another name")
-        # If the output is a link, the file to which it leads is replaced.
+        # If the output is a link, the file that the link names is replaced.
         place = Path(os.path.realpath(output))
         new = place.with_name(f"{place.name}.new")
         new.unlink(missing_ok=True)
-        # A directory that cannot be written is found out here, and not after minutes.
+        # This fails at once if the directory cannot be written, and not after minutes.
         new.touch()
     except OSError as error:
         raise unwritable(output, error) from error

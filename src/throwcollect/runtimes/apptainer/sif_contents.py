@@ -14,7 +14,7 @@ from throwcollect.version import __version__
 from throwcollect.wording import command
 
 _MAGIC_AT = 32
-"""The bytes before hold the line with which a shell finds the program for such files."""
+"""The bytes before this position hold the line that names the program with which a shell runs such a file."""
 _MAGIC = b"SIF_MAGIC\0"
 
 

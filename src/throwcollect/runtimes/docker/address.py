@@ -22,7 +22,7 @@ def is_local() -> bool:
 
 
 def has_socket() -> bool:
-    """Whether the engine's socket exists; assumed of an engine that has no socket in the file system."""
+    """Whether the engine's socket exists; true also for an engine that has no socket in the file system."""
     path = engine_address().removeprefix("unix://")
     return not path.startswith("/") or Path(path).exists()
 
@@ -38,7 +38,7 @@ def check_socket() -> None:
 
 
 def no_answer(reason: str) -> WorkerError:
-    """The error that no engine answers, for a reason in a few words."""
+    """The error that no engine answers; `reason` says why in a few words."""
     return WorkerError(
         f"no Docker engine answers at {engine_address()}: {reason}",
         hint="start it, let DOCKER_HOST name another one, or use processes: --runtime local",

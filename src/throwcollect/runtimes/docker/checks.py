@@ -37,12 +37,12 @@ def check(client: DockerClient, place: RunPlace, config: Config) -> str:
         Id of the image, which is a SHA-256 of its content.
 
     Raises:
-        ConfigError: If a mount or a network is not there or must not be used, or the router's port is taken,
+        ConfigError: If a mount or a network does not exist or must not be used, or the router's port is taken,
             or published twice.
         WorkerError: If the engine does not answer, or does not have the image.
     """
     with engine_errors("the Docker engine cannot be asked"):
-        # If a launcher died, its router still has the port, and this run takes both over.
+        # If a launcher died, its router still occupies the port. This run takes over that router, and its port.
         begun = client.api.containers(all=True, filters={"label": f"{RUN_LABEL}={place.run_id}"})
     sections = {f"containers.{kind}": section_of(config, node) for kind, node in _NODES.items()}
     image_id = _check(client, image(config), sections)
@@ -60,7 +60,7 @@ def check_container(client: DockerClient, spec: ContainerSpec, component: str) -
     """Check the image, the mounts and the networks of a container that the catalogue describes for a component.
 
     Raises:
-        ConfigError: If a mount or a network is not there or must not be used.
+        ConfigError: If a mount or a network does not exist or must not be used.
         WorkerError: If the engine does not answer, or does not have the image.
     """
     _check(client, spec.image, {f"components.{component}": spec.section}, mounts="volumes")
@@ -101,7 +101,7 @@ def _problems(
 
 
 def _wrong_mount(source: Path, root: str) -> str | None:
-    """Why a path, or the target of this link, must not be mounted; None if it may. `root` holds the engine's files."""
+    """Why a path, or the target of a link, must not be mounted; None if it may. `root` holds the engine's files."""
     if not source.exists():
         return f"{source} does not exist on this machine"
     real = source.resolve()
@@ -116,7 +116,7 @@ def _wrong_mount(source: Path, root: str) -> str | None:
 
 
 def _wrong_device(device: Path) -> str | None:
-    """Why a container must not get a device, or the target of this link; None if it may."""
+    """Why a container must not get a device, or its target if it is a link; None if it may."""
     if not device.exists():
         return f"{device} does not exist on this machine"
     files = [device, *device.rglob("*")] if device.is_dir() else [device]

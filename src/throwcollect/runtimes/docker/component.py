@@ -42,12 +42,12 @@ CONTAINER = "container"
 _POLL_S = 0.1
 _GRACE_S = 3
 _OVER_S = 3.0
-"""A container that has joined a run loses the router when the run ends, up to this time before the record tells it."""
+"""When a run ends, a container that joined it loses the router up to this time before the record shows the end."""
 
 
 @dataclass(frozen=True)
 class Way:
-    """The way for a container into the ROS graph of a run, whose id is `run`.
+    """Everything that a container needs to join the ROS graph of a run; `run` is the id of that run.
 
     Attributes:
         environment: Environment variables with which the container joins.
@@ -62,7 +62,7 @@ class Way:
 
 
 def find_way(run: str, runtime: str, connection: Connection, spec: ContainerSpec) -> Way:
-    """Find the way for a container into a run of a runtime, which processes of this machine join by `connection`.
+    """Find out how a container can join a run of a runtime; processes of this machine join that run by `connection`.
 
     Raises:
         ConfigError: If the container cannot join the run.
@@ -78,11 +78,11 @@ def find_way(run: str, runtime: str, connection: Connection, spec: ContainerSpec
         return Way(run, _environment(connection, endpoint), place.key_mount(read_only=True), place.network)
     if not is_local():
         raise ConfigError(
-            f"run {run}: is of processes of this machine, which containers at {engine_address()} do not see"
+            f"run {run}: its nodes are processes of this machine, which containers at {engine_address()} cannot reach"
         )
     if spec.section.ports or spec.section.networks:
         raise ConfigError(
-            f"run {run}: is of processes, so a container that joins it has this machine's network, and no other",
+            f"run {run}: its nodes are processes, so a container that joins it has this machine's network and no other",
             expected="a component without ports and networks",
             hint="leave them out in the catalogue, or have the run in containers: run.runtime: docker",
         )
@@ -96,16 +96,16 @@ def _environment(connection: Connection, endpoint: str) -> Mapping[str, str]:
 
 
 class ComponentContainer:
-    """Runs one container until it ends or is told to; a `runtime.Host`.
+    """Runs one container until it ends or somebody asks to stop; a `runtime.Host`.
 
     Args:
         place: The place of the run that consists of this container.
         way: The way into a run that the container joins; None if it joins none.
-        goes_on: Is asked again and again whether the run of an id goes on.
-        warn: Is told in one line when the engine is silent for long.
+        goes_on: Returns whether the run with an id goes on; it is called again and again.
+        warn: Gets a line of text when the engine is silent for long.
 
     Raises:
-        ConfigError: If the container needs something that is not there.
+        ConfigError: If the container needs a mount or a network that does not exist.
         WorkerError: If no engine answers, or it does not have the image.
     """
 
@@ -136,7 +136,7 @@ class ComponentContainer:
         self._container = NodeContainer(self._client, CONTAINER, self._logs.path(CONTAINER), self._clock)
 
     def collect(self, session: Session) -> None:
-        """Run the container until it ends by itself, is told to, or the run that it has joined ends; then close.
+        """Run the container until it ends, somebody asks to stop, or the run that it has joined ends; then close.
 
         Raises:
             WorkerError: If the container cannot be started or fails, or the engine does not answer any more.
@@ -239,7 +239,7 @@ class ComponentContainer:
         state = self._watch.state(container.handle) if self._watch is not None else None
         if state is not None and state.ended:
             container.wait_log(LOG_S)
-            # The end of the run may have made the container fail, but the record of the run tells its end a bit later.
+            # The end of the joined run may have made the container fail; the record of that run shows it a bit later.
             deadline = time.monotonic() + _OVER_S
             while state.code != 0 and self._way and not self._is_left_behind and time.monotonic() < deadline:
                 time.sleep(_POLL_S)

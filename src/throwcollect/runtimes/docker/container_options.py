@@ -48,7 +48,7 @@ _LOG_SIZE = {"max-size": "10m", "max-file": "2"}
 
 @dataclass(frozen=True)
 class RunPlace:
-    """The names of everything that an engine holds of a run.
+    """The names of all containers, networks, volumes and labels that an engine holds for a run.
 
     `source` is the place of the dataset: absolute path of a directory of this machine, or name of a volume.
     """
@@ -152,7 +152,7 @@ def node_options(
     section = section_of(config, node.name)
     own = {
         **node_environment(Connection(router_endpoint(config, middleware), KEY, config.run.domain_id, middleware)),
-        # Nodes would write a random id and /data into the provenance, which mean nothing outside of the container.
+        # Otherwise nodes would write a random id and /data into the provenance, which mean nothing outside.
         HOST_VARIABLE: socket.gethostname(),
         IMAGE_VARIABLE: image_id,
         DIRECTORY_VARIABLE: "" if place.in_volume else place.source,
@@ -208,7 +208,7 @@ def container_options(
 
 
 def mount_source(mount: str) -> Path:
-    """Path on this machine of a mount of the configuration."""
+    """Path on this machine that a mount of the configuration names."""
     return Path(mount.partition(":")[0])
 
 

@@ -16,7 +16,7 @@ from urllib3.exceptions import TimeoutError as PoolTimeoutError
 from throwcollect.errors import WorkerError
 from throwcollect.runtimes.docker.address import no_answer
 
-# A connection that breaks in the middle of an answer or of a stream leads to any of the last three.
+# The client raises any of the last three if a connection breaks in the middle of an answer or of a stream.
 ENGINE_ERRORS = (DockerException, HTTPError, OSError, struct.error, json.JSONDecodeError)
 """The errors that the client raises when the engine refuses, fails or is gone."""
 

@@ -61,11 +61,11 @@ class DockerNodes(NodeHost):
 
     Args:
         place: The place of the run; its id has to be unique on the engine.
-        warn: Is told in one line when the engine is silent for long.
+        warn: Gets a line of text when the engine is silent for long.
         client: Client of the engine; None connects to the engine that ``DOCKER_HOST`` names.
 
     Raises:
-        ConfigError: If something that the configuration asks for is not there, or taken.
+        ConfigError: If a mount or a network of the configuration does not exist, or a port is taken.
         WorkerError: If no engine answers, or it does not have the image.
     """
 
@@ -90,7 +90,7 @@ class DockerNodes(NodeHost):
         self._ended_at: dict[str, float] = {}
         with ExitStack() as undo:
             self._clock = EngineClock(warn)
-            # The clock is a thread, which would go on counting and warning for a host that was never made.
+            # The clock has a thread, which would go on counting and warning if making this host failed.
             undo.callback(self._clock.close)
             self._client = client or connect(timeout_s=engine_clock.SILENCE_S)
             self._clock.attend(self._client)
@@ -121,9 +121,9 @@ class DockerNodes(NodeHost):
                     self._client.volumes.get(place.source)
                 except NotFound:
                     self._client.volumes.create(place.source, labels=place.labels())
-            # If the network exists, the volume with the key exists, too, and nodes of an earlier launcher use both.
+            # If the network exists, an earlier launcher made it and the volume with the key, and its nodes use both.
             if not self._client.networks.list(filters={"label": f"{RUN_LABEL}={place.run_id}"}):
-                # Each of the two is a wait for the engine, so they are done side by side.
+                # Both steps wait for the engine, so they are done side by side.
                 with ThreadPoolExecutor(1) as pool:
                     placing = pool.submit(place_key, self._client, place, self.config, self.place.key)
                     self._create_network()
@@ -157,11 +157,11 @@ class DockerNodes(NodeHost):
             return None
         with engine_errors("the engine does not say which addresses the run's network has"):
             network = self._client.networks.get(self._place.network)
-        # The engine gives addresses from the beginning of the range, so one at its end stays free.
+        # The engine hands out addresses from the beginning of the range, so an address at its end stays free.
         return str(ip_network(network.attrs["IPAM"]["Config"][0]["Subnet"])[_ROUTER_HOST])
 
     def _adopt(self) -> tuple[str, ...]:
-        """Take over the containers of a launcher that died; the names of their nodes."""
+        """Take over the containers of a launcher that died, and return the names of their nodes."""
         filters = {"label": [f"{RUN_LABEL}={self._place.run_id}", NODE_LABEL]}
         with engine_errors(f"the nodes of run {self._place.run_id} cannot be found"):
             for container in self._client.containers.list(all=True, filters=filters):
@@ -250,7 +250,7 @@ class DockerNodes(NodeHost):
     def stop(self, names: Sequence[str], *, grace_s: float = 3.0) -> None:
         """End nodes and remove their containers: with SIGTERM, then after `grace_s`, in whole seconds, by force."""
         nodes = [self._nodes.pop(name) for name in names if name in self._nodes]
-        # A container that the engine is still starting cannot be ended yet; `close` waits for it.
+        # The engine cannot end a container that it is still starting; `close` waits for such a container.
         self._beginning += [node for node in nodes if not node.begun]
         with ThreadPoolExecutor(_AT_ONCE) as pool:
             for node in nodes:
@@ -259,7 +259,7 @@ class DockerNodes(NodeHost):
     def close(self) -> None:
         """End all nodes, the router last, and remove everything that was made for the run but its volume.
 
-        `cleared` tells whether the engine has removed all containers, or is silent or refuses.
+        Afterwards, `cleared` tells whether the engine has removed all containers.
         """
         if not self._clock.given_up:
             self.stop([name for name in self._nodes if name != ROUTER])
@@ -275,7 +275,7 @@ class DockerNodes(NodeHost):
             node.close()
 
     def _remove(self) -> None:
-        # The network cannot be removed while a container is in it that somebody else has added.
+        # The network cannot be removed while somebody else's container is in it.
         with suppress(WorkerError):
             remove(self._client, self._place.run_id, volumes=False)
         filters = {"label": [f"{RUN_LABEL}={self._place.run_id}", NODE_LABEL]}
@@ -283,7 +283,7 @@ class DockerNodes(NodeHost):
             self.cleared = not self._client.api.containers(all=True, filters=filters)
 
     def _silence(self) -> WorkerError:
-        """The error that the engine is given up, with the containers that may be left on it, and how to go on."""
+        """The error of a silent engine, with the containers that may still run there, and how to go on."""
         place = self._place
         left = ", ".join(map(place.container, self._nodes)) or "none"
         hint = f"once it answers, {command('down', '--run', place.run_id)} ends them"
@@ -310,7 +310,7 @@ class DockerNodes(NodeHost):
         return self._opened.state(node.handle) if node else None
 
     def _end_of(self, node: NodeContainer) -> NodeExit | None:
-        """How a node ended, once its last lines are in its log; None before."""
+        """How a node ended; None while it runs, or its last lines are not yet in its log."""
         if node.failure is not None:
             return NodeExit(node.name, None, f"cannot be started: {node.failure}", self.log_tail(node.name))
         state = self._opened.state(node.handle)
@@ -336,10 +336,10 @@ class DockerNodes(NodeHost):
 
 
 def end_in_words(state: ContainerState, memory: str | None) -> str:
-    """How a container with this memory limit ended."""
+    """Say in words how a container with this memory limit ended."""
     if state.code is None:
         return "its container was removed"
-    # The engine also notes that the kernel has killed another process of the container, after which that went on.
+    # `out_of_memory` alone proves nothing: the kernel may have killed another process, and the container went on.
     if state.out_of_memory and state.code == _SIGNALLED + signal.SIGKILL:
         return "ran out of memory" + (f" (limit {memory})" if memory else "")
     if state.code > _SIGNALLED and state.code != Interrupted.exit_code:

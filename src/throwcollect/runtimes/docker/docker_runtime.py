@@ -98,7 +98,7 @@ class DockerRuntime(Runtime):
             return []
 
     def is_left(self, run: str) -> bool:
-        """Whether the engine holds containers of a run; an engine that has ended has no running containers.
+        """Whether the engine holds containers of a run; false if the engine has ended, as its containers end with it.
 
         Raises:
             WorkerError: If the engine does not answer in time.
@@ -122,17 +122,17 @@ class DockerRuntime(Runtime):
 
 
 def _choose_middleware(rmw: str | None, image: str, config: Config, launcher: Middleware) -> Middleware:
-    """Choose the middleware of containers: the image has to have it, and the launcher has to be able to join it.
+    """Choose the middleware of containers: one that the image has, and over which the launcher can join the nodes.
 
     Raises:
-        ConfigError: If rclpy is asked for, and the image has none, or the launcher could not join its nodes.
+        ConfigError: If the configuration asks for rclpy, but the image has none, or the launcher could not join nodes.
     """
     if rmw is None:
         problem = f"the image {image} has no rclpy"
-    # The embedded client understands this middleware, so every launcher can join it, on another machine, too.
+    # Every launcher has the embedded client, which can join this middleware, on another machine, too.
     elif (found := Middleware("rclpy", rmw)).joining.backend == "embedded":
         return found if config.run.ros != "embedded" else Middleware()
-    # With another middleware, the launcher has to load the same one, and to be on the machine of the nodes.
+    # With any other middleware, the launcher has to load the same one, and to be on the machine of the nodes.
     elif not is_local():
         problem = f"with {rmw} nodes talk to each other directly, and those at {engine_address()} cannot be reached"
     else:
@@ -143,7 +143,9 @@ def _choose_middleware(rmw: str | None, image: str, config: Config, launcher: Mi
 
 
 def _handle_outdated_image(client: DockerClient, name: str, config: Config, warn: Callable[[str], None]) -> None:
-    """Use an image of other sources only if the user has named it, as it may collect other bytes; else build a new one.
+    """Handle an image that was made from other sources, which may collect other bytes.
+
+    It is used only if the user has named it; otherwise a new one is built.
 
     Raises:
         WorkerError: If ``run.runtime: auto`` may use processes instead, or the image cannot be built.

@@ -9,20 +9,21 @@ from contextlib import suppress
 from docker.client import DockerClient
 
 SILENCE_S = 120.0
-"""An engine that answers nothing for this long is given up; a busy one may let a request wait for half a minute."""
+"""An engine that is silent for this long is given up; a busy engine may let a request wait for half a minute."""
 _TICK_S = 0.5
 _WARN_S = 15.0
-"""The user is told of a longer silence; a busy engine often takes some seconds for an answer."""
+"""The user is warned of a longer silence; a busy engine often takes some seconds for an answer."""
 
 
 class EngineClock:
     """Measures how long an engine has not answered any request of this process.
 
-    Every answer to a client that was attended counts, and so does everything that arrives on a stream. A thread counts
-    the time in small steps, so that time in which this process itself was stopped does not count as silence.
+    Every answer to a client that was given to `attend` ends the silence, and so does everything that arrives on a
+    stream. A thread counts the time in small steps, so that time in which this process itself was stopped does not
+    count as silence.
 
-    `silent_s` is the time since the engine last answered [s]. `warn` is told in one line when that is long, and when
-    the engine answers again.
+    `silent_s` is the time since the engine last answered [s]. `warn` gets a line of text when that is long, and another
+    when the engine answers again.
     """
 
     def __init__(self, warn: Callable[[str], None]) -> None:
@@ -34,7 +35,7 @@ class EngineClock:
 
     @property
     def given_up(self) -> bool:
-        """Whether the engine has been silent for so long that nobody waits for it any more."""
+        """Whether the engine has been silent for so long that this process no longer waits for it."""
         return self.silent_s >= SILENCE_S
 
     def attend(self, client: DockerClient) -> None:
@@ -55,7 +56,7 @@ class EngineClock:
             if (self.silent_s >= _WARN_S) == self._warned:
                 continue
             self._warned = not self._warned
-            # The terminal may be closed by now, but the time must still be counted.
+            # The terminal may be closed by now; that error must not end the counting.
             with suppress(OSError, ValueError):
                 self._warn(
                     f"the Docker engine has not answered for {self.silent_s:.0f} s; waiting"

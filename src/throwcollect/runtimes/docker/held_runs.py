@@ -1,4 +1,4 @@
-"""Finds the runs of which an engine holds containers or networks, and removes what is left of one."""
+"""Finds the runs of which an engine holds containers or networks, and removes everything that is left of a run."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def remove(client: DockerClient, run_id: str, *, volumes: bool) -> list[str]:
         Names of the containers, networks and volumes that were removed.
 
     Raises:
-        WorkerError: If something could not be removed, after everything else was.
+        WorkerError: If something could not be removed; everything else is removed first.
     """
     filters = {"label": f"{RUN_LABEL}={run_id}"}
     removed: list[str] = []

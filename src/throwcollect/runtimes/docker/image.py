@@ -118,7 +118,7 @@ def ensure(client: DockerClient, tag: str, *, say: Callable[[str], None]) -> Non
 
 
 def is_outdated(client: DockerClient, tag: str) -> bool:
-    """Whether an image that the engine has was made from other sources than those of this package's clone.
+    """Whether an image of the engine was made from other sources than those of this package's clone.
 
     Raises:
         WorkerError: If the engine does not answer.
@@ -234,7 +234,7 @@ def _run_steps(
                 printed.append(line.rstrip())
             if match := _MISSING_WHEEL.search(line):
                 missing = match[1]
-        # The engine answers with 200 before the first step, so a step that fails is told in the stream.
+        # The engine sends status 200 before the first step, so it reports a failed step in the stream of output.
         if "error" in answer:
             raise _failure(tag, answer["error"].strip(), missing, wheelhouse, "\n".join(printed))
 

@@ -33,7 +33,7 @@ class NodeContainer:
 
     Args:
         log: File to which the output of the container is appended.
-        clock: Is told of all output; it counts the client's answers by itself.
+        clock: Takes note of all output; it takes note of the client's answers by itself.
     """
 
     def __init__(self, client: DockerClient, name: str, log: Path, clock: EngineClock) -> None:
@@ -59,9 +59,9 @@ class NodeContainer:
         return self._thread is not None and not self._thread.is_alive()
 
     def start(self, options: dict[str, Any], *, networks: Sequence[str]) -> None:
-        """Begin to start the container, by keywords for `containers.create`; an ended container of its name is removed.
+        """Begin to start the container, and remove an ended container of the same name.
 
-        It joins these networks besides that of the keywords.
+        `options` are keywords for `containers.create`. The container joins `networks` besides the network in `options`.
         """
         self._run_in_thread(lambda: self._live(options, networks))
 
@@ -73,11 +73,11 @@ class NodeContainer:
         self._run_in_thread(lambda: self._copy_log(container, offset))
 
     def wait_begun(self, timeout_s: float) -> bool:
-        """Wait for `begun`, at most this time [s]; whether it is so."""
+        """Wait for `begun`, at most this time [s], and return its value."""
         return self._begun.wait(timeout_s)
 
     def renounce(self) -> None:
-        """If the container is still being started, remove it as soon as it runs, because nobody waits for it."""
+        """If the container is still being started, remove it as soon as it runs, because nobody needs it any more."""
         self._unwanted.set()
 
     def wait_log(self, timeout_s: float) -> None:
@@ -86,7 +86,7 @@ class NodeContainer:
             self._thread.join(timeout_s)
 
     def close(self) -> None:
-        """Stop to copy output at the next error of the engine."""
+        """Stop copying output at the next error of the engine or the end of a stream."""
         self._closed.set()
 
     def _run_in_thread(self, work: Callable[[], None]) -> None:
@@ -127,9 +127,9 @@ class NodeContainer:
         self._copy_log(container, offset)
 
     def _copy_log(self, container: Container, offset: int) -> None:
-        """Append the output of the container to the file until it has ended; `offset` is where in the file it begins.
+        """Append the output of the container to the log file until the container has ended.
 
-        Output that is in the file already is not written again.
+        The output begins at `offset` in the file. Output that is in the file already is not written again.
         """
         with open(open_log(self._log), "ab", buffering=0) as log:
             while not self._closed.is_set():
@@ -137,10 +137,10 @@ class NodeContainer:
                     known = log.tell() - offset
                     for chunk in container.logs(stream=True, follow=True):
                         self._clock.note_arrival()
-                        # Each stream begins with the first byte of the output again.
+                        # Each stream repeats the output from its first byte, so `known` bytes are skipped.
                         log.write(chunk[known:])
                         known = max(0, known - len(chunk))
-                    # A stream also ends when the engine does, so only the state tells whether more can come.
+                    # A stream also ends when the engine ends, so only the state tells whether more output can come.
                     container.reload()
                     if container.status not in _LIVELY:
                         return

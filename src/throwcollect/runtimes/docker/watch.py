@@ -17,7 +17,7 @@ from throwcollect.runtimes.docker.engine_clock import EngineClock
 
 _EVENTS = ["start", "die", "oom", "destroy", "pause", "unpause", "health_status"]
 _LOOK_EVERY_S = 2.0
-"""Events arrive at once, but none arrives on a stream that hangs or breaks, so the containers are also listed."""
+"""Events arrive at once, but a stream of events may hang or break, so the containers are also listed, this often."""
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ class EngineWatch:
         last_error: The reason of the last error of the engine; empty if there was none.
 
     Args:
-        clock: Is told of every event; it counts the client's answers by itself.
+        clock: Takes note of every event; it takes note of the client's answers by itself.
     """
 
     def __init__(self, client: DockerClient, place: RunPlace, clock: EngineClock) -> None:
@@ -63,7 +63,7 @@ class EngineWatch:
         self._network = place.network
         self._label = f"{RUN_LABEL}={place.run_id}"
         self._states: dict[str, ContainerState] = {}
-        # Containers are inspected one after the other, so that an old state never replaces a newer one.
+        # This lock lets threads inspect containers one after the other, so an old state never replaces a newer one.
         self._looking = threading.Lock()
         self._closed = threading.Event()
         self._stream: Any = None
@@ -111,7 +111,7 @@ class EngineWatch:
             try:
                 listed = self._client.api.containers(all=True, filters={"label": self._label})
                 now = {container["Id"]: container["State"] for container in listed}
-                # The copy is made because the thread of the events may add a container meanwhile.
+                # `_states` is copied because the thread that follows the events may add a container meanwhile.
                 before = {key: state.status for key, state in self._states.copy().items() if state.status != "removed"}
                 for container in now.keys() | before.keys():
                     if now.get(container) != before.get(container):
