@@ -1,7 +1,8 @@
 """Checks of every request and every socket: the token, the headers Host and Origin, and the size of the body.
 
-The page of another site can neither read nor do anything here: its browser sends its Origin, a foreign name that was
-pointed at this address (DNS rebinding) stands in Host, and there are no cookies that a browser would add.
+So the page of another site can neither read nor do anything here. The browser sends that site's Origin. If somebody has
+pointed a foreign name at this address (DNS rebinding), that name stands in Host. And there are no cookies, which a
+browser would send by itself.
 """
 
 from __future__ import annotations
@@ -31,7 +32,7 @@ _TOO_MANY = 503, f"{_MOST_SOCKETS} sockets are open, as many as there may be"
 MAY_ONLY_LOOK = 403, "this token may only look"
 """Status and sentence for a request to change something with the token that may only look."""
 _GROUPS = {True: "full", False: "read-only", None: "anybody"}
-"""Names of clients in the log, by what they may do."""
+"""How the log calls clients, by whether they may change anything."""
 _PLAIN = "/-_.~{}:@!$&'()*+,;="
 _CODE_S = 600.0
 """Time for which a one-time code can be exchanged."""
@@ -63,8 +64,7 @@ class Keys:
 
     def may_change(self, token: str) -> bool | None:
         """Whether the owner of a token may change anything; None if it is no token of this server."""
-        # Both comparisons are always made and take the same time for any token, so that no time tells anything of a
-        # token.
+        # Both comparisons are always made, and take the same time for any token, so that the time reveals nothing.
         given = token.encode()
         full = hmac.compare_digest(given, self.full.encode())
         read_only = hmac.compare_digest(given, self.read_only.encode())
@@ -87,7 +87,8 @@ class Keys:
 class Access:
     """Lets only permitted requests and sockets through to an application.
 
-    The header Host has to be one of ``hosts``, with their ports, and Origin one of these or of the further ``origins``.
+    The header Host has to be one of ``hosts``, which include ports. Origin has to be one of these, or one of
+    ``origins``.
     """
 
     def __init__(self, app: Any, keys: Keys, hosts: frozenset[str], origins: frozenset[str] = frozenset()) -> None:
@@ -139,7 +140,7 @@ class Access:
             return (403, "pages of another origin may not connect"), None
         length = headers.get("content-length", "0")
         too_long = None if length.isdecimal() and int(length) <= _MOST_BODY else _TOO_LONG
-        # The page itself holds no secret: it gets its token by the code in the printed address.
+        # The page itself needs no token, because it holds no secret: it exchanges the code in the printed address.
         if scope["type"] == "http" and _is_public(scope["path"]):
             return too_long, None
         may_change = self._keys.may_change(_token(scope, headers))
@@ -165,12 +166,12 @@ def _token(scope: Scope, headers: dict[str, str]) -> str:
     for protocol in scope.get("subprotocols", ()):
         if protocol.startswith(_SUBPROTOCOL):
             return str(protocol).removeprefix(_SUBPROTOCOL)
-    # Clients of rosbridge can set neither headers nor subprotocols.
+    # Clients of rosbridge can set neither headers nor subprotocols, so they give the token in the query.
     return str(parse_qs(scope["query_string"].decode("latin-1")).get("token", [""])[0])
 
 
 class _Body:
-    """Receives a body, and breaks off as if the client had left when the body is too long, whatever its header says.
+    """Receives a body; if it gets too long, whatever its header says, breaks off as if the client had left.
 
     Attributes:
         is_too_long: Whether the body was too long.
@@ -188,7 +189,7 @@ class _Body:
         return {"type": "http.disconnect"} if self.is_too_long else message
 
     def unless_too_long(self, send: Send) -> Send:
-        """Make a function that drops the application's answer if the body was too long, as a refusal is sent then."""
+        """Make a function that drops the application's answer if the body was too long: the client gets a refusal."""
 
         async def send_some(message: MutableMapping[str, Any]) -> None:
             if not self.is_too_long:
@@ -202,7 +203,7 @@ async def _refuse(scope: Scope, receive: Receive, send: Any, status: int, title:
     response = problem(status, title, headers=headers)
     if scope["type"] == "http":
         await response(scope, receive, send)
-    # By this extension of ASGI a refused handshake gets a status and a body; without it, the server answers 403 alone.
+    # With this extension of ASGI, a refused handshake gets a status and a body; without it, the status is always 403.
     elif "websocket.http.response" in scope.get("extensions", {}):
         start = {"status": status, "headers": response.raw_headers}
         await send({"type": "websocket.http.response.start", **start})
@@ -212,8 +213,8 @@ async def _refuse(scope: Scope, receive: Receive, send: Any, status: int, title:
 
 
 def _write_policy(host: str | None) -> bytes:
-    """Write the policy by which the page connects to this server alone; to no socket if its name is not ours."""
-    # Not every browser takes sockets of the same host for 'self'.
+    """Write the policy that lets the page connect to this server only; if `host` is None, the page gets no sockets."""
+    # The sockets have to be named because in some browsers 'self' does not include them.
     return _POLICY.format(sockets=f" ws://{host} wss://{host}" if host else "").encode()
 
 
@@ -234,7 +235,7 @@ class _Answer:
             message = {**message, "headers": [*message.get("headers", ()), *self._headers]}
         elif message["type"] == "websocket.accept":
             self._note(HTTPStatus.SWITCHING_PROTOCOLS)
-            # A browser closes the socket if none of its protocols is taken.
+            # A browser closes the socket if the server accepts none of the protocols that the browser offers.
             message = {**message, "subprotocol": message.get("subprotocol") or self._protocol}
         elif message["type"] == "websocket.close":
             self._note(HTTPStatus.FORBIDDEN)
@@ -244,6 +245,6 @@ class _Answer:
         if self._is_noted:
             return
         self._is_noted = True
-        # Without the query, which may hold a token; and quoted, so that no path can forge a second line.
+        # The query is left out, because it may hold a token. The path is quoted, so that it cannot forge a second line.
         path = quote(self._scope["path"], safe=_PLAIN)
         _AUDIT.info("%s %s %d %s", self._scope.get("method", "SOCKET"), path, status, self._group)

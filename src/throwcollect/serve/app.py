@@ -73,7 +73,7 @@ def make_app(instances: Instances, models: Models, keys: Keys) -> FastAPI:
     ):
         app.include_router(routes, prefix=PREFIX, responses=describe_problems(*_ALWAYS, *statuses))
     app.include_router(make_rosbridge_routes(instances, Bridges()))
-    # Routes are tried in their order, and this one takes every path that is left.
+    # Routes are tried in their order, and this last one takes all other paths.
     app.mount("/", StaticFiles(directory=_PAGE, html=True))
     return app
 
@@ -127,7 +127,7 @@ def _general(watch: StateWatch, keys: Keys) -> APIRouter:
 
 
 async def _send_states(socket: WebSocket, watch: StateWatch) -> None:
-    # Without this, the generator of a client that has left would listen on until it is collected as garbage.
+    # Without `aclosing`, the generator would go on listening after its client has left, until Python deletes it.
     async with aclosing(watch.states()) as states:  # type: ignore[type-var]
         async for text in states:
             await socket.send_text(text.decode())

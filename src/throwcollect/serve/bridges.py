@@ -17,7 +17,7 @@ _LOOK_S = 0.5
 
 
 class FullError(ConflictError):
-    """As many clients are connected as there may be."""
+    """The largest number of clients is connected."""
 
 
 @dataclass
@@ -38,7 +38,7 @@ class Bridges:
         """The bridge of a run, for one more client.
 
         Raises:
-            FullError: If there are as many clients, of all runs together, as there may be.
+            FullError: If the clients of all runs together have reached their largest number.
         """
         if sum(each.clients for each in self._shared.values()) >= _MOST_CLIENTS:
             raise FullError(f"{_MOST_CLIENTS} clients are connected by rosbridge, as many as there may be")
@@ -58,12 +58,12 @@ class Bridges:
 
 
 async def _follow(run: Run, bridge: Bridge) -> None:
-    """Tell a bridge the way to the router of its run, whenever that changes."""
+    """Give a bridge the connection to the router of its run whenever the connection changes."""
     known = run.connection
     while True:
         await asyncio.sleep(_LOOK_S)
         connection: Connection | None = None
-        # A forgotten run has no router.
+        # A run that was forgotten raises an error, and has no router.
         with suppress(ThrowcollectError):
             connection = (await asyncio.to_thread(run.now)).connection
         if connection != known:

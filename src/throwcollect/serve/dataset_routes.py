@@ -31,7 +31,7 @@ _OWN_FILES = {CARD, PROVENANCE}
 _LANDING = ("landing_x_m", "landing_y_m", "outcome", "trial")
 _MOST_LANDINGS = 20_000
 _JOURNAL_BYTES = 4_000_000
-"""Bounds of one answer; this much of a journal has about 15,000 throws."""
+"""Most landings, and most bytes of a journal (about 15,000 throws), for one answer."""
 _MOST_FIRST = 2**53
 
 
@@ -142,7 +142,7 @@ def _find_file(directory: Path, path: str) -> Path:
 
 
 def _is_finished(directory: Path) -> bool:
-    # Another run may go on with the dataset in this directory.
+    # A dataset that another run continues is not finished, even if it has a manifest.
     grows = any(each.status == "running" and each.place.directory == directory for each in Records().all())
     return not grows and (directory / MANIFEST).is_file()
 
@@ -152,7 +152,7 @@ def _find_finished(instances: Instances, instance: str) -> Path:
 
     Raises:
         NotFoundError: If the run does not exist, or has no dataset.
-        ConflictError: If the dataset is not finished.
+        ConflictError: If the dataset is not finished yet.
     """
     run = _get_collection(instances, instance)
     directory = run.place.directory
@@ -195,7 +195,7 @@ def _read_landings_so_far(directory: Path, first: int) -> LandingPoints:
 
 def _archive(directory: Path, name: str) -> Iterator[bytes]:
     """Write a tar archive of a dataset piece by piece; equal files give equal archives."""
-    # `tarfile` writes to a file, and here the client decides when it takes the next piece.
+    # `tarfile` would write the whole archive to a file, but here the client decides when it takes the next piece.
     for path in _list_names(directory):
         with open(open_regular(directory / path), "rb") as file:
             entry = tarfile.TarInfo(f"{name}/{path}")

@@ -51,7 +51,7 @@ class Address:
     certificate: str | None = None
 
     def page(self, code: str, run: str | None = None) -> str:
-        """Address of the page, on one run or all; browsers send the fragment, with the one-time code, to nobody."""
+        """Address of the page, on one run or all; the one-time code is in the fragment, which browsers never send."""
         return f"{self.url}/#code={code}" + (f"&run={run}" if run else "")
 
 
@@ -59,7 +59,7 @@ class Address:
 def publish(address: Address) -> Iterator[None]:
     """Let programs of this user find this server as long as the block lasts.
 
-    If there is another server already, programs find this one after the other has ended.
+    If there is another server already, programs find this one only after the other one has ended.
 
     Raises:
         DatasetError: If the file with the address cannot be written.
@@ -71,7 +71,7 @@ def publish(address: Address) -> Iterator[None]:
         lock = os.open(path.with_name(_LOCK), os.O_RDWR | os.O_CREAT, 0o600)
     except OSError as error:
         raise WorkerError(f"{path}: nobody would find this server: {error.strerror}") from error
-    # The lock may come just when this server ends. `turn` keeps the file from being written after it was removed.
+    # This server may get the lock just when it ends. `turn` prevents writing the file after it was removed.
     turn, has_left = threading.Lock(), threading.Event()
 
     def wait() -> None:
@@ -80,14 +80,14 @@ def publish(address: Address) -> Iterator[None]:
             if has_left.is_set():
                 os.close(lock)
                 return
-            # The disk may be full by now; this server works without the file.
+            # The disk may be full by now, but this server works without the file.
             with suppress(DatasetError):
                 write_secret(path, _ADDRESS.dump_json(address))
 
     try:
         fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
-        # The other server holds the lock until it ends, however it ends.
+        # The other server holds the lock until it ends, even if it is killed; a thread waits for that.
         threading.Thread(target=wait, name="next to be found", daemon=True).start()
     else:
         write_secret(path, _ADDRESS.dump_json(address))
@@ -96,7 +96,7 @@ def publish(address: Address) -> Iterator[None]:
     finally:
         with turn:
             has_left.set()
-            # If it is not this server's turn yet, the file is that of the other one.
+            # If this server has not got the lock yet, the file belongs to the other server, and stays.
             if _read() == address:
                 path.unlink(missing_ok=True)
                 os.close(lock)
@@ -118,7 +118,7 @@ def find_server() -> Address | None:
         ConfigError: If runs cannot be remembered.
     """
     address = _read()
-    # Another process may have the port or the pid of a server that was killed, but it does not hold the lock.
+    # If a server was killed, another process may have got its port or pid. Only the lock proves that a server lives.
     if address is None or not is_locked(_path().with_name(_LOCK)):
         return None
     try:
@@ -140,7 +140,7 @@ def ensure_server() -> Address:
     log = log_path()
     words = [*make_command(), "serve", "--json"]
     with open(open_log(log), "ab") as output:
-        # Standard output has a one-time code, and the user may have allowed others to read the log.
+        # Standard output has a one-time code. It does not go to the log, which the user may let others read.
         process = subprocess.Popen(
             words, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=output, start_new_session=True
         )
@@ -148,7 +148,7 @@ def ensure_server() -> Address:
     while time.monotonic() < deadline and process.poll() is None:
         if (address := find_server()) is not None:
             if address.pid != process.pid:
-                # Another process has started a server at the same time, and was faster.
+                # Another process has started a server at the same time, and that one was faster.
                 process.terminate()
             return address
         time.sleep(_POLL_S)
@@ -177,7 +177,7 @@ def _ask(address: Address, method: str, path: str) -> dict[str, str]:
     if address.certificate is None:
         connection = http.client.HTTPConnection(host, port, timeout=_ANSWER_S)
     else:
-        # Only this very certificate is accepted, so its names and who has signed it do not matter.
+        # Only this one certificate is accepted, so the names in it and its issuer do not matter.
         context = ssl.create_default_context(cafile=address.certificate)
         context.check_hostname = False
         context.verify_flags |= ssl.VERIFY_X509_PARTIAL_CHAIN

@@ -38,7 +38,7 @@ class InstanceRequest(BaseModel):
     @field_validator("component", "set", "joins")
     @classmethod
     def _is_text(cls, value: JsonValue) -> JsonValue:
-        # JSON can escape half a character (a lone surrogate), which no file can hold.
+        # JSON can contain half a character (a lone surrogate, escaped), which cannot be written to a file.
         try:
             json.dumps(value, ensure_ascii=False).encode()
         except UnicodeEncodeError as error:
@@ -141,7 +141,7 @@ def make_log_routes(instances: Instances) -> APIRouter:
     @router.get("/{instance}/log/{node}", response_class=PlainTextResponse)
     def log(instance: str, node: str, tail: Annotated[int, Query(ge=1, le=10_000)] = 200) -> Any:
         """The last lines of what a node has printed."""
-        # The name is looked up among the files of the directory, so it cannot lead out of it.
+        # The name is only compared with names of files in the directory, so it cannot lead out of the directory.
         files = NodeLogs(Path(instances.get(instance).record.logs)).files()
         try:
             with open(open_log(files[node], os.O_RDONLY), encoding="utf-8", errors="replace") as file:
@@ -160,7 +160,7 @@ def make_log_routes(instances: Instances) -> APIRouter:
             suppress(OSError),
             open(open_log(Path(record.logs) / EVENTS, os.O_RDONLY), encoding="utf-8", errors="replace") as file,
         ):
-            # Where a dataset is resumed, the file has the events of earlier runs, too.
+            # If the run resumes a dataset, the file has the events of earlier runs, too.
             told += (line for line in file if (event := parse(line)) and event.run == record.run)
         return Response("".join(told), media_type="application/x-ndjson")
 

@@ -38,7 +38,7 @@ _KEY = r"[A-Za-z0-9_-]+(\.[A-Za-z0-9_-]+)*"
 _LOCK = "instances.lock"
 _LOOK_S = 0.02
 _LONGEST_STOP_S = 2.0
-"""Longest wait until a launcher has written that it is stopping."""
+"""Longest wait for a launcher to write into its record that it is stopping."""
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ class Instances:
             NotFoundError: If there is none.
             ConflictError: If its record cannot be read.
         """
-        # Ids become names of files.
+        # Ids become names of files, so they must not hold a slash, for example.
         if not re.fullmatch(r"(?!\.)[A-Za-z0-9_.-]{1,80}", instance):
             raise NotFoundError(f"no run {instance!r}", expected="at most 80 of letters, digits, -, _ and .")
         try:
@@ -75,10 +75,10 @@ class Instances:
 
         Raises:
             NotFoundError: If there is no such component.
-            ConflictError: If there is another run of that id, or a dataset of one that was forgotten, or as many
-                instances live as may, or a container cannot join the run that the request names.
-            ConfigError: If the configuration cannot be used, or the request does not fit such a component.
-            WorkerError: If it cannot be begun.
+            ConflictError: If another run has that id, or there is a dataset of a forgotten run with that id, or no more
+                instances of the component may live, or a container cannot join the run that the request names.
+            ConfigError: If the configuration cannot be used, or the request does not fit this kind of component.
+            WorkerError: If the instance cannot be begun.
         """
         component = self.catalogue.get(origin.component)
         if not re.fullmatch(NAME, instance):
@@ -109,15 +109,15 @@ class Instances:
         return run, True
 
     def resume(self, instance: str) -> Run:
-        """Go on with the dataset of a run that has ended, as a run of its own.
+        """Begin a new run, which continues the dataset of a run that has ended.
 
         Raises:
             NotFoundError: If there is no such run.
-            ConflictError: If it lives, has no dataset to go on with or a complete one, or as many instances live as
-                may.
+            ConflictError: If the run lives, its dataset is complete or cannot be continued, or no more instances of the
+                component may live.
             ConfigError: If the configuration cannot be used.
             DatasetError: If the configuration is no file.
-            WorkerError: If it cannot be begun.
+            WorkerError: If the new run cannot be begun.
         """
         run = self.get(instance)
         origin = run.record.origin
@@ -134,8 +134,8 @@ class Instances:
     def stop(self, instance: str, *, force: bool = False) -> None:
         """Ask an instance to finish its running trials and end; by force, end it at once, and forget it.
 
-        To ask once more does not hurry it. One whose launcher died cannot be asked: what is left of it is ended, and it
-        is forgotten.
+        Asking again does not hurry the instance. If its launcher died, nobody can be asked, so this ends all nodes that
+        are left, and forgets the instance.
 
         Raises:
             NotFoundError: If there is no such run.
@@ -182,8 +182,8 @@ class Instances:
 
         Raises:
             NotFoundError: If there is no such run.
-            ConflictError: If it has ended, died or has no simulation that runs, or more than what is seen differs from
-                the description of the configuration.
+            ConflictError: If it has ended, died or has no running simulation, or if the description differs from that
+                of the configuration in more than its appearance.
             ConfigError: If the text is no URDF.
             WorkerError: If a simulation does not answer.
         """
@@ -203,10 +203,12 @@ class Instances:
 
 
 def _require_living(run: Run) -> RunRecord:
-    """The record of a run, which has to live; if it died, the request is in conflict, and the server has not failed.
+    """Check that a run lives, and return its record.
+
+    A run that died is a `ConflictError` here, too, because it is no failure of the server.
 
     Raises:
-        ConflictError: If it has ended, or its launcher died.
+        ConflictError: If the run has ended, or its launcher died.
     """
     try:
         return require_living(run)
@@ -217,7 +219,7 @@ def _require_living(run: Run) -> RunRecord:
 def _stop_once(run: Run) -> None:
     """Ask a run to stop, unless somebody has just done so: a second signal would hurry it.
 
-    The launcher writes that it is stopping when its loop sees the signal, so this waits for that, for a while.
+    The launcher writes into its record that it is stopping when it sees the signal; this waits for that, for a while.
 
     Raises:
         ConflictError: If it has ended.
@@ -233,10 +235,10 @@ def _stop_once(run: Run) -> None:
 
 
 def _refuse_taken(directory: Path) -> None:
-    """Refuse a directory that holds anything; the run would refuse it when the client was already told that it begins.
+    """Refuse a directory that is not empty. The run would refuse it, too, but only after the client got its answer.
 
     Raises:
-        ConflictError: If it does.
+        ConflictError: If the directory is not empty.
     """
     try:
         refuse_taken(directory)
@@ -255,10 +257,10 @@ def _check_simulations(run: Run) -> None:
 
 
 def _check_wish(origin: Origin, component: Component) -> None:
-    """Refuse a request for something that an instance of the component cannot have.
+    """Refuse a request with fields that do not fit the kind of component.
 
     Raises:
-        ConfigError: If the request is such a one.
+        ConfigError: If the request has such fields.
     """
     problems = []
     if component.kind != "container" and origin.joins is not None:
@@ -272,10 +274,10 @@ def _check_wish(origin: Origin, component: Component) -> None:
 
 
 def _check_room(component: Component) -> None:
-    """Refuse one more instance if as many live as may.
+    """Refuse one more instance if as many instances live as `max_instances` allows.
 
     Raises:
-        ConflictError: If so.
+        ConflictError: If that many live.
     """
     runs = (run for run in Records().all() if run.record.origin and run.record.origin.component == component.name)
     living = [run.id for run in runs if run.status == "running"]
@@ -293,7 +295,7 @@ def _one_at_a_time() -> Iterator[None]:
 
     Raises:
         ConfigError: If runs cannot be remembered.
-        WorkerError: If the lock cannot be had.
+        WorkerError: If the lock cannot be opened.
     """
     path = state_directory() / _LOCK
     try:

@@ -1,7 +1,8 @@
 """Simulations that are slowed down to real time as long as somebody watches them live.
 
-Each watcher shares the lock of a file beside the key of the run. The lock ends with the server that holds it, so any
-server sees at the file which simulations nobody watches any more, even if the watchers' server was killed.
+For each simulation that is watched, there is a file beside the key of the run. Each watcher holds a shared lock of the
+file, which ends with the server. So any server can find files without a lock, and with them the simulations that nobody
+watches any more, even if the server of their watchers was killed.
 """
 
 from __future__ import annotations
@@ -42,12 +43,12 @@ class Hold:
     lock: int
 
     def let_go(self) -> None:
-        """Watch no longer; after its last watcher, the simulation gets the speed of its configuration again."""
+        """Stop watching; the last watcher gives the simulation the speed of its configuration again."""
         try:
-            # The own share becomes the only lock, unless somebody else has a share, too.
+            # This turns the shared lock into an exclusive one, which fails if there is another watcher.
             fcntl.flock(self.lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
-            # Somebody else still watches it.
+            # Another watcher still watches the simulation.
             return
         else:
             try:
@@ -55,7 +56,7 @@ class Hold:
                 if _runs(run, self.simulation):
                     _set_speed(run, self.simulation, None)
             except (ConfigError, DatasetError):
-                # The run was forgotten, or its configuration is gone, so nothing of it can be slow.
+                # The run was forgotten, or its configuration was removed, so it has no slow simulation.
                 pass
             except WorkerError:
                 # The simulation may be busy: the file stays, so that `let_go_of_left` tries again.
@@ -82,14 +83,14 @@ def take(run: Run, simulation: str) -> Hold:
     try:
         _set_speed(run, simulation, _REAL_TIME)
     except ThrowcollectError:
-        # The simulation may slow down after all; because of the file, `let_go_of_left` gives it its speed back.
+        # The simulation may have slowed down nevertheless. The file stays, so `let_go_of_left` restores the speed.
         os.close(lock)
         raise
     return Hold(run, simulation, lock)
 
 
 async def keep_letting_go() -> None:
-    """Let go every few seconds of simulations whose watchers' server was killed, or which did not answer."""
+    """Call `let_go_of_left` every few seconds, for simulations whose server was killed or that did not answer."""
     while True:
         await asyncio.to_thread(let_go_of_left)
         await asyncio.sleep(_SWEEP_S)
@@ -97,7 +98,7 @@ async def keep_letting_go() -> None:
 
 def let_go_of_left() -> None:
     """Let go of simulations that nobody watches any more."""
-    # If records cannot be read for a while, the next attempt finds the same files.
+    # If records cannot be read for a while, a later attempt finds the same files.
     with suppress(ThrowcollectError, OSError):
         for run in Records().all():
             for note in sorted(_note(run, "").glob("*")) if run.status == "running" else ():
@@ -106,12 +107,12 @@ def let_go_of_left() -> None:
 
 
 def _note(run: Run, simulation: str) -> Path:
-    """File whose lock the watchers of a simulation share."""
+    """Path of the file whose lock the watchers of a simulation share."""
     return run.key.directory.parent / _DIRECTORY / simulation
 
 
 def _share(path: Path) -> int:
-    """Descriptor of a file whose lock this process shares from now on."""
+    """Share the lock of a file from now on, and return the file's descriptor."""
     path.parent.mkdir(exist_ok=True)
     while True:
         lock = os.open(path, os.O_RDWR | os.O_CREAT, 0o600)
@@ -119,7 +120,7 @@ def _share(path: Path) -> int:
         with suppress(FileNotFoundError):
             if os.path.samestat(os.fstat(lock), path.stat()):
                 return lock
-        # The last watcher has removed the file between the opening and the lock.
+        # The last watcher has removed the file after it was opened and before it was locked here.
         os.close(lock)
 
 

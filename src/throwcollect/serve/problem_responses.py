@@ -99,7 +99,7 @@ def add_handlers(app: FastAPI) -> None:
     async def http(request: Request, error: HTTPException) -> ProblemResponse:
         headers = dict(error.headers or {})
         if "Allow" in headers:
-            # Each method is a route of its own, and Starlette names only the method of the first one.
+            # Each method has a route of its own, and Starlette names only the method of the first route.
             headers["Allow"] = ", ".join(sorted(_methods_at(request)))
         return problem(error.status_code, str(error.detail), headers=headers)
 
@@ -110,7 +110,7 @@ def add_handlers(app: FastAPI) -> None:
 
 
 def _find_problems_of_body(request: Request, error: RequestValidationError) -> list[Problem]:
-    """Put into words what is wrong with the body of a request; nothing if it is not the body that is wrong."""
+    """Put into words what is wrong with the body of a request; empty if the error is not in the body."""
     wrong = next((each for each in error.errors() if each["loc"][0] == "body"), None)
     model = _find_model_of_body(request)
     if wrong is None or model is None:
@@ -137,7 +137,7 @@ def _find_problems_of_query(request: Request) -> list[Problem]:
 
 
 def _find_problems(model: type[BaseModel], values: object, what: str) -> list[Problem]:
-    """Find what does not fit a model; `what` begins the sentence on something that is wrong as a whole."""
+    """Find values that do not fit a model; `what` begins the sentence if the values are wrong as a whole."""
     try:
         model.model_validate(values)
     except ValidationError as found:
@@ -151,7 +151,7 @@ def _find_problems(model: type[BaseModel], values: object, what: str) -> list[Pr
 
 
 def _resolve(node: Any, definitions: dict[str, Any]) -> Any:
-    """Put definitions in the place of references to them, as shapes know those of configurations alone."""
+    """Replace references by the definitions that they name, because a shape resolves only those of configurations."""
     if isinstance(node, list):
         return [_resolve(each, definitions) for each in node]
     if not isinstance(node, dict):

@@ -1,4 +1,4 @@
-"""Decides whether clients may go on with the dataset of a run that is over."""
+"""Decides whether clients may continue the dataset of a run that is over."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from throwcollect.wording import command
 
 
 def check_resumption(run: Run, *, is_complete: Callable[[Path], bool] = is_complete) -> None:
-    """Refuse to go on with the dataset of a run.
+    """Check that clients may continue the dataset of a run.
 
     Args:
         run: The run, as it is now.
-        is_complete: Says whether nothing is left to collect into a directory.
+        is_complete: Returns whether nothing is left to collect into a directory.
 
     Raises:
-        ConflictError: If the run lives, or has no dataset to go on with, or a complete one.
+        ConflictError: If the run lives, or has no dataset that can be continued, or a complete one.
     """
     directory = run.place.directory
     if run.status == "running":
@@ -37,7 +37,7 @@ def check_resumption(run: Run, *, is_complete: Callable[[Path], bool] = is_compl
 
 
 def can_be_resumed(run: Run) -> bool:
-    """Whether clients may go on with the dataset of a run; it costs little to ask again and again.
+    """Whether clients may continue the dataset of a run; cheap enough to be called again and again.
 
     A run that has finished its dataset counts as complete, although files may have been lost since.
     """
@@ -51,7 +51,7 @@ def can_be_resumed(run: Run) -> bool:
 
 
 def _is_complete_by_now(directory: Path) -> bool:
-    """Whether a dataset is complete; its tables are read again only if files have come, gone or been replaced."""
+    """Whether a dataset is complete; its tables are read again only if files were added, removed or replaced."""
     try:
         changed_ns = directory.stat().st_mtime_ns, (directory / METADATA).stat().st_mtime_ns
     except OSError:

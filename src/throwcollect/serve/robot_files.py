@@ -21,7 +21,7 @@ from throwcollect.runs.component_container import DESCRIPTION
 from throwcollect.runs.records import Run
 
 _MESH = re.compile(r"package://([\w.-]+)/([^\"'<>]+)")
-"""URL of a mesh in a description: its package, and its path in there."""
+"""URL of a mesh in a description: its package, and its path in that package."""
 
 
 def description_of(run: Run) -> str:
@@ -85,7 +85,7 @@ def _find_config(run: Run) -> Path:
     return path
 
 
-# The time of the last change belongs to the key of the cache, so a file that was changed is read again.
+# The time of the last change is part of the cache's key, so a file that has changed is read again.
 @lru_cache(maxsize=16)
 def _describe(path: Path, _changed_ns: int) -> str:
     return full_description(load(path))
@@ -99,7 +99,7 @@ def find_mesh(package: str, path: str) -> Path:
         ConfigError: If the description of a robot cannot be read.
     """
     root = _find_packages().get(package)
-    # Neither dots nor links may lead out of the package; a path that no file can have raises an error.
+    # Neither dots nor links may lead out of the package. A path that is not possible for a file raises an error.
     with suppress(OSError, ValueError):
         if root is not None and ".." not in PurePosixPath(path).parts:
             file = (root / path).resolve(strict=True)
@@ -113,8 +113,8 @@ class MeshFile:
     """The file of a mesh that a description names.
 
     Attributes:
-        url: Its name there: ``package://PACKAGE/PATH``.
-        sha256: SHA-256 of what is in it, in hexadecimal.
+        url: Its URL in the description: ``package://PACKAGE/PATH``.
+        sha256: SHA-256 of its content, in hexadecimal.
         bytes: Its size.
     """
 
@@ -151,7 +151,7 @@ def find_mesh_by_content(sha256: str) -> Path:
 
 
 def _find_files(description: str) -> Iterator[tuple[str, str, Path]]:
-    """Find the mesh files that a description names, each with its package and its path in there."""
+    """Find the mesh files that a description names, each with its package and its path in that package."""
     for package, path in dict.fromkeys(_MESH.findall(description)):
         with suppress(NotFoundError):
             yield package, path, find_mesh(package, path)

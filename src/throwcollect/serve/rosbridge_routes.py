@@ -1,4 +1,4 @@
-"""The sockets of rosbridge: of a run by its id, or of the only one that lives."""
+"""The sockets of rosbridge: for a run with a given id, or for the only run that lives."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def _find(instances: Instances, instance: str) -> Run:
     """The run of an id.
 
     Raises:
-        NotFoundError: If there is none, or it has ended: nobody would ever answer.
+        NotFoundError: If there is none, or it has ended, so that nobody would ever answer.
     """
     run = instances.get(instance)
     if run.status == "ended":

@@ -30,9 +30,9 @@ from throwcollect.serve.rosbridge.reassembly import LONGEST_FRAME
 _PORT = 8080
 """Port to serve at if the user names none and it is free."""
 WEBSOCKETS: Literal["websockets-sansio"] = "websockets-sansio"
-"""Implementation of WebSockets: it waits for a client that reads slowly, instead of collecting frames in memory."""
+"""This implementation of WebSockets waits for a client that reads slowly, and does not collect frames in memory."""
 _MOST_CLIENTS = 256
-"""Connections up to which requests are answered; uvicorn opens sockets beyond it, so `access` counts those."""
+"""With more connections, requests are refused. uvicorn does not limit sockets in this way, so `access` counts those."""
 _LOG_BYTES = 1_000_000
 _PEM = "a certificate and its key without a password, both in PEM"
 _END_S = 2.5
@@ -58,7 +58,7 @@ def serve(
     names: frozenset[str] = frozenset(),
     tell: Callable[[Address, str], None],
 ) -> None:
-    """Serve until the process is told to end.
+    """Serve until a signal asks the process to end.
 
     Args:
         instances: All runs, and what can be done with them.
@@ -68,7 +68,7 @@ def serve(
         tls: Certificate and key; None to speak in the clear.
         origins: Further origins of pages that may connect.
         names: Host names by which clients know this machine, besides the address.
-        tell: Called once, when the server can be reached, with its address and a one-time code.
+        tell: Called once, when the server can be reached, with the server's address and a one-time code.
 
     Raises:
         ConfigError: If the port is taken, or the certificate or its key cannot be used.
@@ -96,7 +96,7 @@ def serve(
             ws_per_message_deflate=False,
             limit_concurrency=_MOST_CLIENTS,
             timeout_graceful_shutdown=1,
-            # A client could forge the headers of a proxy.
+            # These headers are ignored, because any client could send them.
             proxy_headers=False,
             ssl_certfile=None if tls is None else tls.certificate,
             ssl_keyfile=None if tls is None else tls.key,
@@ -106,7 +106,7 @@ def serve(
         _write_lines()
         with publish(address):
             tell(address, keys.new_code())
-            # uvicorn raises the signal that ended it once more; for a server, that is the usual end and no error.
+            # uvicorn raises the signal that ended it a second time. For a server, that is the usual end and no error.
             with contextlib.suppress(KeyboardInterrupt):
                 _Server(config).run(sockets=[listener])
 
@@ -114,7 +114,7 @@ def serve(
 class _Server(uvicorn.Server):
     """A server that ends soon after a signal, whatever its threads are doing.
 
-    Nothing has to be finished there, because the next server finds on disk what is left to do.
+    Threads need not finish their work, because the next server finds on disk what is left to do.
     """
 
     def handle_exit(self, sig: int, frame: FrameType | None) -> None:
@@ -161,7 +161,7 @@ class _CutLog(logging.handlers.RotatingFileHandler):
 def _write_lines() -> None:
     """Write a line for each request: to the log of a server in the background, else to standard error."""
     lines: logging.Handler = logging.StreamHandler()
-    # Without that log, or without standard error, this server is not in the background.
+    # An error means that there is no such log, or no standard error, so this server is not in the background.
     with contextlib.suppress(OSError, ValueError):
         if os.path.samestat(os.fstat(sys.stderr.fileno()), log_path().stat()):
             lines = _CutLog(log_path())
@@ -185,7 +185,7 @@ def _listen(host: str, port: int | None) -> Iterator[socket.socket]:
                     raise
                 listener.bind((host, 0))
             listener.listen()
-        # A host name that no name can have is a TypeError.
+        # A text that cannot be a host name leads to a TypeError.
         except (OSError, TypeError) as error:
             why = error.strerror if isinstance(error, OSError) else error
             raise ConfigError(

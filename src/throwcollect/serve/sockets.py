@@ -13,9 +13,9 @@ from throwcollect.errors import ThrowcollectError
 NOT_FOUND = 4404
 """Close code of a socket to something that does not exist."""
 MAY_NOT = 4403
-"""Close code of a socket that would change something, while its token may only look."""
+"""Close code of a socket that would change something, if the client's token allows only looking."""
 FULL = 1013
-"""Close code of a socket that is one too many; those who try later may get in."""
+"""Close code of a socket beyond the largest number; a later attempt may succeed."""
 FAILED = 4503
 """Close code of a socket to something that does not answer."""
 # A control frame carries 125 bytes (RFC 6455, 5.5), and the close code takes two of them.
@@ -24,9 +24,9 @@ _MOST_REASON = 123
 
 
 async def refuse(socket: WebSocket, code: int, reason: str) -> None:
-    """Accept a socket and close it at once, because browsers tell a page nothing of a socket that was not accepted.
+    """Accept a socket and close it at once, because a page learns nothing about a socket that was not accepted.
 
-    The frame that closes it holds the first line of the reason, as far as that fits.
+    The frame that closes the socket holds the first line of the reason, cut to the size that fits.
     """
     await socket.accept()
     await socket.close(code, _cut(reason))
@@ -34,15 +34,15 @@ async def refuse(socket: WebSocket, code: int, reason: str) -> None:
 
 def _cut(reason: str) -> str:
     first, _, _ = reason.partition("\n")
-    # The cut may have gone through a character, the rest of which is left out.
+    # If the cut goes through a character, its remaining bytes are left out.
     return first.encode()[:_MOST_REASON].decode(errors="ignore")
 
 
 async def keep_telling(socket: WebSocket, telling: Coroutine[Any, Any, object]) -> None:
-    """Have ``telling`` send to a client until the client has gone, or there is nothing more to send."""
+    """Let ``telling`` send to a client until the client has left, or there is nothing more to send."""
 
     async def wait_until_gone() -> None:
-        # What the client sends is ignored, but only reading shows that it has gone.
+        # Messages of the client are ignored, but only reading shows that it has left.
         while (await socket.receive())["type"] != "websocket.disconnect":
             pass
 

@@ -29,7 +29,7 @@ Status = Literal["planning", "starting", "running", "ended", "died"]
 _LIVING: tuple[Status, ...] = ("planning", "starting", "running")
 
 
-# Of dataclasses of its own, pydantic makes a schema once; of plain ones, for each route that tells a state.
+# These are dataclasses of pydantic, which makes their schema once; for plain ones, it would do so for each route.
 @dataclass(frozen=True)
 class ComponentState:
     """A component.
@@ -62,12 +62,12 @@ class InstanceState:
         kind: Whether it collects a dataset, has simulations for clients alone, or is a container of the catalogue.
         joins: Id of the run that a container has joined; None if it has joined none.
         status: ``planning`` while a large plan is made, ``starting`` until all nodes run, ``running``, ``ended``, or
-            ``died``: its launcher did before it ended.
+            ``died`` if its launcher died before the end.
         started: When it was begun.
         ended: When it ended; None before.
         stopping: Whether it ends because somebody has asked for that; running trials are finished.
         exit_code: Exit code of its launcher; None before it ended.
-        message: What it ended with, in words; empty if there was no error.
+        message: The error with which it ended, in words; empty if there was none.
         simulations: Number of simulations that are wanted.
         nodes: Its nodes; none once it has ended, or died with them.
         planning: How far the plan is while it is made; else None.
@@ -75,7 +75,7 @@ class InstanceState:
         dataset: Where the dataset is, in words; None if it collects none.
         summary: What the dataset holds; None if it is not finished.
         robots: Names of its simulations that run, each of which is the namespace of its topics.
-        can_be_resumed: Whether it is over before its last trial, so that clients can go on with its dataset.
+        can_be_resumed: Whether it ended before its last trial, so that clients can continue its dataset.
     """
 
     id: str
@@ -155,13 +155,13 @@ class Lookout:
             written = name, records.read_change_ns(name)
             if written in known:
                 run, instance = known[written]
-                # A later run may have gone on with the dataset, which the record of this one does not tell.
+                # A later run may have continued the dataset, which the record of this run does not show.
                 instance = replace(instance, can_be_resumed=can_be_resumed(run))
             else:
                 try:
                     run = records.get(name)
                 except ConfigError:
-                    # The record was removed just now, or is damaged; `throwcollect ps` tells of damaged ones.
+                    # The record was removed just now, or is damaged; `throwcollect ps` reports damaged records.
                     continue
                 instance = describe(run)
             instances.append(instance)
@@ -173,7 +173,7 @@ class Lookout:
                 ended[written] = run, instance
         self._ended = ended
         instances = [
-            # Another run may be going on with the dataset of one that is over.
+            # A dataset that another run continues right now cannot be resumed.
             replace(each, can_be_resumed=False) if resumable.get(each.id) in collecting else each
             for each in instances
         ]
@@ -187,7 +187,7 @@ def _find_targets(component: Component) -> list[str]:
     try:
         return _read_targets(component.source, component.source.stat().st_mtime_ns)
     except (ConfigError, OSError):
-        # The error is told to the client that starts an instance.
+        # A client that starts an instance gets the error then.
         return []
 
 

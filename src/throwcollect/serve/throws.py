@@ -59,7 +59,7 @@ def encode_throw(delivery: Delivery, simulation: str, values: Mapping[str, float
         "values": dict(values),
     }
     text = json.dumps(header).encode()
-    # A typed array of JavaScript has to begin at a multiple of the size of its numbers.
+    # In JavaScript, a typed array has to begin at a multiple of the size of its numbers.
     padding = b"\0" * (-(_LENGTH.size + len(text)) % _FLOAT_BYTES)
     numbers = (samples.position, samples.ball_position)
     return b"".join((_LENGTH.pack(len(text)), text, padding, *(part.astype("<f4").tobytes() for part in numbers)))
@@ -94,10 +94,14 @@ class ThrowWatch:
 
     @asynccontextmanager
     async def throws(self) -> AsyncIterator[Callable[[], Awaitable[bytes]]]:
-        """Listen; the function that is given waits for the next throw, or takes the newest that came meanwhile."""
+        """Listen as long as the block lasts.
+
+        Yields:
+            A function that returns the newest throw since its last call, and waits for one if none has come.
+        """
         queue: asyncio.Queue[bytes] = asyncio.Queue(maxsize=1)
         if not self._listeners:
-            # Each thread has an event of its own: a thread that ends slowly must not see the event of its successor.
+            # Each thread gets an event of its own, because the event of a new thread must not keep an old one alive.
             self._is_over = threading.Event()
             name = f"throws of {self._run.id}"
             threading.Thread(target=self._listen, args=(self._is_over,), name=name, daemon=True).start()
@@ -174,7 +178,7 @@ class _Subscriptions:
 
 
 def _replace(queue: asyncio.Queue[bytes], frame: bytes) -> None:
-    """Put a frame into a queue that holds one, in place of the one in it."""
+    """Put a frame into a queue that holds one frame, in place of the frame that it holds."""
     while not queue.empty():
         queue.get_nowait()
     queue.put_nowait(frame)

@@ -39,23 +39,23 @@ def make_description_routes(instances: Instances) -> APIRouter:
 
     @router.get("/instances/{instance}/meshes")
     def meshes(instance: str) -> list[MeshFile]:
-        """The meshes that the robot of a run is drawn with; what is in them is had by their SHA-256."""
+        """The meshes that the robot of a run is drawn with; clients get their contents by their SHA-256."""
         return list_meshes(description_of(instances.get(instance)))
 
     @router.get("/instances/{instance}/scene")
     def scene(instance: str) -> SceneFacts:
-        """What viewers have to know besides."""
+        """Heights and distances in the scene of a run, which viewers need besides the description of the robot."""
         return scene_of(instances.get(instance))
 
     @router.put("/instances/{instance}/urdf", status_code=202, openapi_extra=_XML)
     async def show(instance: str, request: Request) -> None:
-        """Have viewers draw another description, which may differ in what is seen."""
+        """Let viewers draw another description, which may differ from that of the configuration only in appearance."""
         urdf = (await request.body()).decode(errors="replace")
         await asyncio.to_thread(instances.show, instance, urdf)
 
     @router.delete("/instances/{instance}/urdf", status_code=202)
     def show_own(instance: str) -> None:
-        """Have viewers draw the description of the configuration again."""
+        """Let viewers draw the description of the configuration again."""
         instances.show(instance, None)
 
     return router
@@ -90,7 +90,7 @@ def make_view_routes(instances: Instances) -> APIRouter:
             async with watch.throws() as next_throw:
                 await keep_telling(socket, _send_throws(socket, next_throw))
         finally:
-            # A later run of this id must not get the throws of this one.
+            # A later run of the same id must not get the throws of this run.
             if watch.is_idle and watches.get(instance) is watch:
                 del watches[instance]
 
@@ -106,7 +106,7 @@ def make_view_routes(instances: Instances) -> APIRouter:
             return
         try:
             await socket.accept()
-            # Nothing is ever sent: the simulation is held as long as the client is there.
+            # Nothing is ever sent: the simulation stays slow as long as the client is connected.
             await keep_telling(socket, asyncio.Event().wait())
         finally:
             await asyncio.to_thread(hold.let_go)

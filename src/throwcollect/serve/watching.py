@@ -35,7 +35,7 @@ class StateWatch:
         Raises:
             ConfigError: If runs cannot be remembered.
         """
-        # One at a time, so that an older state can never get a higher revision than a newer one.
+        # Only one reads at a time, so that an older state never gets a higher revision than a newer one.
         async with self._one_look:
             state = await asyncio.to_thread(self._look)
             async with self._changed:
@@ -73,6 +73,6 @@ class StateWatch:
     async def _keep_looking(self) -> None:
         while True:
             await asyncio.sleep(_LOOK_S)
-            # If records cannot be read for a while, as on a full disk, listeners keep the last state.
+            # If records cannot be read for a while, such as on a full disk, listeners keep the last state.
             with suppress(ThrowcollectError, OSError):
                 await self.current()

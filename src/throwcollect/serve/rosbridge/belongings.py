@@ -1,4 +1,4 @@
-"""Things of one client in the ROS graph that outlive a session: topics, services and actions, by their names."""
+"""Topics, services and actions of one client in the ROS graph, by their names; each outlives a session."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ class Belonging(Protocol):
     """Something that a client has in the ROS graph."""
 
     def open(self) -> None:
-        """Make it in the session of the bridge."""
+        """Make this topic, service or action in the session of the bridge."""
 
     def lose(self) -> None:
-        """Forget the session, which is gone, and what came by it."""
+        """Forget the session, which has ended, and all messages that came by it."""
 
     def close(self) -> None:
         """Withdraw it."""

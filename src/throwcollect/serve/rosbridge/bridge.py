@@ -1,4 +1,4 @@
-"""A bridge: all clients of one run, and their common place in its ROS graph, in a thread of its own."""
+"""A bridge connects all clients of one run to its ROS graph, in a thread of its own."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ from throwcollect.serve.rosbridge.offered_actions import FAREWELL_S
 _logger = logging.getLogger(__name__)
 
 _LOOK_S = 1.0
-"""Time between two looks at the router and at what publishers offer."""
+"""Time between two looks at the router and at the quality of service that publishers offer."""
 _RETRY_S = 0.2
 _MISSES = 2
-"""Looks in a row without an answer after which the router counts as gone; on a busy machine, one answer may be late."""
+"""After this many looks without an answer, the router counts as gone; on a busy machine, one answer may be late."""
 
 
 class Bridge:
@@ -34,7 +34,7 @@ class Bridge:
     Several bridges may live in one process, each in another run. On Fast DDS a process is in one run at a time.
 
     Args:
-        connection: The way into the run; None while its router has no address, until `move` tells it.
+        connection: The way into the run; None if its router has no address yet, which `move` then sets.
     """
 
     def __init__(self, connection: Connection | None) -> None:
@@ -43,7 +43,7 @@ class Bridge:
         self._joined: Connection | None = None
         self._clients: list[BridgeClient] = []
         self._work: SimpleQueue[Callable[[], None]] = SimpleQueue()
-        # The number decides between equal times, because functions have no order.
+        # The number orders timers of equal time, because functions cannot be compared.
         self._timers: list[tuple[float, int, Callable[[], None]]] = []
         self._numbers = itertools.count()
         self._lock = threading.Lock()
@@ -56,7 +56,7 @@ class Bridge:
     def attach(self, send: Callable[[Frame], None], *, read_only: bool = False) -> BridgeClient:
         """Add a client, which the caller has to close.
 
-        Each frame for the client is given to ``send`` in the bridge's thread, so that may neither wait nor fail.
+        The bridge's thread calls ``send`` with each frame for the client, so ``send`` may neither wait nor fail.
         """
         client = BridgeClient(self, send, read_only=read_only)
         self.submit(lambda: self._clients.append(client))
@@ -98,7 +98,7 @@ class Bridge:
         self._work.put(action)
         with self._lock:
             if self._session is not None:
-                # The thread waits in the executor then, which only a task wakes.
+                # During a session, the thread waits in the executor, and only a task wakes it.
                 self._session.executor.create_task(self._do_next)
 
     def forget(self, client: BridgeClient) -> None:
@@ -113,13 +113,13 @@ class Bridge:
             if self._session is not None:
                 self._spin(self._session, max(wait_s, 0.0))
             else:
-                # With 0, `_do_next` would not wait at all, and this loop would take a whole core.
+                # With a time of 0, `_do_next` would not wait, and this loop would use a whole core.
                 self._do_next(max(min(wait_s, _RETRY_S), 0.001))
         for client in list(self._clients):
             client.close()
         while not self._work.empty():
             self._do_next()
-        # Nodes that wait for results of clients' actions get them before the actions are withdrawn.
+        # Timers withdraw the actions of clients a bit later, so that nodes get the last results before.
         end = time.monotonic() + FAREWELL_S
         while self._session is not None and self._timers and self._timers[0][0] <= end:
             self._spin(self._session, max(self._timers[0][0] - time.monotonic(), 0.0))
@@ -146,7 +146,7 @@ class Bridge:
         except ros.ExternalShutdownException:
             raise
         except Exception:
-            # One action that fails must not end the thread, which all clients share.
+            # A failing action must not end this thread, which serves all clients.
             _logger.exception("the bridge could not do something")
 
     def _call_timers(self) -> None:
@@ -154,7 +154,7 @@ class Bridge:
             self._attempt(heapq.heappop(self._timers)[2])
 
     def _look(self) -> None:
-        """Join the run if its router answers, and notice when it does not any more."""
+        """Join the run if its router answers, and notice when the router no longer answers."""
         now = time.monotonic()
         wait_s = _LOOK_S if self._session is not None else _RETRY_S
         if now < self._looked_at + wait_s and self._joined == self._connection:
@@ -181,7 +181,7 @@ class Bridge:
         self._joined = connection
         for client in self._clients:
             client.restore()
-        # Work that came without a session has no task in the executor of this one.
+        # Actions that were submitted while there was no session have no task in its executor, so they are done here.
         while not self._work.empty():
             self._do_next()
 

@@ -55,7 +55,7 @@ class ClientHost(Protocol):
 
 
 class BridgeClient:
-    """One client. `receive` and `close` may be called in any thread, everything else only in that of the bridge."""
+    """One client. Any thread may call `receive` and `close`; only the bridge's thread may call everything else."""
 
     def __init__(self, host: ClientHost, send: Callable[[Frame], None], *, read_only: bool) -> None:
         self._host = host
@@ -109,7 +109,7 @@ class BridgeClient:
         return len(self._frames)
 
     def receive(self, frame: Frame) -> None:
-        """Take a frame of the client; the client is told what is wrong with it."""
+        """Take a frame of the client; if something is wrong with it, the client gets a status message."""
         self._frames.append(frame)
         self._host.submit(self.work_off)
 
@@ -132,7 +132,7 @@ class BridgeClient:
         """Make everything that the client had again, in a new session."""
         for part in self._parts:
             part.restore()
-        # This takes back the error that `lose` has told, so clients that only want errors get it, too.
+        # This message cancels the error that `lose` has sent, so clients that only want errors get it, too.
         if self._level != "none":
             self.answer({"op": "status", "level": "info", "msg": "the router of the run is back"}, Form())
         self.work_off()
@@ -177,14 +177,14 @@ class BridgeClient:
             operation = self._looking.get(request.op) or self._acting.get(request.op)
             if operation is None:
                 raise ConfigError(f"no operation {request.op}", expected=", ".join([*self._looking, *self._acting]))
-            # Whoever sends a goal waits for a result, so `_send_goal` refuses by a result and not by a status message.
+            # A client that sends a goal waits for a result, so `_send_goal` refuses with a result instead of a status.
             if request.op in self._acting and request.op != "send_action_goal":
                 self._require_writing(request.op)
             operation(request)
         except ThrowcollectError as error:
             self.say("error", sentence(error), number)
         except Exception as error:
-            # A frame of one client must not end the bridge, which serves the others, too.
+            # A frame of one client must not end the bridge, which serves other clients, too.
             _logger.exception("a client of the bridge sent what could not be done")
             self.say("error", f"this could not be done: {type(error).__name__}: {error}", number)
 
@@ -217,10 +217,10 @@ class BridgeClient:
             goal.fail(sentence(error))
 
     def _require_writing(self, what: str) -> None:
-        """Refuse what changes something to a client that may only look.
+        """Refuse a request that changes something if this client may only look.
 
         Raises:
-            ConfigError: If it is such a client.
+            ConfigError: If the client may only look.
         """
         if self._read_only:
             raise ConfigError(f"{what}: this client may only look", expected="the token of those who may act")
@@ -234,7 +234,7 @@ class BridgeClient:
         _logger.info("a client says: %s", request.text_or("msg", ""))
 
     def _authenticate(self, request: BridgeRequest) -> None:
-        """Refuse the way of ROS 1 to say who one is.
+        """Refuse the operation by which clients of ROS 1 authenticate themselves.
 
         Raises:
             ConfigError: Always.

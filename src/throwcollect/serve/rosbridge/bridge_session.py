@@ -1,4 +1,4 @@
-"""The place of a bridge in the ROS graph while there is a router: a node, and what all clients share."""
+"""A bridge's session in the ROS graph, while there is a router: a node, and all feeds and clients that are shared."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ class BridgeSession:
 
     def listen(self, topic: str, type_name: str, listener: Listener) -> Feed:
         """Give the messages of a topic to a listener; a latched topic begins with its earlier messages."""
-        # Only ROS has the earlier messages of a latched topic, so a later listener needs a subscription of its own.
+        # Earlier messages of a latched topic come only with a new subscription, so a later listener gets its own.
         alone = (topic, type_name, listener)
         shared = (topic, type_name, None)
         feed = self._feeds.get(shared)
@@ -93,7 +93,7 @@ class BridgeSession:
         )
 
     def look_around(self) -> None:
-        """Subscribe again where publishers offer another quality of service by now."""
+        """Subscribe again to topics whose publishers offer another quality of service by now."""
         changes = ros.graph_changes(self.node)
         if changes != self._changes:
             self._changes = changes

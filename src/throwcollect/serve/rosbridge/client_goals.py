@@ -107,12 +107,12 @@ class Goals(Errands[Goal]):
             goal.handle.cancel_goal_async()
 
     def lose(self) -> None:
-        """Fail everything, because the session is gone."""
+        """Fail all goals, because the session has ended."""
         self._action_clients.clear()
         super().lose()
 
     def close(self) -> None:
-        """Wait for no result any more; goals that are under way go on."""
+        """Stop waiting for results; goals that are under way go on."""
         super().close()
         for client in self._action_clients.values():
             client.destroy()
@@ -127,7 +127,7 @@ class Goals(Errands[Goal]):
             return
         goal.handle = handle
         handle.get_result_async().add_done_callback(partial(self._take_result, goal))
-        # The client has asked to cancel the goal before the action had accepted it.
+        # If the client asked to cancel the goal before the action accepted it, it is cancelled now.
         if goal.is_cancelled:
             handle.cancel_goal_async()
 

@@ -36,7 +36,7 @@ def read_frame(frame: Frame) -> BridgeRequest:
         ConfigError: If it is neither, or no operation.
     """
     try:
-        # No map of CBOR begins with a byte that an object of JSON can begin with.
+        # The first byte decides: no CBOR map begins with a byte that can begin a JSON object.
         if isinstance(frame, str) or frame[:1].isspace() or frame[:1] == b"{":
             fields = orjson.loads(frame)
         else:
@@ -57,7 +57,7 @@ def _read_array(tag: cbor2.CBORTag, _immutable: bool) -> Any:
 
 
 def plain_values(message: Any, compression: str = "none") -> Any:
-    """Turn a message into values that `encode` writes with the same ``compression``; JSON's have arrays of NumPy."""
+    """Turn a message into values for `encode` with the same ``compression``; those for JSON have NumPy arrays."""
     return plain(message, _json_numbers if compression == "none" else _cbor_numbers)
 
 
@@ -67,7 +67,7 @@ def encode(fields: object, compression: str = "none") -> Frame:
 
 
 def json_text(fields: object) -> str:
-    """Write JSON in one line, in ASCII, because ROS# takes every byte of a frame for a character."""
+    """Write JSON in one line, in ASCII, because ROS# treats every byte of a frame as a character."""
     text = orjson.dumps(fields, option=orjson.OPT_SERIALIZE_NUMPY).decode()
     # orjson cannot escape characters beyond ASCII; `json` does, in the form that JSON demands.
     return text if text.isascii() else _NOT_ASCII.sub(lambda found: json.dumps(found[0])[1:-1], text)

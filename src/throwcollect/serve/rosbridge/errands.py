@@ -16,12 +16,12 @@ _WATCH_S = 1.0
 
 
 class Errand:
-    """One thing that a client has asked of a node; it ends once.
+    """One request of a client to a node; it ends once.
 
     Attributes:
         name: Absolute name of the service or action.
         fail: Tells the client why there is no answer.
-        is_open: Whether it has not ended.
+        is_open: Whether the errand has not ended yet.
     """
 
     def __init__(self, name: str, fail: Callable[[str], None]) -> None:
@@ -39,7 +39,7 @@ class Errands(Generic[AnErrand]):
     Args:
         client: The client.
         unoffered: Sentence, with a place for the name, that says that no node offers the service or action.
-        gone: Sentence, with a place for the name, that says that the node has gone before it answered.
+        gone: Sentence, with a place for the name, that says that the node has ended before it answered.
     """
 
     def __init__(self, client: Peer, unoffered: str, gone: str) -> None:
@@ -75,15 +75,15 @@ class Errands(Generic[AnErrand]):
             errand.fail(why)
 
     def lose(self) -> None:
-        """Fail everything, because the session is gone."""
+        """Fail all errands, because the session has ended."""
         for errand in list(self._open):
             self.fail(errand, f"{errand.name}: the router of the run has gone")
 
     def restore(self) -> None:
-        """Ask nothing again in a new session: the client was told that it failed."""
+        """Do nothing in a new session: `lose` has told the client that its requests failed."""
 
     def close(self) -> None:
-        """Wait for no answer any more; what nodes have begun goes on."""
+        """Stop waiting for answers; nodes go on with what they have begun."""
         for errand in list(self._open):
             self.end(errand)
 

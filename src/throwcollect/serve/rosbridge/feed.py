@@ -24,12 +24,12 @@ class Sample:
         self._frames: dict[tuple[str, str], Frame] = {}
 
     def frame(self, topic: str, compression: str) -> Frame:
-        """The message as a client gets it that calls the topic like this.
+        """Encode the message for a client that knows the topic by this name.
 
         Raises:
             ValueError: If the bytes are malformed.
         """
-        # Clients that ask for the same get the same frame, which is encoded once.
+        # All clients with the same name and compression get the same frame, which is encoded once.
         key = topic, compression
         if key not in self._frames:
             fields = {"op": "publish", "topic": topic, "msg": self._content(compression)}
@@ -42,7 +42,8 @@ class Sample:
             return {"secs": secs, "nsecs": nsecs, "bytes": self._data}
         if compression not in self._encoded:
             values = plain_values(ros.deserialize_message(self._data, self._type), compression)
-            # Clients may have other names for the topic, and the values are the largest part of a frame.
+            # The values are kept encoded, as they are the largest part of a frame, and do not depend on a client's name
+            # for the topic.
             self._encoded[compression] = orjson.Fragment(json_text(values)) if compression == "none" else values
         return self._encoded[compression]
 
@@ -53,7 +54,7 @@ Listener = Callable[[Sample], None]
 class Feed:
     """Subscribes to a topic for all clients that listen to it; ``on_end`` is called when nobody listens any more.
 
-    The topic has its absolute name, and its type the full one.
+    ``topic`` is the absolute name of the topic, and ``type_name`` the full name of its type.
     """
 
     def __init__(self, node: ros.Node, topic: str, type_name: str, on_end: Callable[[], object]) -> None:
@@ -77,7 +78,7 @@ class Feed:
             self._subscribe()
 
     def remove(self, listener: Listener) -> None:
-        """Give the samples to a listener no longer."""
+        """Stop giving the samples to a listener."""
         self._listeners.remove(listener)
         if not self._listeners:
             self._node.destroy_subscription(self._subscription)
@@ -92,7 +93,8 @@ class Feed:
             self._subscribe()
 
     def _find_offered(self) -> ros.QoSProfile:
-        # Most publishers are reliable: a subscription that waits for them like this is not renewed, and misses nothing.
+        # Without publishers, this assumes reliable ones, as most are: if one comes, the subscription need not be
+        # renewed, and misses nothing.
         return find_offered_qos(self._node, self._topic, ros.ReliabilityPolicy.RELIABLE)
 
     def _subscribe(self) -> None:

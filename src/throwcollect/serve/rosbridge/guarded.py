@@ -1,4 +1,4 @@
-"""Topics and parameters that clients of a bridge may not have, as they would change or reveal what a run is made of."""
+"""Topics and parameters that are closed to clients of a bridge, as they would disturb a run or reveal its leases."""
 
 from __future__ import annotations
 

@@ -44,7 +44,7 @@ class OfferedAction:
         )
 
     def close(self) -> None:
-        """Withdraw it; goals that are under way are aborted."""
+        """Withdraw the action; goals that are under way are aborted."""
         server, self._server = self._server, None
         if server is None:
             return
@@ -53,11 +53,11 @@ class OfferedAction:
             return
         for number in list(self._goals):
             self._finish(number, self._type.Result(), _ABORTED)
-        # Nodes that wait for a result get it first.
+        # The action is withdrawn a bit later, so that nodes that wait for a result get it first.
         self._client.later(FAREWELL_S, server.destroy)
 
     def lose(self) -> None:
-        """Forget the session, which is gone, and all goals that came by it."""
+        """Forget the session, which has ended, and all goals that came by it."""
         self._server = None
         self._goals.clear()
 
@@ -86,7 +86,7 @@ class OfferedAction:
         self._finish(number, result, request.natural_or("status", _SUCCEEDED) if has_succeeded else _ABORTED)
 
     def settle(self, request: BridgeRequest) -> None:
-        """Take note of the state of a goal; one that has ended gets an empty result, as the client sends none.
+        """Take note of the state of a goal; if it has ended, finish it with an empty result, as the client sends none.
 
         Raises:
             ConfigError: If there is no such goal.
@@ -104,7 +104,7 @@ class OfferedAction:
         handle, future = self._goals.pop(number)
         if status == _SUCCEEDED:
             handle.succeed()
-        # A goal of ROS can only become cancelled after somebody has asked for that; otherwise, it is aborted.
+        # In ROS, a goal can be cancelled only after a request to cancel it; otherwise, this aborts it.
         elif status == _CANCELED and handle.is_cancel_requested:
             handle.canceled()
         else:

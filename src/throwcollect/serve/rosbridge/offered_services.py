@@ -37,16 +37,16 @@ class OfferedService:
         self._service = self._client.session.node.create_service(self._type, self._name, self._serve)
 
     def close(self) -> None:
-        """Withdraw it; nodes that wait for an answer get none."""
+        """Withdraw the service; nodes that wait for an answer get none."""
         if self._service is not None:
             self._client.session.node.destroy_service(self._service)
-        # Callbacks that wait for the client end here; without the service, their answers reach nobody.
+        # This ends callbacks that wait for the client. The service is gone, so their answers are not sent.
         for future, response in self._pending.values():
             future.set_result(response)
         self.lose()
 
     def lose(self) -> None:
-        """Forget the session, which is gone, and all requests that came by it."""
+        """Forget the session, which has ended, and all requests that came by it."""
         self._service = None
         self._pending.clear()
 
@@ -60,13 +60,13 @@ class OfferedService:
             raise ConfigError(f"service_response: no request {request.id} to {self._name} waits for an answer")
         future, response = self._pending[request.id]
         values = request.any("values")
-        # With `result: false`, the values may be a text that says why.
+        # With `result: false`, the values may be a text with the reason, instead of fields.
         if isinstance(values, Mapping) or request.flag("result", default=True):
             fill(response, {} if values is None else values)
         else:
             # ROS has no way to say that a service has failed, and without an answer the node would wait for ever.
             self._client.say("warning", f"{self._name}: a failed request is answered with defaults", request.id)
-        # Values of the wrong type have raised an error before, so that the client can still answer.
+        # The request is removed last: if values of a wrong type raise an error above, the client can answer again.
         del self._pending[request.id]
         future.set_result(response)
 

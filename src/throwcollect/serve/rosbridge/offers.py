@@ -19,7 +19,7 @@ class Offers(Belongings[ABelonging]):
         client: The client.
         kind: The field of requests that has the name.
         make: Makes an offer from the client's name for it and the name of its type.
-        probe: A service that each node with such an offer has, behind the offer's name.
+        probe: What is appended to an offer's name to get the name of a service that every node with that offer has.
     """
 
     def __init__(
@@ -35,14 +35,14 @@ class Offers(Belongings[ABelonging]):
         self._probe = probe
 
     def advertise(self, request: BridgeRequest) -> None:
-        """Offer something, in place of what the client has offered by the same name before.
+        """Offer a service or an action; it replaces an earlier offer of this client with the same name.
 
         Raises:
             ConfigError: If there is no such type, ROS does not allow the name, or a node offers it already.
         """
         given = request.text(self._kind)
         name = absolute_name(given)
-        # The new offer is made before the old one is withdrawn, so that a wrong request leaves everything as it is.
+        # The new offer is made before the old one is withdrawn, so that a malformed request changes nothing.
         offered = self._make(self._client, given, request.text("type"))
         if name in self._by_name:
             self._by_name.pop(name).close()
@@ -61,7 +61,7 @@ class Offers(Belongings[ABelonging]):
         del self._by_name[absolute_name(request.text(self._kind))]
 
     def pass_on(self, operation: Callable[[ABelonging, BridgeRequest], None]) -> Callable[[BridgeRequest], None]:
-        """Make what hands a request of the client to the offer that it names."""
+        """Make a function that passes a request of the client to the offer that the request names."""
         return lambda request: operation(self._find(request), request)
 
     def _find(self, request: BridgeRequest) -> ABelonging:

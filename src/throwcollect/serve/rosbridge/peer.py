@@ -1,4 +1,4 @@
-"""A client, as the parts of it see it that carry out its operations."""
+"""The interface of a client for its own parts, which carry out its operations."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ Level = Literal["info", "warning", "error"]
 
 
 class Peer(Protocol):
-    """A client. Everything here is called in the thread of the bridge."""
+    """A client. Only the thread of the bridge calls these methods."""
 
     @property
     def session(self) -> BridgeSession:

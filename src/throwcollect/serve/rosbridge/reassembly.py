@@ -8,10 +8,10 @@ from throwcollect.errors import ConfigError
 from throwcollect.serve.rosbridge.request import BridgeRequest, RequestId
 
 LONGEST_FRAME = 10 * 2**20
-"""Bytes of a frame that a client may send, whole or in fragments."""
+"""Largest number of bytes of a frame that a client may send, whole or in fragments."""
 _MOST_PARTS = 100_000
 _OF_A_PART = 64
-"""Characters by which each part counts more than its text, because it takes memory even if it is empty."""
+"""Each part counts as this many characters more than its text, because even an empty part takes memory."""
 
 
 @dataclass
@@ -35,8 +35,8 @@ class Reassembly:
             The frame, if this was its last part.
 
         Raises:
-            ConfigError: If it is no part of a frame, or all parts that wait are too long together; the frame is
-                dropped then.
+            ConfigError: If the request is no part of a frame, or all waiting parts together are too long; then the
+                frame is dropped.
         """
         number, total = request.natural_or("num", _MOST_PARTS), request.natural_or("total", 0)
         data = request.any("data")

@@ -9,7 +9,7 @@ from typing import Any
 from throwcollect.errors import ConfigError, ThrowcollectError
 
 COMPRESSIONS = ("none", "cbor", "cbor-raw")
-"""Encodings of messages to clients; of two that one client asks for, the later one counts."""
+"""Encodings of messages to clients; if the subscriptions of a client differ, the one that comes last here is used."""
 
 RequestId = str | int | None
 """The id that a client has given a request; None if it has given none."""
@@ -29,11 +29,11 @@ class Form:
 
 
 _LONGEST = 200
-"""Characters that a text may have: no name is longer, and messages repeat it."""
+"""Most characters of a text: no name is longer, and error messages repeat the text."""
 
 
 class Fields:
-    """Fields by name, as a client gives them; messages begin with ``what`` they belong to."""
+    """Fields by name, as a client gives them; error messages begin with ``what``, which the fields belong to."""
 
     def __init__(self, fields: Mapping[Any, Any], what: str) -> None:
         self._fields = fields
@@ -67,7 +67,7 @@ class Fields:
         value = self._fields.get(name)
         if value is None:
             return default
-        # Clients in JavaScript have only floats, which are exact up to here. A bool is an int of Python, too.
+        # Numbers of JavaScript are floats, which represent whole numbers exactly up to here. In Python, bools are ints.
         if isinstance(value, bool) or not isinstance(value, int | float) or not 0 <= value < 1 << 53:
             raise self._wrong(name, "a number from 0 on", value)
         return int(value)
@@ -129,7 +129,7 @@ class BridgeRequest(Fields):
         """How the client wants answers and messages to be sent.
 
         Raises:
-            ConfigError: If they cannot be sent like that.
+            ConfigError: If there is no such compression, or the fields are of the wrong type.
         """
         compression = self.text_or("compression", "none")
         if compression not in COMPRESSIONS:

@@ -22,11 +22,11 @@ Values = Mapping[str, object]
 NamesAndTypes = Iterable[tuple[str, list[str]]]
 
 SET_PARAMETER = "rosapi/set_param"
-"""The only one of them that changes something."""
+"""The only service of rosapi that changes something."""
 
 
 class Rosapi:
-    """The services of rosapi for one client. They leave out what ROS hides, and topics that clients may not have.
+    """The services of rosapi for one client. They leave out hidden names, and topics that clients may not have.
 
     Attributes:
         answers: Function that answers each service, by its name without a slash at its beginning.
@@ -130,7 +130,7 @@ class Rosapi:
         ]
 
     def _list_providers(self, call: Call) -> Values:
-        # rosapi of ROS 2 takes a type here, though the field is called service; earlier ones took a name.
+        # The rosapi of ROS 2 takes a type here, although the field is called service; earlier ones take a name.
         wanted = call.fields.text("service")
         return {"providers": self._providers(absolute_name(wanted), full_name("srv", wanted))}
 
@@ -154,7 +154,7 @@ class Rosapi:
         namespace, _, name = absolute_name(call.fields.text("node")).rpartition("/")
         owner = (name, namespace or "/")
         if owner not in self._nodes():
-            # As rosapi does: a client that asks for all nodes in turn must not fail at one that has just ended.
+            # As in the original rosapi, a client that asks for all nodes in turn must not fail if one has just ended.
             return {"subscribing": [], "publishing": [], "services": []}
         return {
             "subscribing": [each for each, _ in _visible(self._node.get_subscriber_names_and_types_by_node(*owner))],

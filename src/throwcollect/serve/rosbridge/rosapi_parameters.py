@@ -83,14 +83,14 @@ class Parameters:
             if not self._is_offered(f"{node}/set_parameters"):
                 call.fail(f"{node}: there is no such node, or it tells nobody of its parameters")
                 return
-            # JavaScript writes 1.0 as 1.
+            # JavaScript writes 1.0 as 1, so numbers for a floating-point parameter are converted.
             value = _as_floats(wanted) if isinstance(_first(ros.parameter_value_to_python(current)), float) else wanted
             request = ros.get_service(_SET).Request()
             request.parameters = [ros.Parameter(name, value=value).to_parameter_msg()]
             try:
                 self._questions.ask(f"{node}/set_parameters", _SET, request, answer, call.fail, _TIMEOUT_S)
             except ConfigError as error:
-                # A callback answers the call itself; nothing catches its errors.
+                # This is a callback, whose errors nobody catches, so it has to answer the call itself.
                 call.fail(sentence(error))
 
         self._get(call, set_like)
@@ -132,7 +132,7 @@ class Parameters:
             )
 
     def _get(self, call: Call, answer: Callable[[Any], None]) -> None:
-        """Get the value of a parameter; without such a node, the value is not set."""
+        """Get the value of a parameter; if there is no such node, `answer` gets a value that is not set."""
         node, name = _read_name(call)
         unset = ros.get_message("rcl_interfaces/msg/ParameterValue")()
 

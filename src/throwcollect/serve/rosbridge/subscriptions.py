@@ -42,10 +42,10 @@ class RateLimit:
         self._waits = False
 
     def change(self, wish: SubscriptionRequest) -> None:
-        """Use another wish from now on."""
+        """Use another rate and form from now on."""
         self._wish = wish
         self._queue = deque(self._queue, maxlen=wish.queue_length)
-        # A shorter interval counts at once, and not only after the next sample.
+        # A shorter interval takes effect at once, and not only after the next sample.
         self._due = min(self._due, time.monotonic() + wish.throttle_s)
 
     def offer(self, sample: Sample) -> None:
@@ -58,7 +58,8 @@ class RateLimit:
             self._wait(now)
 
     def _let_through(self, sample: Sample, now: float) -> None:
-        # Samples that wait are sent at even intervals, even if the timer is late each time.
+        # Waiting samples are sent at even intervals, so the next interval begins when this sample was due, and not at
+        # `now`, as the timer may be late.
         is_late = now - self._due < self._wish.throttle_s and self._wish.queue_length
         self._due = (self._due if is_late else now) + self._wish.throttle_s
         self._send(sample)
@@ -106,7 +107,7 @@ class SubscribedTopic:
         self._feed = self._client.session.listen(self._topic, self.type_name, self._pace.offer)
 
     def lose(self) -> None:
-        """Forget the session, which is gone."""
+        """Forget the session, which has ended."""
         self._feed = None
 
     def close(self) -> None:

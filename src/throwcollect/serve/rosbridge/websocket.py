@@ -16,7 +16,7 @@ from throwcollect.serve.rosbridge.reassembly import LONGEST_FRAME
 
 MOST_FRAMES = 1000
 MOST_BYTES = 32 * 2**20
-"""What may wait for a client that reads slowly; beyond either limit, the oldest frames are dropped."""
+"""Limits of frames that wait for a client that reads slowly; beyond either limit, the oldest frames are dropped."""
 
 _MOST_WAITING = 100
 _POLL_S = 0.01
@@ -31,7 +31,7 @@ _DROPPED = json_text(
 
 
 class Outbox:
-    """Frames that wait to be sent; filled in any thread, emptied in that of an event loop."""
+    """Frames that wait to be sent; any thread may add frames, only the thread of the event loop takes them."""
 
     def __init__(self, loop: asyncio.AbstractEventLoop) -> None:
         self._loop = loop
@@ -46,13 +46,13 @@ class Outbox:
         with self._lock:
             was_empty = not self._frames
             self._append(frame)
-            # A single frame is sent however long it is, as nothing older could be dropped for it.
+            # A single frame is kept however long it is.
             while len(self._frames) > MOST_FRAMES or (self._bytes > MOST_BYTES and len(self._frames) > 1):
                 self._bytes -= len(self._frames.popleft())
                 if not self._is_told:
                     self._is_told = True
                     self._append(_DROPPED)
-        # `take` waits only when there is no frame, so only the first one has to wake it.
+        # `take` waits only if there is no frame, so only the first frame has to wake it.
         if was_empty:
             # The loop may have ended, and with it the connection.
             with suppress(RuntimeError):
@@ -100,13 +100,13 @@ async def _receive_all(websocket: WebSocket, client: BridgeClient) -> None:
             await websocket.close(_TOO_BIG, "a frame is longer than 10 MiB")
             return
         client.receive(frame)
-        # A client that sends faster than the bridge works is not read meanwhile, so that TCP makes it wait.
+        # If a client sends faster than the bridge works, its frames are not read for a while, so TCP makes it wait.
         while client.waiting > _MOST_WAITING:
             await asyncio.sleep(_POLL_S)
 
 
 async def _send_all(websocket: WebSocket, outbox: Outbox) -> None:
-    # `_receive_all` notices a client that leaves.
+    # The errors mean that the client has left, which `_receive_all` handles.
     with suppress(WebSocketDisconnect, RuntimeError):
         while True:
             frame = await outbox.take()
