@@ -1,4 +1,4 @@
-"""Adapting a learned map to another world by a few throws in it."""
+"""Adapts a learned map to another world by a few throws in that world."""
 
 from __future__ import annotations
 
@@ -16,24 +16,24 @@ from throwcollect.units import unit_of_name
 _OFFSET = 0.1
 """Standard deviation that is expected of the offset [m or rad] before any throw."""
 _SMALL_OFFSET = 0.02
-"""The same where biases or latents explain most of the difference."""
+"""The same for methods whose biases or latents explain most of the difference."""
 _BIAS = 0.2
 """Standard deviation that is expected of a bias, scaled: a tenth of the parameter's range."""
 _LATENT = 0.6
-"""Standard deviation that is expected of a latent, scaled: about that of numbers spread evenly over the range."""
+"""Standard deviation that is expected of a latent, scaled: about that of numbers that are even over the range."""
 _MOST_PARTS = 10
-"""At most so many maps are adapted to parts of the throws, to predict the other throws."""
+"""The throws are divided into at most this many parts, to predict each part by a map that is adapted to the others."""
 _STEPS = 30
 _LOOKS = 4
-"""Residuals of the nearest throws are looked up in so many steps: later, the nearest ones might alternate for ever."""
+"""In this many first steps, residuals are those of the nearest throws; later, these throws might alternate for ever."""
 _SMALL_STEP = 1e-5
-"""The search ends after a step that is smaller [scaled, or m or rad]: nobody could measure the difference."""
+"""The search ends after a step smaller than this [scaled, or m or rad]: nobody could measure the difference."""
 _THROWS_FOR_BIAS = 3
 _FAR = 2.0
-"""Parameters and context that are farther from the middle of their range [scaled: it ends at 1] are refused."""
+"""Parameters and context farther than this from the middle of their range [scaled: the range ends at 1] are refused."""
 _LEAST_WIDTH = 1.0
-"""Regions where throws ended count as this wide at least [m or rad], as other worlds may shift them by more than their
-width."""
+"""A region where throws ended counts as at least this wide [m or rad], as another world may shift a small region by
+more than its width."""
 _NOT_MIXED_UP = {"m": "m, not cm or mm", "rad": "rad, not degrees"}
 """Units of places, and those that people measure in."""
 _CLEARLY = 3.0
@@ -41,11 +41,11 @@ _CLEARLY = 3.0
 
 
 class FarThrowError(ConfigError):
-    """A throw is so far from all that a map was learned from that it is taken for a slip.
+    """A throw is so far from all throws that a map was learned from that it must be a mistake.
 
     Args:
         number: Which of the throws, counted from 0.
-        problem: What is far, and which value it has.
+        problem: The value that is too far away, and its name.
     """
 
     def __init__(self, number: int, problem: str, *, expected: str, hint: str | None = None) -> None:
@@ -59,7 +59,7 @@ class FarThrowError(ConfigError):
 
 
 class Method(str, Enum):
-    """How a world is taken to differ from the one of the map."""
+    """How a world is assumed to differ from the world of the map."""
 
     NONE = "none"
     """It does not differ."""
@@ -80,7 +80,7 @@ class Adaptation:
     """How a world differs, found by a few throws in it.
 
     Attributes:
-        method: How the world is taken to differ.
+        method: How the world is assumed to differ.
         correction: The correction of the map for this world.
         deviations: Standard deviations of the numbers that were found: of the biases or latents, scaled, then of the
             offset; shape ``(n_found,)``.
@@ -106,9 +106,9 @@ def adapt(
     scatter: float,
     latents_count: bool,
 ) -> Adaptation:
-    """Find out how a world differs from the one of a map.
+    """Find out how a world differs from the world of a map.
 
-    The difference is the most probable one, by what is expected before any throw, and by the throws.
+    The result is the most probable difference, given the throws and what was expected before them.
 
     Args:
         learned: The map, corrected or not; the search begins with its latents.
@@ -136,7 +136,7 @@ def adapt(
 
 
 def refuse_far_inputs(learned: LearnedMap, role: KeyRole, inputs: Array) -> None:
-    """Refuse throws where the polynomials say nothing: mostly slips, such as degrees for radians.
+    """Refuse throws where polynomials cannot predict: mostly mistakes, such as degrees in place of radians.
 
     Args:
         learned: The map.
@@ -157,15 +157,15 @@ def refuse_far_inputs(learned: LearnedMap, role: KeyRole, inputs: Array) -> None
 
 
 def refuse_far_places(learned: LearnedMap, places: Array) -> None:
-    """Refuse throws that ended where nothing was learned: mostly slips, such as millimetres for metres.
+    """Refuse throws that ended far from all learned ones: mostly mistakes, such as millimetres in place of metres.
 
     Args:
         learned: The map.
         places: Where they ended, shape ``(n_throws, n_targets)``.
 
     Raises:
-        FarThrowError: If a throw ended farther from the region where those of the map did than this is wide, and than a
-            metre or radian.
+        FarThrowError: If the distance of a throw's end from the region where the throws of the map ended is larger than
+            the width of that region, and larger than a metre or radian.
     """
     low, high = learned.outputs.min(axis=0), learned.outputs.max(axis=0)
     away = np.linalg.norm(np.maximum(0.0, np.maximum(low - places, places - high)), axis=1)
@@ -198,7 +198,7 @@ def _predict_by_others(
 ) -> Array:
     """Measure the distance of each throw from the prediction of a map that was adapted to others, ``(n_throws,)``.
 
-    The search begins with `begun`, the difference by all throws, as that by most of them is nearly the same.
+    The search begins with `begun`, the difference found by all throws, because most of the throws lead nearly to that.
     """
     parts = np.arange(len(throws[2])) % _MOST_PARTS
     distances = np.empty(len(parts))
@@ -227,14 +227,14 @@ def _find(
     for step in range(_STEPS):
         current = learned.correct(_shift(learned.correction, method, found))
         inputs = current.in_world(parameters, context)
-        # Residuals by neighbours jump where the nearest ones change, so they are held after the first steps.
+        # Residuals jump where other throws become the nearest ones, so they stay the same after the first steps.
         if step < (_LOOKS if begun is None else 1):
             residuals = current.predict_residuals(inputs)
         missing = places - (current.forward.predict(inputs) + residuals + current.correction.offset)
         slopes = np.zeros((len(places), targets, len(found)))
         if width:
             slopes[:, :, :width] = current.forward.slopes(inputs, columns)
-        # An offset moves its own target alone, by as much.
+        # The slope of an offset is 1 for its own target, and 0 for the others.
         slopes[:, :, width:] = np.eye(targets)
         flat = slopes.reshape(-1, len(found))
         transposed = np.ascontiguousarray(flat.T)
@@ -244,7 +244,7 @@ def _find(
         before, found = found, _step_inside(normal, right, found, low, high)
         if np.abs(found - before).max() < _SMALL_STEP:
             break
-    # With the prior in it, the inverse of the normal matrix is the covariance of the most probable difference.
+    # The normal matrix includes the prior, so its inverse is the covariance of the most probable difference.
     covariance = solve(normal, np.eye(len(found)))
     return found, np.sqrt(np.diagonal(covariance))
 
@@ -259,10 +259,10 @@ def _ends(learned: LearnedMap, method: Method, count: int) -> tuple[Array, Array
 
 
 def _step_inside(normal: Array, right: Array, found: Array, low: Array, high: Array) -> Array:
-    """Solve the normal equations; a number that would leave its bounds is held there, and the others adjust.
+    """Solve the normal equations; a number that would leave its bounds is held at its bound, and the others adjust.
 
     Raises:
-        ConfigError: If the numbers are beyond all floats.
+        ConfigError: If the numbers are too large for floats.
     """
     held = np.full(len(found), np.nan)
     while True:

@@ -1,4 +1,4 @@
-"""Aiming: from a target to the parameters of a trial that ends there."""
+"""Aims: finds, for a target, the parameters of a trial that ends there."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ _STARTS = 8
 _MANY_STARTS = 48
 """The same number for choices other than the nearest: these need more candidates to choose from."""
 _TOGETHER = 32
-"""Number of targets that are aimed at together, as operations on short arrays take most of their time to begin."""
+"""Number of targets to aim at together: NumPy needs nearly the same time for short arrays, so one by one is slower."""
 _STEPS = 25
 _SMALL_STEP = 1e-9
-"""The search ends after a scaled step that is smaller."""
+"""The search ends after a scaled step that is smaller than this."""
 _DAMPING = 1e-4
-"""Damping of the steps: how much miss [m or rad] a step may leave for each scaled unit that it is shorter by."""
+"""Damping of the steps: the miss [m or rad] that is accepted to make a step shorter by one scaled unit."""
 _CLOSE = 1e-4
 """Candidates whose predicted misses [m or rad] are below this count as equally good."""
 
@@ -66,7 +66,7 @@ def aim(learned: LearnedMap, targets: Array, context: Array, choice: Choice = Ch
     inside of the ranges of the dataset.
 
     Args:
-        learned: The map of the world that is aimed in.
+        learned: The map of the world in which the throws will be.
         targets: Shape ``(n, n_targets)``.
         context: Scaled, shape ``(n, n_context)``.
         choice: Which of several candidates is taken.
@@ -82,14 +82,14 @@ def aim(learned: LearnedMap, targets: Array, context: Array, choice: Choice = Ch
 
 
 def _aim_at_once(learned: LearnedMap, targets: Array, context: Array, choice: Choice) -> tuple[Array, Array, Array]:
-    """Find parameters for a few targets; also their predicted places, and where the nearest throws would have ended."""
+    """Find parameters for a few targets, with predicted places and with the places where the nearest throws ended."""
     numbers = np.arange(len(targets))
     landings = _carry_over(learned, context)
     squares = ((landings - targets[:, np.newaxis]) ** 2).sum(axis=2)
     starts = np.argsort(squares, axis=1, kind="stable")[:, : _STARTS if choice is Choice.NEAREST else _MANY_STARTS]
     begun = np.clip(learned.inputs[starts][..., learned.columns_of(KeyRole.PARAMETER)], -1.0, 1.0)
     given = np.repeat(context[:, np.newaxis], starts.shape[1], axis=1)
-    # On its way, a candidate keeps the residual of the throw at which it begins, so only the polynomial has to be
+    # While a candidate moves, it keeps the residual of the throw at which it begins, so only the polynomial has to be
     # inverted.
     shift = learned.residuals[starts] + learned.correction.offset
     parameters = _walk(learned, begun, given, targets[:, np.newaxis] - shift)
@@ -97,7 +97,7 @@ def _aim_at_once(learned: LearnedMap, targets: Array, context: Array, choice: Ch
     predicted = learned.forward.predict(inputs).reshape(shift.shape) + shift
     missed = np.linalg.norm(predicted - targets[:, np.newaxis], axis=2)
     costs = _weigh(learned, choice, inputs, _list_rows(parameters - begun)).reshape(starts.shape)
-    # The last key counts first: the misses, of which all small ones are equal, and among equal ones the cost.
+    # The last key is the first criterion: the miss, where all small misses count as equal; the cost is the second one.
     best = np.lexsort((costs, np.maximum(missed, _CLOSE)), axis=1)[:, 0]
     return parameters[numbers, best], predicted[numbers, best], landings[numbers, starts[:, 0]]
 
@@ -119,8 +119,8 @@ def _list_rows(values: Array) -> Array:
 def _walk(learned: LearnedMap, parameters: Array, context: Array, goals: Array) -> Array:
     """Step from parameters to ones for which the polynomial predicts the goals, inside of the ranges.
 
-    All arrays have the shape ``(n, n_candidates, n_columns)``. The candidates of a target stand still together, so that
-    where they end does not depend on the other targets.
+    All arrays have the shape ``(n, n_candidates, n_columns)``. All candidates of a target stop at the same step, so
+    their ends do not depend on other targets.
     """
     columns = learned.columns_of(KeyRole.PARAMETER)
     parameters = parameters.copy()
@@ -131,7 +131,7 @@ def _walk(learned: LearnedMap, parameters: Array, context: Array, goals: Array) 
         missing = _list_rows(goals[walking]) - learned.forward.predict(inputs)
         slopes = learned.forward.slopes(inputs, columns)
         step = _step(slopes, missing)
-        # A parameter that would leave its range stays, and the others make up for it.
+        # A parameter that would leave its range stays where it is, and the other parameters make up for it.
         stuck = np.abs(np.clip(before + step, -1.0, 1.0) - before) < 1e-12
         step = _step(np.where(stuck[:, np.newaxis], 0.0, slopes), missing)
         after = np.clip(before + step, -1.0, 1.0)

@@ -19,7 +19,7 @@ class ModelEntry(BaseModel):
 
 
 def _read_lists(lists: Any, dtype: type[np.generic]) -> GetPydanticSchema:
-    """Make an array of the lists in a JSON file, and write it as lists; Python code hands arrays over as they are."""
+    """Read lists of a JSON file as an array, and write the array as lists; arrays from Python code stay as they are."""
     return GetPydanticSchema(
         lambda _, handler: core_schema.json_or_python_schema(
             core_schema.no_info_after_validator_function(lambda rows: np.array(rows, dtype), handler(lists)),

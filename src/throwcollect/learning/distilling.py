@@ -13,9 +13,9 @@ from throwcollect.learning.polynomial import SAMPLES_PER_TERM, Polynomial, fit_p
 from throwcollect.reproducible_math import matmul, solve
 
 _DEGREE = 4
-"""Degree of the polynomial, if there are enough throws: higher degrees hit no better."""
+"""Degree of the polynomial, if there are enough throws; higher degrees hit no better."""
 _MOST_THROWS = 1000
-"""The places where so many throws end, the first ones, are the targets to learn from."""
+"""The places where the first throws ended, at most this many, are the targets to learn from."""
 _STEPS = 10
 _TO_THE_MIDDLE = 0.005
 """Miss [m or rad] that costs as much as one parameter at an end of its range: of the many parameters that lead to a
@@ -39,7 +39,7 @@ class DistilledMap:
     polynomial: Polynomial
 
     def has_shape(self, targets: int, context: int, parameters: int) -> bool:
-        """Whether ranges and polynomial belong to so many targets, keys that are given, and parameters."""
+        """Whether ranges and polynomial fit these numbers of targets, of keys that are given, and of parameters."""
         return (
             len(self.low) == len(self.high) == targets
             and bool((self.low < self.high).all())
@@ -59,8 +59,9 @@ class DistilledMap:
 def distil(learned: LearnedMap) -> DistilledMap:
     """Find the polynomial whose parameters lead to their targets, as the map predicts it.
 
-    The polynomial is not fitted to the parameters of the throws: different parameters lead to one target, and their
-    mean to none. Instead, Gauss-Newton steps for all coefficients together make the misses small that the map predicts.
+    The polynomial is not fitted to the parameters of the throws: different parameters may lead to the same target, but
+    their mean would lead elsewhere. Instead, Gauss-Newton steps for all coefficients together reduce the misses that
+    the map predicts.
 
     Raises:
         ConfigError: If a target is the same in all throws, so that it has no range to be scaled by.
@@ -99,7 +100,7 @@ def _step(learned: LearnedMap, terms: Array, squares: Array, raw: Array, context
     """The Gauss-Newton step of the coefficients, shape ``(n_terms, n_parameters)``."""
     clipped = np.clip(raw, -1.0, 1.0)
     slopes = learned.forward.slopes(learned.in_world(clipped, context), learned.columns_of(KeyRole.PARAMETER))
-    # A parameter beyond its range is clipped, so no coefficient moves it.
+    # A parameter beyond its range is clipped, so small changes of coefficients do not change it.
     slopes = slopes * (clipped == raw)[:, np.newaxis]
     wide = (slopes[:, :, np.newaxis, :] * terms[:, np.newaxis, :, np.newaxis]).reshape(missing.size, -1)
     transposed = np.ascontiguousarray(wide.T)

@@ -29,7 +29,7 @@ _FOLDS = 5
 _CELL = 0.05
 """Width of the cells of targets [m or rad]."""
 _WORTH_KNOWING = 2.0
-"""Latents are worth knowing if predictions without them are so many times worse."""
+"""Latents are worth knowing if predictions without them are at least this many times worse."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +41,7 @@ class Fit:
         trials: Numbers of the trials that it was learned from, shape ``(n,)``.
         ignored: Number of the dataset's throws that did not succeed.
         validation: How polynomials of several degrees predict throws that they were not fitted to.
-        without_latents: Median of that error when latents are no inputs; None if there are no latents.
+        without_latents: Median error of predictions without latents as inputs; None if there are no latents.
     """
 
     learned: LearnedMap
@@ -79,8 +79,7 @@ def fit_map(
         context: Swept keys that are given with a target; those that the task names by default.
 
     Raises:
-        ConfigError: If there is nothing to aim at, a key was not swept, a name is there twice, or too few throws
-            succeeded.
+        ConfigError: If there are no targets, a key was not swept, a name appears twice, or too few throws succeeded.
         DatasetError: If a column is missing, or holds no numbers.
     """
     for argument, names in (("targets", targets), ("parameters", parameters), ("given", context)):
@@ -120,7 +119,7 @@ def fit_throws(
     minor = sum(axis.role is KeyRole.LATENT for axis in axes)
     validation = cross_validate(inputs, outputs, folds, minor=minor)
     known = [axis.role is not KeyRole.LATENT for axis in axes]
-    # The error without latents tells whether they are worth knowing.
+    # The error of predictions without latents tells whether latents are worth knowing.
     blind = None if all(known) else float(np.median(cross_validate(inputs[:, known], outputs, folds).best))
     forward = fit_polynomial(inputs, outputs, validation.degree, minor=minor)
     effort = fit_polynomial(inputs, efforts[:, np.newaxis], min(_EFFORT_DEGREE, validation.degree))
@@ -130,7 +129,7 @@ def fit_throws(
 
 
 def count_needed_throws(parameters: int) -> int:
-    """How many throws a model of so many parameters takes at least."""
+    """Smallest number of throws from which a model with this many parameters can be learned."""
     return _THROWS_PER_PARAMETER * (parameters + 1)
 
 
@@ -157,14 +156,14 @@ def _find_axes(
         ends = pc.min_max(throws[key]).as_py()
         low, high = ends["min"], ends["max"]
         role = _choose_role(dataset.config, key, parameters, context)
-        # Nothing can be learned of a key with one value, and scaling would divide by zero. Of a single throw, no key
-        # varies; that is too few throws, however many keys were swept.
+        # Nothing can be learned about a key with one value, and scaling would divide by zero. With a single throw, no
+        # key varies; such a dataset is refused later, because it has too few throws.
         if low == high and len(throws) > 1:
             if key in (*parameters, *context):
                 raise ConfigError(f"{key} has the value {low:g} in all throws", expected="a key that varies")
             continue
         axes.append(Axis(key, role, low, high, float(nominal[key])))
-    # The axes of a role stand side by side, on which `LearnedMap.columns_of` relies.
+    # `LearnedMap.columns_of` relies on axes of the same role being side by side.
     return tuple(sorted(axes, key=lambda axis: list(KeyRole).index(axis.role)))
 
 
@@ -221,9 +220,9 @@ def _numbers(throws: pa.Table, column: str, dataset: Dataset) -> Array:
 
 def _folds(outputs: Array) -> NDArray[np.int64]:
     """Number of the fold of each throw; throws that ended in one cell are in one fold."""
-    # By a hash of the cell, so that a throw stays in its fold when the dataset grows.
+    # A hash of the cell gives the fold, so that a throw stays in its fold when the dataset grows.
     numbers = [hashlib.sha256(cell.tobytes()).digest()[0] % _FOLDS for cell in number_cells(outputs)]
     if len(set(numbers)) < 2:
-        # All ended so close together that one fold would have all of them, and nothing would be left to learn from.
+        # All throws ended in cells of one fold, so nothing would be left to learn from; now their order gives the fold.
         numbers = [number % _FOLDS for number in range(len(numbers))]
     return np.array(numbers, np.int64)

@@ -23,7 +23,7 @@ class Kind(str, Enum):
     LOCAL = "local"
     """By the polynomial, corrected by the residuals of the nearest throws."""
     POLYNOMIAL = "polynomial"
-    """By the polynomial alone, which can be written down as a formula."""
+    """By the polynomial alone, which is a formula."""
 
 
 class KeyRole(str, Enum):
@@ -32,9 +32,9 @@ class KeyRole(str, Enum):
     PARAMETER = "parameter"
     """Aiming chooses its value; a number of the task."""
     CONTEXT = "context"
-    """Its value is given with the target, such as the height of the plane to land on."""
+    """Its value is given together with the target, such as the height of the plane to land on."""
     LATENT = "latent"
-    """It belongs to the world; only throws there tell its value."""
+    """It belongs to the world; its value is only known from throws in that world."""
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ class Axis:
         role: How aiming treats it.
         minimum: Smallest value in the dataset, in the key's unit.
         maximum: Largest value.
-        nominal: Value in the configuration; the world is taken to have it until adapting finds another one.
+        nominal: Value in the configuration, which is assumed for the world until adapting finds another one.
     """
 
     key: str
@@ -63,12 +63,12 @@ class Axis:
 
 @dataclass(frozen=True, eq=False)
 class Correction:
-    """How a world differs from the one of the dataset. Without a difference, all numbers but the latents are 0.
+    """How a world differs from the world of the dataset. Without a difference, all numbers but the latents are 0.
 
     Attributes:
-        bias: Is added to parameters of this world to get those of the dataset's world, scaled, ``(n_parameters,)``.
+        bias: Added to parameters of this world to get those of the dataset's world, scaled, shape ``(n_parameters,)``.
         latents: Values of the latents in this world, scaled, ``(n_latents,)``.
-        offset: Is added to the place where a trial ends, in the units of the targets, ``(n_targets,)``.
+        offset: Added to the place where a trial ends, in the units of the targets, shape ``(n_targets,)``.
     """
 
     bias: Vector
@@ -168,26 +168,27 @@ class LearnedMap:
     def correct(self, correction: Correction) -> LearnedMap:
         """The map of another world, learned from the same throws."""
         other = replace(self, correction=correction)
-        # The throws are the same, so what was computed of them is, too.
+        # The throws are the same, so cached values that were computed from them are reused.
         vars(other).update(inputs=self.inputs, residuals=self.residuals)
         return other
 
     def predict_residuals(self, inputs: Array) -> Array:
-        """Means of the residuals of the throws nearest to scaled inputs, ``(n, n_axes)``, weighted by closeness.
+        """Means of the residuals of the throws nearest to scaled inputs, weighted by closeness.
 
-        Shape ``(n, n_targets)``.
+        The inputs have the shape ``(n, n_axes)``, the means ``(n, n_targets)``.
         """
         if self.kind is Kind.POLYNOMIAL:
             return np.zeros((len(inputs), len(self.targets)))
         predicted = np.empty((len(inputs), len(self.targets)))
         for row, place in enumerate(inputs):
             squares = ((self.inputs - place) ** 2).sum(axis=1)
-            # The nearest of all, found among the few that are as near as the last of them.
+            # Sorting all throws would take longer, so this first finds those that are at least as near as the last of
+            # the nearest ones.
             last = min(_NEIGHBOURS, len(squares)) - 1
             few = np.flatnonzero(squares <= np.partition(squares, last)[last])
             # Throws at the same distance are taken in the order of trials, on every machine.
             near = few[np.argsort(squares[few], kind="stable")][:_NEIGHBOURS]
-            # The small number keeps the weight finite where the point is a throw itself.
+            # The small number keeps the weight finite if the point is the same as that of a throw.
             weights = 1.0 / (squares[near] + 1e-12)
             predicted[row] = (weights[:, np.newaxis] * self.residuals[near]).sum(axis=0) / weights.sum()
         return predicted

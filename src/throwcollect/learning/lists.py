@@ -37,17 +37,17 @@ def read_table(path: Path, names: Sequence[str], *, aliases: dict[str, str] | No
     Args:
         path: The file.
         names: Names of the columns.
-        aliases: For some of these names, the column that is read instead where the file has none of that name.
+        aliases: For some of these names, the column that is read instead if the file has no column of that name.
 
     Raises:
-        ConfigError: If it cannot be read, a column is missing or there twice, a row has more or fewer values than the
+        ConfigError: If it cannot be read, a column is missing or appears twice, a row has more or fewer values than the
             header has names, or a cell is no finite number.
     """
     try:
-        # Spreadsheets begin a CSV file with a byte order mark, which would belong to the name of the first column.
+        # Spreadsheets begin a CSV file with a byte order mark, which `utf-8-sig` removes from the first column's name.
         with path.open(encoding="utf-8-sig", newline="") as file:
             reader = csv.reader(file)
-            # Lines without any cell count nowhere.
+            # Lines without any cell are ignored.
             header = [name.strip() for name in next(filter(None, reader), [])]
             columns = _find_columns(header, names, aliases or {}, place=f"{path}:{reader.line_num or 1}")
             rows = [_read_row(cells, header, columns, f"{path}:{reader.line_num}") for cells in reader if cells]
@@ -93,11 +93,11 @@ def read_targets(path: Path, names: Sequence[str], task: TaskConfig) -> list[lis
 
     Args:
         path: The file.
-        names: What the numbers of a target are: columns of the table of throws, and keys that are given.
-        task: Declares the columns of targets that stand in such lists.
+        names: Names of the numbers of a target: columns of the table of throws, and keys that are given.
+        task: Declares the names that columns of targets have in such lists.
 
     Raises:
-        ConfigError: As `read_table`, or if a number is beyond those that targets may have.
+        ConfigError: As `read_table`, or if a number is too large for a target.
     """
     aliases = {column.of: column.name for column in task.target_columns if column.of in names}
     rows = read_table(path, names, aliases=aliases)
@@ -106,10 +106,10 @@ def read_targets(path: Path, names: Sequence[str], task: TaskConfig) -> list[lis
 
 
 def refuse_large_targets(rows: Sequence[Row], names: Sequence[str]) -> None:
-    """Refuse rows with numbers of which powers would not be finite.
+    """Refuse rows with numbers that are so large that their powers are not finite.
 
     Raises:
-        ConfigError: If a number of one of the names is beyond those that targets may have.
+        ConfigError: If a number of one of these names is too large for a target.
     """
     for row in rows:
         for name in names:
@@ -122,8 +122,8 @@ def refuse_large_targets(rows: Sequence[Row], names: Sequence[str]) -> None:
 def write_aims(path: Path, aims: Sequence[Aim], names: Sequence[str], task: TaskConfig) -> None:
     """Write a list that the sampler `list` reads: a CSV file with a row for each aim, of which there is at least one.
 
-    Each of the names says what a number of their targets is: a column of the table of throws, or a key that is given.
-    The list has columns for those targets alone that the task declares.
+    `names` are those of the numbers of a target: columns of the table of throws, and keys that are given. The list has
+    columns only for targets that the task declares.
 
     Raises:
         ConfigError: If the name of the file does not end in ``.csv``.
@@ -138,6 +138,6 @@ def write_aims(path: Path, aims: Sequence[Aim], names: Sequence[str], task: Task
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(rows[0])
-    # repr writes as many digits as it takes to read the same number again.
+    # `repr` writes enough digits that a reader gets the same number.
     writer.writerows([map(repr, row.values()) for row in rows])
     write_file(path, text.getvalue().encode())

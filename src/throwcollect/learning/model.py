@@ -1,4 +1,4 @@
-"""A model: from a target to the parameters of a throw, learned from a dataset, scored and adapted in simulation."""
+"""A model finds parameters of a throw for a target; it is learned from a dataset, and can be scored and adapted."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class Aim:
         target: Values of the model's targets, then of the keys that are given with them.
         parameters: Values by dotted key, as `Simulator.throw` takes them, also of the keys that are given.
         predicted: Where the trial should end, shape ``(n_targets,)``.
-        reachable: Whether throws of the dataset came near enough, and the prediction does.
+        reachable: Whether a throw of the dataset and the prediction are near enough to the target.
         nearest: Where the nearest throw of the dataset ended, shape ``(n_targets,)``.
     """
 
@@ -59,7 +59,7 @@ class Model:
     A model is a pure function of the dataset and of the arguments of `fit`, byte for byte.
 
     Attributes:
-        file: All of the model but the throws that it was learned from.
+        file: The model without the throws that it was learned from.
         learned: The map, with these throws.
         trials: Numbers of their trials, shape ``(n,)``.
         config: YAML of the dataset's configuration.
@@ -82,12 +82,12 @@ class Model:
 
     @property
     def given(self) -> tuple[str, ...]:
-        """Keys whose values are given behind a target."""
+        """Keys whose values are given after a target's."""
         return tuple(axis.key for axis in self.learned.axes_of(KeyRole.CONTEXT))
 
     @property
     def latents(self) -> tuple[str, ...]:
-        """Keys of the world, whose values only throws tell."""
+        """Keys of the world, whose values are only known from throws."""
         return tuple(axis.key for axis in self.learned.axes_of(KeyRole.LATENT))
 
     @property
@@ -202,8 +202,8 @@ class Model:
             scatter: Standard deviation of what is measured, in the unit of the targets.
 
         Raises:
-            ConfigError: If there are no throws, or not as many places; a key is missing or unknown, a value not finite,
-                there is no such method, or a parameter, context or place is far outside of what the dataset has.
+            ConfigError: If there are no throws, or not one place for each; a key is missing or unknown, a value is not
+                finite, there is no such method, or a parameter, context or place is far outside the dataset.
         """
         parameters, context = self._inputs(points)
         measured = _read_places("places", places, self.targets)
@@ -262,7 +262,7 @@ class Model:
         """Write the model into a directory that is new or empty.
 
         Raises:
-            ConfigError: If there is something already.
+            ConfigError: If the directory is not empty.
             DatasetError: If it cannot be written.
             MissingExtraError: If the model was distilled, and the package ``onnx`` is not installed.
         """
@@ -375,8 +375,8 @@ def _read_places(argument: str, given: Iterable[Sequence[float]], names: Sequenc
     """Read targets, or places where throws ended, shape ``(n, n_names)``.
 
     Raises:
-        ConfigError: If there are not as many numbers as names in each, or one is not finite, or so large that powers
-            of it are not.
+        ConfigError: If a place has not one number for each name, or a number is not finite, or so large that its powers
+            are not finite.
     """
     rows = []
     for place in read_list(argument, given, f"{argument}, each with {', '.join(names)}", (Iterable,)):
@@ -393,7 +393,7 @@ def _check_scatter(scatter: float) -> None:
     """Refuse a number that is no standard deviation.
 
     Raises:
-        ConfigError: If it is negative, no number, or as large as no target is.
+        ConfigError: If it is negative, no number, or too large for a target.
     """
     if not 0.0 <= as_float(scatter) <= LARGEST_TARGET:
         expected = f"0 to {LARGEST_TARGET:g}, in the unit of the targets"

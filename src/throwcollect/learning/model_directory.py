@@ -21,7 +21,7 @@ from throwcollect.learning.score import Score
 from throwcollect.sweep.parquet_file import encode_table, read_parquet
 
 POINTS = "points.parquet"
-"""Parameters, ends and efforts of the throws, at which aiming begins."""
+"""File with parameters, ends and efforts of the throws, from which aiming begins."""
 CONFIG = "config.yaml"
 SCORE = "score.json"
 CARD = "README.md"
@@ -29,10 +29,10 @@ _MOST_BYTES = 10_000_000
 
 
 def write_model(directory: Path, file: ModelFile, learned: LearnedMap, trials: NDArray[np.int64], config: str) -> None:
-    """Write a model, in the parts in which `read_model` gives it, into a directory that is new or empty.
+    """Write a model, given in the parts that `read_model` returns, into a directory that is new or empty.
 
     Raises:
-        ConfigError: If there is something already.
+        ConfigError: If the directory is not empty.
         DatasetError: If it cannot be written.
         MissingExtraError: If the model was distilled, and the package ``onnx`` is not installed.
     """
@@ -53,7 +53,7 @@ def read_model(directory: Path) -> tuple[ModelFile, LearnedMap, NDArray[np.int64
     """Read a model.
 
     Returns:
-        All of it but its throws; the map with its throws; numbers of their trials, shape ``(n,)``; YAML of the
+        The model without its throws; the map with the throws; numbers of their trials, shape ``(n,)``; YAML of the
         dataset's configuration.
 
     Raises:
@@ -62,7 +62,7 @@ def read_model(directory: Path) -> tuple[ModelFile, LearnedMap, NDArray[np.int64
     file = read_model_file(directory)
     path = directory / POINTS
     table = read_parquet(path)
-    # A target may be a key, or the effort, and has one column all the same.
+    # A target may also be a key, or the effort; then it has only one column.
     names = list(dict.fromkeys(["trial", *(axis.key for axis in file.axes), *file.targets, EFFORT]))
     if table.column_names != names or not all(
         pa.types.is_floating(field.type) or (field.name == "trial" and pa.types.is_integer(field.type))

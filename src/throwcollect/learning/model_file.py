@@ -1,4 +1,4 @@
-"""``model.json``: everything that a learned map is, but for the throws that it was learned from."""
+"""``model.json``: a learned map without the throws that it was learned from."""
 
 from __future__ import annotations
 
@@ -39,9 +39,9 @@ class AdaptationEntry(ModelEntry):
     """How the model was adapted.
 
     Attributes:
-        method: How the world is taken to differ.
+        method: How the world is assumed to differ.
         throws: Number of throws.
-        scatter: Standard deviation that was taken for each measured coordinate, in the unit of the targets.
+        scatter: Standard deviation that was assumed for each measured coordinate, in the unit of the targets.
         before: Distances of the throws from where the model predicted them before it was adapted.
         after: The same distances, each from the prediction of a model that was adapted to the other throws; empty for a
             single throw.
@@ -87,7 +87,7 @@ class TrainedOn(ModelEntry):
 
     @property
     def error(self) -> float:
-        """The smallest of the errors, which is that of the degree that was chosen."""
+        """The smallest of the errors, which belongs to the chosen degree."""
         return min(self.folds_error.values())
 
 
@@ -129,7 +129,7 @@ def read_model_file(directory: Path) -> ModelFile:
     """Read ``model.json`` from the directory of a model.
 
     Raises:
-        DatasetError: If there is none, it cannot be read, or is no such file.
+        DatasetError: If the file is missing, cannot be read, or has other content.
     """
     path = directory / MODEL
     try:
@@ -137,7 +137,7 @@ def read_model_file(directory: Path) -> ModelFile:
     except DatasetError as error:
         if not isinstance(error.__cause__, FileNotFoundError):
             raise
-        # A dataset is mistaken for its model easily.
+        # Users easily give a dataset in place of its model, so the hint makes a model of it.
         dataset = directory if has_files(directory) else "DATASET"
         hint = command("fit", dataset, "-o", "MODEL")
         raise DatasetError(f"holds no model: there is no {MODEL}", path=directory, hint=hint) from error

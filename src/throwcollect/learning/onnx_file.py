@@ -11,7 +11,7 @@ from throwcollect.learning.learned_map import KeyRole, LearnedMap
 
 ONNX = "model.onnx"
 _OPERATORS, _FORMAT = 13, 8
-"""Versions of the operators and of the file: old enough for the runtimes of controllers."""
+"""Versions of the operators and of the file, which are old enough for the runtimes of controllers."""
 
 helper, numpy_helper = lazily("onnx.helper"), lazily("onnx.numpy_helper")
 

@@ -15,11 +15,11 @@ from throwcollect.reproducible_math import matmul, solve
 DEGREES = (1, 2, 3, 4)
 """Degrees that are tried."""
 SAMPLES_PER_TERM = 1.5
-"""A degree is tried only where there are so many samples for each of its terms."""
+"""A degree is tried only if there are this many samples for each of its terms."""
 _ALL_TERMS = 2
 """Up to this degree, minor inputs have all terms."""
 _RIDGE = 1e-7
-"""Ridge, as a share of the number of samples: it keeps terms small that the samples say nothing about."""
+"""Ridge, as a share of the number of samples; it keeps terms small that the samples do not determine."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +40,7 @@ class Polynomial:
         return int(self.exponents.sum(axis=1).max())
 
     def has_shape(self, inputs: int, outputs: int) -> bool:
-        """Whether exponents and coefficients belong to so many inputs and outputs, and there is a term."""
+        """Whether exponents and coefficients fit these numbers of inputs and outputs, and there is a term."""
         terms = len(self.exponents)
         return terms > 0 and self.exponents.shape == (terms, inputs) and self.coefficients.shape == (terms, outputs)
 
@@ -52,7 +52,7 @@ class Polynomial:
         """Derivatives of the outputs by some of the inputs, at least one.
 
         Args:
-            inputs: Where they are wanted, shape ``(n, n_inputs)``.
+            inputs: Points at which to derive, shape ``(n, n_inputs)``.
             columns: Inputs to derive by.
 
         Returns:
@@ -61,12 +61,12 @@ class Polynomial:
         slopes = []
         for column in range(inputs.shape[1])[columns]:
             with_it = self.exponents[:, column] > 0
-            # Indexing by a mask makes a copy, so that the exponents of the polynomial stay as they are.
+            # Indexing by a mask makes a copy, so the exponents of the polynomial are not changed below.
             lowered = self.exponents[with_it]
             factors = lowered[:, column : column + 1] * self.coefficients[with_it]
             lowered[:, column] -= 1
             zero = np.zeros((len(inputs), self.coefficients.shape[1]))
-            # A polynomial may have no term with this input, and then it has no slope along it.
+            # If no term has this input, the slope is zero.
             slopes.append(matmul(list_terms(inputs, lowered), factors) if len(lowered) else zero)
         return np.stack(slopes, axis=-1)
 
@@ -137,9 +137,9 @@ def list_exponents(inputs: int, degree: int, *, minor: int = 0) -> NDArray[np.in
     Args:
         inputs: Number of inputs.
         degree: Highest sum of the exponents of a term.
-        minor: Number of inputs, the last ones, that mostly change how the others act: terms above the second degree
-            have at most one of them, once. With all terms, 15 inputs and the third degree would take more samples than
-            datasets have.
+        minor: Number of minor inputs, which are the last ones, and mostly change the effect of other inputs. A term
+            above the second degree has at most one of them, with exponent 1. With all terms, 15 inputs and the third
+            degree would need more samples than datasets have.
     """
     rows = [
         [chosen.count(column) for column in range(inputs)]
@@ -152,7 +152,7 @@ def list_exponents(inputs: int, degree: int, *, minor: int = 0) -> NDArray[np.in
 
 @dataclass(frozen=True, eq=False)
 class _Sums:
-    """The sums that least squares needs of samples; those of several groups of samples add up."""
+    """The sums over samples that least squares needs; the sums of several groups of samples can be added."""
 
     samples: int
     squares: Array

@@ -13,7 +13,7 @@ from throwcollect.learning.arrays import Array, ModelEntry
 from throwcollect.units import unit_of_name
 
 SHOWN_AS = {"m": (100.0, " cm"), "rad": (180.0 / np.pi, "°")}
-"""By unit of targets: the factor and the unit by which people read their misses."""
+"""For a unit of targets: the factor and the unit with which misses are shown to people."""
 
 
 class MissStatistics(ModelEntry):
@@ -21,9 +21,9 @@ class MissStatistics(ModelEntry):
 
     Attributes:
         unit: The unit.
-        median: Median; None if half of the throws did not succeed, as a throw that did not counts as farther than all.
-        share90: Nine of ten throws miss by less; None likewise.
-        largest: Largest; None likewise.
+        median: Median; None if half of the throws did not succeed, as such a throw counts as farther than all others.
+        share90: Nine of ten throws miss by less; None if it is the miss of a throw that did not succeed.
+        largest: Largest miss; None if a throw did not succeed.
     """
 
     unit: str = "m"
@@ -107,9 +107,9 @@ def tell_scatter(scatter: float, targets: Sequence[str]) -> str:
 
 def _sum_up(away: Array, unit: str) -> MissStatistics:
     distances = np.linalg.norm(away, axis=1)
-    # A throw that did not succeed counts as farther away than all others, and has no number.
+    # A throw that did not succeed has no distance, and counts as farther away than all others.
     ordered = np.sort(np.where(np.isfinite(distances), distances, np.inf))
-    # The places of the lower median, of the least distance that 9 of 10 do not exceed, and of the largest.
+    # Indices of the lower median, of the smallest distance that 9 of 10 do not exceed, and of the largest distance.
     places = (len(ordered) - 1) // 2, int(np.ceil(0.9 * len(ordered))) - 1, len(ordered) - 1
     median, share90, largest = (float(ordered[place]) if np.isfinite(ordered[place]) else None for place in places)
     return MissStatistics(unit=unit, median=median, share90=share90, largest=largest)
@@ -167,7 +167,7 @@ class ThrowAtTarget(ModelEntry):
 
 
 class Score(ModelEntry):
-    """All results of a model; every number is one "in simulation".
+    """All results of a model; all numbers are from simulation.
 
     Attributes:
         targets: Number of targets of each seed.
@@ -178,7 +178,7 @@ class Score(ModelEntry):
         throws: Throws of the model itself.
         scatter: Noise on what was measured of throws in the other world, in the unit of the targets.
         adapted: By the number of throws in the other world; empty if there was none.
-        adapted_throws: Throws in the other world after the most of them.
+        adapted_throws: Throws at targets in the other world, by the model that was adapted by the most throws.
     """
 
     format: Literal["1"] = "1"
@@ -216,7 +216,7 @@ def pool_scores(scores: Sequence[Score]) -> Score:
 
 
 def _pool_adapted(some: Sequence[Adapted]) -> Adapted:
-    """The method that most seeds chose, and the errors of all."""
+    """Pool results of several seeds: the method that most of them chose, and the errors of all."""
     methods = [each.method for each in some]
     method = max(methods, key=methods.count)
     return Adapted(real_throws=some[0].real_throws, method=method, errors=Errors.middle([each.errors for each in some]))

@@ -19,11 +19,11 @@ from throwcollect.learning.score import Adapted, Errors, Score, ThrowAtTarget, T
 from throwcollect.side_by_side import THROWS_A_START
 
 SIZES = (30, 100, 300, 1000, 3000, 10_000)
-"""Numbers of throws that models are learned from, to show how many throws a model takes."""
+"""Numbers of throws from which models are learned, to show how many throws a model needs."""
 REAL_THROWS = (0, 1, 3, 5, 10)
 """Numbers of throws in another world that a model is adapted by."""
 _APART = 1000
-"""Distance from the seed of targets to that of throws to adapt by, which must not be another seed's targets."""
+"""Added to the seed of targets, this gives the seed of throws to adapt by, so that these are no seed's targets."""
 
 
 class Simulates(Protocol):
@@ -90,7 +90,7 @@ def score_model(
     return Score(
         targets=count,
         seed=seed,
-        # The errors of a distilled map come last, and belong to no size.
+        # `errors` may have one element more than `maps`, the last one: that of the distilled map, which has no size.
         trained=[Trained(trained_on=size, errors=each) for size, each in zip(maps, errors, strict=False)],
         distilled=None if distilled is None else errors[-1],
         throws=_list_throws(targets, places[len(maps) - 1]),
@@ -115,14 +115,14 @@ def _adapt_step_by_step(
     latents_count: bool,
     processes: int,
 ) -> dict[int, Adaptation]:
-    """Throw in another world, and adapt a map by more and more throws; the keys are their numbers, from 0."""
+    """Throw in another world, and adapt a map by more and more throws; the keys are the numbers of throws, from 0."""
     context = _nominal_context(learned)
     tries = spread_first(draw_targets(learned.carry_over(context), REAL_THROWS[-1], seed + _APART))
     given = np.tile(context, (len(tries), 1))
     parameters = aim(learned, tries, given).parameters
     [places] = _throw(learned, [parameters], given, world, processes)
     landed = np.isfinite(places).all(axis=1)
-    # The second number makes a sequence of its own, apart from that of the targets.
+    # The second number of the seed makes this sequence independent of the sequence for targets.
     noise = scatter * np.random.default_rng((seed, 1)).standard_normal(places.shape)
     parameters, given, measured = parameters[landed], given[landed], (places + noise)[landed]
     found = {0: leave_as_it_is(learned, np.empty(0))}
@@ -141,10 +141,10 @@ def _adapt_step_by_step(
 def _throw_there(
     learned: LearnedMap, adaptations: Mapping[int, Adaptation], targets: Array, world: Simulates, processes: int
 ) -> tuple[list[Adapted], list[ThrowAtTarget]]:
-    """Throw in another world at the targets that can be reached there, by each of some adaptations.
+    """Throw in another world at the targets that can be reached there, once with each adaptation.
 
     Returns:
-        How each of them hits, and the throws of the last one; both empty if no target can be reached.
+        How each adaptation hits, and the throws of the last one; both empty if no target can be reached.
     """
     given = np.tile(_nominal_context(learned), (len(targets), 1))
     worlds = [learned.correct(each.correction) for each in adaptations.values()]
@@ -184,16 +184,17 @@ def draw_targets(landings: Array, count: int, seed: int) -> Array:
         inside = np.flatnonzero(members == randomness.integers(members.max() + 1))
         chosen = landings[inside[randomness.integers(len(inside))]]
         near = np.argsort(((landings - chosen) ** 2).sum(axis=1), kind="stable")[: landings.shape[1] + 1]
-        # The gaps between sorted random numbers are weights whose sum is 1, spread evenly over all such weights.
+        # The gaps between sorted random numbers are weights with the sum 1, and all such weights are equally probable.
         shares = np.diff(np.sort(randomness.random(len(near) - 1)), prepend=0.0, append=1.0)
         targets[number] = (shares[:, np.newaxis] * landings[near]).sum(axis=0)
     return targets
 
 
 def spread_first(targets: Array) -> Array:
-    """Order targets, ``(n, n_targets)``, so that the first few are spread, as a few throws there tell most of a world.
+    """Order targets, ``(n, n_targets)``, so that the first few are far apart and tell most about a world.
 
-    The target nearest to the middle comes first, as it stands for all; then always the one farthest from all before.
+    The target nearest to the middle is first, as it is typical of all. Each further one is the target that is farthest
+    from all before it.
     """
     squares = ((targets[:, np.newaxis] - targets) ** 2).sum(axis=2)
     order = [int(((targets - targets.mean(axis=0)) ** 2).sum(axis=1).argmin())]
@@ -231,7 +232,7 @@ def _throw(learned: LearnedMap, lists: Sequence[Array], given: Array, world: Sim
         lists: Scaled parameters, each of shape ``(n, n_parameters)``.
         given: Scaled context of each of these lists, shape ``(n, n_context)``.
         world: Simulates the throws.
-        processes: How many processes simulate at most; there are fewer where few throws are not worth their start.
+        processes: Largest number of processes that simulate; there are fewer if throws are too few to be worth a start.
 
     Returns:
         For each list, where the throws ended, shape ``(n, n_targets)``, with NaN where one did not succeed.
