@@ -17,8 +17,9 @@ class Panel:
         title: Short title, as text.
         figure: The figure, with its height.
         text: Caption, as text.
-        picture: Name of the picture for papers; panels of one name stand below one another in it. Empty for none.
-        width_px: Width below which it scrolls [px]; at 0 it shrinks with the page instead.
+        picture: Name of the picture for papers; panels with the same name stand below one another in one picture. Empty
+            for none.
+        width_px: Width below which it scrolls [px]; with 0, it shrinks with the page instead.
         small: True if a third of the width of the page is enough.
         on_page: False if the page shows the same in another way, so that the panel is only a picture.
     """

@@ -1,4 +1,4 @@
-"""Groups trials that failed by their reasons; reasons that differ only in numbers are one."""
+"""Groups trials that failed by their reasons; reasons that differ only in numbers count as the same."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ class FailureGroup:
     """A group of trials with the same outcome and, but for numbers, the same reason.
 
     Attributes:
-        pattern: Their reason; if its numbers differ between the trials, with ``#`` in place of numbers.
+        pattern: Their reason; if its numbers differ between the trials, ``#`` stands in place of each number.
         examples: Numbers of the first of these trials.
     """
 

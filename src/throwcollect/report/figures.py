@@ -25,9 +25,9 @@ LIMIT_LINE = {"color": "#D55E00", "width": 1.5, "dash": "dash"}
 MOMENT_LINE = {"color": NEUTRAL, "width": 1.5, "dash": "dot"}
 
 MOST_KEYS = 8
-"""Swept keys in a matrix of pairs."""
+"""Most swept keys in a matrix of pairs."""
 _MOST_MATRIX_POINTS = 8000
-"""Points in all panels of the matrix together; a browser redraws more of them slowly."""
+"""Most points in all panels of the matrix together; a browser redraws more points slowly."""
 _CELL_PX = 128
 _CELL_GAP = 0.012
 
@@ -52,7 +52,7 @@ def draw_parameter_matrix(parameters: Sequence[SweptKey], outcomes: Outcomes) ->
                     marker={"color": style.colour, "symbol": style.symbol, "size": 4, "opacity": 0.8},
                     name=in_words(name),
                     legendgroup=name,
-                    # The same outcome is in every panel of the matrix, but once in the legend.
+                    # An outcome is in every panel of the matrix, but in the legend only once.
                     showlegend=row == 1,
                     hovertemplate=f"trial %{{customdata}}<br>%{{x:.4g}}, %{{y:.4g}}<extra>{in_words(name)}</extra>",
                 )
@@ -77,7 +77,7 @@ def count_matrix_points(parameters: Sequence[SweptKey]) -> int:
 
 
 def _matrix_axes(parameters: Sequence[SweptKey]) -> dict[str, object]:
-    """Axes of the matrix: x and y of parameter i, and behind all of these the y axes of the counts."""
+    """Axes of the matrix: x and y of each parameter, numbered as the parameters, then the y axes of the counts."""
     count = len(parameters)
     axes: dict[str, object] = {}
     for index, parameter in enumerate(parameters):
@@ -87,7 +87,7 @@ def _matrix_axes(parameters: Sequence[SweptKey]) -> dict[str, object]:
         title = {"text": f"{last}<br>{above}", "font": {"size": 10}}
         shared = {"title": title, "tickfont": {"size": 9}, "nticks": 4, "range": _matrix_range(parameter)}
         shared |= {"type": "log", **parameter.ticks} if parameter.logarithmic else {}
-        # Each column is labelled below its lowest panel; in the last column that is the one of the counts.
+        # Each column has its labels below its lowest panel; in the last column, this is the panel with the counts.
         lowest = _axis_name("y", count - 1 if index < count - 1 else count + index)
         axes[_axis_name("xaxis", index)] = {**shared, "domain": across, "anchor": lowest, "tickangle": 0}
         if index:
@@ -180,7 +180,7 @@ def draw_throughput(throughput: Throughput, noun: str) -> go.Figure:
     edges = throughput.edges_s / seconds
     figure = go.Figure(
         go.Scatter(
-            # Each rate is a step from one edge to the next, so all edges but the outer ones are there twice.
+            # Each rate is a step from one edge to the next, so each edge appears twice, but the first and last once.
             x=np.repeat(edges, 2)[1:-1],
             y=np.repeat(throughput.rate_per_s, 2),
             mode="lines",

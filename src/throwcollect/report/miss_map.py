@@ -1,4 +1,4 @@
-"""The figure of targets: where trials should end, and by how much they miss."""
+"""Draws the figure of targets: where trials should end, and by how much they miss."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from throwcollect.report.figures import BLUE, LEGEND_ABOVE, LIMIT_LINE, NEUTRAL
 from throwcollect.units import unit_of_name
 
 _MOST = 10_000
-"""A miss is drawn at most so many times as long as it is."""
+"""A miss is drawn at most this many times as long as it is."""
 
 
 def choose_scale(targets: NDArray[np.float64], places: NDArray[np.float64]) -> int:
     """Choose how many times as long misses are drawn, so that they are seen: the largest power of ten that fits.
 
-    It fits if the longest miss is drawn no longer than the targets are apart; the arrays are those of `draw_miss_map`.
+    It fits if the longest drawn miss is no longer than the targets are apart; the arrays are those of `draw_miss_map`.
     """
     if not len(targets):
         return 1
@@ -44,8 +44,8 @@ def draw_miss_map(
 ) -> go.Figure:
     """Draw targets amid the ends of other trials, and a line for each miss, in the first two columns.
 
-    Ends have the shape ``(n, n_columns)``; targets, and the places where the trials at these targets ended, NaN for one
-    without an end, have the shape ``(n_targets, n_columns)``. Misses are drawn `times` as long.
+    `ends` have the shape ``(n, n_columns)``. `targets`, and the `places` where the trials at these targets ended, have
+    the shape ``(n_targets, n_columns)``; a place is NaN if its trial has no end. Misses are drawn `times` as long.
     """
     figure = go.Figure()
     ends, targets, places = map(_take_two, (ends, targets, places))
@@ -61,7 +61,7 @@ def draw_miss_map(
     if hit.any():
         tips = targets[hit] + times * (places[hit] - targets[hit])
         x, y = (
-            # None divides the lines from each other.
+            # None separates the lines from each other.
             [end for line in zip(starts.tolist(), ends.tolist(), strict=True) for end in (*line, None)]
             for starts, ends in zip(targets[hit].T, tips.T, strict=True)
         )

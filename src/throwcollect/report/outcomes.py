@@ -44,7 +44,7 @@ _UNKNOWN = Style("#882255", "pentagon")
 _SHARED = (LIMIT_VIOLATED, TRACKING_FAILED, LOST, REFUSED)
 """Failures of any task."""
 _FAILURES = (_UNKNOWN, *(style for name, style in _STYLES.items() if name not in (LANDED, *_SHARED)))
-"""Styles for failures that only a task of another package has: such a task has none of those of a throw."""
+"""Styles for failures that only tasks of other packages have; such a task has no failures of a throw."""
 
 
 def style_of(outcome: str) -> Style:

@@ -32,7 +32,7 @@ DPI = 300
 _PX_PER_IN = 145
 """At this scale, a column of a paper is as wide as half a page in a browser."""
 _FRAME_PX = 100
-"""Height of the labels below and the legend above a figure; a stack of figures has them once."""
+"""Height of the labels below and the legend above a figure together; a stack of figures has them once."""
 _PT = 72 / _PX_PER_IN
 """Printer's points in one pixel."""
 _SMALLEST_TEXT_PT = 5
@@ -75,13 +75,13 @@ _STYLE: dict[Any, Any] = {
     "legend.handletextpad": 0.4,
     "grid.linewidth": 0.4,
     "grid.color": "#dddddd",
-    # Names may have dollar signs, which would begin a formula.
+    # This is off because names may have dollar signs, which would begin a formula.
     "text.parse_math": False,
 }
 
 
 def write_pictures(sections: Iterable[ReportSection], directory: Path) -> tuple[Path, ...]:
-    """Paint the panels that have the name of a picture, a PNG file in the directory for each name.
+    """Paint the panels that belong to a picture; each picture becomes a PNG file in the directory.
 
     Raises:
         OSError: If a file cannot be written.
@@ -185,7 +185,7 @@ def _set_axis(axes: Axes, letter: Literal["x", "y"], axis: Any, *, has_labels: b
         own.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
         own.set_minor_locator(NullLocator())
     elif axis.nticks and isinstance(own.get_major_locator(), AutoLocator):
-        # plotly limits the number of ticks, and matplotlib that of the intervals between them.
+        # plotly limits the number of ticks, but matplotlib limits the number of intervals between ticks.
         own.set_major_locator(MaxNLocator(axis.nticks - 1))
     if axis.tickvals is not None:
         own.set_ticks(axis.tickvals, axis.ticktext)
@@ -226,9 +226,9 @@ def _paint_scatter(axes: Axes, trace: Any) -> None:
         elif is_open:
             width = (marker.line.width or 1) * _PT
             colours = {"facecolors": "white", "edgecolors": marker.color, "linewidths": width}
-        # matplotlib takes the square of the size, in printer's points.
+        # matplotlib takes the square of the size, which is in printer's points.
         shape, area = MARKERS[symbol], (marker.size * _PT) ** 2
-        # Above lines, which matplotlib would put above all markers.
+        # Markers are drawn above lines; by default, matplotlib would draw lines above them.
         axes.scatter(x, y, marker=shape, s=area, alpha=marker.opacity, label=label, zorder=3, **colours)
 
 
@@ -297,7 +297,7 @@ def _add_legend(painted: Figure, legend: Any) -> None:
     """Name all lines and markers if there are several: a picture has no text that explains its colours."""
     named: dict[str, Any] = {}
     for axes in painted.axes:
-        # A trace may have both a line and markers, which its entry then shows together.
+        # If a trace has both a line and markers, its entry in the legend shows them together.
         together: dict[str, tuple[Artist, ...]] = {}
         for handle, name in zip(*axes.get_legend_handles_labels(), strict=True):
             together[name] = (*together.get(name, ()), handle)

@@ -23,10 +23,10 @@ class SweptKey:
 
     Attributes:
         key: Dotted key.
-        unit: Of its values; empty when they have none.
-        logarithmic: True if its logarithm, not its value, was drawn evenly.
+        unit: Unit of its values; empty if they have none.
+        logarithmic: True if its logarithm, and not its value, was drawn evenly.
         values: Value of each trial, shape ``(n_trials,)``.
-        edges: Of the bins, shape ``(n_bins + 1,)``; around each value if there are only a few.
+        edges: Edges of the bins, shape ``(n_bins + 1,)``; around each value if there are only a few.
         counts: Trials in each bin by outcome, shape ``(n_bins, n_outcomes)``.
         steps: The distinct values, one a bin, if there are only a few; else None.
     """
@@ -41,7 +41,7 @@ class SweptKey:
 
     @property
     def ticks(self) -> dict[str, list[Any]]:
-        """Ticks of a logarithmic axis for plotly, whose own are powers of ten, of which most ranges have none."""
+        """Ticks of a logarithmic axis for plotly: its own are powers of ten, and most ranges contain none."""
         values = [float(f"{value:.2g}") for value in np.geomspace(self.edges[0], self.edges[-1], 3)]
         return {"tickvals": values, "ticktext": [f"{value:g}" for value in values]}
 
@@ -54,7 +54,7 @@ class SweptKey:
 
 def read_parameters(config: Config, throws: pa.Table, outcomes: Outcomes) -> tuple[SweptKey, ...]:
     """Read all swept keys of a table of throws, in its order."""
-    # Of all columns, those of swept keys alone have dots in their names.
+    # Only columns of swept keys have dots in their names.
     return tuple(
         _read_parameter(config, key, read_numbers(throws, key), outcomes) for key in throws.column_names if "." in key
     )
@@ -70,7 +70,7 @@ def _read_parameter(config: Config, key: str, values: NDArray[np.float64], outco
         bins = np.searchsorted(steps, values)
     else:
         low, high = (swept.min, swept.max) if isinstance(swept, Range) else (distinct[0], distinct[-1])
-        # Bins have to hold all values, of which some may lie outside of the range of the sweep.
+        # Bins have to cover all values, also those outside of the range of the sweep.
         low, high = min(low, float(distinct[0])), max(high, float(distinct[-1]))
         edges = np.geomspace(low, high, _BINS + 1) if logarithmic else np.linspace(low, high, _BINS + 1)
         # The largest value lies on the last edge, and belongs to the last bin.

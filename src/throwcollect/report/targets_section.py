@@ -19,7 +19,7 @@ from throwcollect.wording import format_count
 
 _TITLE = "How targets are missed"
 _LEAST_TOLD = 0.01
-"""What is smaller has two significant digits instead of two decimals, which would be zeros."""
+"""A smaller number is shown with two significant digits, because its first two decimals would be zeros."""
 
 
 def show_targets(dataset: Dataset) -> tuple[ReportSection, ...]:
@@ -70,7 +70,7 @@ def _draw_share(dataset: Dataset, miss: str) -> go.Figure:
     chosen = choose_points(len(values))
     figure.add_scatter(
         x=values[chosen],
-        # Of sorted values, so large a share is not greater than the one at this place.
+        # The values are sorted, so this share of them is not greater than the value at this index.
         y=(chosen + 1) / len(values),
         mode="lines+markers",
         line={"color": BLUE, "width": 2},

@@ -35,14 +35,14 @@ class Throughput:
 
 
 def measure_throughput(events: Iterable[JournalLine]) -> Throughput | None:
-    """Measure throughput from the entries of a journal, in order; None if no episode came in, or all at one instant."""
+    """Measure throughput from the entries of a journal, in order; None if no episode came in, or all at one time."""
     times: dict[str, list[float]] = {kind: [] for kind in ("commit", "opened", "fail", "lost")}
     elapsed = 0.0
     last: float | None = None
     for event in events:
-        # Until a resumed run opens the journal again, nothing is collected.
+        # The time before an entry `opened` does not count, because nothing is collected before a run opens the journal.
         if last is not None and event.event != "opened":
-            # A clock may have been set back between two entries.
+            # If the clock was set back between two entries, no time counts between them.
             elapsed += max(event.time_s - last, 0.0)
         last = event.time_s
         if event.event in times:
@@ -55,7 +55,7 @@ def measure_throughput(events: Iterable[JournalLine]) -> Throughput | None:
         edges_s=edges,
         rate_per_s=np.histogram(commits, edges)[0] / np.diff(edges),
         commits=len(commits),
-        # The collection began with the first opening.
+        # The first opening began the collection; each later one resumed it.
         resumed_s=tuple(times["opened"][1:]),
         failed_s=tuple(times["fail"]),
         lost_s=tuple(times["lost"]),

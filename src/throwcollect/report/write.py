@@ -23,8 +23,8 @@ class Written:
 def write_report(directory: Path, page: Path, *, pictures: Path | None = None, model: Path | None = None) -> Written:
     """Write a report on a dataset, and on a model that was learned from it, if its directory is given.
 
-    The page is an HTML file, which must not exist; the directory for pictures, if there shall be some, must not exist
-    or be empty.
+    The page is an HTML file, which must not exist yet. `pictures` is a directory for pictures, which must not exist or
+    must be empty; None for no pictures.
 
     Raises:
         MissingExtraError: If a library that draws is not installed.
@@ -40,7 +40,7 @@ def write_report(directory: Path, page: Path, *, pictures: Path | None = None, m
             f"{page}: exists", expected="a file that is new", hint="choose another --output, or remove it"
         )
     written: tuple[Path, ...] = ()
-    # Entered before the dataset is read, so that a directory that cannot be used is reported at once.
+    # This block begins before the dataset is read, so that a directory that cannot be used is reported at once.
     with new_directory(pictures) if pictures else nullcontext() as unfinished:
         report = report_dataset(Dataset.open(directory), model=model)
         text = render_page(report).encode()
@@ -48,6 +48,6 @@ def write_report(directory: Path, page: Path, *, pictures: Path | None = None, m
             from throwcollect.report.painter import write_pictures
 
             written = tuple(pictures / path.name for path in write_pictures(report.sections, unfinished))
-    # The page may lie in the directory of the pictures, which is there only now.
+    # The page is written last, because it may lie in the directory of the pictures, which exists only now.
     write_file(page, text)
     return Written(page, written)

@@ -27,8 +27,8 @@ class CellAxis:
     """One dimension of the cells.
 
     Attributes:
-        name: What it is called.
-        label: What stands beside an axis: the same, how it is measured, and the unit.
+        name: Its name.
+        label: Label of its axis: the name, how it is measured, and the unit.
         edges: Edges of its bins, shape ``(n_bins + 1,)``.
     """
 
@@ -43,7 +43,7 @@ class Coverage:
 
     Attributes:
         axes: One to three dimensions.
-        counts: Throws in each cell, of one dimension for each axis.
+        counts: Number of throws in each cell; an array with one dimension for each axis.
         throws: Number of throws that landed, in a cell or not.
         configured: Whether the cells are those of the configuration; else they span the values of the throws.
     """
@@ -80,13 +80,13 @@ def count_throws(landings: Landings, throws: pa.Table, *, target: TargetConfig |
         edges = {name: _choose_edges(column) for name, column in values.items()}
     else:
         if target.height_m is not None:
-            # Heights are those of all trials, and only the landings count here.
+            # The column has the heights of all trials, but only trials with landings matter here.
             values["height_m"] = read_numbers(throws, LANDING_HEIGHT)[landings.trial]
         bins = target.dimensions
         values = {name: column for name, column in values.items() if name in bins}
         edges = {name: np.linspace(bins[name].min, bins[name].max, bins[name].bins + 1) for name in values}
         if "hit_angle_rad" in edges:
-            # The configuration has radians, and the values above are degrees, as the axis shows them.
+            # The configuration has radians, but the axis and the values above are in degrees.
             edges["hit_angle_rad"] = np.degrees(edges["hit_angle_rad"])
     counts, _ = np.histogramdd(np.column_stack(list(values.values())), list(edges.values()))
     axes = tuple(CellAxis(*_TITLES[name], edges[name]) for name in values)
@@ -97,7 +97,7 @@ def _choose_edges(values: NDArray[np.float64]) -> NDArray[np.float64]:
     """Choose edges of cells whose width is a round number, which people can quote."""
     low, high = float(values.min()), float(values.max())
     width = _round_up((high - low) / _BINS) or 0.1
-    # One edge more, as the largest value has to lie inside, and not beyond the last edge.
+    # There is one edge more, so that the largest value lies inside the last cell.
     first, last = np.floor(low / width), np.floor(high / width) + 1
     edges: NDArray[np.float64] = np.arange(first, last + 1) * width
     return edges
@@ -108,5 +108,5 @@ def _round_up(width: float) -> float:
     if width < 1e-9:
         return 0.0
     power = 10.0 ** np.floor(np.log10(width))
-    # The factor lets a width through that is a round number but for an error of rounding.
+    # The factor accepts a width that is a round number except for a rounding error.
     return float(next(step * power for step in (1, 2, 5, 10) if step * power >= width * (1 - 1e-9)))

@@ -65,7 +65,7 @@ def write_deviations(deviations: Sequence[Sequence[float]], engine: str, path: P
     figure.add_hline(y=0, line={"color": NEUTRAL, "width": 1})
     figure.add_vline(x=0, line={"color": NEUTRAL, "width": 1})
     figure.update_xaxes(title=f"landing by {engine}, farther in x than stored by [mm]")
-    # Both axes have one scale, as the shape of the cloud says in which direction engines differ.
+    # Both axes have the same scale, so that the shape of the cloud shows in which direction engines differ.
     figure.update_yaxes(title="farther in y by [mm]", scaleanchor="x", constrain="domain")
     figure.update_layout(height=400, legend=LEGEND_ABOVE)
     try:

@@ -21,7 +21,7 @@ from throwcollect.tasks.throw.throw_config import throw_section
 from throwcollect.units import NS_PER_S
 
 MOST_RESIDUALS = 2000
-"""Most episodes whose flight is computed again, which takes some 15 s; `verify` computes those of all."""
+"""Most episodes whose flight is computed again, which takes some 15 s; `verify` computes the flights of all."""
 _MOST_LANDED = 6
 _MOST_OTHERS = 3
 
@@ -98,7 +98,7 @@ def measure_residuals(dataset: Dataset) -> Residuals:
         DatasetError: If an episode is not where the table says, or is damaged.
     """
     trials = dataset.recorded.throws["trial"].to_numpy()
-    # At random, as every n-th point of a Sobol sequence or a grid would lie on a lattice of its parameters.
+    # Episodes are chosen at random, as every n-th point of a Sobol sequence or a grid would lie on a lattice.
     chosen = np.sort(np.random.default_rng(0).permutation(trials)[:MOST_RESIDUALS])
     distances = []
     for trial in chosen.tolist():

@@ -30,9 +30,9 @@ _SHADES = ("#3b528b", "#2c728e", "#21908d", "#27ad81", "#5dc863", "#aadc32")
 _MOST_SVG_POINTS = 1500
 """Plots of more points are drawn by WebGL, which is faster."""
 _FEW = 8
-"""Up to so many throws in a cell, each of them has its own mark beside the scale; Plotly would mark halves."""
+"""Up to this many throws in a cell, the scale has a mark for each number of throws; plotly would also mark halves."""
 FLOOR_M = 1e-17
-"""Residuals are drawn as at least this, as 0 has no place on a logarithmic axis."""
+"""Smaller residuals are drawn as this value, as 0 has no place on a logarithmic axis."""
 
 
 def draw_landing_map(landings: Landings, outcomes: Outcomes) -> go.Figure:
@@ -75,7 +75,7 @@ def _draw_coloured(
     size = 8 if len(shown) <= 300 else 6 if len(shown) <= 1500 else 4
     figure = go.Figure()
     present = [(code, name) for code, name in enumerate(outcomes.names) if (shown.code == code).any()]
-    # Throws that landed are drawn last, on top of the others, as the colours are for them.
+    # Throws that landed are drawn last, on top of the others, because the colour scale is mostly about them.
     for code, name in reversed(present):
         own, style = shown.code == code, style_of(name)
         outline = {"size": 1.4 * size, "line": {"color": style.colour, "width": size / 5}} if name != LANDED else {}
@@ -96,7 +96,7 @@ def _draw_coloured(
                 hovertemplate=f"trial %{{customdata}}<br>{hover}<extra>{in_words(name)}</extra>",
             )
         )
-    # The legend has other markers than the points, which have no single colour.
+    # The legend has markers of its own, because the points have no single colour.
     for _, name in present:
         style = style_of(name)
         look = {"symbol": style.symbol, "color": NEUTRAL}
@@ -184,7 +184,7 @@ def _draw_paths(paths: Sequence[BallPath], axis: int) -> go.Figure:
         release = len(x) - 1 if path.release is None else path.release
         hover = f"x %{{x:.3f}} m, {letter} %{{y:.3f}} m<extra>{name}</extra>"
         common = {"legendgroup": name, "name": name, "hovertemplate": hover}
-        # Both lines have the sample of the release, so that they meet.
+        # Both lines include the sample of the release, so that they meet.
         held, free = slice(release + 1), slice(release, None)
         line = {"color": colour, "width": 1, "dash": "dot"}
         figure.add_scatter(x=x[held], y=y[held], mode="lines", line=line, showlegend=False, **common)
