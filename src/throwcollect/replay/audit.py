@@ -19,7 +19,7 @@ _Found = TypeVar("_Found")
 
 
 def select_trials(dataset: Dataset, *, sample: int | None) -> list[int]:
-    """List the trials that have an episode, in order; or so many of them, always the same random choice.
+    """List the trials that have an episode, in order; with `sample`, so many of them, always the same random choice.
 
     Raises:
         DatasetError: If no trial has an episode.
@@ -66,7 +66,7 @@ def require_simulating(engine: str) -> None:
 
 def _begin(directory: Path) -> Callable[[int], Comparison]:
     """Open dataset and simulation in a process, which keeps both from one trial to the next."""
-    # Datasets are verified without the extra `collect`, too, which this import takes.
+    # This import needs the extra `collect`, but datasets can be verified without it.
     from throwcollect.replay.replayer import Replayer
 
     dataset = Dataset.open(directory)

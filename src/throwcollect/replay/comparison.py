@@ -28,11 +28,11 @@ def compare(stored: Episode, again: Episode) -> Comparison:
     """Compare two episodes of one trial.
 
     Raises:
-        DatasetError: If the stored one is damaged, or another robot's.
+        DatasetError: If the stored episode is damaged, or belongs to another robot.
     """
     stored.check_records()
     differences: tuple[str, ...] = ()
-    # Contents are compared and not chunks, as the same messages may be compressed in another way.
+    # This compares contents and not chunks, as the same messages may be compressed in different ways.
     if (stored.state.contents, stored.header_json) != (again.state.contents, again.header_json):
         differences = tuple(_differences(stored, again)) or ("other channels than joint states and ball differ",)
     return Comparison(stored.header.trial, stored.digest, again.digest, differences)

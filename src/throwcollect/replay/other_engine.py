@@ -97,7 +97,7 @@ def _begin(directory: Path, engine: str) -> Callable[[int], Deviation]:
         trial = plan.trial(number)
         result = judge_episode(with_values(config, trial.values), replayer.run(trial))
         stored, again = rows[number], table.row(trial, result, None)
-        # Columns of text, and numbers that only one of both rows has, cannot be compared.
+        # Columns of text, and numbers that only one of the two rows has, cannot be compared.
         compared = [
             column
             for column in again

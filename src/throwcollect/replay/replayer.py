@@ -12,13 +12,13 @@ from throwcollect.sweep.trials import Trial
 
 
 class Replayer:
-    """Runs trials of one collection, one after the other, without its slow motion for onlookers.
+    """Runs trials of one collection, one after the other, and ignores the real-time factor of its configuration.
 
     Attributes:
         close: Frees the world, as the end of this object does, too; no trial can be run afterwards.
 
     Raises:
-        ConfigError: If it does not describe a world.
+        ConfigError: If the configuration does not describe a world.
         WorkerError: If the physics engine does not start.
     """
 
@@ -27,7 +27,7 @@ class Replayer:
         self._simulation.real_time_factor = None
         self._runner = TrialRunner(self._simulation)
         self.close = finalize(self, self._simulation.world.close)
-        # The end of the process frees all worlds, and engines may be gone by then.
+        # This is not called when the process ends, which frees all worlds, because engines may be unloaded by then.
         self.close.atexit = False
 
     def run(self, trial: Trial) -> Episode:
@@ -35,7 +35,9 @@ class Replayer:
         return self.delivery(trial).episode
 
     def delivery(self, trial: Trial) -> Delivery:
-        """Simulate a trial of the collection, whether its plan has it or not: episode, result and conditions.
+        """Simulate a trial with the collection's configuration, and return its episode, result and conditions.
+
+        The trial need not be in the plan.
 
         Raises:
             ThrowcollectError: If a controller refuses its goal, or the samples are not finite, as in a collection.

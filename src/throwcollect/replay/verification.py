@@ -32,8 +32,8 @@ def verify_dataset(
         directory: Its directory.
         replay: How many throws, chosen by the seed of the dataset, to simulate again and to compare bit for bit; None
             for none.
-        processes: How many processes may check the recordings of a large dataset; more than one import the program that
-            calls this, as those of `multiprocessing` do.
+        processes: How many processes may check the recordings of a large dataset; if there are several, each imports
+            the main program, as processes of `multiprocessing` do.
         say: Called with the progress of the check of a large dataset.
 
     Returns:
@@ -67,6 +67,6 @@ def _replay_findings(directory: Path, count: int) -> Iterator[Finding]:
                 problem = f"comes out differently: {'; '.join(comparison.differences)}"
                 yield Finding(shards[comparison.trial], f"trial {comparison.trial}", problem)
     except DatasetError as error:
-        # What it recommends is the command that has called this.
+        # The hint of the error would recommend the command that has called this function.
         error.hint = None
         yield Finding("", "", f"cannot be replayed: {error}")

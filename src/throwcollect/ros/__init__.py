@@ -1,7 +1,7 @@
 """The ROS 2 edge: the part of rclpy's API that a node needs, and the classes of its messages.
 
-Nodes import from here and from nowhere below, so that they run unchanged on both backends: genuine rclpy, and the
-embedded one. The first name that is taken from here decides which one it is; see `middleware`.
+Nodes import only from here and not from the modules below, so that they run unchanged on both backends: genuine rclpy,
+and the embedded one. When the first name is taken from here, the backend is chosen; see `middleware`.
 """
 
 from typing import TYPE_CHECKING

@@ -1,4 +1,4 @@
-"""Finds names in the backend that nodes run on, which is imported when the first of them is asked for."""
+"""Finds names in the backend of this process, which is imported when the first name is needed."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ Kind = Literal["msg", "srv", "action"]
 
 
 def __getattr__(name: str) -> Any:
-    # Python itself asks a module for such names, which must not load a backend.
+    # Python itself looks for such names in a module, and that must not load a backend.
     if name.startswith("__"):
         raise AttributeError(name)
     from throwcollect.ros.middleware import uses_rclpy
@@ -23,7 +23,7 @@ def __getattr__(name: str) -> Any:
         value = getattr(backend, name)
     except AttributeError:
         raise AttributeError(f"module {_EDGE!r} has no attribute {name!r}") from None
-    # Python asks `__getattr__` only for what a module does not have, so it does not come here for this name again.
+    # Python calls `__getattr__` only for names that a module does not have, so it is not called for this name again.
     setattr(sys.modules[_EDGE], name, value)
     return value
 

@@ -24,9 +24,9 @@ class Connection:
 
     Attributes:
         endpoint: Endpoint of the router, such as ``tls/127.0.0.1:7447``.
-        key: Key of the run, which a router at ``tls/...`` lets nobody in without.
+        key: Key of the run; a router at ``tls/...`` lets nobody in without it.
         domain_id: ROS domain.
-        middleware: What carries the messages of the run.
+        middleware: The middleware that carries the messages of the run.
     """
 
     endpoint: str
@@ -51,7 +51,7 @@ class Connection:
         """Refuse to join the run by an RMW that its nodes do not understand.
 
         Raises:
-            ConfigError: If this process has another one than the run.
+            ConfigError: If this process has another RMW than the run.
         """
         if self.middleware.rmw != rmw:
             raise ConfigError(

@@ -31,9 +31,9 @@ _LOOK_S = 0.02
 
 @contextmanager
 def discovery_server(endpoint: str) -> Iterator[None]:
-    """Run a discovery server as a child process, from when it listens at an endpoint like ``udp/127.0.0.1:7447``.
+    """Run a discovery server as a child process; the block begins when it listens, such as at ``udp/127.0.0.1:7447``.
 
-    The same port of TCP takes connections meanwhile, by which others find out that the server is there.
+    Meanwhile, this process accepts TCP connections at the same port, by which others find out that the server runs.
 
     Raises:
         ConfigError: If there is no such program, or it cannot listen there.
@@ -42,7 +42,7 @@ def discovery_server(endpoint: str) -> Iterator[None]:
     command = [_program(), "-i", "0", "-x", str(write_temporarily(server_profile(endpoint)))]
     with (
         _accept_connections(endpoint),
-        # A file instead of a pipe, because nobody reads on once it runs, and a full pipe would stop it.
+        # The output goes to a file and not to a pipe: nobody reads it later, and a full pipe would stop the server.
         TemporaryFile() as output,
         subprocess.Popen(
             command,
@@ -65,7 +65,7 @@ def discovery_server(endpoint: str) -> Iterator[None]:
 
 @contextmanager
 def _accept_connections(endpoint: str) -> Iterator[None]:
-    """Accept connections and close them: a port of UDP alone does not tell whether somebody listens.
+    """Accept TCP connections and close them, because a UDP port does not show whether somebody listens.
 
     Raises:
         ConfigError: If the port is taken, or the address is not this machine's.
@@ -83,7 +83,7 @@ def _accept_connections(endpoint: str) -> Iterator[None]:
             try:
                 server.accept()[0].close()
             except OSError:
-                # It is about to be closed, or the process has too many files open for the moment.
+                # The socket is being closed, or the process has too many open files at the moment.
                 time.sleep(_LOOK_S)
 
     threading.Thread(target=accept, daemon=True).start()
@@ -97,7 +97,7 @@ def _accept_connections(endpoint: str) -> Iterator[None]:
 
 def _wait_until_it_runs(process: subprocess.Popen[bytes], output: IO[bytes], endpoint: str) -> None:
     while True:
-        # The end comes before the output, so that all is read that led to it.
+        # The end is checked before the output is read, so that after the end, all of the output is read.
         has_ended = process.poll() is not None
         said = os.pread(output.fileno(), os.fstat(output.fileno()).st_size, 0)
         if _RUNNING in said:
@@ -109,7 +109,7 @@ def _wait_until_it_runs(process: subprocess.Popen[bytes], output: IO[bytes], end
 
 
 def _program() -> str:
-    # Where ROS is installed by pip, the program lies beside this Python, and that directory need not be in PATH.
+    # If ROS is installed by pip, the program lies beside this Python, in a directory that PATH may not contain.
     beside_python = Path(sys.prefix, "bin", _PROGRAM)
     program = str(beside_python) if beside_python.is_file() else shutil.which(_PROGRAM)
     if program is None:

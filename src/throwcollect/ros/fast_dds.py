@@ -1,12 +1,12 @@
 """XML profiles by which nodes of genuine rclpy on Fast DDS find each other through a discovery server.
 
-By itself DDS has all nodes of a network find each other by multicast, which is what nodes of an open run do. Other runs
-have a discovery server, in the place of Zenoh's router and at an endpoint of the same form: nodes know its address and
-nothing else, so runs do not see each other. Everything goes over UDP, without multicast and without shared memory,
-which containers do not share.
+By default, all nodes of a network on DDS find each other by multicast, as nodes of an open run do. Other runs have a
+discovery server in place of Zenoh's router, at an endpoint of the same form. Nodes know only the address of that
+server, so runs do not see each other. Everything goes over UDP, without multicast, and without shared memory, which
+containers do not have in common.
 
-The server keeps nobody out who knows the address: DDS Security is not compiled into the wheels of Fast DDS, and over
-TLS, which was tried, one connection in ten was never made on a busy machine.
+The server lets everybody in who knows its address. DDS Security is not compiled into the wheels of Fast DDS. TLS was
+tried, but on a busy machine, one connection in ten was never made.
 
 Source: documentation of Fast DDS 2.14, "XML profiles" and "Discovery Server".
 """
@@ -27,13 +27,13 @@ PLAIN_DISCOVERY = {"ROS_AUTOMATIC_DISCOVERY_RANGE": "SYSTEM_DEFAULT"}
 """Environment variable that keeps rmw_fastrtps from adding ways of discovery of its own to those of the profile."""
 
 _SERVER = "44.53.00.5f.45.50.52.4f.53.49.4d.41"
-"""Identifier of a discovery server, by which its clients know it; Fast DDS's own tools take the same one."""
+"""Identifier by which clients know a discovery server; it is the one that Fast DDS's own tools use."""
 _LEASE_S, _ANNOUNCED_S = 10, 1
-"""Times [s] after which a silent node or server counts as gone, and in which each announces itself. On a busy machine
-they are silent for a while, and one that counts as gone by mistake is often not found again."""
+"""Time [s] after which a silent node or server counts as gone, and time [s] between its announcements. On a busy
+machine a node may be silent for a while, and if it counts as gone by mistake, others often do not find it again."""
 SERVER_REST_S = 11.0
-"""Time [s] after which a server that ended is started again. Nodes take one that comes back sooner for the old one,
-which they have not missed yet: they do not announce themselves to it, and never hear of nodes that come later."""
+"""Time [s] after which a server that ended is started again. If it came back before nodes have noticed its end, they
+would take it for the old server: they would not announce themselves to it, and never hear of later nodes."""
 
 
 def client_profile(endpoint: str) -> str:
@@ -43,8 +43,7 @@ def client_profile(endpoint: str) -> str:
         ConfigError: If the endpoint has no address.
     """
     address, port = _place(endpoint)
-    # A plain client would hear only of nodes with which it has topics in common, and the ROS graph would be full of
-    # gaps.
+    # A plain client would only hear of nodes with which it has topics in common, so its ROS graph would be incomplete.
     discovery = f"""<discoveryProtocol>SUPER_CLIENT</discoveryProtocol>
           <discoveryServersList><RemoteServer prefix="{_SERVER}"><metatrafficUnicastLocatorList>
             {_locator(address, port)}
@@ -88,7 +87,7 @@ def _locator(address: str, port: int) -> str:
 
 
 def _profile(address: str, discovery: str, locators: str = "", prefix: str = "") -> str:
-    # Nodes of a run on one machine must not be reachable from others.
+    # If the server is at a loopback address, nodes must not be reachable from other machines.
     loopback = f"<interfaceWhiteList><address>{address}</address></interfaceWhiteList>"
     return f"""<?xml version="1.0" encoding="UTF-8" ?>
 <dds xmlns="http://www.eprosima.com/XMLSchemas/fastRTPS_Profiles">

@@ -60,9 +60,9 @@ _looks = itertools.count()
 
 
 def init(*, context: Context | None = None, connection: Connection | None = None) -> None:
-    """Initialise a context, as ``rclpy.init`` does but for signals: they are left to whoever handles them.
+    """Initialise a context, as ``rclpy.init`` does, but without handlers of signals, which the caller may set.
 
-    rclpy's own handlers would take the context away from nodes that still have to finish something.
+    rclpy's own handlers would shut the context down while nodes still have to finish something.
 
     Args:
         context: The context; None for the default one.
@@ -72,10 +72,10 @@ def init(*, context: Context | None = None, connection: Connection | None = None
         RuntimeError: If the context is in use already.
         ConfigError: If a variable of the environment does not hold what it should, or the connection is one by other
             middleware.
-        ThrowcollectError: If the RMW does not start, as rmw_zenoh_cpp does not without a router, or this process is in
-            another run on Fast DDS.
+        ThrowcollectError: If the RMW does not start (rmw_zenoh_cpp needs a router), or this process is in another run
+            on Fast DDS.
     """
-    # rclpy loads its RMW when it is first used, and takes its name from the environment alone.
+    # rclpy loads its RMW when it is first used, and gets the name of the RMW only from the environment.
     os.environ[RMW_VARIABLE] = Middleware.of_process().rmw
     middleware = Middleware("rclpy", rclpy.get_rmw_implementation_identifier())
     variables: Mapping[str, str] = {}
@@ -102,14 +102,14 @@ _discovery_server: list[str] = []
 
 
 def _use_discovery_server(endpoint: str) -> None:
-    """Have the nodes of this process find others by a discovery server of Fast DDS.
+    """Let the nodes of this process find others by a discovery server of Fast DDS.
 
     Fast DDS reads its profile when the first node is made, and never again. So the variable stays set, and a process
     can use one discovery server only.
 
     Raises:
         ConfigError: If the endpoint has no address.
-        WorkerError: If this process has another one.
+        WorkerError: If this process uses another discovery server.
     """
     if _discovery_server and _discovery_server != [endpoint]:
         raise WorkerError(
@@ -161,13 +161,13 @@ get_action = partial(_find_interface, "action")
 
 
 def graph_changes(_node: Node) -> int:
-    """Another number at each call, as rclpy does not tell whether the ROS graph has changed."""
+    """Return another number at each call, because rclpy does not tell whether the ROS graph has changed."""
     return next(_looks)
 
 
 def let_callbacks_wait(node: Node) -> None:
-    """Have a node go on with other callbacks while one of its coroutines waits."""
-    # Callbacks without a group of their own are put into this one; there is no public way to choose it.
+    """Let a node go on with other callbacks while one of its coroutines waits."""
+    # Callbacks without a group of their own belong to this group; rclpy has no public function to set it.
     node._default_callback_group = ReentrantCallbackGroup()
 
 
@@ -184,7 +184,7 @@ def joins_protected() -> bool:
 
 
 def spin_some(executor: Executor, timeout_sec: float) -> None:
-    """Wait for an input, then call back with it and all others that have come by then, but none that come meanwhile.
+    """Wait for an input, then call the callbacks of all inputs that have arrived by then, but not of later ones.
 
     Up to rclpy 7.1.8, the executor of a node that carries out a goal does not wait.
     """
@@ -200,13 +200,12 @@ def spin_some(executor: Executor, timeout_sec: float) -> None:
                 get_logger("rclpy").warning(
                     f"a request that cannot be read is left without an answer: {error}", throttle_duration_sec=1.0
                 )
-            # From now on the executor goes once through the ready callbacks, and raises a TimeoutException at their
-            # end.
+            # Without waiting, the executor goes once through the ready callbacks, and then raises a TimeoutException.
             wait = 0.0
 
 
 def stop_waiting(executor: Executor) -> None:
-    """Let an executor look for work; `spin_some` waits on for its whole time, a tenth of a second at most."""
+    """Let an executor look for work; this does not end the wait of `spin_some`, a tenth of a second at most."""
     executor.wake()
 
 
@@ -221,7 +220,7 @@ def _is_of_request(error: BaseException) -> bool:
 
 def pass_on_log(node: Node, record: logging.LogRecord) -> None:
     """Log a record of Python's own logging under a node's name and with the place that the record comes from."""
-    # The node's logger would name the line here as the place.
+    # The node's logger would give this line as the place of the record.
     rclpy_implementation.rclpy_logging_rcutils_log(
         record.levelno,
         node.get_logger().name,
@@ -234,5 +233,5 @@ def pass_on_log(node: Node, record: logging.LogRecord) -> None:
 
 def provide_time(node: Node) -> None:
     """Make a node the source of its own time: its clock shows the last ``set_ros_time_override``."""
-    # rclpy's own time source does it like this; there is no public way.
+    # rclpy's own time source does it like this; there is no public function for it.
     node.get_clock()._set_ros_time_is_active(True)

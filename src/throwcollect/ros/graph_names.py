@@ -1,4 +1,4 @@
-"""Names in the ROS graph: as people and programs outside of ROS give them, and of our own nodes that only look on."""
+"""Converts names that people and programs outside of ROS give, and makes names for our own nodes that only look on."""
 
 from __future__ import annotations
 

@@ -18,10 +18,10 @@ from throwcollect.ros.router_endpoint import split_address
 from throwcollect.ros.zenoh_errors import zenoh_errors
 
 NODE_VARIABLE = "THROWCOLLECT_NODE"
-"""Names the node of a container."""
+"""Name of the environment variable that names the node of a container."""
 
 TIMEOUT_S = 3.0
-"""Time for the session, and then for the answer."""
+"""Time to open the session, and again to get the answer."""
 
 _ROUTER, _COORDINATOR = "router", "coordinator"
 _NAME = re.compile("[A-Za-z_][A-Za-z0-9_]*")
@@ -46,7 +46,7 @@ def check(node: str | None = None) -> None:
         )
     is_fast_dds = Middleware.of_process().is_fast_dds
     if is_fast_dds and name != _ROUTER:
-        # Nothing can be asked over DDS at so little cost; the loop of the node in this container keeps a heartbeat.
+        # A request over DDS would cost too much. Instead, the loop of the node in this container keeps a heartbeat.
         if not is_beating():
             raise ThrowcollectError(f"{name}: does not answer")
         return
@@ -63,7 +63,7 @@ def check(node: str | None = None) -> None:
             f"{name}: no session with the router: {config.get_json('connect/endpoints')}"
         ) from error
     try:
-        # A simulation lives in a namespace of its own name, or in that of the root.
+        # The namespace of a simulation has the simulation's own name, or is the root.
         path = name if name == _COORDINATOR else f"**/{name}"
         if name != _ROUTER and not node_answers(session, path, domain_id=domain_id, timeout_s=TIMEOUT_S):
             raise ThrowcollectError(f"{name}: does not answer")
@@ -79,7 +79,7 @@ def _check_discovery_server(endpoint: str) -> None:
     """
     try:
         with socket.create_connection(split_address(endpoint), TIMEOUT_S) as connection:
-            # The router hangs up at once; one that is stuck does not.
+            # The router closes the connection at once; if it is stuck, it does not, and this times out.
             connection.recv(1)
     except OSError as error:
         raise ThrowcollectError(f"{_ROUTER}: no session with the router at {endpoint}: {error}") from error

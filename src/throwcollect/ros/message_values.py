@@ -40,7 +40,7 @@ def fill(message: Any, values: object, where: str = "") -> None:
         message: The message.
         values: Mapping of field names to values; nested messages are mappings, too. Null is the number NaN, octets may
             be bytes or Base64, arrays may be NumPy's, and fields of times may have the names that they have in ROS 1.
-        where: Path of the message in the whole one, with a dot at its end.
+        where: Path of this message inside the whole message, with a dot at its end.
 
     Raises:
         ConfigError: If there is no such field, or it cannot take the value.
@@ -62,7 +62,7 @@ def fill(message: Any, values: object, where: str = "") -> None:
             continue
         try:
             setattr(message, name, _convert(types[name], value, path, current))
-        # Classes that rosidl generates check fields by assertions, and no float is as large as some integers.
+        # Classes that rosidl generates check fields by assertions. A number that no float can hold overflows.
         except (TypeError, ValueError, AssertionError, OverflowError) as error:
             raise ConfigError(f"{path}: should be {types[name]}, got {value!r:.80}") from error
 
@@ -87,7 +87,7 @@ def _plain(value: Any, kind: str, numbers: Numbers) -> Any:
     if isinstance(value, array.array):
         return numbers(np.frombuffer(value, value.typecode), _element(kind))
     if isinstance(value, bytes):
-        # On rclpy a single octet is bytes of length 1.
+        # In rclpy, a single octet is a `bytes` object of length 1.
         return value[0] if kind == "octet" else list(value)
     if isinstance(value, Sequence) and not isinstance(value, str):
         element = _element(kind)
@@ -107,7 +107,7 @@ def _field_types(message_class: Any) -> Mapping[str, str]:
 
 @cache
 def array_parts(kind: str) -> tuple[str, int | None, int | None] | None:
-    """Type of the elements of an array, its bound and its fixed length, of which one may be there; None if no array."""
+    """Type of an array's elements, its bound and its fixed length, at most one of which is set; None if no array."""
     match = _ARRAY.fullmatch(kind)
     if match is None:
         return None
@@ -161,7 +161,7 @@ def _numbers(element: str, value: object, current: Any) -> Any:
         numbers = np.array(_check_numbers(element, value if isinstance(value, list) else value.tolist()), dtype)
     else:
         raise TypeError
-    # Fields are `array.array` or lists on rclpy, and arrays of NumPy on the embedded backend.
+    # Fields with numbers are `array.array` or lists on rclpy, and NumPy arrays on the embedded backend.
     if isinstance(current, array.array):
         return array.array(current.typecode, numbers.tobytes())
     if isinstance(current, list):

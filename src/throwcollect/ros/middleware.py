@@ -64,11 +64,11 @@ class Middleware:
 
     @property
     def joining(self) -> Middleware:
-        """The middleware of our processes that are no nodes: the embedded backend, if the nodes understand it."""
+        """The middleware of our processes that are no nodes: the embedded backend, if the nodes' RMW understands it."""
         return Middleware() if self.rmw == EMBEDDED_RMW else self
 
     def environment(self) -> Mapping[str, str]:
-        """Environment variables by which a process of ours takes part."""
+        """Environment variables by which a process of ours uses this middleware."""
         if self.backend == "embedded":
             return {VARIABLE: self.backend}
         return {VARIABLE: self.backend, RMW_VARIABLE: self.rmw}
@@ -79,7 +79,7 @@ class Middleware:
         Call it before the first name is taken from `throwcollect.ros`, as a process has one backend.
 
         Raises:
-            ConfigError: If the backend or its RMW is not there.
+            ConfigError: If the backend or its RMW is not installed.
         """
         _settled[:] = [_choose_installed(self.backend, self.rmw if self.backend == "rclpy" else None)]
 
@@ -96,7 +96,7 @@ def choose_middleware(backend: Literal["auto", "embedded", "rclpy"]) -> Middlewa
             that are installed.
 
     Raises:
-        ConfigError: If the backend is not there.
+        ConfigError: If the backend is not installed.
     """
     if backend == "auto":
         return Middleware.of_process()
@@ -112,17 +112,17 @@ def uses_rclpy() -> bool:
     return Middleware.of_process().backend == "rclpy"
 
 
-# Cached because the search for all interfaces takes milliseconds, and each name taken from `throwcollect.ros` needs it.
+# This is cached because finding all interfaces takes milliseconds, and each name from `throwcollect.ros` needs it.
 @cache
 def _choose_installed(backend: str, rmw: str | None) -> Middleware:
-    """Choose the middleware that is asked for: by default genuine rclpy, if Python finds it and all interfaces.
+    """Choose the requested middleware; ``auto`` is genuine rclpy, if Python finds it and all interfaces.
 
-    By default the embedded backend is taken instead where rmw_zenoh_cpp is asked for and ROS does not have it, as it
-    speaks the same protocol.
+    With ``auto``, the embedded backend is chosen if rmw_zenoh_cpp is requested but not installed, because it speaks the
+    same protocol.
 
     Raises:
-        ConfigError: If there is no such backend, or rclpy is asked for and is not there or lacks interfaces, or there
-            is no such RMW.
+        ConfigError: If the backend is unknown, or rclpy is requested but not installed or without all interfaces, or
+            the RMW is not installed.
     """
     if backend not in ("auto", "rclpy", "embedded"):
         raise ConfigError(f"{VARIABLE}: got {backend!r}", expected="auto, rclpy or embedded")

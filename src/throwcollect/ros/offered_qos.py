@@ -10,9 +10,9 @@ _DEPTH = 100
 def find_offered_qos(node: ros.Node, topic: str, unknown: ros.ReliabilityPolicy) -> ros.QoSProfile:
     """The strictest profile that all publishers of a topic, given by its absolute name, offer.
 
-    While there is no publisher, reliability is ``unknown``: best effort hears all that may come, reliable suits most.
+    While there is no publisher, reliability is ``unknown``: best effort hears every publisher, reliable suits most.
     """
-    # ROS 2 connects no subscription to a publisher that offers less than it asks for, so the weakest publisher decides.
+    # ROS 2 connects a subscription only to publishers that offer what it asks for, so the weakest publisher decides.
     offered = [info.qos_profile for info in node.get_publishers_info_by_topic(topic)]
     profile = ros.QoSProfile(depth=_DEPTH, reliability=unknown)
     if offered:

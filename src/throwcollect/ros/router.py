@@ -1,6 +1,6 @@
 """The router of a run: one of Zenoh, as ``ros2 run rmw_zenoh_cpp rmw_zenohd`` is, or a discovery server of Fast DDS.
 
-``python -m throwcollect.ros.router --listen tcp/127.0.0.1:7447`` runs until it is told to stop by SIGTERM or SIGINT.
+``python -m throwcollect.ros.router --listen tcp/127.0.0.1:7447`` runs until it gets SIGTERM or SIGINT.
 """
 
 from __future__ import annotations
@@ -78,7 +78,7 @@ def _open(listen: str, key: RunKey | None) -> tuple[zenoh.Session, str]:
         try:
             return zenoh.open(config), endpoint
         except zenoh.ZError as error:
-            # Another process may have taken the free port in between.
+            # Another process may have taken the free port meanwhile, so this tries again.
             if not attempts_left:
                 raise ConfigError(
                     f"the router cannot listen on {endpoint}: {in_words(error).rpartition(': ')[2]}",
@@ -95,7 +95,7 @@ def _free_port(address: str) -> int:
             probe.bind((host, 0))
             return int(probe.getsockname()[1])
     except (OSError, UnicodeError) as error:
-        # A host name with a part that is too long is a UnicodeError.
+        # A host name with a part that is too long leads to a UnicodeError.
         raise ConfigError(f"cannot listen on {address!r}: {error}", expected="such as tcp/127.0.0.1:0") from error
 
 
@@ -104,12 +104,12 @@ def serve(listen: str = DEFAULT_LISTEN, key_directory: Path | None = None) -> No
 
     Args:
         listen: Endpoint to listen on; port 0 takes a free one.
-        key_directory: Directory of the key that an endpoint ``tls/...`` lets nobody in without; a key is made there if
-            there is none. None for the key that the environment names.
+        key_directory: Directory of the key; at an endpoint ``tls/...``, the router lets nobody in without this key. If
+            the directory holds no key, one is made. None for the key that the environment names.
 
     Raises:
-        ConfigError: If the endpoint is malformed or knows of no key, the router cannot listen on it, or its key cannot
-            be read.
+        ConfigError: If the endpoint is malformed or does not use a key, the router cannot listen on it, or its key
+            cannot be read.
     """
     if key_directory is None:
         key = RunKey.of_environment()
@@ -119,7 +119,7 @@ def serve(listen: str = DEFAULT_LISTEN, key_directory: Path | None = None) -> No
         key = RunKey(key_directory.absolute())
         if not key.exists:
             key.create()
-    # `sigwait` does not work: libraries start threads when they are imported, and one of those may get the signal.
+    # `sigwait` does not work, because libraries start threads when they are imported, which may get the signal instead.
     stop: SimpleQueue[int] = SimpleQueue()
     for number in stop_signals():
         signal.signal(number, lambda received, _frame: stop.put(received))
@@ -128,7 +128,7 @@ def serve(listen: str = DEFAULT_LISTEN, key_directory: Path | None = None) -> No
     with _discovery_server(listen) if by_server else router(listen, key) as endpoint:
         print(f"router listening on {endpoint}", flush=True)
         heartbeat = Heartbeat()
-        # Python runs the handler of a signal that comes just before a wait only after it, so the waits are short.
+        # If a signal comes just before a wait, Python runs its handler only after the wait, so waits are short.
         while True:
             heartbeat.beat()
             with suppress(Empty):

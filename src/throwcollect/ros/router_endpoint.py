@@ -15,7 +15,7 @@ def split_address(endpoint: str) -> tuple[str, int]:
     Raises:
         ValueError: If the port is no number.
     """
-    # The last colon is that of the port: addresses of IPv6 have others, and stand in brackets because of them.
+    # The last colon comes before the port: IPv6 addresses contain colons, too, and are therefore in brackets.
     host, _, port = endpoint.partition("/")[2].rpartition(":")
     return host.strip("[]"), int(port)
 
@@ -23,7 +23,7 @@ def split_address(endpoint: str) -> tuple[str, int]:
 def answers(endpoint: str, *, patience_s: float = 0.0) -> bool:
     """Whether something listens at an endpoint of TCP or TLS.
 
-    With ``patience_s``, ask again for that long, as the router may just be starting again.
+    With ``patience_s``, this tries again for that long [s], as the router may be restarting.
     """
     address = split_address(endpoint)
     deadline = time.monotonic() + patience_s

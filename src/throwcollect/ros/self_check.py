@@ -1,4 +1,4 @@
-"""Checks that a node which is about to announce that it is ready can be reached at all."""
+"""Checks that a node can be reached at all, before it announces that it is ready."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _LOOK_S = 0.05
 
 
 def check_answers(node: ros.Node, executor: ros.Executor) -> None:
-    """Have a node call one of its own services, while its executor spins as it will in this process.
+    """Let a node call one of its own services, while its executor spins as it will in this process.
 
     Without this check, a backend that does not answer would show only as a collection that does not begin.
 
@@ -32,7 +32,7 @@ def check_answers(node: ros.Node, executor: ros.Executor) -> None:
             now = time.monotonic()
             if now > deadline:
                 raise _silent(node)
-            # A request that leaves before client and service have found each other is lost, so it is repeated.
+            # A request that is sent before client and service have found each other is lost, so it is repeated.
             if now >= asked_at + _AGAIN_S:
                 asked_at = now
                 answers.append(client.call_async(service.Request()))

@@ -21,7 +21,7 @@ def zenoh_errors() -> Iterator[None]:
     """
     try:
         yield
-    # This error comes before `ConfigurationError`, from which it is derived.
+    # This error is handled before `ConfigurationError`, because it is derived from that.
     except UnreadableKeyError as error:
         raise unreadable_key(error.path, error.reason) from error
     except ConfigurationError as error:
