@@ -32,7 +32,7 @@ def unpack(data: bytes) -> Attachment:
     """Attachment from its bytes.
 
     Raises:
-        ValueError: If the data is not laid out like one.
+        ValueError: If the data does not have the layout of an attachment.
     """
     if len(data) != _LAYOUT.size or data[16] != GID_LENGTH:
         raise ValueError(f"attachment of {len(data)} bytes is not that of a ROS 2 Jazzy node")

@@ -29,7 +29,8 @@ class Client(Receiver):
     """Calls a service. Made by `Node.create_client`."""
 
     def __init__(self, node: NodeBase, srv_type: type[ServiceType], srv_name: str, qos_profile: QoSProfile) -> None:
-        # Unbounded: there is at most one response per request, and one that is lost would be waited for in vain.
+        # The queue has no limit: there is at most one response per request, and a dropped one would be waited for in
+        # vain.
         super().__init__(node.mailbox, None)
         self.srv_type = srv_type
         self.qos_profile = qos_profile
@@ -37,8 +38,7 @@ class Client(Receiver):
         self._sequence = 0
         self._lock = threading.Lock()
         self._endpoint = Endpoint(node, EntityKind.CLIENT, srv_name, srv_type.TYPE, qos_profile)
-        # As rmw_zenoh_cpp does: every complete queryable of this key is asked, and Zenoh must not merge or drop
-        # replies.
+        # As in rmw_zenoh_cpp, every complete queryable of this key is asked, and Zenoh must not merge or drop replies.
         self._querier: Any = self._endpoint.session.declare_querier(
             self._endpoint.key,
             target=zenoh.QueryTarget.ALL_COMPLETE,
@@ -68,7 +68,7 @@ class Client(Receiver):
     def call_async(self, request: Message, convert: Callable[[Any], Any] = lambda response: response) -> Future:
         """Send a request; the future of the response stays pending if nobody answers.
 
-        It has what ``convert`` makes of the response, which is the response itself by default.
+        The result of the future is what ``convert`` makes of the response, by default the response itself.
 
         Raises:
             TypeError: If the request is not of the service's type.
@@ -84,9 +84,9 @@ class Client(Receiver):
         # Another thread may destroy the client meanwhile.
         if (querier := self._querier) is None:
             raise InvalidHandle(f"{self.service_name}: the client was destroyed")
-        # The future is noted before the request leaves, because the thread that spins may have the response at once.
+        # The future is noted before the request is sent, because the thread that spins may get the response at once.
         self._pending[sequence] = future, convert
-        # Zenoh drops the handler after the last reply, so the number comes into the queue after all of them.
+        # Zenoh drops the handler after the last reply, which puts the number into the queue after all replies.
         handler = zenoh.handlers.Callback(self.deliver, drop=lambda: self.deliver(sequence), indirect=False)
         attachment = Attachment(sequence, time.time_ns(), self._endpoint.gid).pack()
         try:
@@ -97,7 +97,7 @@ class Client(Receiver):
         return future
 
     def handle(self, item: zenoh.Reply | int) -> None:
-        """Decode a response and complete its future; a number says that no further response to that request comes."""
+        """Decode a response and complete its future; a number means that its request gets no further response."""
         if isinstance(item, int):
             self._pending.pop(item, None)
             return
@@ -120,7 +120,7 @@ class Client(Receiver):
             future.set_result(convert(response))
 
     def destroy(self) -> None:
-        """Withdraw the client; what is pending stays so. See `Node.destroy_client`."""
+        """Withdraw the client; pending futures stay pending. See `Node.destroy_client`."""
         self._querier = None
         self._endpoint.close()
         self._pending.clear()

@@ -16,7 +16,7 @@ class ROSClock:
 
     @property
     def is_driven(self) -> bool:
-        """Whether only messages advance the clock, so that an executor need not wait for a time."""
+        """Whether only messages advance the clock, so that waiting for a time is of no use."""
         return self._active
 
     def activate(self, active: bool) -> None:
@@ -33,5 +33,5 @@ class ROSClock:
         return Time(nanoseconds=nanoseconds)
 
     def timer_now_ns(self) -> int:
-        """Time by which timers run [ns]; a steady clock in real time, as the system's may be corrected."""
+        """Time by which timers run [ns]; in real time, that of a steady clock, as the system's may be corrected."""
         return self._override_ns if self._active else system.monotonic_ns()

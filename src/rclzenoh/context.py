@@ -26,7 +26,7 @@ _T = TypeVar("_T")
 
 _open: weakref.WeakSet[Context] = weakref.WeakSet()
 _ARRIVAL_S = 1.0
-"""A subscriber that reads nothing must not keep a session from its end for longer."""
+"""Longest time for which a subscriber that reads nothing can delay the end of a session."""
 
 
 class Context:
@@ -46,7 +46,7 @@ class Context:
         """Open the session.
 
         Args:
-            args: Not used: rclpy has it, and names cannot be remapped here.
+            args: Not used: rclpy has this argument, but names cannot be remapped here.
             domain_id: Domain identifier; None takes ``ROS_DOMAIN_ID``, or 0.
             config: Configuration of the session; None for the one that the environment asks for.
 
@@ -70,7 +70,7 @@ class Context:
         return self._ok
 
     def is_open(self) -> bool:
-        """Whether there is a session: also after a requested shutdown, when nodes can still withdraw their tokens."""
+        """Whether there is a session; it exists even after `request_shutdown`, so nodes can still withdraw tokens."""
         return self._session is not None
 
     @property
@@ -100,7 +100,7 @@ class Context:
         return next(self._ids)
 
     def on_shutdown(self, callback: Callable[[], None]) -> None:
-        """Call something when the context shuts down; methods are called as long as their object lives."""
+        """Call a function when the context shuts down; a method is called only if its object still lives."""
         self._on_shutdown.append(weakref.WeakMethod(callback) if inspect.ismethod(callback) else lambda: callback)
 
     def request_shutdown(self) -> None:
@@ -138,9 +138,9 @@ class Context:
 def _let_messages_arrive(session: zenoh.Session, domain_id: int) -> None:
     """Wait until the router has read all messages that were sent, for a second at most.
 
-    When a session closes, Zenoh 1.10 breaks off the message that it is writing, and goes on with what withdraws tokens,
-    which a subscriber then gets as the end of that message. A query is read after all that was sent before it, and the
-    router answers this one itself, as nobody else has its key.
+    When a session closes, Zenoh 1.10 breaks off the message that it is writing, and then writes the messages that
+    withdraw tokens, whose bytes a subscriber takes for the end of the broken message. The router reads a query after
+    all messages that were sent before it, and answers this query itself, as nobody else has its key.
     """
     with suppress(zenoh.ZError):
         list(session.get(f"{domain_id}/@arrived", timeout=_ARRIVAL_S))
@@ -167,14 +167,14 @@ def init(*, context: Context | None = None, domain_id: int | None = None, config
         NoRouterError: If there is no router.
     """
     (context or get_default_context()).init(domain_id=domain_id, config=config)
-    # Python allows handlers of signals to be set in the main thread alone. One that the program has set stays.
+    # Python allows setting handlers of signals only in the main thread. A handler that the program has set stays.
     in_main_thread = threading.current_thread() is threading.main_thread()
     if context is None and in_main_thread and signal.getsignal(signal.SIGTERM) is signal.SIG_DFL:
         signal.signal(signal.SIGTERM, _on_sigterm)
 
 
 def shutdown(*, context: Context | None = None) -> None:
-    """Shut a context down, the default one if none is given, and handle SIGTERM no longer.
+    """Shut a context down, the default one if none is given, and stop handling SIGTERM.
 
     Raises:
         RuntimeError: If it was never initialised.

@@ -24,7 +24,7 @@ class Duration:
 
 
 Infinite = Duration(nanoseconds=2**63 - 1)
-"""Longest duration; stands for no limit."""
+"""The longest duration, which stands for no limit."""
 
 
 def deadline_after(timeout_s: float | None) -> float:

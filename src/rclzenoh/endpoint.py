@@ -48,7 +48,7 @@ class Endpoint:
         self._has_complained = False
 
     def announce(self, declared: Any) -> None:
-        """Show the endpoint in the graph, now that the Zenoh object behind it works."""
+        """Declare the endpoint's token; called when its Zenoh object works, so that others may use it."""
         self._declared = [self.session.liveliness().declare_token(self.token.key()), declared]
 
     def close(self) -> None:

@@ -18,7 +18,7 @@ from rclzenoh.timer import Timer
 
 _FOREVER = float("inf")
 _LONGEST_WAIT_S = 0.5
-"""Python runs the handler of a signal that comes just before the wait begins only when the wait ends."""
+"""Waits are limited: if a signal comes just before a wait, Python runs its handler only when the wait ends."""
 
 
 class Executor:
@@ -57,7 +57,7 @@ class Executor:
         self._queue.put(None)
 
     def create_task(self, callback: Callable[..., Any] | Coroutine[Any, Any, Any], *args: Any, **kwargs: Any) -> Task:
-        """Have a function called, or a coroutine carried out, by the thread that spins; returns its future."""
+        """Let the thread that spins call a function or carry out a coroutine; returns its future."""
         work = callback if isinstance(callback, Coroutine) else partial(callback, *args, **kwargs)
         return submit(self._mailbox, work)
 
@@ -129,7 +129,7 @@ class Executor:
         for node in self._nodes:
             for timer in node.timers:
                 left = timer.time_until_next_call()
-                # It is no use to wait for a clock that messages alone advance: they wake the executor.
+                # If only messages advance the clock, waiting for a time is of no use: messages wake the executor.
                 if (left <= 0 or not timer.clock.is_driven) and left / S_TO_NS < least:
                     first, least = timer, left / S_TO_NS
         return first, least

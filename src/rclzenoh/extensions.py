@@ -10,12 +10,12 @@ from rclzenoh.node import Node
 
 
 def graph_changes(node: Node) -> int:
-    """A number that is another one whenever the ROS graph has changed since it was last asked for."""
+    """Return a number that differs from the last one if the ROS graph has changed since then."""
     return node.context.graph.changes
 
 
 def let_callbacks_wait(_node: Node) -> None:
-    """Have a node go on with other callbacks while one of its coroutines waits; here all nodes do so anyway."""
+    """Let a node go on with other callbacks while one of its coroutines waits; on this backend, all nodes do so."""
 
 
 def pass_on_log(node: Node, record: logging.LogRecord) -> None:
@@ -30,7 +30,7 @@ def provide_time(node: Node) -> None:
 
 
 def spin_some(executor: Executor, timeout_sec: float) -> None:
-    """Wait for an input, then call back with it and all others that have come by then, but none that come meanwhile."""
+    """Wait for an input, then call the callbacks of all inputs that have arrived by then, but not of later ones."""
     executor.spin_once(timeout_sec)
     last = executor.create_task(_nothing)
     while not last.done():
@@ -39,9 +39,9 @@ def spin_some(executor: Executor, timeout_sec: float) -> None:
 
 def stop_waiting(executor: Executor) -> None:
     """End the wait of `spin_some`, if there is one; for handlers of signals, which run in the thread that spins."""
-    # This is a task and not `wake`, because `spin_once` would only look for work after that, and wait on.
+    # `wake` is not enough: after it, `spin_once` looks for work and then goes on waiting. A task is work.
     executor.create_task(_nothing)
 
 
 def _nothing() -> None:
-    """Work that marks a place among the inputs."""
+    """Do nothing; as a task, this marks a position among the inputs, or ends a wait."""

@@ -17,7 +17,7 @@ from rclzenoh.duration import deadline_after
 from rclzenoh.keys import PREFIX, EntityKind, Token, parse_token
 
 _MOST_UNREAD = 10_000
-"""So many unread changes are read even though nobody asks about the graph."""
+"""With this many unread changes, they are read even if nobody asks about the graph."""
 _POLL_S = 0.1
 _HISTORY_TIMEOUT_S = 10.0
 
@@ -26,19 +26,19 @@ class Graph:
     """Nodes and endpoints that are known in one domain."""
 
     def __init__(self, session: zenoh.Session, domain: int) -> None:
-        # Its lock may be taken twice by one thread, as `_on_change` does when it reads.
+        # A thread may take the lock of a Condition twice, as `_on_change` does when it reads changes.
         self._changed = threading.Condition()
         self._unread: deque[tuple[bool, str]] = deque()
         self._tokens: dict[str, Token] = {}
         self._counts: Counter[tuple[EntityKind, str, str]] = Counter()
         self.changes = 0
-        """Number of changes so far: while it stays the same, so does everything else here."""
+        """Number of changes so far; as long as it stays the same, the graph does, too."""
         key = f"{PREFIX}/{domain}/**"
         handler = zenoh.handlers.Callback(self._on_change, indirect=False)
         self._subscriber = session.liveliness().declare_subscriber(key, handler, history=True)
         # Nobody answers this query, but the router ends it only after it has sent the history that the subscriber asked
-        # for, so the graph is complete now. A liveliness query would not end while there is a subscriber to its tokens
-        # (Zenoh 1.10).
+        # for, so the graph is complete afterwards. A liveliness query would not do: with a subscriber to the same
+        # tokens, it does not end (Zenoh 1.10).
         list(session.get(f"{PREFIX}/{domain}/{session.zid()}", timeout=_HISTORY_TIMEOUT_S))
 
     def _on_change(self, sample: zenoh.Sample) -> None:
@@ -56,7 +56,7 @@ class Graph:
                 token = parse_token(key)
                 if token is None:
                     continue
-                # Tokens that are known already are announced again after the connection to the router was lost.
+                # After a lost connection to the router, tokens that are known already are announced again.
                 if appeared and key not in self._tokens:
                     self._tokens[key] = token
                     self._counts[token.kind, token.name, token.type] += 1
@@ -66,7 +66,7 @@ class Graph:
     def tokens(self, *kinds: EntityKind) -> Iterator[Token]:
         """All nodes and endpoints of some kinds."""
         self._read()
-        # The values are copied, because threads of Zenoh may change the dictionary while somebody goes through it.
+        # The values are copied, because threads of Zenoh may change the dictionary while a caller iterates over them.
         return (token for token in list(self._tokens.values()) if token.kind in kinds)
 
     def count(self, kind: EntityKind, name: str, dds_type: str | None = None) -> int:
@@ -95,13 +95,13 @@ class Graph:
         """
         deadline = deadline_after(timeout_s)
         while not condition():
-            # The wait is cut into slices, because nothing notifies this thread when the context is shut down.
+            # The thread waits for short times only, because nothing notifies it when the context is shut down.
             left = deadline - time.monotonic()
             if left <= 0 or not alive():
                 return False
             with self._changed:
-                # A change may have come since the condition was asked. It must be asked again then, and not wait for
-                # the next change.
+                # If a change has come since the condition was checked, it is checked again at once, without waiting for
+                # another change.
                 if not self._unread:
                     self._changed.wait(min(left, _POLL_S))
         return True

@@ -1,8 +1,8 @@
 """Asks a node for a sign of life at next to no cost, as health checks run often.
 
-A request goes to a service that every node offers. Its answer comes from the loop that does the node's work, so a node
-that is stuck does not answer, however alive its process looks. The request is put together here, without a client node,
-which would have to load all interfaces, and which everybody in the ROS graph would hear of.
+A request goes to a service that every node offers. The loop that does the node's work answers it, so a node that is
+stuck does not answer, even if its process looks alive. The request is put together here without a client node, because
+that would have to load all interfaces, and would be announced to everybody in the ROS graph.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from rclzenoh.attachment import GID_LENGTH, Attachment
 from rclzenoh.keys import data_key
 
 _ANY_HASH = "*"
-"""Any type hash: to compute the only one that there is, all interfaces would have to be loaded."""
+"""Stands for any type hash; computing the right one would need all interfaces to be loaded."""
 
 REQUEST = b"\0\1\0\0" + struct.pack("<I", 0)
 """CDR of ``rcl_interfaces/srv/GetParameters_Request`` that asks for no parameter."""

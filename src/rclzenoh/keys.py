@@ -16,7 +16,7 @@ PREFIX = "@ros2_lv"
 
 _NODE_CHUNKS, _ENDPOINT_CHUNKS = 9, 13
 _MOST_DIGITS = 20
-"""Digits of the largest number of 64 bits."""
+"""Number of digits of the largest 64-bit number."""
 
 
 class EntityKind(str, Enum):
@@ -111,12 +111,12 @@ def parse_token(key: str) -> Token | None:
 
 
 def read_natural(text: str) -> int:
-    """A number from 0 on, as tokens have them.
+    """Read a number from 0 on, as it stands in tokens.
 
     Raises:
-        ValueError: If it is none, or larger than 64 bits may be.
+        ValueError: If the text is no such number, or has more digits than a 64-bit number.
     """
-    # `int` alone takes signs, blanks and underscores, too.
+    # `int` alone would accept signs, blanks and underscores, too.
     if not (text.isascii() and text.isdecimal() and len(text) <= _MOST_DIGITS):
         raise ValueError(f"{text!r:.40} is no number")
     return int(text)

@@ -26,7 +26,7 @@ class LoggingSeverity(IntEnum):
 
 _writing = threading.Lock()
 _MOST_SEEN = 1000
-"""Most texts that a logger remembers so as not to repeat them."""
+"""Largest number of texts that a logger remembers in order not to repeat them."""
 
 
 class Logger:
@@ -34,7 +34,7 @@ class Logger:
 
     Attributes:
         name: Name of the logger.
-        sink: Gets each message after standard error has it; None if nobody else shall.
+        sink: Gets each message after it was written to standard error; None if nobody else gets messages.
     """
 
     def __init__(self, name: str) -> None:
@@ -56,10 +56,10 @@ class Logger:
             if last is not None and now - last < throttle_duration_sec:
                 return False
             if len(self._seen) >= _MOST_SEEN:
-                # A text may hold what somebody else has sent, and be another one each time.
+                # A text may contain data from other nodes and so differ each time; this limits the memory.
                 self._seen.clear()
             self._seen[text] = now
-        # The caller is the first frame outside of this module: `info` and the like come before it.
+        # The caller is the first frame outside of this module; frames of `info` and similar methods are skipped.
         caller = sys._getframe(1)
         while caller.f_back is not None and caller.f_code.co_filename == __file__:
             caller = caller.f_back

@@ -32,12 +32,12 @@ WorkQueue = SimpleQueue[Work | None]
 
 
 class Mailbox:
-    """Queue of a node's work; while the node is in an executor, that of the executor."""
+    """The queue of a node's work; while the node is in an executor, it is the queue of that executor."""
 
     def __init__(self) -> None:
-        # Reentrant: the garbage collector may close a query, and with it deliver, while the lock is held.
+        # The lock is reentrant, because the garbage collector may close a query while the lock is held, which delivers.
         self.lock = threading.RLock()
-        # It is no `Queue`, because a handler of a signal may wake the executor in the middle of another `put`.
+        # This must not be a `Queue`: the handler of a signal may wake the executor in the middle of another `put`.
         self.queue: WorkQueue = SimpleQueue()
 
     def submit(self, work: Work | None) -> None:
@@ -46,7 +46,7 @@ class Mailbox:
             self.queue.put(work)
 
     def attach(self, queue: WorkQueue) -> None:
-        """Deliver to another queue from now on, and move the work that waits in the present one there."""
+        """Deliver to another queue from now on, and move the work that waits in the present queue to it."""
         with self.lock:
             while not self.queue.empty():
                 queue.put(self.queue.get())
@@ -72,7 +72,7 @@ class Receiver(ABC):
 
     Args:
         mailbox: Mailbox of the node.
-        queue_length: Items kept; the oldest is refused when there are more. None keeps all.
+        queue_length: Largest number of waiting items; if there are more, the oldest is refused. None keeps all.
     """
 
     def __init__(self, mailbox: Mailbox, queue_length: int | None) -> None:
@@ -85,13 +85,14 @@ class Receiver(ABC):
         surplus = None
         with self.mailbox.lock:
             if len(self._items) == self._queue_length:
-                # The oldest item makes room; it has put this receiver into the mailbox, which serves for the new one.
+                # The oldest item makes room. This receiver is in the mailbox once for each item, and takes the entry of
+                # the oldest item for the new one.
                 surplus = self._items.popleft()
             else:
                 self.mailbox.queue.put(self)
             self._items.append(item)
         if surplus is not None:
-            # The lock is free again here, because refusing sends an answer.
+            # This happens after the lock is released, because refusing sends an answer.
             self.refuse(surplus, f"more than {self._queue_length} requests are waiting")
 
     def run(self) -> bool:

@@ -41,7 +41,7 @@ class Node(NodeEndpoints, NodeGraph, NodeParameters):
     ) -> None:
         NodeEndpoints.__init__(self, node_name, namespace or "", context)
         NodeParameters.__init__(self, self._publish_parameter_event)
-        # The graph is asked before the token of this node is declared, because it would tell of that one, too.
+        # This looks at the graph before the token of this node is declared, because then this node would be in it, too.
         is_taken = (node_name, self._namespace) in self.get_node_names_and_namespaces()
         self._declared_token: Any = self.context.session.liveliness().declare_token(self.token.key())
         if enable_rosout:
@@ -60,7 +60,7 @@ class Node(NodeEndpoints, NodeGraph, NodeParameters):
             )
 
     def destroy_node(self) -> None:
-        """Withdraw the node and all that it has."""
+        """Withdraw the node and all of its endpoints."""
         if self.executor is not None:
             self.executor.remove_node(self)
         self.destroy_endpoints()

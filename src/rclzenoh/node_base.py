@@ -15,7 +15,7 @@ from rclzenoh.timer import Timer
 
 
 class NodeKeeper(Protocol):
-    """The executor that a node is in; that of `executors` imports this module."""
+    """The executor that a node is in, as a protocol, because the module `executors` imports this one."""
 
     def remove_node(self, node: NodeBase) -> None:
         """Stop taking care of a node's callbacks."""

@@ -28,7 +28,7 @@ class NodeEndpoints(NodeBase):
         self._entities: list[Publisher | Subscription | Service | Client] = []
 
     def create_publisher(self, msg_type: type[Message], topic: str, qos_profile: QoSProfile | int) -> Publisher:
-        """Make a publisher; instead of a profile, a depth will do.
+        """Make a publisher, with a profile or only a depth.
 
         Raises:
             NameValidationException: If the name is invalid.
@@ -44,7 +44,7 @@ class NodeEndpoints(NodeBase):
         *,
         raw: bool = False,
     ) -> Subscription:
-        """Make a subscription; instead of a profile, a depth will do.
+        """Make a subscription, with a profile or only a depth.
 
         The callback may be a coroutine function. It gets the message (with ``raw`` its CDR bytes) and, if it takes two
         arguments, a dictionary that says when the message was sent.
@@ -90,24 +90,24 @@ class NodeEndpoints(NodeBase):
         """Make a timer on the node's clock, so that simulated time counts; the callback may be a coroutine function."""
         timer = Timer(callback, int(timer_period_sec * S_TO_NS), self._clock)
         self.timers.append(timer)
-        # An executor that waits has chosen how long to wait without this timer.
+        # A waiting executor does not know of this timer and may wait too long, so it is woken.
         self.mailbox.submit(None)
         return timer
 
     def destroy_publisher(self, publisher: Publisher) -> bool:
-        """Withdraw a publisher; returns whether it was the node's."""
+        """Withdraw a publisher; returns whether it belonged to this node."""
         return self._destroy(publisher)
 
     def destroy_subscription(self, subscription: Subscription) -> bool:
-        """Withdraw a subscription; returns whether it was the node's."""
+        """Withdraw a subscription; returns whether it belonged to this node."""
         return self._destroy(subscription)
 
     def destroy_service(self, service: Service) -> bool:
-        """Withdraw a service; returns whether it was the node's."""
+        """Withdraw a service; returns whether it belonged to this node."""
         return self._destroy(service)
 
     def destroy_client(self, client: Client) -> bool:
-        """Withdraw a client; returns whether it was the node's."""
+        """Withdraw a client; returns whether it belonged to this node."""
         return self._destroy(client)
 
     def destroy_endpoints(self) -> None:

@@ -23,7 +23,7 @@ from rclzenoh.parameter import Parameter, ParameterKind
 from rclzenoh.parameter_rules import check
 
 OnSet = Callable[[list[Parameter]], SetParametersResult]
-"""Callback that agrees or objects before parameters are set."""
+"""Callback that accepts or refuses parameters before they are set."""
 PostSet = Callable[[list[Parameter]], None]
 """Callback that runs after parameters were set."""
 
@@ -32,7 +32,7 @@ class NodeParameters:
     """Parameters that were declared, and the rules for setting them.
 
     Args:
-        announce: Publishes the event of a change, after it has added node and stamp.
+        announce: Adds node and stamp to the event of a change, and publishes it.
     """
 
     def __init__(self, announce: Callable[[ParameterEvent], None]) -> None:
@@ -45,7 +45,7 @@ class NodeParameters:
     def declare_parameter(
         self, name: str, value: Any = None, descriptor: ParameterDescriptor | None = None
     ) -> Parameter:
-        """Declare a parameter; instead of its value, its type will do.
+        """Declare a parameter with a default value, or only with a type.
 
         Without a descriptor, the parameter keeps the type that it is declared with.
 
@@ -56,7 +56,7 @@ class NodeParameters:
         """
         if name in self._parameters:
             raise ParameterAlreadyDeclaredException(f"parameter {name!r} is declared already")
-        # The descriptor is copied, because one may be used for several parameters, and name and type are set here.
+        # The descriptor is copied, because name and type are set here, and the caller may use it for other parameters.
         described = ParameterDescriptor() if descriptor is None else copy.copy(descriptor)
         described.name = name
         if isinstance(value, ParameterKind):
@@ -124,11 +124,11 @@ class NodeParameters:
         return self._set(list(parameter_list), None)
 
     def add_on_set_parameters_callback(self, callback: OnSet) -> None:
-        """Ask a callback before parameters are set; the last one added is asked first."""
+        """Add a callback to be called before parameters are set; the last one added is called first."""
         self._on_set.insert(0, callback)
 
     def add_post_set_parameters_callback(self, callback: PostSet) -> None:
-        """Tell a callback after parameters were set; the last one added is told first."""
+        """Add a callback to be called after parameters were set; the last one added is called first."""
         self._post_set.insert(0, callback)
 
     def list_parameters(self, prefixes: Sequence[str], depth: int) -> ListParametersResult:
@@ -164,7 +164,7 @@ class NodeParameters:
             result = check(parameter, descriptors[parameter.name], is_declared=declared is None)
             if not result.successful:
                 return result
-        # All or none: nothing is stored before descriptors and callbacks have agreed to every parameter.
+        # All parameters are set or none: nothing is stored before descriptors and callbacks have accepted each of them.
         for callback in list(self._on_set):
             result = callback(parameters)
             if not isinstance(result, SetParametersResult):
@@ -174,7 +174,7 @@ class NodeParameters:
         event = ParameterEvent()
         for parameter in parameters:
             name, message = parameter.name, parameter.to_parameter_msg()
-            # In rclpy, to set a parameter to nothing undeclares it.
+            # As in rclpy, setting a parameter to no value undeclares it.
             if declared is None and parameter.type_ is ParameterKind.NOT_SET:
                 self._parameters.pop(name, None)
                 self._descriptors.pop(name, None)

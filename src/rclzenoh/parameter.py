@@ -33,7 +33,7 @@ class ParameterKind(Enum):
         Raises:
             TypeError: If parameters cannot have such values.
         """
-        # An empty list fits all kinds of elements. It is an array of bytes, as in rclpy, because these come first.
+        # An empty list fits all types of arrays. As in rclpy, it becomes an array of bytes, because that comes first.
         for kind in cls:
             if kind.check(value):
                 return kind

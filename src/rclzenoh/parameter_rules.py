@@ -8,11 +8,11 @@ from rclzenoh.interfaces.msg import FloatingPointRange, IntegerRange, ParameterD
 from rclzenoh.parameter import Parameter, ParameterKind
 
 _RELATIVE_TOLERANCE = 1e-6
-"""A floating point value this close to a bound or a step of its range counts as that; the number is rclpy's."""
+"""A value this close to a bound or a step of its range counts as equal to it; rclpy has the same tolerance."""
 
 
 def check(parameter: Parameter, descriptor: ParameterDescriptor, *, is_declared: bool) -> SetParametersResult:
-    """Whether a parameter may take its new value, and if not, why; one that is not declared yet may take its first."""
+    """Check whether a parameter may get a new value (its first one, if it is not declared yet); if not, say why."""
     if is_declared and descriptor.read_only:
         return _refuse(f"Trying to set a read-only parameter: {parameter.name}.")
     if not descriptor.dynamic_typing:

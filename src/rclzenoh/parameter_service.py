@@ -66,7 +66,7 @@ class _Answers:
         return response
 
     def _type_of(self, name: str) -> int:
-        # A parameter without a value has a type, too; one that is not declared is an error.
+        # `describe_parameter` raises an error if the parameter is not declared. One without a value is no error.
         self._parameters.describe_parameter(name)
         return int(self._parameters.get_parameter_or(name).type_.value)
 

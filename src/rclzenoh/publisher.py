@@ -29,7 +29,7 @@ class Publisher:
         self.qos_profile = qos_profile
         self._endpoint = Endpoint(node, EntityKind.PUBLISHER, topic, msg_type.TYPE, qos_profile)
         self._sequence = 0
-        # Genuine subscribers drop samples that overtake each other, so numbering and putting are one step.
+        # Genuine subscribers drop samples that arrive out of order, so one lock covers numbering and sending.
         self._lock = threading.Lock()
         self._publisher: Any = _declare(self._endpoint, qos_profile)
         self._endpoint.announce(self._publisher)
@@ -76,7 +76,7 @@ class Publisher:
 
 
 def _declare(endpoint: Endpoint, qos: QoSProfile) -> Any:
-    # As rmw_zenoh_cpp does: only such a topic waits for subscribers that are slow.
+    # As in rmw_zenoh_cpp, only a reliable topic that keeps all messages waits for slow subscribers.
     keeps_all = qos.is_reliable and qos.history is HistoryPolicy.KEEP_ALL
     congestion = zenoh.CongestionControl.BLOCK if keeps_all else zenoh.CongestionControl.DROP
     reliability = zenoh.Reliability.RELIABLE if qos.is_reliable else zenoh.Reliability.BEST_EFFORT
@@ -88,7 +88,7 @@ def _declare(endpoint: Endpoint, qos: QoSProfile) -> Any:
         congestion_control=congestion,
         reliability=reliability,
         cache=CacheConfig(max_samples=qos.queue_length or _ENDLESS),
-        # By this, subscribers that were there before notice the publisher, and ask for what it has published already.
+        # With this, subscribers that existed before notice the publisher, and ask for its earlier messages.
         publisher_detection=True,
         sample_miss_detection=MissDetectionConfig(heartbeat=None, sporadic_heartbeat=HEARTBEAT_S)
         if qos.is_reliable
@@ -97,4 +97,4 @@ def _declare(endpoint: Endpoint, qos: QoSProfile) -> Any:
 
 
 _ENDLESS = 2**31
-"""Cache size that stands for keeping all."""
+"""Cache size that stands for no limit."""

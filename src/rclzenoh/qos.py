@@ -29,7 +29,7 @@ class ReliabilityPolicy(IntEnum):
 
 
 class DurabilityPolicy(IntEnum):
-    """Whether those who join late get what was published before."""
+    """Whether subscriptions that join late get earlier messages."""
 
     SYSTEM_DEFAULT = 0
     TRANSIENT_LOCAL = 1
@@ -56,7 +56,7 @@ class QoSProfile:
         depth: Messages kept with `HistoryPolicy.KEEP_LAST`; 0 leaves it to the middleware, which keeps 42.
         history: How many messages are kept.
         reliability: Whether messages may be lost.
-        durability: Whether those who join late get what was published before.
+        durability: Whether subscriptions that join late get earlier messages.
         lifespan: Age at which a message expires; announced only.
         deadline: Longest time between two messages; announced only.
         liveliness: How a publisher shows that it is alive; announced only.
@@ -94,11 +94,11 @@ class QoSProfile:
 
     @property
     def is_transient_local(self) -> bool:
-        """Whether those who join late get what was published before."""
+        """Whether subscriptions that join late get earlier messages."""
         return self.durability is DurabilityPolicy.TRANSIENT_LOCAL
 
 
-# The first is the depth of rmw's default profile, the second that of rmw_zenoh_cpp for profiles that leave it open.
+# The first is the depth of rmw's default profile, the second is what rmw_zenoh_cpp uses for profiles without a depth.
 _RCL_DEPTH, _MIDDLEWARE_DEPTH = 10, 42
 
 

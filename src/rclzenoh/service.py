@@ -39,7 +39,7 @@ class Service(Receiver):
         self._is_destroyed = False
         self._endpoint = Endpoint(node, EntityKind.SERVICE, srv_name, srv_type.TYPE, qos_profile)
         handler = zenoh.handlers.Callback(self.deliver, indirect=False)
-        # Clients of rmw_zenoh_cpp ask complete queryables only.
+        # It is declared complete because clients of rmw_zenoh_cpp ask only complete queryables.
         queryable = self._endpoint.session.declare_queryable(self._endpoint.key, handler, complete=True)
         self._endpoint.announce(queryable)
 
@@ -75,7 +75,7 @@ class Service(Receiver):
                 )
             self._reply(query, received, response)
         finally:
-            # A query that is not dropped stays open at the client until its timeout.
+            # The query is dropped, because otherwise it would stay open at the client until its timeout.
             self._open.discard(query)
             query.drop()  # type: ignore[no-untyped-call]
 
@@ -90,7 +90,7 @@ class Service(Receiver):
 
     def destroy(self) -> None:
         """Withdraw the service; requests without an answer get none. See `Node.destroy_service`."""
-        # First, as the thread that spins may be answering a request with what its owner is about to forget.
+        # This is set first, because the thread that spins may be about to answer a request.
         self._is_destroyed = True
         self._endpoint.close()
         self.discard_all()
@@ -104,6 +104,6 @@ def _refuse(query: zenoh.Query, reason: str) -> None:
     try:
         query.reply_err(reason)
     except zenoh.ZError:
-        return  # The client is gone, or the session is being closed.
+        return  # The client has ended, or the session is being closed.
     finally:
         query.drop()  # type: ignore[no-untyped-call]

@@ -15,7 +15,7 @@ _PATIENCE_S, _RETRY_S = 5.0, 0.1
 def open_session(config: zenoh.Config) -> zenoh.Session:
     """Open a session with a router, which may just be starting; the caller has to close it.
 
-    Zenoh itself waits only if the configuration has ``connect/timeout_ms``, which it does not have by default.
+    Zenoh itself waits for a router only if the configuration has ``connect/timeout_ms``, which it lacks by default.
 
     Raises:
         NoRouterError: If there is no router within some seconds.

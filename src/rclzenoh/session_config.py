@@ -1,4 +1,4 @@
-"""Configurations of Zenoh sessions: for values that a program has, or as the environment asks for.
+"""Makes configurations of Zenoh sessions, from values of a program or from the environment.
 
 The environment variables are those of rmw_zenoh_cpp: ``ZENOH_SESSION_CONFIG_URI`` names a whole configuration file and
 ``ZENOH_CONFIG_OVERRIDE`` (``key=json5;key=json5``) is applied after it.
@@ -28,16 +28,16 @@ OPEN = "tcp/"
 PROTECTED = "tls/"
 """Beginning of the endpoints whose router lets nobody in without a key."""
 LISTENS_OF_RMW = ("tcp/localhost:0",)
-"""Where a session of rmw_zenoh_cpp listens, client or not, unless its environment says something else."""
+"""Endpoints at which a session of rmw_zenoh_cpp listens, even as a client, unless its environment sets others."""
 NOT_IN_PATHS = ";?"
-"""Characters that a path to a key must not have: Zenoh puts paths into endpoints, in which they have a meaning."""
+"""Characters that a path to a key must not have, because Zenoh puts paths into endpoints, where they are separators."""
 
 _TLS = "transport/link/tls"
 _DEFAULT_MODE = "peer"
 """Mode of the sessions whose configuration names none."""
 _SETTINGS = {
     "scouting/multicast/enabled": False,
-    # Advanced subscribers, which all those of rmw_zenoh_cpp are, order samples by the time stamps of the session.
+    # All subscribers of rmw_zenoh_cpp are advanced ones, which order samples by the time stamps of the session.
     "timestamping/enabled": True,
     "queries_default_timeout": 600_000,
 }
@@ -57,7 +57,7 @@ class Key:
 
 
 def client_config(endpoint: str, key: Key | None = None) -> zenoh.Config:
-    """Configuration of a client of a router, whatever the environment says; one at ``tls/...`` asks for the key.
+    """Configuration of a client of a router, regardless of the environment; a router at ``tls/...`` needs the key.
 
     Raises:
         ConfigurationError: If the endpoint is malformed, or the key cannot be read.
@@ -112,15 +112,15 @@ def is_protected(listens: Sequence[str] = ()) -> bool:
     """Whether the environment leads to a router that lets nobody in without a key, and opens no other way in.
 
     Args:
-        listens: Where a client listens of which the environment does not say it; ours do nowhere.
+        listens: Endpoints at which a client listens if the environment sets none; our own clients listen nowhere.
 
     Raises:
         ConfigurationError: As `environment_config`.
     """
     config = environment_config()
     routers = _endpoints(config, "connect")
-    # A session that names no router may be reached by, and find, anybody.
-    # A file takes the place of all that sessions have by default.
+    # A session without a router may find anybody, and be found by anybody, so it is not protected.
+    # If there is a configuration file, it replaces all defaults of sessions, so `listens` does not apply.
     listening = _endpoints(config, "listen", () if os.environ.get(CONFIG_FILE_VARIABLE) else listens)
     return bool(routers) and all(each.startswith(PROTECTED) for each in (*routers, *listening))
 
@@ -150,7 +150,8 @@ def in_words(error: zenoh.ZError) -> str:
 
 
 def _client_settings(endpoint: str, key: Key | None) -> Mapping[str, object]:
-    # A configuration file, as rmw_zenoh_cpp has one, may have nodes listen; clients would do so without a key, too.
+    # `listen/endpoints` is set, because a configuration file, as that of rmw_zenoh_cpp, may let clients listen, and
+    # they would listen even without a key.
     settings: dict[str, object] = {"mode": "client", "connect/endpoints": [endpoint], "listen/endpoints": []}
     if key is None or not endpoint.startswith(PROTECTED):
         return settings
@@ -163,13 +164,14 @@ def _tls_settings(key: Key, side: Literal["connect", "listen"]) -> Mapping[str, 
         f"{_TLS}/{side}_private_key": str(key.private_key),
         f"{_TLS}/{side}_certificate": str(key.certificate),
         f"{_TLS}/enable_mtls": True,
-        # Routers of containers have no address that a certificate could name beforehand.
+        # Names are not verified, because the address of a router in a container is not known when the certificate is
+        # made.
         f"{_TLS}/verify_name_on_connect": False,
     }
 
 
 def _check_key(config: zenoh.Config) -> None:
-    """Refuse a key that cannot be read: Zenoh would only say that it cannot connect.
+    """Refuse a key that cannot be read, because Zenoh's own error would only say that it cannot connect.
 
     Raises:
         UnreadableKeyError: If one of its files cannot be read.
@@ -188,9 +190,8 @@ def _endpoints(
 ) -> Sequence[str]:
     """Endpoints that a session of this configuration connects to or listens on.
 
-    Zenoh takes one list, or one for each mode. By default clients listen nowhere, and others where anybody gets in.
-
-    Where the configuration says nothing of clients, they are ``of_clients``.
+    Zenoh accepts one list, or one for each mode. By default, clients listen nowhere, and other modes at endpoints that
+    let anybody in. If the configuration has no list for clients, this returns ``of_clients``.
     """
     endpoints: list[str] | dict[str, list[str]] = json.loads(config.get_json(f"{side}/endpoints"))
     if isinstance(endpoints, list):

@@ -43,7 +43,7 @@ class Subscription(Receiver):
         if not self._wants_info and not _takes(callback, 1):
             raise RuntimeError(f"{topic}: the callback must take a message, or a message and its info")
         self._endpoint = Endpoint(node, EntityKind.SUBSCRIPTION, topic, msg_type.TYPE, qos_profile)
-        # `handle` may be called for history before `_declare` returns, so it must not need anything that comes below.
+        # `handle` may be called with earlier messages before `_declare` returns, so it must not use anything set below.
         self._endpoint.announce(self._declare())
 
     def _declare(self) -> Any:

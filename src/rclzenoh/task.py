@@ -1,6 +1,6 @@
 """Futures, and the tasks in which callbacks and coroutines run.
 
-A task carries on in whatever executor its node is in by then: it waits in the node's mailbox.
+A task waits in the mailbox of its node, so the executor that the node is in at that time carries it on.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ class _State(Enum):
 
 
 class Future:
-    """Outcome that will be known later; can be awaited in callbacks."""
+    """An outcome that will be known later; callbacks can await it."""
 
     def __init__(self) -> None:
         self._state = _State.PENDING
@@ -86,7 +86,7 @@ class Future:
         task.schedule()
 
     def call_back_through(self, mailbox: Mailbox) -> None:
-        """Have done callbacks called by the thread that spins, not where the outcome is set."""
+        """Let the thread that spins call done callbacks, instead of the thread that sets the outcome."""
         self._mailbox = mailbox
 
     def _finish(self, state: _State, *, result: Any = None, exception: BaseException | None = None) -> None:
@@ -94,7 +94,7 @@ class Future:
             self._result, self._exception, self._state = result, exception, state
             callbacks, self._callbacks = self._callbacks, []
             waiting, self._waiting = self._waiting, []
-        # The lock is free again here, because a callback may use this future.
+        # This happens after the lock is released, because a callback may use this future.
         for task in waiting:
             task.schedule()
         for callback in callbacks:
@@ -108,11 +108,11 @@ class Future:
 
 
 class Task(Future):
-    """A function or coroutine that the thread that spins carries out; the task has the outcome of it.
+    """A function or coroutine that the thread that spins carries out; its outcome is that of the task.
 
     Args:
         work: The coroutine, or a function without arguments, which may return one.
-        mailbox: Where the task waits until it is carried on.
+        mailbox: The mailbox in which the task waits until it is carried on.
     """
 
     def __init__(self, work: Callable[[], Any] | Coroutine[Any, Any, Any], mailbox: Mailbox) -> None:
@@ -122,7 +122,7 @@ class Task(Future):
         self._work = work
 
     def schedule(self) -> None:
-        """Have the thread that spins carry on with this task."""
+        """Let the thread that spins carry on with this task."""
         self.mailbox.submit(self)
 
     def run(self) -> bool:
@@ -154,28 +154,28 @@ class Task(Future):
         return True
 
     def cancel(self) -> None:
-        """Give up the coroutine where it waits."""
+        """End the coroutine at the point where it waits."""
         if isinstance(self._work, Coroutine) and not self.done():
             self._work.close()
         super().cancel()
 
 
 def submit(mailbox: Mailbox, work: Callable[[], Any] | Coroutine[Any, Any, Any]) -> Task:
-    """Have a function without arguments called, or a coroutine carried out, by the thread that spins."""
+    """Let the thread that spins call a function without arguments, or carry out a coroutine."""
     task = Task(work, mailbox)
     task.schedule()
     return task
 
 
 def start(mailbox: Mailbox, coroutine: Coroutine[Any, Any, Any]) -> Task:
-    """Carry a coroutine out, beginning now."""
+    """Begin to carry out a coroutine now."""
     task = Task(coroutine, mailbox)
     task.run()
     return task
 
 
 def call(mailbox: Mailbox, callback: Callable[..., Any], *args: Any) -> None:
-    """Call a callback now; if it is a coroutine function, up to where it first awaits something."""
+    """Call a callback now; a coroutine function runs up to the point where it first awaits something."""
     result = callback(*args)
     if result is not None and inspect.iscoroutine(result):
         start(mailbox, result)

@@ -23,7 +23,7 @@ class Timer:
         """Time left [ns], not positive when due."""
         now = self.clock.timer_now_ns()
         if self._next - now > self.timer_period_ns:
-            # The clock jumped back, or changed between simulated and real time: its old stamps mean nothing.
+            # The clock has jumped back, or has changed between simulated and real time, so `_next` is meaningless.
             self._next = now + self.timer_period_ns
         return self._next - now
 

@@ -18,7 +18,7 @@ class TopicEndpointTypeEnum(IntEnum):
 
 @dataclass(frozen=True)
 class TopicEndpointInfo:
-    """One publisher or subscription; its type has the ROS name, and its identifier is 16 octets."""
+    """One publisher or subscription; the type is its ROS name, and the identifier has 16 octets."""
 
     node_name: str
     node_namespace: str
@@ -52,7 +52,7 @@ class TopicEndpointInfo:
 
 
 def endpoint_info(token: Token) -> TopicEndpointInfo | None:
-    """Description of the endpoint of a token; None if its QoS is malformed, as genuine nodes ignore such a token."""
+    """Describe the endpoint of a token; None if its QoS is malformed, because genuine nodes ignore such tokens."""
     qos = decode(token.qos)
     if qos is None:
         return None

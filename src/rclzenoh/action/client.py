@@ -31,7 +31,7 @@ class ClientGoalHandle:
 
     @property
     def status(self) -> int:
-        """Last state of the goal that the server has published; the client listens from the first time it is asked."""
+        """Last state of the goal that the server has published; the client listens to states from the first call on."""
         self._client.listen_to_status()
         return self._status
 
@@ -51,14 +51,14 @@ class ClientGoalHandle:
 class ActionClient:
     """Sends goals.
 
-    A client subscribes to feedback when it is first given a callback for it, and to the status when a goal's status is
-    first asked for, so that servers spare messages that nobody looks at.
+    A client subscribes to feedback when it first gets a callback for feedback, and to the status when a goal's status
+    is first read, so that servers need not send messages that nobody uses.
     """
 
     def __init__(self, node: NodeEndpoints, action_type: type[Action], action_name: str) -> None:
         self._node = node
         self._action_type = action_type
-        # The references are weak, because the status of a goal is of interest only to whoever holds its handle.
+        # The references are weak, because the status of a goal is needed only as long as somebody holds its handle.
         self._handles: weakref.WeakValueDictionary[bytes, ClientGoalHandle] = weakref.WeakValueDictionary()
         self._feedback_callbacks: dict[bytes, FeedbackCallback] = {}
         protocol, prefix = action_type.Impl, f"{action_name}/_action"
@@ -137,7 +137,7 @@ class ActionClient:
         return self._cancel_client.call_async(CancelGoal.Request(goal_info=GoalInfo(goal_id=goal_handle.goal_id)))
 
     def destroy(self) -> None:
-        """Withdraw the client; what is pending stays so."""
+        """Withdraw the client; pending futures stay pending."""
         for client in (self._goal_client, self._cancel_client, self._result_client):
             self._node.destroy_client(client)
         for subscription in (self._feedback, self._status):
@@ -145,7 +145,7 @@ class ActionClient:
                 self._node.destroy_subscription(subscription)
 
     def listen_to_status(self) -> None:
-        """Hear of the states of goals from now on, the present ones included."""
+        """Subscribe to the states of goals, including the present ones."""
         if self._status is None:
             self._status = self._node.create_subscription(
                 GoalStatusArray, self._status_topic, self._on_status, qos_profile_action_status_default

@@ -1,4 +1,4 @@
-"""The goals of an action server: their states, and the ones that a request to cancel is about."""
+"""The goals of an action server: their states, and the choice of goals for a request to cancel."""
 
 from __future__ import annotations
 
@@ -91,9 +91,9 @@ class GoalTable(dict[bytes, AGoal]):
         self._result_timeout_ns = result_timeout_ns
 
     def select(self, asked: GoalInfo) -> tuple[int, list[AGoal]]:
-        """Goals that a request to cancel is about, behind the return code of action_msgs/srv/CancelGoal."""
-        # action_msgs/srv/CancelGoal has four cases: one goal, all goals, all up to a time, and these together with one
-        # goal.
+        """Select the goals that a request to cancel names; the first value is a code of action_msgs/srv/CancelGoal."""
+        # action_msgs/srv/CancelGoal has four cases: one goal, all goals, all goals up to a time, and all goals up to a
+        # time together with one goal.
         key, stamp_ns = key_of(asked.goal_id), Time.from_msg(asked.stamp).nanoseconds
         has_key = any(key)
         if has_key and not stamp_ns:
@@ -116,7 +116,8 @@ class GoalTable(dict[bytes, AGoal]):
         for key, goal in list(self.items()):
             if goal.ended_ns is None:
                 continue
-            # After a reset of the simulation the clock is behind the time of the end, so the wait begins anew.
+            # After a reset of the simulation, the clock may show an earlier time than that of the end; then the timeout
+            # begins anew.
             goal.ended_ns = min(goal.ended_ns, now_ns)
             if now_ns - goal.ended_ns > self._result_timeout_ns:
                 self.pop(key).status = GoalStatus.STATUS_UNKNOWN

@@ -1,4 +1,4 @@
-"""Actions in the ROS graph, which shows them by their feedback topics."""
+"""Finds actions in the ROS graph, by their feedback topics."""
 
 from __future__ import annotations
 

@@ -140,7 +140,7 @@ class ActionServer:
         self._status = node.create_publisher(GoalStatusArray, f"{prefix}/status", qos_profile_action_status_default)
 
     def destroy(self) -> None:
-        """Withdraw the server; nobody gets a result any more."""
+        """Withdraw the server; clients get no more results."""
         for service in self._services:
             self._node.destroy_service(service)
         self._node.destroy_publisher(self._feedback)
@@ -167,7 +167,7 @@ class ActionServer:
         self._feedback.publish(self.action_type.Impl.FeedbackMessage(goal_id=handle.goal_id, feedback=feedback))
 
     def schedule(self, handle: ServerGoalHandle, execute_callback: Callable[[ServerGoalHandle], Any] | None) -> None:
-        """Have the executor carry a goal out, by the server's callback if no other is given."""
+        """Let the executor carry a goal out, with the server's callback if no other is given."""
         callback = execute_callback or self._execute_callback
         if callback is not None:
             submit(self._node.mailbox, partial(self._execute, handle, callback))
@@ -188,9 +188,9 @@ class ActionServer:
         try:
             result = await _outcome(callback(handle))
         except GeneratorExit:
-            raise  # The executor is gone, so no result can be sent any more.
+            raise  # The executor has ended, so no result can be sent any more.
         except BaseException:
-            # Clients that wait for a result must get one, whatever happened.
+            # Clients that wait for a result must get one, even after an error.
             self._abort_if_active(handle, "failed")
             self.set_result(handle, self.action_type.Result())
             raise
@@ -202,7 +202,7 @@ class ActionServer:
             self._logger.warning(
                 f"the execute callback {how} without ending goal {key_of(handle.goal_id).hex()}: aborted"
             )
-            # The state machine has no way from accepted to aborted.
+            # The state machine has no transition from accepted to aborted, so the goal is executed in between.
             if handle.status == GoalStatus.STATUS_ACCEPTED:
                 self.change(handle, GoalEvent.EXECUTE)
             handle.abort()
@@ -216,7 +216,7 @@ class ActionServer:
             answer = await _outcome(self._goal_callback(request.goal))
             if not isinstance(answer, GoalResponse):
                 raise TypeError(f"the goal callback must return a GoalResponse, got {answer!r:.80}")
-        # Another goal of the same identifier may have been accepted while the callback was waiting.
+        # While the callback was waiting, another goal with the same identifier may have been accepted.
         response.accepted = answer is GoalResponse.ACCEPT and key not in self._goals
         if response.accepted:
             response.stamp = now.to_msg()
@@ -226,7 +226,7 @@ class ActionServer:
         return response
 
     def _begin_after_response(self, handle: ServerGoalHandle) -> None:
-        """Begin in another task: the client must have the response before it hears of the goal's state."""
+        """Begin in another task, so that the client gets the response before the goal's first state."""
 
         async def begin() -> None:
             self._publish_status()
@@ -270,5 +270,5 @@ class ActionServer:
 
 
 async def _outcome(value: Any) -> Any:
-    """Return value of a callback, which is waited for if the callback is a coroutine function."""
+    """Return the value of a callback; if the callback is a coroutine function, wait for it."""
     return await value if hasattr(value, "__await__") else value

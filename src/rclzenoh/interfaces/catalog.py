@@ -1,8 +1,8 @@
 """All known interfaces: the messages of Jazzy in ``jazzy.json``, completed by the files in ``definitions``.
 
-``packaging/jazzy_messages.py`` takes those messages from rosbags. Services and actions, messages that it lacks, and
-messages whose default values it does not keep are read from ``definitions/<package>/{msg,srv,action}/`` when they are
-first asked for; a file wins.
+``packaging/jazzy_messages.py`` takes those messages from rosbags. Services and actions, messages that rosbags lacks,
+and messages whose default values it does not keep are read from ``definitions/<package>/{msg,srv,action}/`` when they
+are first needed; a file takes precedence over ``jazzy.json``.
 
 The generators of ROS 2 derive further structures from a service or an action: requests, events, the services and the
 feedback message behind an action. They are derived here, too, because type hashes cover them (rosidl 4.6, Jazzy).
@@ -203,7 +203,7 @@ def _similar(name: str) -> str:
 
 
 def _read_description(description: list[Any]) -> tuple[Nodetype, Any]:
-    """Make a field's description, as rosbags has it, of the JSON that it became."""
+    """Convert the description of a field from JSON to the form that rosbags has."""
     kind, content = Nodetype(description[0]), description[1]
     if kind in (_ARRAY, _SEQUENCE):
         element, size = content
@@ -212,14 +212,14 @@ def _read_description(description: list[Any]) -> tuple[Nodetype, Any]:
 
 
 def _char_to_uint8(description: Any) -> Any:
-    """Replace ``char``, as rosidl does before it computes a type hash and rosbags does not."""
+    """Replace ``char``, as rosidl does before it computes a type hash; rosbags does not do that."""
     if isinstance(description, tuple):
         return tuple(_char_to_uint8(part) for part in description)
     return "uint8" if description == "char" else description
 
 
 def _parse(name: str, text: str) -> None:
-    # Relative names resolve to messages of the package, so all parts are parsed as if they were one.
+    # Each part is parsed as if it were a message of the package, because relative names mean messages of that package.
     package, _, short = name.split("/")
     message = MSGParser(f"MSG: {package}/msg/{short}\n{text}").specification()[0]
     _DEFAULTS[name] = {

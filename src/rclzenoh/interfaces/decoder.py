@@ -48,14 +48,14 @@ def _strings(data: bytes, at: int, count: int, memory: list[tuple[bytes, tuple[s
         values.append(data[at + 8 : at + 7 + length].decode())
         at += 4 + length
     known = data[start + 4 : at + 4]
-    # Bytes of data that is cut off are not remembered, as whole data may begin with them.
+    # If the data is cut off, its bytes are not remembered, because complete data may begin with the same bytes.
     if len(known) == at - start:
         memory[0] = (known, tuple(values))
     return values, at
 
 
 class _Reader(FunctionWriter):
-    """Writes a function that reads at position ``at``; operands are the places that take what is read."""
+    """Writes a function that reads at position ``at``; operands are the targets of assignments."""
 
     def __init__(self) -> None:
         super().__init__(frombuffer=np.frombuffer, new=object.__new__, strings=_strings)
@@ -91,7 +91,8 @@ class _Reader(FunctionWriter):
             length = self.name("length")
             self.scalar("uint32", length, depth)
             self.flush(depth)
-            # The terminating zero is left out; a length of 0, which some writers use for an empty string, works too.
+            # The terminating zero is left out. This also reads a length of 0, with which some writers write an empty
+            # string.
             self.line(depth, f"{operand} = data[at + 4 : at + 3 + {length}].decode()")
             self.line(depth, f"at += {length}")
             self.at = Alignment(1, 0)
@@ -121,7 +122,7 @@ class _Reader(FunctionWriter):
         self.line(depth + 1, f"at += {count} << {shift}" if shift else f"at += {count}")
         self.line(depth, "else:")
         self.line(depth + 1, f"{operand} = {empty}")
-        # Padding stands before the first number and not after the count, so an empty sequence has none.
+        # Padding belongs to the first number and not to the count, so an empty sequence has none.
         self.at = before.either(Alignment(size, 0))
 
     def elements(self, field: Field, operand: str, depth: int) -> None:
@@ -143,7 +144,7 @@ class _Reader(FunctionWriter):
         memory = self.name("memory")
         self.namespace[memory] = [_STRINGS_OF_NOTHING]
         self.line(depth, f"known, names = {memory}[0]")
-        # Count and lengths are part of the bytes, so equal bytes are equal strings.
+        # The remembered bytes include count and lengths, so equal bytes mean equal strings.
         self.line(depth, "if data.startswith(known, at):")
         self.line(depth + 1, f"{operand} = [*names]; at += len(known) - 4")
         self.line(depth, "else:")

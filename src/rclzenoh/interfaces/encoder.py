@@ -56,7 +56,7 @@ def _check_length(values: Sequence[Any], field: Field) -> None:
         raise ValueError(f"{field.name}: expected {field.length} elements, got {len(values)}")
     if field.bound is None:
         return
-    # The bound of a fixed array is that of each of its strings.
+    # In a fixed array, the bound applies to each of its strings.
     for bounded in (values,) if field.length is None else values:
         if len(bounded) > field.bound:
             raise ValueError(f"{field.name}: expected at most {field.bound}, got {len(bounded)}")
@@ -71,7 +71,7 @@ class _Writer(FunctionWriter):
         self.line(depth, f"out += {pack}({', '.join(self.run_operands)})")
 
     def pad(self, size: int, padding: int | None) -> str:
-        # The header in front of the body is a multiple of four, but not of eight.
+        # The length of the header before the body is a multiple of four, but not of eight.
         at_run_time = f"{'-len(out)' if size < 8 else '4 - len(out)'} & {size - 1}"
         return f"out += PADDING[{at_run_time if padding is None else padding}]"
 

@@ -1,4 +1,4 @@
-"""The part of the CDR encoder and decoder that both have: positions in the body, and the writing of functions."""
+"""The common part of the CDR encoder and decoder: positions in the body, and the writing of functions."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class Alignment:
     remainder: int
 
     def padding(self, size: int) -> int | None:
-        """Bytes up to the next multiple of ``size``; None if that depends on what is not known."""
+        """Bytes up to the next multiple of ``size``; None if the position is not known well enough."""
         return -self.remainder % size if self.modulus % size == 0 else None
 
     def after(self, count: int) -> Alignment:
@@ -44,7 +44,7 @@ class Alignment:
         return Alignment(self.modulus, (self.remainder + count) % self.modulus)
 
     def either(self, other: Alignment) -> Alignment:
-        """The position that is known if the function may have come from this one or from another one."""
+        """The knowledge of a position that may be either this one or the other one."""
         modulus = gcd(self.modulus, other.modulus, self.remainder - other.remainder)
         return Alignment(modulus, self.remainder % modulus)
 
@@ -71,7 +71,7 @@ class FunctionWriter(ABC):
 
     @abstractmethod
     def pad(self, size: int, padding: int | None) -> str:
-        """The line that goes on to a multiple of ``size``, by a number of bytes that may be known."""
+        """The line that goes on to a multiple of ``size``; ``padding`` is the number of bytes, None if not known."""
 
     @abstractmethod
     def element(self, field: Field, operand: str, depth: int) -> None:
@@ -131,8 +131,8 @@ class FunctionWriter(ABC):
     def loop_body(self, field: Field, item: str, depth: int) -> None:
         """Write the body of a loop over elements.
 
-        It must hold for the first element and for those after it, which may begin elsewhere, so it is written again
-        with less knowledge of the position until it does.
+        The code must be right for the first element and for later ones, which may begin at other positions. So it is
+        written again, with less knowledge of the position, until it is right for all elements.
         """
         entry, first_line = self.at, len(self.lines)
         while True:

@@ -53,7 +53,7 @@ def get_service(name: str) -> type[Service]:
         ValueError: If no such service is known, or the name is not one of a service.
     """
     _expect_kind(name, "srv")
-    structure(name)  # Refuses an unknown service by its own name, not by that of its request.
+    structure(name)  # This refuses an unknown service by its own name instead of that of its request.
     return _service(name)
 
 

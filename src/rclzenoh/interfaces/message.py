@@ -104,7 +104,8 @@ def message_class(name: str) -> type[AnyMessage]:
 def as_numbers(value: Any, field: Field, where: str) -> NDArray[Any]:
     """Value of a number sequence as a contiguous one-dimensional array of the field's type; itself if it is one.
 
-    It is an array, a list, a tuple, an ``array.array``, or bytes for octets. Errors begin with ``where`` the field is.
+    The value is an array, a list, a tuple, an ``array.array``, or bytes for octets. Errors begin with ``where``, the
+    name of the structure that has the field.
 
     Raises:
         TypeError: If the value is no sequence of such numbers.
@@ -117,7 +118,7 @@ def as_numbers(value: Any, field: Field, where: str) -> NDArray[Any]:
     is_octets = isinstance(value, (bytes, bytearray))
     array = np.frombuffer(value, np.uint8).copy() if is_octets else np.asarray(value)
     if dtype.kind in "iu" and array.size and array.dtype.kind in "fO" and all(isinstance(item, int) for item in value):
-        # NumPy has no type of integers for a list with both 0 and 2**63, and makes floats or objects of it.
+        # NumPy chooses int64 for 0 and uint64 for 2**63, so it makes floats or objects of a list with both.
         info = np.iinfo(dtype.name)
         if min(value) < info.min or max(value) > info.max:
             raise ValueError(f"{where}.{field.name}: {value!r:.80} does not fit {field.type}")
@@ -128,7 +129,7 @@ def as_numbers(value: Any, field: Field, where: str) -> NDArray[Any]:
             raise TypeError(f"{where}.{field.name}: expected numbers of type {field.type}, got {value!r:.80}")
         with np.errstate(all="ignore"):
             array = given.astype(dtype)
-        # Too large a number becomes another integer, or an infinite float.
+        # A number that is too large has become another integer, or an infinite float.
         fits = np.array_equal(array, given) if dtype.kind in "biu" else (np.isfinite(array) == np.isfinite(given)).all()
         if not fits:
             raise ValueError(f"{where}.{field.name}: {value!r:.80} does not fit {field.type}")
@@ -164,7 +165,7 @@ def _initialiser(fields: tuple[Field, ...]) -> Callable[..., None]:
         name = field.name
         if is_numbers(field):
             zeros = np.zeros(field.length or 0, DTYPES[field.type])
-            # All empty sequences of a class share one array: it has no element that could be changed.
+            # All empty sequences of a class share one array, because it has no element that could be changed.
             namespace[f"zeros{number}"] = zeros
             copy = ".copy()" if field.length else ""
             lines += [f" if {name} is None: self._{name} = zeros{number}{copy}", f" else: self.{name} = {name}"]
