@@ -14,7 +14,7 @@ function color(name) {
   return getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
 }
 
-/** A picture in the room, turned to whoever looks. */
+/** A picture in the room, which is turned to the user. */
 class Board {
   #canvas = document.createElement("canvas");
   #drawn = "";
@@ -36,7 +36,7 @@ class Board {
   /**
    * Put it somewhere.
    * @param {Vector3} place in the room [m]
-   * @param {Vector3} eye of who looks
+   * @param {Vector3} eye of the user, in the room [m]
    */
   stand(place, eye) {
     this.mesh.position.copy(place);
@@ -124,7 +124,7 @@ export class InfoBoard extends Board {
 
   /**
    * Press the button at a place.
-   * @param {{x: number, y: number}} uv place, from the left lower corner, as shares
+   * @param {{x: number, y: number}} uv place as shares of width and height, from the lower left corner
    */
   press(uv) {
     const button = this.buttonAt(uv);
@@ -154,7 +154,7 @@ export class PlotBoard extends Board {
 
   /** @param {import("./plot_panel.js").PlotPanel} panel */
   constructor(panel) {
-    // One that follows no link is as wide as the page.
+    // A plot that follows no link is wide, as it is on the page.
     super(panel.follows ? 0.5 : 1, panel.follows ? 512 : 1024, panel.follows ? 320 : 260);
     this.panel = panel;
     this.leader.frustumCulled = false;

@@ -5,7 +5,7 @@ import { BufferAttribute, BufferGeometry } from "./vendor/three/build/three.modu
 /** Cubes along each axis of the lattice, at most. */
 const LATTICE = 2 ** 15;
 
-/** Numbers of the values that were asked for, in the order of their first coming. */
+/** Numbers of values: each new value gets the next number. */
 class Numbering {
   #numbers = new Map();
 
@@ -22,8 +22,8 @@ class Numbering {
 /**
  * Merge the vertices of each small cube into one, and drop triangles that have no area left.
  *
- * Normals are merged only where they point to the same octant, so that edges stay sharp, and the two sides of a thin
- * wall stay two.
+ * Vertices are merged only if their normals point to the same octant, so that edges stay sharp, and a thin wall keeps
+ * both of its sides.
  * @param {BufferGeometry} geometry with normals
  * @param {number} edge length of the cubes' edges, in units of the mesh
  * @returns {BufferGeometry} with an index

@@ -1,4 +1,4 @@
-/** Talks to the server: the token, requests, and sockets that come back when they are lost. */
+/** Talks to the server: the token, requests, and sockets that are opened again when they are lost. */
 
 const PREFIX = "/api/v1";
 const KEPT = "throwcollect.token";
@@ -6,7 +6,7 @@ const FIRST_WAIT_MS = 500;
 const LONGEST_WAIT_MS = 10_000;
 const TRIES = 3;
 
-/** What the server says is wrong, or that it cannot be reached (status 0). */
+/** A problem that the server reports, or that the server cannot be reached (status 0). */
 export class Problem extends Error {
   /**
    * @param {number} status
@@ -20,7 +20,7 @@ export class Problem extends Error {
 }
 
 /**
- * The token: for the code in the address, which is removed from there, or as it was kept for this tab.
+ * Get the token: by the code in the address, which is then removed from the address, or the one that this tab keeps.
  * @returns {Promise<string | null>} null if there is none
  * @throws {Problem} if the code is used or too old and no token is kept
  */
@@ -58,7 +58,7 @@ async function attempt(act, tries) {
 
 /** Requests and sockets. */
 export class Connection {
-  /** @param {string | null} token null for somebody who has none yet */
+  /** @param {string | null} token null if the user has none yet */
   constructor(token) {
     this.token = token;
   }
@@ -67,7 +67,7 @@ export class Connection {
    * Ask the server.
    * @param {string} method
    * @param {string} path below the interface
-   * @param {unknown} [body] what is sent as JSON
+   * @param {unknown} [body] is sent as JSON
    * @returns {Promise<Response>}
    * @throws {Problem}
    */
@@ -81,7 +81,7 @@ export class Connection {
     return response;
   }
 
-  /** Ask the server as `ask` does; returns what the answer says in JSON. */
+  /** Ask the server as `ask` does, and return the values of the JSON in the answer. */
   async read(method, path, body) {
     return (await this.ask(method, path, body)).json();
   }
@@ -110,8 +110,8 @@ export class Connection {
 /**
  * @typedef {object} SocketEvents
  * @property {(data: any) => void} receive a message: text, or an ArrayBuffer
- * @property {() => void} [opened] each time that it is open
- * @property {(waitMs: number) => void} [lost] it is not, and will be tried again after a while
+ * @property {() => void} [opened] called each time that the socket is open
+ * @property {(waitMs: number) => void} [lost] called when it was lost; it is opened again after this time
  */
 
 /** A socket that is opened again when it is lost. */
@@ -164,7 +164,7 @@ export class Socket {
     };
     socket.onclose = () => {
       if (this.#closed) return;
-      // The wait is random, so that not all pages connect at the same instant when a server is back.
+      // The wait is random, so that pages do not all connect at the same instant when a server is back.
       const wait = this.#wait * (0.75 + Math.random() / 2);
       this.#wait = Math.min(this.#wait * 2, LONGEST_WAIT_MS);
       this.#timer = setTimeout(() => this.#connect(), wait);

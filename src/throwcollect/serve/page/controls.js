@@ -69,7 +69,7 @@ export class Controls {
   }
 }
 
-/** Put the cards of things into a place, in their order; a card that is in its place already is not touched. */
+/** Put cards into an element in this order; a card that is at its position already is not moved. */
 function keep(place, cards, things, keyOf, makeCard) {
   things.forEach((thing, i) => {
     const key = keyOf(thing);
@@ -239,7 +239,7 @@ class InstanceCard {
     });
   }
 
-  /** Save a file that the server makes of a finished dataset; a plain link could not send the token. */
+  /** Save a file that the server makes from a finished dataset; a plain link would not do, as it sends no token. */
   #save(what, suffix) {
     return this.#attempt(async () => {
       const answer = await this.controls.connection.ask("GET", `/collections/${this.#id}/${what}`);

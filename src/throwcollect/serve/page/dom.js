@@ -1,4 +1,4 @@
-/** Small helpers to make and change elements without disturbing what has the focus. */
+/** Small helpers that make and change elements without disturbing the element that has the focus. */
 
 /**
  * Find an element of the page by its id.
@@ -76,7 +76,7 @@ export function showProblem(place, error) {
   const lines = message.split("\n");
   place.append(...lines.map((line) => make("p", {}, line)));
   const problems = (facts.problems ?? []).filter((each) => each.message).map(({ key, message: text }) => (key ? `${key}: ${text}` : text));
-  // The message of a wrong configuration has a line for each, which may begin with its file.
+  // The message of a wrong configuration has a line for each problem, which may begin with the name of the file.
   const others = problems.filter((each) => !lines.some((line) => line.endsWith(each)));
   if (others.length) place.append(make("ul", {}, ...others.map((each) => make("li", {}, each))));
   if (facts.expected) place.append(make("p", {}, `expected: ${facts.expected}`));

@@ -8,7 +8,7 @@ const DOT_PX = 2.5;
 const MARGIN_PX = 26;
 /** Two lines of the grid are no closer than this. */
 const CLOSEST_PX = 25;
-/** Most landings that are drawn; beyond that, every second one is dropped, and of those to come as many are left out. */
+/** Most landings that are drawn. If there are more, every second one is dropped, now and of all later landings. */
 const MOST = 20000;
 
 const SHOWN = "of throws that were shown";
@@ -19,16 +19,16 @@ const ALL = "of all throws";
 
 /** Draws landings into the canvas of the page. */
 export class LandingMap {
-  /** @type {Landing[]} those that are drawn; each has a place */
+  /** @type {Landing[]} the landings that are drawn; each has a place */
   #landings = [];
   #trials = new Set();
   /** @type {Map<string, number>} how many throws ended with each outcome, drawn or not */
   #outcomes = new Map();
-  /** One of so many landings is drawn. */
+  /** One of this many landings is drawn. */
   #stride = 1;
-  /** Which landings there are, in words. */
+  /** Which landings the map shows, in words. */
   #which = SHOWN;
-  /** How many landings there are; those that are drawn are evenly chosen from them. */
+  /** Number of all landings, from which the drawn ones are evenly chosen. */
   #total = 0;
   /** @type {[number, number] | null} */
   #target = null;
@@ -247,7 +247,7 @@ function drawGrid(pen, style, at, scale, { width, height }) {
   lines(width, left, (value, x) => {
     stroke(pen, [x, 0], [x, height]);
     const text = (-value).toFixed(1);
-    // At the edge there may be no room for it.
+    // At the edge there may be no room for the number.
     if (x + 3 + pen.measureText(text).width <= width) pen.fillText(text, x + 3, height - 4);
   });
   lines(height, bottom, (value, y) => {

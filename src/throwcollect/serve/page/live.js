@@ -166,7 +166,7 @@ export class Live {
     if (moments.length > KEPT) moments.shift();
   }
 
-  /** Slow a simulation down, as nothing could be seen at full speed; the server undoes that when the last page leaves. */
+  /** Slow a simulation down, because at full speed nothing could be seen; the server ends that after the last page. */
   #slowDown(name) {
     const path = `/instances/${encodeURIComponent(this.#run)}/live/${encodeURIComponent(name)}`;
     this.#holds.set(name, this.connection.open(path, {

@@ -16,7 +16,7 @@ import { inOrder, lives, steps, watchable } from "./state.js";
 import { Target } from "./target.js";
 import { Watching } from "./watching.js";
 
-/** Most simulations in a grid; the others are on further pages of it. */
+/** Most simulations in one grid; the others are on further pages of the grid. */
 const MOST_TILES = 16;
 /** Most pictures a second. */
 const RATE_HZ = 30;
@@ -156,7 +156,7 @@ class Page {
     get("target-box").hidden = !instance && !this.models.isOnMap;
   }
 
-  /** Simulations of a run; one that has ended keeps those that were seen. */
+  /** Simulations of a run; after its end, the simulations that the page has shown. */
   #names(instance) {
     if (!instance) return [];
     return inOrder(lives(instance) || !this.view.stations.size ? instance.robots : [...this.view.stations.keys()]);
@@ -179,7 +179,7 @@ class Page {
     this.plots.put(shown);
   }
 
-  /** Names of the tiles, which are buttons that show one alone. */
+  /** Names of the tiles; each is a button that shows its simulation alone. */
   #label(names) {
     const place = get("tiles");
     if (place.dataset.names !== names.join()) {
@@ -253,12 +253,12 @@ class Page {
   #frame(now) {
     requestAnimationFrame((next) => this.#frame(next));
     const since = now - this.#before;
-    // In a room, the device asks for pictures by itself.
+    // In a room, the device itself requests pictures.
     if (now < this.#due - 4 || this.room.isEntered) return;
     // Changed texts make the browser draw as well, so they wait for the next picture of the view. Plots do not wait.
     if (!this.view.isDue(since) && !this.plots.panels.length) return;
     this.#before = now;
-    // One that came late does not put off those behind it, so that there are as many where the browser is slow.
+    // A late picture does not delay the next ones, so that a slow browser gets as many.
     this.#due = Math.max(this.#due + 1000 / RATE_HZ, now);
     this.#advance(since / 1000);
     this.view.draw(since);
@@ -333,7 +333,7 @@ async function begin() {
   window.throwcollect = new Page(token, named);
 }
 
-// To open an address in a tab that has the page changes the fragment alone.
+// If the user opens an address in a tab that has the page already, only the fragment changes.
 window.addEventListener("hashchange", () => location.hash.includes("code=") && location.reload());
 
 begin();

@@ -31,7 +31,7 @@ export class Models {
       event.preventDefault();
       this.#aim();
     });
-    // Commands make and score models while the user looks elsewhere.
+    // While the user was in another window, commands may have made or scored models.
     window.addEventListener("focus", () => this.list());
   }
 
@@ -45,7 +45,7 @@ export class Models {
     try {
       this.#names = await this.connection.read("GET", "/models");
     } catch {
-      // The page says already that the connection is lost.
+      // The page already shows that the connection is lost.
       return;
     }
     get("model-box").hidden = !this.#names.length && !this.#model;

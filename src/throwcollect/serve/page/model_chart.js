@@ -7,7 +7,7 @@ import { byUnit, readAs } from "./model_words.js";
 const HEIGHT_PX = 130;
 
 /**
- * Draw median and what nine of ten throws stay below, in a chart for each unit of the targets.
+ * Draw the median, and the distance that nine of ten throws stay below, in a chart for each unit of the targets.
  * @param {Element} place that it is put into
  * @param {string} title of the numbers of throws
  * @param {[number, import("./model_words.js").Misses & {others: import("./model_words.js").Misses[]}][]} errors by number of throws

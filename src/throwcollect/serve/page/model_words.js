@@ -1,13 +1,13 @@
-/** What is known of a model, in words. */
+/** Describes a model in words. */
 
-/** By unit of targets: the factor and the unit by which people read their misses, and what these are. */
+/** For a unit of targets: the factor and the unit with which misses are shown, and the noun for a miss. */
 const SHOWN_AS = { m: [100, "cm", "Distance"], rad: [180 / Math.PI, "°", "Angle"] };
 
 /** @typedef {{unit: string, median: number | null, share90: number | null, largest: number | null}} Misses */
 
 /**
  * @param {string} unit of targets
- * @returns {[number, string, string]} the factor and the unit by which people read their misses, and what these are
+ * @returns {[number, string, string]} the factor and the unit with which misses are shown, and the noun for a miss
  */
 export function readAs(unit) {
   return SHOWN_AS[unit] ?? [1, unit, "Difference"];
@@ -45,7 +45,7 @@ function tellLength(length, targets) {
 }
 
 /**
- * What is known of a model, in sentences.
+ * Describe a model in sentences.
  * @param {any} model as the server tells it
  * @returns {string}
  */
@@ -64,7 +64,7 @@ export function describe({ learned_from: name, throws, error, parameters, target
 
 /** Rows of the table of errors: what was thrown with, median, what nine of ten stay below, largest. */
 export function tabulate({ trained, adapted }) {
-  // A line may be broken between two units alone.
+  // A line may be broken only between two units.
   const tell = (errors, name) => [...new Set(byUnit(errors).map((each) => tellMiss(each[name], each.unit).replaceAll(" ", "\u00a0")))].join(", ");
   const row = (text, errors) => [text, ...["median", "share90", "largest"].map((name) => tell(errors, name))];
   return [

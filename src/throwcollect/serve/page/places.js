@@ -5,15 +5,15 @@ export const EDGE_PX = 4;
 /** @typedef {{left: number, top: number, width: number, height: number}} Box */
 
 /**
- * The free place that is nearest to where a panel wants to be; null if none is free. The first panel gets what it wants.
- * @param {Box} box where it wants to be [px]
+ * The free place that is nearest to the wanted place of a panel; null if none is free. The first panel gets its place.
+ * @param {Box} box the wanted place [px]
  * @param {Box[]} taken where others are
- * @param {{most: number, lowest: number}} stage up to where its left and its top may be
+ * @param {{most: number, lowest: number}} stage largest left and largest top that the panel may have
  * @returns {{left: number, top: number} | null}
  */
 export function placeApart(box, taken, { most, lowest }) {
   const { left, top, width, height } = box;
-  // A stage that is smaller than a panel shows as much of it as there is.
+  // If the stage is smaller than a panel, it shows the part of the panel that fits.
   if (!taken.length) return { left, top };
   const lefts = [left, ...taken.flatMap((each) => [each.left + each.width + EDGE_PX, each.left - width - EDGE_PX])];
   const tops = [top, ...taken.flatMap((each) => [each.top + each.height + EDGE_PX, each.top - height - EDGE_PX])];

@@ -1,12 +1,12 @@
 /** Replays the newest throw of each simulation again and again, until a newer one follows at its end. */
 
 const REST_S = 0.7;
-/** Longest step between two pictures, so that a page that was out of sight does not catch up. */
+/** Longest step between two pictures, so that a page that was hidden does not catch up. */
 const LONGEST_STEP_S = 0.2;
 
 /** @typedef {import("./throws.js").Throw} Throw */
 
-/** Time of the throws that are shown, one a simulation. */
+/** Keeps the time in each throw that is replayed, one for each simulation. */
 export class Playback {
   playing = true;
   speed = 1;

@@ -74,7 +74,7 @@ export class PlotPanel {
    * Move the panel to its link, beside other panels; dock it if there is no room for it, as on a phone.
    * @param {{x: number, y: number}} at on the stage [px]
    * @param {Element} stage
-   * @param {import("./places.js").Box[]} taken where other panels are; where this one is, is added
+   * @param {import("./places.js").Box[]} taken boxes of other panels; the box of this panel is added
    * @returns {{x1: number, y1: number, x2: number, y2: number} | null} line from the panel to the link, unless it was docked
    */
   follow(at, stage, taken) {
@@ -175,7 +175,7 @@ export class PlotPanel {
     this.#show(this.#zoomed);
   }
 
-  /** Show its head alone, or all of it again. */
+  /** Show only its head, or all of it again. */
   collapse() {
     const isClosed = this.element.classList.toggle("collapsed");
     setText(this.collapser, isClosed ? "□" : "–");

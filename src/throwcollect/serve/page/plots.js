@@ -85,7 +85,7 @@ export class Plots {
     this.#bind();
   }
 
-  /** A plot of a joint is bound to the link that it moves, unless another is chosen. */
+  /** Bind a plot of a joint to the link that the joint moves, unless the user chooses another link. */
   #bind() {
     const link = this.#robot()?.linkMovedBy(get("plot-name").value);
     if (link) get("plot-link").value = link;

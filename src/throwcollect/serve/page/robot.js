@@ -8,11 +8,11 @@ import URDFLoader from "./vendor/urdf-loader/src/URDFLoader.js";
 import { coarsen } from "./coarse.js";
 
 const PACKAGE = "package://";
-/** Edges of the cubes by which meshes are coarsened, as shares of a mesh's size: the first that gives few triangles. */
+/** Edges of the cubes that merge vertices, as shares of a mesh's size; the first edge that gives few triangles is used. */
 const SHARES = [1 / 32, 1 / 24, 1 / 16, 1 / 12];
 const FEW_TRIANGLES = 1200;
 
-/** Geometries with fewer triangles, by those with all; and back. Clones of meshes share their geometries. */
+/** From full geometries to those with fewer triangles, and back. Clones of meshes share their geometries. */
 const COARSE = new WeakMap();
 const FINE = new WeakMap();
 
@@ -86,7 +86,7 @@ function parse(path, bytes) {
 /** A robot whose base is fixed above the origin. */
 export class Robot {
   object = new Group();
-  /** Whether all meshes are there. */
+  /** Whether all meshes have been fetched. */
   isWhole = false;
   #robot;
   #positions = new Map();
@@ -126,7 +126,7 @@ export class Robot {
     };
     this.#robot = loader.parse(urdf);
     this.object.add(this.#robot);
-    /** Resolves when each mesh is there, or cannot be fetched. */
+    /** Resolves when each mesh has been fetched, or its request has failed. */
     this.whole = Promise.all(loading).then(() => {
       this.isWhole = true;
       changed();

@@ -17,7 +17,7 @@ const AHEAD_M = 2;
 const RAY_M = 1.5;
 /** Size of the target in a hand, relative to one that was set. */
 const HELD = 0.6;
-/** Place of the info board, and how far below it plots stand that follow no link [m], frame world. */
+/** Place of the info board, and the distance below it of plots that follow no link [m], frame world. */
 const BOARD = new Vector3(-1.1, 0, 1.45);
 const BELOW_M = 0.5;
 const PLOT_HEIGHT_M = 0.33;

@@ -28,7 +28,7 @@ export class RunRecords {
     this.#instance = instance;
     const names = instance.nodes.map(({ name }) => name);
     const choices = [["", "events"], ...names.map((name) => [name, `log of ${name}`])];
-    // Logs of a run that has ended stay, though its nodes are gone.
+    // After the end of a run, its nodes are not listed any more, but their logs stay.
     if (names.length || !this.choice.options.length) setChoices(this.choice, choices);
   }
 
@@ -37,7 +37,7 @@ export class RunRecords {
     if (!this.element.open || !this.element.isConnected) return;
     const { id } = this.#instance;
     const node = this.choice.value;
-    // The user may choose something else meanwhile, which another request fetches.
+    // If the user has chosen something else meanwhile, another request fetches that.
     const isChosen = () => node === this.choice.value;
     const run = `/instances/${encodeURIComponent(id)}`;
     try {

@@ -14,13 +14,13 @@ const TARGET = new Vector3(0.6, 0, 1);
 const EYE = new Vector3(3.3, -4, 1.9);
 const TURN_RAD = 0.12;
 const ZOOM = 1.15;
-/** Number of robots that are drawn with all triangles; if more are shown, all are drawn with fewer. */
+/** Most robots that are drawn with all triangles; if there are more, all of them are drawn with fewer triangles. */
 const MOST_FINE = 1;
-/** A picture that takes longer than this on average [ms] is drawn with less. */
+/** If pictures take longer than this on average [ms], they are drawn with fewer triangles and points. */
 const SLOW_MS = 70;
-/** Software that draws; some of it passes for graphics hardware in a browser that was told to use it. */
+/** Names of software renderers; browsers with certain settings present some of them as graphics hardware. */
 const SOFTWARE = /swiftshader|llvmpipe|softpipe|software|basic render/i;
-/** Software draws for a third of the time at most, and leaves the rest of the processors to the simulations. */
+/** A software renderer draws for a third of the time at most, and leaves the processors to the simulations otherwise. */
 const SOFTWARE_SHARE = 1 / 3;
 /** Time between two pictures that are drawn by software, at least and at most [ms]. */
 const SOFTWARE_STEP_MS = [95, 400];
@@ -104,7 +104,7 @@ export class View {
   #mean = 0;
   #waited = 0;
   #isBySoftware = isDrawnBySoftware();
-  /** Whether robots have fewer triangles, and pictures no more points than the page. */
+  /** Whether robots have fewer triangles, and pictures have one point for each pixel of the page at most. */
   #plain = this.#isBySoftware;
   /** @type {{ended: WebGLSync, beganMs: number} | null} the picture that software draws at the moment */
   #drawn = null;
@@ -116,7 +116,7 @@ export class View {
    */
   constructor(canvas) {
     this.canvas = canvas;
-    // Smooth edges take software more time than all else.
+    // For a software renderer, smooth edges take more time than everything else.
     this.renderer = new WebGLRenderer({ canvas, antialias: !this.#isBySoftware });
     this.#camera.up.set(0, 0, 1);
     this.orbit = new OrbitControls(this.#camera, canvas);
@@ -172,7 +172,7 @@ export class View {
   }
 
   /**
-   * @param {string[]} names of the simulations to show, in order; those of which nothing is known yet get a station
+   * @param {string[]} names of the simulations to show, in order; a new simulation gets a station
    */
   show(names) {
     this.shown = names;
@@ -263,7 +263,7 @@ export class View {
    * Where a link is on the stage.
    * @param {string} name of the simulation
    * @param {string} link
-   * @returns {{x: number, y: number} | null} in CSS pixels; null if it is not to be seen
+   * @returns {{x: number, y: number} | null} in CSS pixels; null if it is not visible
    */
   project(name, link) {
     const tile = this.tileOf(name);
@@ -276,7 +276,7 @@ export class View {
 
   /**
    * @param {number} sinceMs time since the last call of `draw` [ms]
-   * @returns {boolean} whether the last picture is there, and old enough for another one
+   * @returns {boolean} whether the last picture is finished, and old enough for another one
    */
   isDue(sinceMs) {
     if (this.#drawn !== null) this.#lookAtDrawn();
@@ -311,7 +311,7 @@ export class View {
     }
   }
 
-  /** If software has drawn the picture, have the next one come so late that the processors are free in between. */
+  /** If software has drawn the picture, delay the next one, so that the processors are free in between. */
   #lookAtDrawn() {
     const gl = this.renderer.getContext();
     const { ended, beganMs } = this.#drawn;
@@ -340,7 +340,7 @@ export class View {
     if (station) station.group.visible = false;
   }
 
-  /** Draw with less where pictures take long. */
+  /** Draw fewer triangles and points if pictures take long. */
   #adapt(sinceMs) {
     this.#mean = this.#mean === 0 ? Math.min(sinceMs, SLOW_MS) : 0.9 * this.#mean + 0.1 * Math.min(sinceMs, 1000);
     if (this.#mean > SLOW_MS && !this.#plain) {
@@ -370,7 +370,7 @@ export class View {
       if (shape < best) [best, this.#columns, this.#rows] = [shape, columns, rows];
     }
     this.#camera.aspect = this.#width / this.#columns / (this.#height / this.#rows);
-    // A tile that is higher than wide shows as much from left to right.
+    // If a tile is higher than wide, the angle of view grows, so that it shows as much from left to right.
     this.#camera.fov = this.#camera.aspect >= 1 ? 38 : Math.min(75, 38 / this.#camera.aspect);
     this.#camera.updateProjectionMatrix();
     this.touch();

@@ -32,7 +32,7 @@
  * @property {string} started
  * @property {string | null} ended
  * @property {boolean} stopping whether it has been asked to stop
- * @property {string} message what it ended with; empty if there was no error
+ * @property {string} message the error with which it ended; empty if there was none
  * @property {number} simulations
  * @property {{name: string, status: string, restarts: number, last_end: string | null}[]} nodes
  * @property {{checked: number, trials: number} | null} planning how far its plan is, while it is made
@@ -40,7 +40,7 @@
  * @property {string | null} dataset
  * @property {object | null} summary what its dataset holds; null if it is not finished
  * @property {string[]} robots names of its simulations that run
- * @property {boolean} can_be_resumed whether it is over before its last trial
+ * @property {boolean} can_be_resumed whether it ended before its last trial
  */
 
 /** @typedef {{components: Component[], instances: Instance[], revision: number}} State */
@@ -54,9 +54,9 @@ export function lives(instance) {
 }
 
 /**
- * Runs that can be watched. A container has no simulations, so whoever opens the page does not see one that joined last.
+ * Runs that can be watched. Containers are left out, because they have no simulations to show, even if one began last.
  * @param {Instance[]} instances
- * @param {(string | null)[]} kept ids of those that the user has asked for, whatever they are
+ * @param {(string | null)[]} kept ids of runs that the user has asked for, which are included in any case
  * @returns {string[]} ids
  */
 export function watchable(instances, kept) {

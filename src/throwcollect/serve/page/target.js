@@ -37,7 +37,7 @@ function round(metres) {
 export class Target {
   /** @type {number[] | null} [m], frame world; null before it is set */
   place = null;
-  /** What became of the target, in words. */
+  /** In words, whether the target was published. */
   note = "";
   #components = [];
 
@@ -84,7 +84,7 @@ export class Target {
     this.set([x, y, Number(get("target-z").value)]);
   }
 
-  /** @param {number[]} place [m], frame world; is shown, and published in the run that is watched */
+  /** @param {number[]} place of the target [m], frame world; it is shown, and published in the run that is watched */
   set(place) {
     this.place = place;
     ["x", "y", "z"].forEach((axis, i) => {

@@ -26,7 +26,7 @@ export function decodeThrow(buffer) {
   const header = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 4, length)));
   const start = 4 + Math.ceil(length / 4) * 4;
   const { samples, joints } = header;
-  // The numbers are little-endian, as all machines with a browser are.
+  // Typed arrays need the byte order of the machine; all machines with a browser are little-endian, as the message is.
   const positions = new Float32Array(buffer, start, samples * joints.length);
   const ball = new Float32Array(buffer, start + positions.byteLength, samples * 3);
   return { ...header, positions, ball, duration: Math.max(0, samples - 1) / header.rate_hz };
@@ -70,7 +70,7 @@ export function ballAt(shown, time) {
  * @param {Throw} shown
  * @param {"position" | "velocity" | "effort" | "ball"} field
  * @param {string} name of a joint, or x, y, z
- * @returns {Float64Array | null} null if throws do not tell it
+ * @returns {Float64Array | null} null if throws do not contain this field
  */
 export function seriesOf(shown, field, name) {
   const width = field === "ball" ? 3 : shown.joints.length;

@@ -1,4 +1,4 @@
-/** Paths of the ball: of the throw that is replayed, and fainter ones of those before it, coloured by outcome. */
+/** Paths of the ball in the throw that is replayed and, fainter, in earlier throws, coloured by outcome. */
 
 import {
   CatmullRomCurve3, CircleGeometry, Group, Mesh, MeshBasicMaterial, TubeGeometry, Vector3,
@@ -31,7 +31,7 @@ export class Trails {
     for (let i = 0; i < shown.samples; i += step) points.push(new Vector3().fromArray(shown.ball, 3 * i));
     if (points.length < 2) return;
     const material = new MeshBasicMaterial({ color: colorOf(shown.outcome), transparent: true });
-    // With arc-length sampling, a share of the tube would not be the same share of the time.
+    // The curve is sampled by time: with arc lengths, a share of the tube would not be the same share of the time.
     const curve = new CatmullRomCurve3(points, false, "catmullrom", 0);
     curve.getPointAt = curve.getPoint;
     curve.getTangentAt = curve.getTangent;

@@ -5,7 +5,7 @@ import { Robot } from "./robot.js";
 import { lives } from "./state.js";
 import { ballAt, decodeThrow, jointsAt } from "./throws.js";
 
-/** Watches one run at a time, and only while the page is to be seen. */
+/** Watches one run at a time, and only while the page is visible. */
 export class Watching {
   /** @type {string | null} id of the run */
   id = null;
@@ -32,7 +32,7 @@ export class Watching {
     document.addEventListener("visibilitychange", () => this.#follow());
   }
 
-  /** @param {import("./state.js").Instance | undefined} instance what is to be seen from now on; undefined for nothing */
+  /** @param {import("./state.js").Instance | undefined} instance the run to show from now on; undefined for none */
   put(instance) {
     const id = instance?.id ?? null;
     if (id !== this.id) this.#begin(id);
@@ -108,7 +108,7 @@ export class Watching {
     this.landings.begin(id);
   }
 
-  /** Listen for throws as long as there may be some, and somebody looks. */
+  /** Listen for throws as long as the run can have some, and the page is visible. */
   #follow() {
     const { instance } = this;
     const wanted = instance?.kind === "collection" && lives(instance) && !document.hidden;
@@ -127,7 +127,7 @@ export class Watching {
     this.map.add(newest);
   }
 
-  /** Fetch the description of the robots, once there are some. */
+  /** Fetch the description of the robots, once the run has robots. */
   async #fetchDescription() {
     const { id, instance } = this;
     const run = `/instances/${encodeURIComponent(id)}`;
@@ -137,7 +137,7 @@ export class Watching {
       const urdf = await this.#ask(id, `${run}/urdf`, (response) => response.text());
       if (this.id !== id) return;
       const isWhole = scene !== null && urdf !== null;
-      // The next state asks again for what the server has not given.
+      // The next state makes another request for whatever the server has not given.
       this.#urdf = isWhole ? urdf : null;
       if (isWhole && this.#isMissed) this.tell("");
       this.#isMissed = !isWhole;
@@ -149,7 +149,7 @@ export class Watching {
     }
   }
 
-  /** What the server answers on a run; null if it has nothing, which is told as long as the run is watched. */
+  /** The server's answer to a request about a run; null if it fails, which the view says if the run is still watched. */
   async #ask(id, path, read) {
     try {
       return await read(await this.connection.ask("GET", path));
