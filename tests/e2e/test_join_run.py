@@ -266,14 +266,14 @@ def test_joining_with_other_sources_is_refused_with_the_reason(tmp_path: Path) -
     token = JoinToken("many-1234", "tls/127.0.0.1:1", "11" * 32, 0, "bullet", build="another").encode()
     done = call_here("join-run", token)
     assert done.returncode == 2
-    assert "run many-1234: other sources, or another engine bullet or robot model" in done.stderr
+    assert "run many-1234: this machine has other sources, another build of the engine bullet" in done.stderr
 
 
 @pytest.mark.parametrize("word", ["", "tc2.", "tc2.e30", "x" * 50, "tc2.!!!"])
 def test_a_malformed_token_is_refused(word: str) -> None:
     done = call_here("join-run", word)
     assert done.returncode == 2
-    assert "this is no token of a run, or not a whole one" in done.stderr
+    assert "this is no token of a run, or only a part of one" in done.stderr
 
 
 def test_a_token_is_read_from_standard_input() -> None:

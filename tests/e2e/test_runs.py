@@ -273,7 +273,7 @@ def test_a_run_whose_record_cannot_be_written_goes_on(config: Path, records: Rec
     running.wait_until(stands)
     code, _, err = running.finish()
     assert code == 0, err
-    assert err.count("what happens in this run is not written down any more: ") == 1
+    assert err.count("the record and the events of this run are no longer written: ") == 1
 
 
 def test_ctrl_c_on_wait_does_not_end_the_run(config: Path, records: Records, tmp_path: Path) -> None:

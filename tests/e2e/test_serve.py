@@ -352,7 +352,7 @@ def test_an_unusable_address_or_certificate_gives_one_message(place: Place, tmp_
         port = str(taken.getsockname()[1])
         said = call_here("serve", "--port", port)
     assert said.returncode == 2
-    assert said.stderr.startswith(f"throwcollect: --host 127.0.0.1 --port {port}: nobody can be served there: Address")
+    assert said.stderr.startswith(f"throwcollect: --host 127.0.0.1 --port {port}: cannot listen there: Address")
     said = call_here("serve", "--host", "0.0.0.0", "--port", "0")  # noqa: S104 - it is refused
     assert said.returncode == 2
     assert "--host 0.0.0.0: anybody on that network could read the token" in said.stderr

@@ -55,7 +55,7 @@ def _strings(data: bytes, at: int, count: int, memory: list[tuple[bytes, tuple[s
 
 
 class _Reader(FunctionWriter):
-    """Writes a function that reads at position ``at``; operands are the targets of assignments."""
+    """Writes a function that reads at position ``at``; operands are expressions that get the values."""
 
     def __init__(self) -> None:
         super().__init__(frombuffer=np.frombuffer, new=object.__new__, strings=_strings)

@@ -222,7 +222,7 @@ def _find(
     # The standard deviation that is expected of each number before any throw: the prior of the least squares below.
     spread = np.full(width + targets, _SMALL_OFFSET if width else _OFFSET)
     spread[:width] = _BIAS if method is Method.BIAS else _LATENT
-    low, high = _ends(learned, method, len(spread))
+    low, high = _find_bounds(learned, method, len(spread))
     found = np.zeros(len(spread)) if begun is None else begun
     for step in range(_STEPS):
         current = learned.correct(_shift(learned.correction, method, found))
@@ -249,7 +249,7 @@ def _find(
     return found, np.sqrt(np.diagonal(covariance))
 
 
-def _ends(learned: LearnedMap, method: Method, count: int) -> tuple[Array, Array]:
+def _find_bounds(learned: LearnedMap, method: Method, count: int) -> tuple[Array, Array]:
     """Bounds of a difference: latents stay inside of the ranges of the dataset."""
     low, high = np.full(count, -np.inf), np.full(count, np.inf)
     if method is Method.LATENT:
@@ -274,7 +274,7 @@ def _step_inside(normal: Array, right: Array, found: Array, low: Array, high: Ar
             raise ConfigError(
                 "the throws ended too far from where the model has them",
                 expected="places in the unit of the targets",
-                hint="the method offset takes any place",
+                hint="the method offset accepts any place",
             )
         bounded = np.clip(unbounded, low, high)
         leaving = free & (bounded != unbounded)

@@ -53,7 +53,7 @@ class DistilledMap:
             targets: Shape ``(n, n_targets)``.
             context: Scaled, shape ``(n, n_context)``.
         """
-        return np.clip(self.polynomial.predict(_inputs(targets, context, self.low, self.high)), -1.0, 1.0)
+        return np.clip(self.polynomial.predict(_scale_inputs(targets, context, self.low, self.high)), -1.0, 1.0)
 
 
 def distil(learned: LearnedMap) -> DistilledMap:
@@ -74,7 +74,7 @@ def distil(learned: LearnedMap) -> DistilledMap:
     )
     targets = learned.predict(parameters, context)
     low, high = targets.min(axis=0), targets.max(axis=0)
-    inputs = _inputs(targets, context, low, high)
+    inputs = _scale_inputs(targets, context, low, high)
     exponents = list_exponents(inputs.shape[1], 1)
     for degree in range(2, _DEGREE + 1):
         if len(more := list_exponents(inputs.shape[1], degree)) * SAMPLES_PER_TERM <= len(inputs):
@@ -112,5 +112,5 @@ def _step(learned: LearnedMap, terms: Array, squares: Array, raw: Array, context
     return solve(matmul(transposed, wide) + middle, right).reshape(-1, size)
 
 
-def _inputs(targets: Array, context: Array, low: Array, high: Array) -> Array:
+def _scale_inputs(targets: Array, context: Array, low: Array, high: Array) -> Array:
     return np.hstack([(targets - low) / (high - low) * 2.0 - 1.0, context])

@@ -94,10 +94,10 @@ def fit_map(
     throws = dataset.throws.filter(pc.equal(dataset.throws["outcome"], config.task.success))
     axes = _find_axes(dataset, throws, parameters, context)
     _check_amount(dataset, throws, axes)
-    outputs = np.column_stack([_numbers(throws, column, dataset) for column in columns])
-    values = np.column_stack([_numbers(throws, axis.key, dataset) for axis in axes])
+    outputs = np.column_stack([_read_numbers(throws, column, dataset) for column in columns])
+    values = np.column_stack([_read_numbers(throws, axis.key, dataset) for axis in axes])
     trials: NDArray[np.int64] = throws["trial"].to_numpy()
-    fit = fit_throws(kind, axes, columns, values, outputs, _numbers(throws, EFFORT, dataset))
+    fit = fit_throws(kind, axes, columns, values, outputs, _read_numbers(throws, EFFORT, dataset))
     return replace(fit, trials=trials, ignored=len(dataset) - len(throws))
 
 
@@ -114,7 +114,7 @@ def fit_throws(
         outputs: Where the trials ended, shape ``(n, n_targets)``.
         efforts: Largest shares of a joint's torque limit, shape ``(n,)``.
     """
-    inputs, folds = scale_values(axes, values), _folds(outputs)
+    inputs, folds = scale_values(axes, values), _assign_folds(outputs)
     # Latents come last. Products of two latents have little effect, so such terms are left out.
     minor = sum(axis.role is KeyRole.LATENT for axis in axes)
     validation = cross_validate(inputs, outputs, folds, minor=minor)
@@ -200,7 +200,7 @@ def _check_amount(dataset: Dataset, throws: pa.Table, axes: tuple[Axis, ...]) ->
         )
 
 
-def _numbers(throws: pa.Table, column: str, dataset: Dataset) -> Array:
+def _read_numbers(throws: pa.Table, column: str, dataset: Dataset) -> Array:
     """Read a column of finite numbers.
 
     Raises:
@@ -218,7 +218,7 @@ def _numbers(throws: pa.Table, column: str, dataset: Dataset) -> Array:
     return values
 
 
-def _folds(outputs: Array) -> NDArray[np.int64]:
+def _assign_folds(outputs: Array) -> NDArray[np.int64]:
     """Number of the fold of each throw; throws that ended in one cell are in one fold."""
     # A hash of the cell gives the fold, so that a throw stays in its fold when the dataset grows.
     numbers = [hashlib.sha256(cell.tobytes()).digest()[0] % _FOLDS for cell in number_cells(outputs)]

@@ -131,7 +131,7 @@ class LearnedMap:
 
     def unscale(self, role: KeyRole, inputs: Array) -> Array:
         """Values of scaled inputs of a role, in the units of their keys."""
-        low, high = _bounds(self.axes_of(role))
+        low, high = _list_bounds(self.axes_of(role))
         return low + (inputs + 1.0) / 2.0 * (high - low)
 
     def in_world(self, parameters: Array, context: Array) -> Array:
@@ -205,9 +205,9 @@ def no_correction(axes: tuple[Axis, ...], targets: tuple[str, ...]) -> Correctio
 
 def scale_values(axes: tuple[Axis, ...], values: Array) -> Array:
     """Scale values of axes, shape ``(..., n_axes)``: -1 is the minimum of an axis, 1 its maximum."""
-    low, high = _bounds(axes)
+    low, high = _list_bounds(axes)
     return (values - low) / (high - low) * 2.0 - 1.0
 
 
-def _bounds(axes: tuple[Axis, ...]) -> tuple[Array, Array]:
+def _list_bounds(axes: tuple[Axis, ...]) -> tuple[Array, Array]:
     return np.array([axis.minimum for axis in axes], np.float64), np.array([axis.maximum for axis in axes], np.float64)

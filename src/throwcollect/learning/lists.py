@@ -130,7 +130,7 @@ def write_aims(path: Path, aims: Sequence[Aim], names: Sequence[str], task: Task
         DatasetError: If it cannot be written.
     """
     if path.suffix != ".csv":
-        raise ConfigError(f"{path}: a list of another kind than CSV is not written", expected="a name with .csv")
+        raise ConfigError(f"{path}: lists are written only as CSV", expected="a name with .csv")
     columns = {column.name: names.index(column.of) for column in task.target_columns if column.of in names}
     if task.find_wrong_targets(columns):
         columns = {}

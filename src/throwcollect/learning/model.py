@@ -104,7 +104,7 @@ class Model:
         Raises:
             ConfigError: If a key is missing or unknown, or a value is not finite.
         """
-        parameters, context = self._inputs(points)
+        parameters, context = self._read_inputs(points)
         return self.learned.predict(parameters, context)
 
     def aim(self, targets: Iterable[Sequence[float]], *, choose: str = Choice.NEAREST.value) -> list[Aim]:
@@ -205,7 +205,7 @@ class Model:
             ConfigError: If there are no throws, or not one place for each; a key is missing or unknown, a value is not
                 finite, there is no such method, or a parameter, context or place is far outside the dataset.
         """
-        parameters, context = self._inputs(points)
+        parameters, context = self._read_inputs(points)
         measured = _read_places("places", places, self.targets)
         if not len(measured) or len(measured) != len(parameters):
             raise ConfigError(
@@ -268,7 +268,7 @@ class Model:
         """
         write_model(Path(directory), self.file, self.learned, self.trials, self.config)
 
-    def _inputs(self, points: Sequence[Mapping[str, float]]) -> tuple[Array, Array]:
+    def _read_inputs(self, points: Sequence[Mapping[str, float]]) -> tuple[Array, Array]:
         """Read scaled parameters and context of points.
 
         Raises:

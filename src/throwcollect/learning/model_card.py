@@ -62,11 +62,11 @@ def describe_model(file: ModelFile, score: Score | None) -> str:
         "Parameters are chosen when aiming, context is given with the target, latents belong to the world. Nothing is "
         "extrapolated beyond the ranges.",
         "",
-        f"Predictions for throws that polynomials were not fitted to are off by {_length(trained.error, file)} "
+        f"Predictions for throws that polynomials were not fitted to are off by {_format_length(trained.error, file)} "
         "(median, in simulation); by degree: "
-        + ", ".join(f"{degree}: {_length(error, file)}" for degree, error in trained.folds_error.items())
+        + ", ".join(f"{degree}: {_format_length(error, file)}" for degree, error in trained.folds_error.items())
         + (
-            f"; without latents: {_length(trained.without_latents, file)}"
+            f"; without latents: {_format_length(trained.without_latents, file)}"
             if trained.without_latents is not None
             else ""
         )
@@ -133,8 +133,8 @@ def _describe_adaptation(adaptation: AdaptationEntry, file: ModelFile) -> list[s
     if adaptation.after:
         before, after = (sorted(each)[len(each) // 2] for each in (adaptation.before, adaptation.after))
         lines += [
-            f"The throws were off by {_length(before, file)} before (median), and by {_length(after, file)} after, "
-            "each predicted by a model that was adapted to the others.",
+            f"The throws were off by {_format_length(before, file)} before (median), "
+            f"and by {_format_length(after, file)} after, each predicted by a model that was adapted to the others.",
             "",
         ]
     return lines
@@ -179,6 +179,6 @@ def _describe_errors(errors: Errors) -> str:
     return " | ".join([*tell_misses(errors), str(errors.missed)])
 
 
-def _length(value: float, file: ModelFile) -> str:
+def _format_length(value: float, file: ModelFile) -> str:
     """A distance between targets, over all of them."""
     return tell_length(value, file.targets)

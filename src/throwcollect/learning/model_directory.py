@@ -68,7 +68,7 @@ def read_model(directory: Path) -> tuple[ModelFile, LearnedMap, NDArray[np.int64
         pa.types.is_floating(field.type) or (field.name == "trial" and pa.types.is_integer(field.type))
         for field in table.schema
     ):
-        raise DatasetError("has not the columns of this model", path=path, expected=", ".join(names))
+        raise DatasetError("does not have the columns of this model", path=path, expected=", ".join(names))
     columns = {name: table[name].to_numpy() for name in names}
     if not len(table) or not all(np.isfinite(column).all() for column in columns.values()):
         raise DatasetError("has rows without finite numbers, or no rows", path=path)

@@ -34,11 +34,11 @@ def compare(stored: Episode, again: Episode) -> Comparison:
     differences: tuple[str, ...] = ()
     # This compares contents and not chunks, as the same messages may be compressed in different ways.
     if (stored.state.contents, stored.header_json) != (again.state.contents, again.header_json):
-        differences = tuple(_differences(stored, again)) or ("other channels than joint states and ball differ",)
+        differences = tuple(_find_differences(stored, again)) or ("other channels than joint states and ball differ",)
     return Comparison(stored.header.trial, stored.digest, again.digest, differences)
 
 
-def _differences(stored: Episode, again: Episode) -> Iterator[str]:
+def _find_differences(stored: Episode, again: Episode) -> Iterator[str]:
     for field in fields(EpisodeHeader):
         before, now = getattr(stored.header, field.name), getattr(again.header, field.name)
         if before != now:

@@ -116,15 +116,15 @@ def _draw_errors(numbers: Sequence[int], misses: Sequence[MissStatistics]) -> go
 
 
 def _tabulate(score: Score) -> Table:
-    rows = [(f"learned from {each.trained_on:,} throws", *_cells(each.errors)) for each in score.trained]
+    rows = [(f"learned from {each.trained_on:,} throws", *_list_cells(each.errors)) for each in score.trained]
     if score.distilled is not None:
-        rows.append(("model.onnx of these", *_cells(score.distilled)))
+        rows.append(("model.onnx of these", *_list_cells(score.distilled)))
     for each in score.adapted:
         after = f"after {format_count(each.real_throws, 'throw')} ({each.method.value})"
-        rows.append((f"in the other world {after}", *_cells(each.errors)))
+        rows.append((f"in the other world {after}", *_list_cells(each.errors)))
     head = ("", "median", "9 of 10 below", "largest", "throws", "did not succeed")
     return Table(head=head, rows=tuple(rows), number_columns=(1, 2, 3, 4, 5))
 
 
-def _cells(errors: Errors) -> tuple[str, ...]:
+def _list_cells(errors: Errors) -> tuple[str, ...]:
     return (*tell_misses(errors), str(errors.throws), str(errors.missed))

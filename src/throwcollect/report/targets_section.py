@@ -64,7 +64,7 @@ def _show_map(dataset: Dataset, targets: Targets) -> Panel:
 
 
 def _draw_share(dataset: Dataset, miss: str) -> go.Figure:
-    scale, unit = _scale(miss)
+    scale, unit = _choose_unit(miss)
     values: NDArray[np.float64] = np.sort(dataset.throws[miss].drop_null().to_numpy()) * scale
     figure = go.Figure()
     chosen = choose_points(len(values))
@@ -98,12 +98,12 @@ def _tabulate(misses: dict[str, MissSummary]) -> Table:
 def _format(miss: str, value: float | None) -> str:
     if value is None:
         return "-"
-    scale, unit = _scale(miss)
+    scale, unit = _choose_unit(miss)
     digits = ".2f" if value == 0 or scale * value >= _LEAST_TOLD else ".2g"
     return f"{scale * value:{digits}} {unit}"
 
 
-def _scale(miss: str) -> tuple[float, str]:
+def _choose_unit(miss: str) -> tuple[float, str]:
     """The factor that makes a distance easy to read, and the unit that it has then."""
     unit = unit_of_name(miss)
     return {"m": (100.0, "cm"), "rad": (1000.0, "mrad")}.get(unit, (1.0, unit))

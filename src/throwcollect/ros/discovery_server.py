@@ -39,7 +39,7 @@ def discovery_server(endpoint: str) -> Iterator[None]:
         ConfigError: If there is no such program, or it cannot listen there.
         WorkerError: If it ends at once.
     """
-    command = [_program(), "-i", "0", "-x", str(write_temporarily(server_profile(endpoint)))]
+    command = [_find_program(), "-i", "0", "-x", str(write_temporarily(server_profile(endpoint)))]
     with (
         _accept_connections(endpoint),
         # The output goes to a file and not to a pipe: nobody reads it later, and a full pipe would stop the server.
@@ -108,7 +108,7 @@ def _wait_until_it_runs(process: subprocess.Popen[bytes], output: IO[bytes], end
         time.sleep(_LOOK_S)
 
 
-def _program() -> str:
+def _find_program() -> str:
     # If ROS is installed by pip, the program lies beside this Python, in a directory that PATH may not contain.
     beside_python = Path(sys.prefix, "bin", _PROGRAM)
     program = str(beside_python) if beside_python.is_file() else shutil.which(_PROGRAM)

@@ -42,7 +42,7 @@ def client_profile(endpoint: str) -> str:
     Raises:
         ConfigError: If the endpoint has no address.
     """
-    address, port = _place(endpoint)
+    address, port = _resolve_address(endpoint)
     # A plain client would only hear of nodes with which it has topics in common, so its ROS graph would be incomplete.
     discovery = f"""<discoveryProtocol>SUPER_CLIENT</discoveryProtocol>
           <discoveryServersList><RemoteServer prefix="{_SERVER}"><metatrafficUnicastLocatorList>
@@ -53,7 +53,7 @@ def client_profile(endpoint: str) -> str:
 
 def server_profile(endpoint: str) -> str:
     """The profile of the discovery server itself; errors are those of `client_profile`."""
-    address, port = _place(endpoint)
+    address, port = _resolve_address(endpoint)
     locators = f"<metatrafficUnicastLocatorList>{_locator(address, port)}</metatrafficUnicastLocatorList>"
     return _profile(address, "<discoveryProtocol>SERVER</discoveryProtocol>", locators, f"<prefix>{_SERVER}</prefix>")
 
@@ -69,7 +69,7 @@ def write_temporarily(profile: str) -> Path:
     return path
 
 
-def _place(endpoint: str) -> tuple[str, int]:
+def _resolve_address(endpoint: str) -> tuple[str, int]:
     """IPv4 address and port of an endpoint; its name is resolved here, as nodes pass the address on to others.
 
     Raises:

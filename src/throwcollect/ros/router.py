@@ -57,7 +57,7 @@ def _discovery_server(listen: str) -> Iterator[str]:
         WorkerError: If it ends at once.
     """
     address, _, port = listen.rpartition(":")
-    endpoint = f"{address}:{_free_port(address)}" if port == "0" else listen
+    endpoint = f"{address}:{_find_free_port(address)}" if port == "0" else listen
     with discovery_server(endpoint):
         yield endpoint
 
@@ -67,7 +67,7 @@ def _open(listen: str, key: RunKey | None) -> tuple[zenoh.Session, str]:
     attempts_left = _PORT_ATTEMPTS if port == "0" else 1
     while True:
         attempts_left -= 1
-        endpoint = f"{address}:{_free_port(address)}" if port == "0" else listen
+        endpoint = f"{address}:{_find_free_port(address)}" if port == "0" else listen
         with zenoh_errors():
             config = router_config(endpoint, session_key(endpoint, key) if key is not None else None)
         if endpoint.startswith(PROTECTED) and key is None:
@@ -87,7 +87,7 @@ def _open(listen: str, key: RunKey | None) -> tuple[zenoh.Session, str]:
                 ) from error
 
 
-def _free_port(address: str) -> int:
+def _find_free_port(address: str) -> int:
     host = address.partition("/")[2].strip("[]")
     try:
         family = socket.getaddrinfo(host, None)[0][0]

@@ -47,7 +47,7 @@ def follow(run: Run, *, keep_on: Callable[[], bool] = lambda: True) -> Iterator[
     run.record.middleware.joining.settle()
     from throwcollect.runtimes.run_listener import RunListener
 
-    events = Tail(_events_of(run))
+    events = Tail(_locate_events(run))
     events.skip()
     reports: list[Progress] = []
     with RunListener(reports.append) as listener:
@@ -57,7 +57,7 @@ def follow(run: Run, *, keep_on: Callable[[], bool] = lambda: True) -> Iterator[
             listener.spin(run.connection, _POLL_S)
             # The launcher writes events before the record, so the last record is read before the last events.
             run = run.now()
-            happened = tuple(event for event, _ in _new_events(events, run))
+            happened = tuple(event for event, _ in _read_new_events(events, run))
             yield Look(run, reports[-1] if reports else None, happened)
 
 
@@ -101,7 +101,7 @@ def read_logs(
         message = f"run {run.id}: no node {unknown[0]!r} has printed anything"
         raise ConfigError(message, expected=", ".join(files) or None)
     tails: dict[str, Tail] = {}
-    for now, last in _looks(run, follow=follow, keep_on=keep_on):
+    for now, last in _look_repeatedly(run, follow=follow, keep_on=keep_on):
         files = NodeLogs(Path(now.record.logs)).files()
         width = max(map(len, files), default=0)
         for name, path in files.items():
@@ -121,26 +121,26 @@ def read_events(run: Run, *, keep_on: Callable[[], bool] = lambda: True) -> Iter
     Raises:
         ConfigError: If the record vanishes.
     """
-    tail = Tail(_events_of(run))
-    for now, _ in _looks(run, follow=True, keep_on=keep_on):
-        yield from _new_events(tail, now)
+    tail = Tail(_locate_events(run))
+    for now, _ in _look_repeatedly(run, follow=True, keep_on=keep_on):
+        yield from _read_new_events(tail, now)
 
 
-def _new_events(tail: Tail, run: Run) -> Iterator[tuple[Event, str]]:
+def _read_new_events(tail: Tail, run: Run) -> Iterator[tuple[Event, str]]:
     """The events of a run that were written since the last call, and the line of each."""
     # A run that is begun in the background moves its events and logs to another directory once its plan is made.
-    tail.path = _events_of(run)
+    tail.path = _locate_events(run)
     for line in tail.lines():
         # If the run resumes a dataset, the file has the events of earlier runs, too.
         if (event := parse(line)) is not None and event.run == run.id:
             yield event, line
 
 
-def _events_of(run: Run) -> Path:
+def _locate_events(run: Run) -> Path:
     return Path(run.record.logs) / EVENTS
 
 
-def _looks(run: Run, *, follow: bool, keep_on: Callable[[], bool]) -> Iterator[tuple[Run, bool]]:
+def _look_repeatedly(run: Run, *, follow: bool, keep_on: Callable[[], bool]) -> Iterator[tuple[Run, bool]]:
     """Look at a run several times a second while it lives (if it is to be followed), and once at the end.
 
     Yields:

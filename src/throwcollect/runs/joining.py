@@ -90,7 +90,9 @@ def _simulate(
     elif reports.finished:
         onlooker.say("the run is over")
     else:
-        raise WorkerError(f"nothing was heard of the run for {_SILENT_S:g} s", hint="join it again if it still goes on")
+        raise WorkerError(
+            f"no report of the run has arrived for {_SILENT_S:g} s", hint="join it again if it still goes on"
+        )
 
 
 class _Reports:
@@ -128,7 +130,7 @@ def _read_configuration(connection: Connection, token: JoinToken) -> str:
 
         client = node.create_client(GetParameters, f"/{LAUNCHER}/get_parameters")
         if not client.wait_for_service(_ANSWER_S):
-            raise WorkerError(f"run {token.run}: its launcher is not to be found at {connection.endpoint}")
+            raise WorkerError(f"run {token.run}: its launcher cannot be found at {connection.endpoint}")
         # A request that is sent before the service is found is lost.
         future = client.call_async(GetParameters.Request(names=[CONFIGURATION]))
         executor.spin_until_future_complete(future, timeout_sec=_ANSWER_S)

@@ -178,7 +178,7 @@ class _Session:
             if not self._failed:
                 self._failed = True
                 reason = error.message if isinstance(error, ConfigError) else str(error)
-                self._onlooker.warn(f"what happens in this run is not written down any more: {reason}")
+                self._onlooker.warn(f"the record and the events of this run are no longer written: {reason}")
 
 
 def launch_inherited(run: str, lock: int, *, onlooker: Onlooker, interruptions: Callable[[], int]) -> None:

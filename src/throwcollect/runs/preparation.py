@@ -262,7 +262,7 @@ def _take_over(
     # `left` is true from now on: if this launcher dies, too, the containers still exist.
     run.update(ended=None, exit_code=None, failure=None, left=True)
     fate = "died" if left.status == "died" else "given up"
-    onlooker.say(f"run {run.run}: its launcher had {fate}; it goes on where its containers are")
+    onlooker.say(f"run {run.run}: its launcher had {fate}; the run goes on with its containers")
     return PreparedRun(records, run, kept, directory, onlooker=onlooker)
 
 
@@ -302,12 +302,12 @@ def prepare_run(
         if request.plan is None:
             undo.callback(_remove_plan, directory, is_new=is_new)
         choice = choice or choose(config, say=onlooker.say, warn=onlooker.warn, begun=begun)
-        record = _record(run, request, choice, directory, volume)
+        record = _make_record(run, request, choice, directory, volume)
         # A host checks image, mounts, networks and ports when it is made, so errors show before the run is launched.
         choice.runtime.host(record.place(run.key), config, warn=onlooker.warn).close()
         run.write(record)
-        _warn_of_company(config, choice.middleware, onlooker)
-        onlooker.say(f"plan: {_in_words(plan)}; dataset: {f'volume {volume}' if volume else directory}")
+        _warn_if_others_may_join(config, choice.middleware, onlooker)
+        onlooker.say(f"plan: {_describe_plan(plan)}; dataset: {f'volume {volume}' if volume else directory}")
         return PreparedRun(
             records,
             run,
@@ -325,7 +325,9 @@ def _make_plan(request: RunRequest, directory: Path, onlooker: Onlooker) -> Plan
 
     config = request.config
     if (config.trials or 0) >= MANY_TRIALS and not config.grows:
-        onlooker.say(f"plan: checking {config.trials} trials against limits and collisions, 1 to 5 ms each and core")
+        onlooker.say(
+            f"plan: checking {config.trials} trials against limits and collisions, 1 to 5 ms for each on one core"
+        )
     return prepare_plan(
         config,
         directory,
@@ -335,7 +337,7 @@ def _make_plan(request: RunRequest, directory: Path, onlooker: Onlooker) -> Plan
     )
 
 
-def _in_words(plan: Plan) -> str:
+def _describe_plan(plan: Plan) -> str:
     from throwcollect.coordinator.prepare import more_trials
 
     refused = len(plan.trials.refused)
@@ -343,7 +345,9 @@ def _in_words(plan: Plan) -> str:
     return f"{format_count(len(plan.trials), 'trial')}{note}{more_trials(plan)}"
 
 
-def _record(run: OpenRun, request: RunRequest, choice: RuntimeChoice, directory: Path, volume: str | None) -> RunRecord:
+def _make_record(
+    run: OpenRun, request: RunRequest, choice: RuntimeChoice, directory: Path, volume: str | None
+) -> RunRecord:
     return RunRecord(
         run=run.run,
         name=request.config.name,
@@ -361,7 +365,7 @@ def _record(run: OpenRun, request: RunRequest, choice: RuntimeChoice, directory:
     )
 
 
-def _warn_of_company(config: Config, middleware: Middleware, onlooker: Onlooker) -> None:
+def _warn_if_others_may_join(config: Config, middleware: Middleware, onlooker: Onlooker) -> None:
     """Warn the user if others may join the run."""
     if config.run.open:
         onlooker.warn("run.open: anybody who reaches the router may join, read and disturb this run")

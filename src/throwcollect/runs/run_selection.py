@@ -36,10 +36,10 @@ def find_run_to_change(records: Records, named: str | None, *, command: str, die
     if not here and len(candidates) == 1:
         (other,) = candidates
         raise ConfigError(
-            f"no run of this directory lives; {other.id} {_origin(other)}",
+            f"no run of this directory lives; {other.id} {_describe_origin(other)}",
             hint=f"throwcollect {command} --run {other.id}, if that one is meant",
         )
-    return _only(here or candidates, runs)
+    return _require_only_run(here or candidates, runs)
 
 
 def find(named: str | os.PathLike[str]) -> Run:
@@ -67,18 +67,18 @@ def find_run_to_watch(records: Records, named: str | None, *, say: Callable[[str
     here = [run for run in runs if _belongs_here(run.record)]
     known = here or runs
     living = [run for run in known if run.status == "running"]
-    run = known[-1] if known and not living else _only(living, runs)
+    run = known[-1] if known and not living else _require_only_run(living, runs)
     if not here:
-        say(f"run {run.record.run}, which {_origin(run)}")
+        say(f"run {run.record.run}, which {_describe_origin(run)}")
     return run
 
 
-def _only(living: Sequence[Run], runs: Sequence[Run]) -> Run:
+def _require_only_run(living: Sequence[Run], runs: Sequence[Run]) -> Run:
     if len(living) == 1:
         return living[0]
     if living:
-        raise ConfigError(f"{len(living)} runs live", expected=_list(living), hint="name one of them with --run")
-    over = f"; of those that are over, there is {_list(runs)}" if runs else ""
+        raise ConfigError(f"{len(living)} runs live", expected=_list_latest(living), hint="name one of them with --run")
+    over = f"; runs that are over: {_list_latest(runs)}" if runs else ""
     raise ConfigError(f"no run lives{over}", hint="throwcollect up -d starts one" if not runs else "name it with --run")
 
 
@@ -89,7 +89,7 @@ def _belongs_here(record: RunRecord) -> bool:
     return record.begun_in == here or (dataset is not None and dataset.is_relative_to(here))
 
 
-def _origin(run: Run) -> str:
+def _describe_origin(run: Run) -> str:
     begun_in = run.record.begun_in
     return f"was begun in {begun_in}" if begun_in else f"collects into {run.place.dataset}"
 
@@ -114,7 +114,7 @@ def id_of(records: Records, named: str) -> str:
         return matches[0]
     if matches:
         return _find_only_living(records, matches, named)
-    known = _list(records.all())
+    known = _list_latest(records.all())
     hint = "throwcollect ps -a lists all" if known else None
     raise NotFoundError(f"no run {named!r}", expected=f"one of {known}" if known else None, hint=hint)
 
@@ -139,7 +139,7 @@ def _find_only_living(records: Records, ids: Sequence[str], named: str) -> str:
     raise ConfigError(f"{len(ids)} runs begin with {named!r}", expected="\n".join(["one of", *lines]))
 
 
-def _list(runs: Sequence[Run]) -> str:
+def _list_latest(runs: Sequence[Run]) -> str:
     """The ids of the latest of these runs, the latest first, and the number of all others."""
     more = len(runs) - _MOST_LISTED
     return ", ".join(run.id for run in runs[: -_MOST_LISTED - 1 : -1]) + (f" and {more} more" if more > 0 else "")

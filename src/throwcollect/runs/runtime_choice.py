@@ -33,7 +33,7 @@ def begin(config: Config) -> RuntimeChoice | None:
         MissingExtraError: If the runtime needs a package that is not installed.
     """
     middleware = choose_middleware(config.run.ros)
-    for name in _candidates(config):
+    for name in _list_candidates(config):
         runtime = get_runtime(name)
         if not runtime.is_absent():
             runtime.begin(config, middleware)
@@ -66,7 +66,7 @@ def choose(
         say(f"runtime: {runtime.in_words(config)}{rclpy}{note}")
         return RuntimeChoice(name, runtime, middleware)
 
-    *others, last = candidates = _candidates(config)
+    *others, last = candidates = _list_candidates(config)
     note = " (auto)" if candidates == AUTOMATIC else ""
     for name in others:
         try:
@@ -78,7 +78,7 @@ def choose(
     return prepare(last, note)
 
 
-def _candidates(config: Config) -> tuple[str, ...]:
+def _list_candidates(config: Config) -> tuple[str, ...]:
     """Names of the runtimes that the run may have, in the order in which they are tried."""
     # Simulations of other machines can join a run only if its nodes are processes.
     name = config.run.runtime if config.run.listen is None else "local"

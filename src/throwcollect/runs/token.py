@@ -54,7 +54,7 @@ class JoinToken:
             token = _JSON.validate_json(text)
             bytes.fromhex(token.secret)
         except (ValueError, binascii.Error, ValidationError) as error:
-            raise ConfigError("this is no token of a run, or not a whole one", expected=f"{_START}...") from error
+            raise ConfigError("this is no token of a run, or only a part of one", expected=f"{_START}...") from error
         return token
 
     def check_build(self) -> None:
@@ -65,9 +65,10 @@ class JoinToken:
         """
         if self.build != build_digest(self.engine):
             raise ConfigError(
-                f"run {self.run}: other sources, or another engine {self.engine} or robot model, compute there than "
-                "here; other bytes would be collected",
-                hint="install the same version on both machines, or the image on both; throwcollect doctor shows it",
+                f"run {self.run}: this machine has other sources, another build of the engine {self.engine} or another "
+                "robot model, and would collect other bytes",
+                hint="install the same version on both machines, or the image on both; throwcollect doctor shows what "
+                "is installed",
             )
 
 

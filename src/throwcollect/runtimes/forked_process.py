@@ -31,7 +31,7 @@ class ForkedProcess:
         parent = os.getpid()
         self.pid = os.fork()
         if self.pid == 0:
-            _do(work, parent, environment, kept)
+            _work_and_exit(work, parent, environment, kept)
 
     def send_signal(self, number: signal.Signals) -> None:
         """Send the process a signal, unless it has ended."""
@@ -47,7 +47,7 @@ class ForkedProcess:
         return os.waitstatus_to_exitcode(os.waitpid(self.pid, 0)[1])
 
 
-def _do(work: Callable[[], object], parent: int, environment: Mapping[str, str], kept: int) -> None:
+def _work_and_exit(work: Callable[[], object], parent: int, environment: Mapping[str, str], kept: int) -> None:
     """Call `work`, then always end this process, because the functions that called this one belong to the parent."""
     code = 1
     try:

@@ -148,7 +148,7 @@ class NodeCollection:
         # This is a good time for imports: the simulations are busy, and nobody waits for this process.
         if progress.ended and not self._ready_for_the_end:
             self._ready_for_the_end = True
-            _get_ready_for_the_end(self._host.config)
+            _prepare_for_summary(self._host.config)
         self._about_to_end = progress.ended >= progress.total
         self._check_that_nodes_meet(progress)
         self._supervisor.replace(progress.hung)
@@ -189,14 +189,14 @@ class NodeCollection:
         """Declare the launcher's parameters: the number of simulations, and the configuration for other machines."""
         node.declare_parameter(CONFIGURATION, dump_yaml(self._host.config), ros.ParameterDescriptor(read_only=True))
         most = 1 if self._host.config.run.root_namespace else MOST_SIMULATIONS
-        offer_scaling(node, self._simulations, self._want, most=most)
+        offer_scaling(node, self._simulations, self._request_simulations, most=most)
 
-    def _want(self, simulations: int) -> None:
+    def _request_simulations(self, simulations: int) -> None:
         # `_follow` scales the run later, so that the client that sets the parameter does not wait for nodes to end.
         self._wanted = simulations
 
 
-def _get_ready_for_the_end(config: Config) -> None:
+def _prepare_for_summary(config: Config) -> None:
     """Import modules and fill caches for the summary of the dataset, so that it comes soon after the last trial."""
     importlib.import_module("throwcollect.dataset.inspect")
     # The text of the dataset's ``config.yaml``, and the units of its columns.

@@ -310,10 +310,10 @@ def main() -> None:
 
 def _run(connection: socket.socket) -> None:
     """Serve a connection; in a forked process, run the node."""
-    _show("throwcollect.runtimes.node_server", str(connection.fileno()))
+    _set_title("throwcollect.runtimes.node_server", str(connection.fileno()))
     _import_libraries()
     arguments = serve(connection)
-    _show("throwcollect", *arguments)
+    _set_title("throwcollect", *arguments)
     sys.argv[1:] = arguments
     # If this process was forked off a command, the module is imported already, and `runpy` would warn about that.
     sys.modules.pop("throwcollect.__main__", None)
@@ -322,17 +322,17 @@ def _run(connection: socket.socket) -> None:
     except SystemExit as end:
         if Middleware.of_process().backend != "embedded" or not isinstance(end.code, int):
             raise
-        _leave(end.code)
+        _exit_at_once(end.code)
 
 
-def _show(module: str, *arguments: str) -> None:
+def _set_title(module: str, *arguments: str) -> None:
     """Let `ps` show the command of this process instead of the command of the process that forked it."""
     import setproctitle
 
     setproctitle.setproctitle(" ".join([sys.executable, "-m", module, *arguments]))
 
 
-def _leave(code: int) -> NoReturn:
+def _exit_at_once(code: int) -> NoReturn:
     """End this process without the usual end of the interpreter, which writes to all memory that nodes share.
 
     Nodes have closed their files and sessions before. Zenoh leaves files of such a process in /dev/shm; the next

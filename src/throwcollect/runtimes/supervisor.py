@@ -112,14 +112,14 @@ class Supervisor:
                 news.append(f"{node.name} was lost ({node.reason}) and is started again")
             else:
                 fate = "is started again" if self._schedule_restart(node) else "is given up"
-                news.append(f"{node.name} was lost ({node.reason}) and {fate}{_last_words(node)}")
+                news.append(f"{node.name} was lost ({node.reason}) and {fate}{_quote_last_line(node)}")
         now = time.monotonic()
         for name in [name for name, due in self._due.items() if due <= now]:
             del self._due[name]
             self._start(name)
         # Once the main node has come to its own end, the run needs no simulation any more.
         if end is None:
-            self._check_hope()
+            self._check_that_run_can_go_on()
         return end, news
 
     def states(self) -> list[NodeState]:
@@ -205,7 +205,7 @@ class Supervisor:
         self._due[node.name] = time.monotonic() + max(rest, self._roster[node.name].rest_s)
         return True
 
-    def _check_hope(self) -> None:
+    def _check_that_run_can_go_on(self) -> None:
         """Check that the run can go on.
 
         Raises:
@@ -245,6 +245,6 @@ def _killed(node: NodeExit) -> bool:
     return node.code is not None and (node.code < 0 or node.code > Interrupted.exit_code)
 
 
-def _last_words(node: NodeExit) -> str:
+def _quote_last_line(node: NodeExit) -> str:
     lines = node.log.splitlines()
     return f"; its log ends: {lines[-1]}" if lines else ""

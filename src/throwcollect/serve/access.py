@@ -25,10 +25,10 @@ Send = Callable[[MutableMapping[str, Any]], Awaitable[None]]
 
 _MOST_BODY = 1_000_000
 """Bytes of a request's body."""
-_TOO_LONG = 413, f"a body may have {_MOST_BODY} bytes"
+_TOO_LONG = 413, f"a body may have at most {_MOST_BODY} bytes"
 _MOST_SOCKETS = 128
 """Sockets that may be open at once; a page has up to four."""
-_TOO_MANY = 503, f"{_MOST_SOCKETS} sockets are open, as many as there may be"
+_TOO_MANY = 503, f"{_MOST_SOCKETS} sockets are open, which is the limit"
 MAY_ONLY_LOOK = 403, "this token may only look"
 """Status and sentence for a request to change something with the token that may only look."""
 _GROUPS = {True: "full", False: "read-only", None: "anybody"}

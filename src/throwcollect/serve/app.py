@@ -61,8 +61,8 @@ def make_app(instances: Instances, models: Models, keys: Keys) -> FastAPI:
     watch = StateWatch(lookout.look)
     of_runs = (401, 404, 409, 422, 503)
     for routes, statuses in (
-        (_public(keys), ()),
-        (_general(watch, keys), (401,)),
+        (_make_public_routes(keys), ()),
+        (_make_general_routes(watch, keys), (401,)),
         (make_component_routes(watch), (401, 404, 422)),
         (make_instance_routes(instances, lookout), of_runs),
         (make_log_routes(instances), of_runs),
@@ -86,7 +86,7 @@ async def _let_go_meanwhile(_: FastAPI) -> AsyncIterator[None]:
     letting_go.cancel()
 
 
-def _public(keys: Keys) -> APIRouter:
+def _make_public_routes(keys: Keys) -> APIRouter:
     router = APIRouter()
 
     @router.get("/health")
@@ -105,7 +105,7 @@ def _public(keys: Keys) -> APIRouter:
     return router
 
 
-def _general(watch: StateWatch, keys: Keys) -> APIRouter:
+def _make_general_routes(watch: StateWatch, keys: Keys) -> APIRouter:
     router = APIRouter()
 
     @router.post("/codes", status_code=201)

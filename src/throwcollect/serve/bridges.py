@@ -41,7 +41,7 @@ class Bridges:
             FullError: If the clients of all runs together have reached their largest number.
         """
         if sum(each.clients for each in self._shared.values()) >= _MOST_CLIENTS:
-            raise FullError(f"{_MOST_CLIENTS} clients are connected by rosbridge, as many as there may be")
+            raise FullError(f"{_MOST_CLIENTS} clients are connected by rosbridge, which is the limit")
         if (shared := self._shared.get(run.id)) is None:
             run.record.middleware.joining.settle()
             bridge = Bridge(run.connection)

@@ -156,7 +156,7 @@ def ensure_server() -> Address:
     last_lines = ""
     with suppress(OSError):
         last_lines = "\n".join(log.read_text(errors="replace").splitlines()[-5:])
-    raise WorkerError("no server starts", evidence=last_lines or None, hint="throwcollect serve tells more")
+    raise WorkerError("no server starts", evidence=last_lines or None, hint="throwcollect serve shows why")
 
 
 def make_page_address(address: Address, run: str | None = None) -> str:

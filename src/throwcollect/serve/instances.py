@@ -84,7 +84,7 @@ class Instances:
         if not re.fullmatch(NAME, instance):
             raise ConfigError(f"no instance can have the id {instance!r}", expected="at most 63 of a-z, 0-9, - and _")
         _check_wish(origin, component)
-        overrides = _overrides(origin)
+        overrides = _write_overrides(origin)
         with _one_at_a_time():
             with suppress(NotFoundError):
                 run = self.get(instance)
@@ -309,7 +309,7 @@ def _one_at_a_time() -> Iterator[None]:
         os.close(lock)
 
 
-def _overrides(origin: Origin) -> list[str]:
+def _write_overrides(origin: Origin) -> list[str]:
     """Write the keys that a request sets as ``--set`` takes them.
 
     Raises:
@@ -322,7 +322,7 @@ def _overrides(origin: Origin) -> list[str]:
             if not re.fullmatch(_KEY, key)
         ),
         *(
-            Problem("is the operator's alone; a request may not set it", key=kept)
+            Problem("may be set only by the operator, not by a request", key=kept)
             for key, value in origin.changes.items()
             for kept in list_operator_keys()
             if _sets(key, value, kept)

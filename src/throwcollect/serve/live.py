@@ -61,7 +61,7 @@ class Hold:
             except WorkerError:
                 # The simulation may be busy: the file stays, so that `let_go_of_left` tries again.
                 return
-            _note(self.run, self.simulation).unlink(missing_ok=True)
+            _find_lock_path(self.run, self.simulation).unlink(missing_ok=True)
         finally:
             os.close(self.lock)
 
@@ -77,7 +77,7 @@ def take(run: Run, simulation: str) -> Hold:
     if not _runs(run, simulation):
         raise NotFoundError(f"run {run.id}: no simulation {simulation!r} runs")
     try:
-        lock = _share(_note(run, simulation))
+        lock = _share(_find_lock_path(run, simulation))
     except OSError as error:
         raise WorkerError(f"run {run.id}: {simulation} cannot be slowed down: {error}") from error
     try:
@@ -101,12 +101,12 @@ def let_go_of_left() -> None:
     # If records cannot be read for a while, a later attempt finds the same files.
     with suppress(ThrowcollectError, OSError):
         for run in Records().all():
-            for note in sorted(_note(run, "").glob("*")) if run.status == "running" else ():
+            for note in sorted(_find_lock_path(run, "").glob("*")) if run.status == "running" else ():
                 with suppress(FileNotFoundError):
                     Hold(run, note.name, os.open(note, os.O_RDWR)).let_go()
 
 
-def _note(run: Run, simulation: str) -> Path:
+def _find_lock_path(run: Run, simulation: str) -> Path:
     """Path of the file whose lock the watchers of a simulation share."""
     return run.key.directory.parent / _DIRECTORY / simulation
 

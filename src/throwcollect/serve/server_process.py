@@ -189,7 +189,7 @@ def _listen(host: str, port: int | None) -> Iterator[socket.socket]:
         except (OSError, TypeError) as error:
             why = error.strerror if isinstance(error, OSError) else error
             raise ConfigError(
-                f"--host {host} --port {_PORT if port is None else port}: nobody can be served there: {why}",
+                f"--host {host} --port {_PORT if port is None else port}: cannot listen there: {why}",
                 hint="--port 0 takes one that is free; throwcollect view finds who serves already",
             ) from error
         yield listener

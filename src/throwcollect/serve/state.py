@@ -211,7 +211,7 @@ def describe(run: Run) -> InstanceState:
         name=record.name,
         kind=record.kind,
         joins=None if record.origin is None else record.origin.joins,
-        status=_status(run),
+        status=_find_status(run),
         started=record.started,
         ended=record.ended,
         stopping=record.stopping and run.status == "running",
@@ -233,7 +233,7 @@ def simulations_of(nodes: Sequence[NodeState]) -> list[str]:
     return [node.name for node in nodes if node.name.startswith("sim_") and node.status == "running"]
 
 
-def _status(run: Run) -> Status:
+def _find_status(run: Run) -> Status:
     if run.status in ("ended", "abandoned"):
         return "ended"
     if run.status == "died":

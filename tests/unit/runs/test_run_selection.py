@@ -124,7 +124,7 @@ def test_an_error_lists_only_the_latest_of_many_runs(records: Records, make: Mak
     for age_h in range(8):
         make(f"a{age_h}", "ended", age_h=age_h)
     latest = "a0-0123, a1-0123, a2-0123, a3-0123, a4-0123 and 3 more"
-    for named, said in (("x", f"one of {latest}\n"), (None, f"there is {latest}\n")):
+    for named, said in (("x", f"one of {latest}\n"), (None, f"runs that are over: {latest}\n")):
         with pytest.raises(ConfigError, match=said):
             find(records, named)
     with pytest.raises(ConfigError, match=r"8 runs begin with 'a'\n") as caught:
@@ -154,7 +154,7 @@ def test_without_an_id_the_only_living_run_is_changed(records: Records, make: Ma
         find(records, None)
     make("a", "ended")
     make("b", "died")
-    with pytest.raises(ConfigError, match="no run lives; of those that are over, there is b-0123, a-0123"):
+    with pytest.raises(ConfigError, match="no run lives; runs that are over: b-0123, a-0123"):
         find(records, None)
     only = make("c", "lives")
     assert find(records, None).record == only

@@ -24,7 +24,7 @@ def test_a_token_is_one_word_and_decodes_to_the_same_values() -> None:
 
 @pytest.mark.parametrize("cut", [0, 3, 10, 100, -1])
 def test_an_incomplete_token_is_refused(cut: int) -> None:
-    with pytest.raises(ConfigError, match="not a whole one"):
+    with pytest.raises(ConfigError, match="only a part of one"):
         JoinToken.decode(make().encode()[:cut])
 
 
@@ -35,7 +35,7 @@ def test_a_token_with_a_malformed_secret_is_refused() -> None:
 
 def test_a_token_of_a_run_with_other_sources_is_refused() -> None:
     make().check_build()
-    with pytest.raises(ConfigError, match="run many-1234: other sources, or another engine bullet") as refused:
+    with pytest.raises(ConfigError, match="other sources, another build of the engine bullet") as refused:
         make("f" * 64).check_build()
     # The image has a slimmed engine, so the same version is not enough.
     assert "or the image on both" in str(refused.value.hint)

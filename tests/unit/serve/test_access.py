@@ -117,7 +117,7 @@ def parts(size: int) -> Iterator[bytes]:
 def test_a_body_that_is_too_long_is_refused(served: Served, path: str, with_length: bool) -> None:
     content = 1_001_000 * b" " if with_length else parts(1_001_000)
     answer = served.client().post(path, content=content, headers={"Content-Type": "application/json"})
-    assert problem_of(answer, 413) == "a body may have 1000000 bytes"
+    assert problem_of(answer, 413) == "a body may have at most 1000000 bytes"
 
 
 @pytest.mark.parametrize("with_length", [True, False])
@@ -174,7 +174,7 @@ def test_a_socket_beyond_the_limit_is_refused(served: Served, monkeypatch: pytes
         first.receive_text()
         with pytest.raises(WebSocketDenialResponse) as refusal, served.socket(STATE, served.keys.full):
             pass
-        assert problem_of(refusal.value, 503) == "128 sockets are open, as many as there may be"
+        assert problem_of(refusal.value, 503) == "128 sockets are open, which is the limit"
     with served.socket(STATE, served.keys.full) as after:
         after.receive_text()
 

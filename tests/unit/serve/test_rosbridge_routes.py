@@ -36,7 +36,7 @@ def test_a_client_beyond_the_limit_is_told_to_try_later(
     monkeypatch.setattr(bridges, "_MOST_CLIENTS", 0)
     assert end_of(served, "/rosbridge/busy") == (
         1013,
-        "0 clients are connected by rosbridge, as many as there may be",
+        "0 clients are connected by rosbridge, which is the limit",
     )
 
 

@@ -44,7 +44,7 @@ def check_archive(archive: Path) -> None:
     if len(entry_points) != 1:
         raise ConfigError(f"{archive}: holds {len(entry_points)} images", expected="one", hint=_HINT)
     if entry_points[0][-1] != _ENTRY_POINT:
-        raise ConfigError(f"{archive}: holds another image than one of throwcollect", hint=_HINT)
+        raise ConfigError(f"{archive}: holds an image that is not of throwcollect", hint=_HINT)
 
 
 def unpack_archive(archive: Path, directory: Path) -> None:

@@ -63,7 +63,7 @@ def make_sif(
     """
     # Saving or building an image takes minutes, so a missing Apptainer is reported before that.
     find_program()
-    with _replacing(output) as new, _working() as work:
+    with _replacing(output) as new, _make_work_directory() as work:
         if archive is not None:
             check_archive(archive)
             _convert(archive, new, work, say)
@@ -160,7 +160,7 @@ def _run(new: Path, work: Path, *arguments: str, cwd: Path | None = None) -> Non
 
 
 @contextmanager
-def _working() -> Iterator[Path]:
+def _make_work_directory() -> Iterator[Path]:
     """Make a directory for temporary files, which is removed after the block.
 
     Raises:
@@ -185,7 +185,7 @@ def _replacing(output: Path) -> Iterator[Path]:
     """
     try:
         if output.is_dir() or (output.exists() and not is_sif(output)):
-            raise ConfigError(f"{output}: is there and no SIF, so it is not replaced", hint="choose another name")
+            raise ConfigError(f"{output}: exists and is no SIF, so it is not replaced", hint="choose another name")
         # If the output is a link, the file that the link names is replaced.
         place = Path(os.path.realpath(output))
         new = place.with_name(f"{place.name}.new")

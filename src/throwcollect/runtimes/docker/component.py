@@ -250,6 +250,6 @@ class ComponentContainer:
                 evidence=self._logs.tail(CONTAINER) or None,
             )
         if self._way is not None and self._is_left_behind:
-            session.say(f"run {self._way.run} has ended, and so does the container that had joined it")
+            session.say(f"run {self._way.run} has ended, so the container that had joined it ends, too")
             return True
         return False

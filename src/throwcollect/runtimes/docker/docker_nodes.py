@@ -223,8 +223,8 @@ class DockerNodes(NodeHost):
             WorkerError: If the engine does not answer any more.
         """
         if self._clock.given_up:
-            raise self._silence()
-        ends = [end for node in self._nodes.values() if (end := self._end_of(node)) is not None]
+            raise self._make_silence_error()
+        ends = [end for node in self._nodes.values() if (end := self._find_end(node)) is not None]
         for end in ends:
             del self._nodes[end.name]
         return ends
@@ -282,7 +282,7 @@ class DockerNodes(NodeHost):
         with suppress(*ENGINE_ERRORS):
             self.cleared = not self._client.api.containers(all=True, filters=filters)
 
-    def _silence(self) -> WorkerError:
+    def _make_silence_error(self) -> WorkerError:
         """The error of a silent engine, with the containers that may still run there, and how to go on."""
         place = self._place
         left = ", ".join(map(place.container, self._nodes)) or "none"
@@ -309,7 +309,7 @@ class DockerNodes(NodeHost):
         node = self._nodes.get(name)
         return self._opened.state(node.handle) if node else None
 
-    def _end_of(self, node: NodeContainer) -> NodeExit | None:
+    def _find_end(self, node: NodeContainer) -> NodeExit | None:
         """How a node ended; None while it runs, or its last lines are not yet in its log."""
         if node.failure is not None:
             return NodeExit(node.name, None, f"cannot be started: {node.failure}", self.log_tail(node.name))

@@ -63,7 +63,7 @@ class NodeContainer:
 
         `options` are keywords for `containers.create`. The container joins `networks` besides the network in `options`.
         """
-        self._run_in_thread(lambda: self._live(options, networks))
+        self._run_in_thread(lambda: self._start_and_copy_log(options, networks))
 
     def adopt(self, container: Container) -> None:
         """Take over a container that exists."""
@@ -93,7 +93,7 @@ class NodeContainer:
         self._thread = threading.Thread(target=work, daemon=True)
         self._thread.start()
 
-    def _live(self, options: dict[str, Any], networks: Sequence[str]) -> None:
+    def _start_and_copy_log(self, options: dict[str, Any], networks: Sequence[str]) -> None:
         """Start the container, and copy its output until it has ended."""
         container = None
         try:

@@ -37,7 +37,7 @@ def place_directory(client: DockerClient, place: RunPlace, config: Config, direc
         engine_errors(f"{directory} cannot be copied into the volume {place.source}"),
         tempfile.SpooledTemporaryFile(_IN_MEMORY) as packed,
         # The container need not be started, because the engine also writes into the mounts of a stopped one.
-        _single(client, place, config, ["--version"], place.mount(read_only=False)) as container,
+        _make_single_container(client, place, config, ["--version"], place.mount(read_only=False)) as container,
     ):
         with tarfile.open(fileobj=packed, mode="w") as archive:
             archive.add(directory, arcname=place.run_id, filter=_give_to_caller)
@@ -62,7 +62,9 @@ def place_key(client: DockerClient, place: RunPlace, config: Config, key: RunKey
         with tarfile.open(fileobj=packed, mode="w") as archive:
             for path in (key.certificate, key.private_key):
                 archive.add(path, arcname=path.name, filter=_let_caller_read)
-        with _single(client, place, config, ["--version"], place.key_mount(read_only=False)) as container:
+        with _make_single_container(
+            client, place, config, ["--version"], place.key_mount(read_only=False)
+        ) as container:
             container.put_archive(str(KEY.directory), packed.getvalue())
 
 
@@ -76,7 +78,7 @@ def dataset_info(client: DockerClient, place: RunPlace, config: Config) -> Info:
     command = ["dataset", "info", place.data, "--json"]
     with (
         engine_errors(f"the dataset in the volume {place.source} cannot be looked at"),
-        _single(client, place, config, command, place.mount(read_only=True)) as container,
+        _make_single_container(client, place, config, command, place.mount(read_only=True)) as container,
     ):
         container.start()
         code = container.wait(timeout=_INFO_S)["StatusCode"]
@@ -99,7 +101,7 @@ def _let_caller_read(member: tarfile.TarInfo) -> tarfile.TarInfo:
 
 
 @contextmanager
-def _single(
+def _make_single_container(
     client: DockerClient, place: RunPlace, config: Config, command: list[str], mount: Mount
 ) -> Iterator[Container]:
     """Create a container without a network for a single command; it is removed after the block."""

@@ -67,7 +67,7 @@ class EngineWatch:
         self._looking = threading.Lock()
         self._closed = threading.Event()
         self._stream: Any = None
-        for target in (self._follow_events, self._look_around):
+        for target in (self._follow_events, self._keep_listing):
             threading.Thread(target=target, daemon=True).start()
 
     def state(self, container: str | None) -> ContainerState | None:
@@ -106,7 +106,7 @@ class EngineWatch:
                 self._note(error)
             self._closed.wait(_LOOK_EVERY_S)
 
-    def _look_around(self) -> None:
+    def _keep_listing(self) -> None:
         while not self._closed.wait(_LOOK_EVERY_S):
             try:
                 listed = self._client.api.containers(all=True, filters={"label": self._label})

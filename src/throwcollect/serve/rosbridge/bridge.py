@@ -147,7 +147,7 @@ class Bridge:
             raise
         except Exception:
             # A failing action must not end this thread, which serves all clients.
-            _logger.exception("the bridge could not do something")
+            _logger.exception("an action of the bridge failed")
 
     def _call_timers(self) -> None:
         while self._timers and self._timers[0][0] <= time.monotonic():

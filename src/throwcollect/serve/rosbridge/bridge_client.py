@@ -126,7 +126,7 @@ class BridgeClient:
         """Forget the session, as the router has gone, and tell the client."""
         for part in self._parts:
             part.lose()
-        self.say("error", "the router of the run has gone; what is asked for now waits until it is back")
+        self.say("error", "the router of the run has gone; requests wait until it is back")
 
     def restore(self) -> None:
         """Make everything that the client had again, in a new session."""
@@ -185,7 +185,7 @@ class BridgeClient:
             self.say("error", sentence(error), number)
         except Exception as error:
             # A frame of one client must not end the bridge, which serves other clients, too.
-            _logger.exception("a client of the bridge sent what could not be done")
+            _logger.exception("a request of a client failed")
             self.say("error", f"this could not be done: {type(error).__name__}: {error}", number)
 
     def _set_level(self, request: BridgeRequest) -> None:
@@ -239,4 +239,4 @@ class BridgeClient:
         Raises:
             ConfigError: Always.
         """
-        raise ConfigError(f"{request.op}: nobody has to say who he is here", expected="the token in the address")
+        raise ConfigError(f"{request.op}: clients do not authenticate here", expected="the token in the address")

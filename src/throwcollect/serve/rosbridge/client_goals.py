@@ -61,7 +61,7 @@ class Goals(Errands[Goal]):
     """All goals that a client has sent and that have not ended."""
 
     def __init__(self, client: Peer) -> None:
-        super().__init__(client, "nobody offers {} with this type", "{}: the action has gone, and no result has come")
+        super().__init__(client, "nobody offers {} with this type", "{}: the action has gone without a result")
         self._action_clients: dict[tuple[str, str], ros.ActionClient] = {}
 
     def send(self, goal: Goal, request: BridgeRequest) -> None:

@@ -18,7 +18,7 @@ class Questions(Errands[Errand]):
     """All requests of one client to services that wait for an answer."""
 
     def __init__(self, client: Peer) -> None:
-        super().__init__(client, "{}: nobody offers the service", "{}: the service has gone and has not answered")
+        super().__init__(client, "{}: nobody offers the service", "{}: the service has gone without an answer")
 
     def ask(
         self,

@@ -156,7 +156,9 @@ class Subscriptions(Belongings[SubscribedTopic]):
         type_name = self._client.session.type_of(topic, wanted)
         subscription = self._by_name.get(given)
         if subscription is not None and subscription.type_name != type_name:
-            raise ConfigError(f"subscribe: {given} is heard as {subscription.type_name} already", expected="that type")
+            raise ConfigError(
+                f"subscribe: {given} is subscribed to as {subscription.type_name} already", expected="that type"
+            )
         if subscription is None:
             subscription = SubscribedTopic(self._client, given, type_name)
             subscription.want(request.id, wish)

@@ -95,7 +95,7 @@ def test_a_file_that_is_no_archive_of_our_image_is_refused(tmp_path: Path) -> No
     for manifest in (b"[", b"{}", b"[1]", b'[{"Config": "other"}]'):
         with pytest.raises(ConfigError, match=r"is no archive of an image|holds 0 images"):
             check_archive(write_archive(nothing, manifest=manifest))
-    with pytest.raises(ConfigError, match="holds another image than one of throwcollect"):
+    with pytest.raises(ConfigError, match="holds an image that is not of throwcollect"):
         check_archive(write_archive(nothing, "bash"))
     with pytest.raises(ConfigError, match="holds 2 images"):
         check_archive(write_archive(nothing, "throwcollect", "throwcollect"))

@@ -204,7 +204,7 @@ def test_singularity_is_used_if_apptainer_is_missing(apptainer: Path, tmp_path: 
 def test_a_file_that_is_no_sif_is_not_replaced(apptainer: Path, tmp_path: Path) -> None:
     (tmp_path / "throws.yaml").write_text("trials: 2\n")
     for name in ("throws.yaml", "apptainer"):
-        with pytest.raises(ConfigError, match="is there and no SIF"):
+        with pytest.raises(ConfigError, match="exists and is no SIF"):
             make(tmp_path / name)
     assert (tmp_path / "throws.yaml").read_text() == "trials: 2\n"
     with pytest.raises(DatasetError, match="cannot be written: No such file or directory"):
@@ -212,7 +212,7 @@ def test_a_file_that_is_no_sif_is_not_replaced(apptainer: Path, tmp_path: Path) 
 
 
 def test_an_archive_of_another_image_is_not_converted(apptainer: Path, tmp_path: Path) -> None:
-    with pytest.raises(ConfigError, match="holds another image than one of throwcollect"):
+    with pytest.raises(ConfigError, match="holds an image that is not of throwcollect"):
         make(tmp_path / "it.sif", archive=write_archive(tmp_path / "image.tar", "bash"))
     assert not (apptainer / "asked").exists()
     assert not list(tmp_path.glob("it.sif*"))

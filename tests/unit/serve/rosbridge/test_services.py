@@ -97,7 +97,7 @@ def test_a_call_fails_after_its_timeout_or_when_its_service_disappears(party: Pa
     party.ask(op="call_service", id=2, service="/slow")
     assert party.next(id=1)["values"] == "/slow: no answer within 0.05 s"
     node.destroy_service(service)
-    assert party.next(id=2)["values"] == "/slow: the service has gone and has not answered"
+    assert party.next(id=2)["values"] == "/slow: the service has gone without an answer"
 
 
 def call(node: Node, service: str = "/clock") -> Future:
