@@ -48,11 +48,11 @@ class Context:
         Args:
             args: Not used: rclpy has this argument, but names cannot be remapped here.
             domain_id: Domain identifier; None takes ``ROS_DOMAIN_ID``, or 0.
-            config: Configuration of the session; None for the one that the environment asks for.
+            config: Configuration of the session; None makes it from the environment.
 
         Raises:
             RuntimeError: If the context is in use already.
-            ConfigurationError: If the environment does not hold what it should.
+            ConfigurationError: If an environment variable has a wrong value.
             NoRouterError: If there is no router.
         """
         del args
@@ -163,7 +163,7 @@ def init(*, context: Context | None = None, domain_id: int | None = None, config
 
     Raises:
         RuntimeError: If the context is in use already.
-        ConfigurationError: If the environment does not hold what it should.
+        ConfigurationError: If an environment variable has a wrong value.
         NoRouterError: If there is no router.
     """
     (context or get_default_context()).init(domain_id=domain_id, config=config)

@@ -72,7 +72,7 @@ def environment_config() -> zenoh.Config:
     """Configuration that the environment asks for; by default, that of a client of the router on this host.
 
     Raises:
-        ConfigurationError: If an environment variable does not hold what it should, or the key cannot be read.
+        ConfigurationError: If an environment variable has a wrong value, or the key cannot be read.
     """
     path = os.environ.get(CONFIG_FILE_VARIABLE)
     if path:

@@ -146,7 +146,7 @@ def _walk(learned: LearnedMap, parameters: Array, context: Array, goals: Array) 
 def _step(slopes: Array, missing: Array) -> Array:
     """The shortest step of the parameters that closes the distance to the goals, shape ``(n, n_parameters)``."""
     transposed = np.swapaxes(slopes, 1, 2)
-    # The damped step of least norm: Jᵀ (J Jᵀ + λ² I)⁻¹ r, with J for the slopes and r for what is missing.
+    # The damped step of least norm: Jᵀ (J Jᵀ + λ² I)⁻¹ r, with J for the slopes and r for the missing distance.
     squares = matmul(slopes, transposed) + _DAMPING**2 * np.eye(slopes.shape[1])
     return matmul(transposed, solve(squares, missing[..., np.newaxis]))[..., 0]
 

@@ -156,7 +156,7 @@ class Model:
             seed: The first seed of their choice; models of one dataset get the same ones.
             seeds: Number of seeds, whose medians are taken.
             world: Simulates another world, in which the model is adapted by a few throws; None for none.
-            scatter: Standard deviation of noise on what is measured of those throws, in the unit of the targets.
+            scatter: Standard deviation of noise on the measured ends of those throws, in the unit of the targets.
             processes: How many processes simulate.
 
         Raises:
@@ -199,7 +199,7 @@ class Model:
             points: For each throw, values by key of all `parameters` and all `given`.
             places: Where these throws ended, each as many numbers as `targets`.
             method: How the world may differ: ``offset``, ``bias``, ``latent`` or ``none``; None to choose.
-            scatter: Standard deviation of what is measured, in the unit of the targets.
+            scatter: Standard deviation of the measured ends, in the unit of the targets.
 
         Raises:
             ConfigError: If there are no throws, or not one place for each; a key is missing or unknown, a value is not

@@ -1,4 +1,4 @@
-"""The card of a model: its axes and errors, how it hits, what it was not tested on, how a robot's program uses it."""
+"""Writes the card of a model: axes, errors, misses, what it was not tested on, and how a robot's program uses it."""
 
 from __future__ import annotations
 

@@ -176,7 +176,7 @@ class Score(ModelEntry):
         trained: By the number of throws that a model was learned from; the model itself comes last.
         distilled: How the distilled map hits; None if the model was not distilled.
         throws: Throws of the model itself.
-        scatter: Noise on what was measured of throws in the other world, in the unit of the targets.
+        scatter: Noise on the measured ends of throws in the other world, in the unit of the targets.
         adapted: By the number of throws in the other world; empty if there was none.
         adapted_throws: Throws at targets in the other world, by the model that was adapted by the most throws.
     """

@@ -62,7 +62,7 @@ def score_model(
         count: Number of targets.
         seed: Seed of their choice, of the throws that smaller models are learned from, and of the noise.
         world: Simulates the other world; None for none.
-        scatter: Standard deviation of noise on what is measured of throws in the other world.
+        scatter: Standard deviation of noise on the measured ends of throws in the other world.
         error: Standard deviation of throws from the predictions of the map.
         latents_count: Whether latents have an effect that is worth knowing.
         distilled: The map that is distilled for the world of the dataset; None for none.

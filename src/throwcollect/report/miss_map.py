@@ -78,7 +78,7 @@ def _take_two(points: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def title_misses(targets: str, times: int) -> str:
-    """Title of a map of misses, with what it calls the targets and how many times as long misses are drawn."""
+    """Title of a map of misses; `targets` is the word for the targets, and misses are drawn `times` as long."""
     return f"{targets}, and misses drawn {times:,} times as long" if times > 1 else f"{targets} and misses"
 
 

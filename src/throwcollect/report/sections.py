@@ -41,7 +41,7 @@ class Report:
     Attributes:
         lead: Sentence on its trials.
         tiles: Key numbers.
-        sections: In the order of the page; one that has nothing to show says so.
+        sections: Sections in the order of the page; a section that has nothing to show says so.
         noun: Word for a trial.
     """
 

@@ -21,7 +21,7 @@ def init(*, context: Context | None = None, connection: Connection | None = None
 
     Raises:
         RuntimeError: If the context is in use already.
-        ConfigError: If the environment or the connection cannot be used, or the connection is one by other middleware.
+        ConfigError: If the environment or the connection cannot be used, or the connection needs other middleware.
         ThrowcollectError: If there is no router.
     """
     domain_id = config = None
@@ -37,7 +37,7 @@ def joins_protected() -> bool:
     """Whether nodes of this process join a graph that lets nobody in without a key.
 
     Raises:
-        ConfigError: If an environment variable does not hold what it should.
+        ConfigError: If an environment variable has a wrong value.
     """
     with zenoh_errors():
         return is_protected()

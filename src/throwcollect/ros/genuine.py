@@ -70,8 +70,7 @@ def init(*, context: Context | None = None, connection: Connection | None = None
 
     Raises:
         RuntimeError: If the context is in use already.
-        ConfigError: If a variable of the environment does not hold what it should, or the connection is one by other
-            middleware.
+        ConfigError: If an environment variable has a wrong value, or the connection needs other middleware.
         ThrowcollectError: If the RMW does not start (rmw_zenoh_cpp needs a router), or this process is in another run
             on Fast DDS.
     """
@@ -175,7 +174,7 @@ def joins_protected() -> bool:
     """Whether nodes of this process join a graph that lets nobody in without a key: other RMWs know of no key.
 
     Raises:
-        ConfigError: If an environment variable does not hold what it should.
+        ConfigError: If an environment variable has a wrong value.
     """
     if not Middleware("rclpy", rclpy.get_rmw_implementation_identifier()).keeps_others_out:
         return False

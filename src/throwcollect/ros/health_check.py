@@ -35,7 +35,7 @@ def check(node: str | None = None) -> None:
             names.
 
     Raises:
-        ConfigError: If no node is named, or a variable of the environment does not hold what it should.
+        ConfigError: If no node is named, or an environment variable has a wrong value.
         ThrowcollectError: If it does not answer.
     """
     name = node or os.environ.get(NODE_VARIABLE)

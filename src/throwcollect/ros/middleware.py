@@ -43,7 +43,7 @@ class Middleware:
 
     @classmethod
     def of_process(cls) -> Middleware:
-        """The middleware of this process: the one it has settled on, or else the one that its environment asks for.
+        """The middleware of this process: the one that was settled on, or else the one that its environment chooses.
 
         Raises:
             ConfigError: If the environment asks for a backend that is not there.
@@ -59,7 +59,7 @@ class Middleware:
 
     @property
     def keeps_others_out(self) -> bool:
-        """Whether its router asks for the key of a run; other middleware has no router, or one that lets anybody in."""
+        """Whether its router asks for the key of a run. Other middleware has no router, or a router without a key."""
         return self.rmw == EMBEDDED_RMW
 
     @property

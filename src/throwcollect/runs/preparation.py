@@ -45,9 +45,9 @@ class RunRequest:
         started: Time of the request.
         plan: The plan of the dataset that the run continues; None for a new dataset.
         processes: Number of processes that may check the trials of a large plan.
-        ahead: Whether the runtime begins what it can before there is a plan, for `PreparedRun.collect`.
+        ahead: Whether the runtime begins its work before there is a plan, for `PreparedRun.collect`.
         origin: The request of a client; None if a command or a program asks.
-        begun: The runtime that has begun what it can; None if it has not yet. See `runtime_choice.begin`.
+        begun: The runtime that has begun its work; None if none has yet. See `runtime_choice.begin`.
         choice: The runtime; None if it is not chosen yet.
     """
 

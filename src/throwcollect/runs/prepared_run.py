@@ -30,7 +30,7 @@ class PreparedRun:
     Args:
         runtime: The runtime, if it has begun something for the run; else None.
         held: Holds the lock of the directory until the launcher, which may be another process, holds it itself.
-        undo: Removes what was made for the run, if it is not launched.
+        undo: Removes the files that were made for the run, if it is not launched.
     """
 
     def __init__(

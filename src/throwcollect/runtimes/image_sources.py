@@ -136,7 +136,7 @@ def find_address(root: Path) -> str | None:
 
 
 def _git(root: Path, *arguments: str) -> str | None:
-    """Run git in a clone, and return what it prints; None if it fails, or the directory is only a part of a clone."""
+    """Run git in a clone, and return its output; None if it fails, or the directory is only a part of a clone."""
     if not (root / ".git").exists():
         return None
     try:

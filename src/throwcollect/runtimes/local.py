@@ -72,7 +72,7 @@ class LocalNodes(NodeHost):
 
     Args:
         elsewhere: Endpoint of a router on another machine; None if the router is one of the nodes.
-        server: The server that forks the nodes, which its owner closes; None makes one that this host closes.
+        server: The server that forks the nodes; its owner closes it. With None, this host makes and closes a server.
 
     Raises:
         ConfigError: If the router's port is taken.

@@ -122,7 +122,7 @@ class NodeHost(ABC):
         return Connection(endpoint, self.place.key, self.config.run.domain_id, self.place.middleware)
 
     def open(self) -> tuple[str, ...]:
-        """Make what the nodes need, such as a network.
+        """Make everything that the nodes need, such as a network.
 
         Returns:
             Names of the nodes of a launcher that died, which run on as nodes of this launcher.

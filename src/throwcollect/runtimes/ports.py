@@ -45,14 +45,14 @@ def _bind(host: str, port: int, key: str, *, hint: str) -> socket.socket:
 
 
 def reach_from_here(host: str) -> str:
-    """The address at which processes of this machine reach one that listens at `host`, which may be all addresses."""
+    """The address at which processes of this machine reach a process that listens at `host`, maybe at all addresses."""
     if not _is_unspecified(host):
         return host
     return "::1" if ":" in host else LOOPBACK
 
 
 def reach_from_elsewhere(host: str) -> str:
-    """The address at which other machines most likely reach one that listens at `host`, which may be all addresses."""
+    """The address at which other machines most likely reach a process here that listens at `host`, maybe at all."""
     if not _is_unspecified(host):
         return host
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:

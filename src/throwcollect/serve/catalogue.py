@@ -78,7 +78,7 @@ class ComponentSection(Section):
     options: ContainerOptions = Field(default_factory=ContainerOptions)
     """Further options."""
     urdf: str | None = None
-    """File of a description of the robot that viewers are told; relative to the catalogue."""
+    """File with the description of the robot for viewers; relative to the catalogue."""
 
     @model_validator(mode="after")
     def _is_one_thing(self) -> ComponentSection:
@@ -109,7 +109,7 @@ class Component:
         name: Its name.
         pretty_name: The name that people see.
         kind: Whether its instances collect datasets, have simulations for clients alone, or are containers.
-        source: File of the configuration; of a container, what it is made from.
+        source: File of the configuration; for a container, its image and options.
         max_instances: How many instances may live at once.
         urdf: File of the robot's description for viewers of a container; None if it has none.
     """

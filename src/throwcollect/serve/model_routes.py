@@ -20,12 +20,12 @@ def make_model_routes(models: Models) -> APIRouter:
 
     @router.get("/{model}")
     def view(model: str) -> ModelView:
-        """What a model was learned from, how it hits, and what adapting did."""
+        """The throws that a model was learned from, its misses, and the effect of adapting it."""
         return models.view(model)
 
     @router.get("/{model}/aim")
     def aim(model: str, at: Annotated[list[float], Query()]) -> AimView:
-        """The parameters of a throw at a target: values of the model's targets, then of what is given with them."""
+        """The parameters of a throw at a target: values of the model's targets, then of the keys given with them."""
         return models.aim(model, at)
 
     return router

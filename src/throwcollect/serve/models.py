@@ -104,7 +104,7 @@ class Models:
         )
 
     def aim(self, name: str, target: Sequence[float]) -> AimView:
-        """Find parameters for a target: values of the model's targets, then of what is given with them.
+        """Find parameters for a target: values of the model's targets, then of the keys that are given with them.
 
         Raises:
             NotFoundError: If there is no such model.

@@ -1,4 +1,4 @@
-"""The whole state that clients are told: the runs that this machine remembers, and the catalogue."""
+"""The whole state that the server sends to clients: the runs that this machine remembers, and the catalogue."""
 
 from __future__ import annotations
 

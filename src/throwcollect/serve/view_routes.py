@@ -29,7 +29,7 @@ _XML = {"requestBody": {"required": True, "content": {"application/xml": {"schem
 
 
 def make_description_routes(instances: Instances) -> APIRouter:
-    """Make the routes on what the robot of a run looks like."""
+    """Make the routes on the look of the robot of a run."""
     router = APIRouter()
 
     @router.get("/instances/{instance}/urdf", response_class=Response, responses=describe_bytes("application/xml"))

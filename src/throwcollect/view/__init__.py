@@ -1,1 +1,1 @@
-"""A dataset made ready for Foxglove, Rerun and RViz, with frames, meshes and markers; animated pictures."""
+"""Prepares a dataset for Foxglove, Rerun and RViz, with frames, meshes and markers, and draws animated pictures."""

@@ -30,21 +30,21 @@ drawing = lazily("PIL.ImageDraw")
 _FORMATS = MappingProxyType({".webp": "WEBP", ".gif": "GIF"})
 _WIDTH, _HEIGHT = 640, 400
 _FINER = 1.5
-"""Pictures are drawn so many times as large and then made smaller, because the renderer does not smooth edges."""
+"""Pictures are drawn this many times as large and then made smaller, because the renderer does not smooth edges."""
 _FRAME_MS = 50
 _LAST_FRAME_MS = 1200
 _LIGHT = (2.0, -5.0, 8.0)
 _ROOM_M = 0.15
-"""How far the robot's shapes reach beyond the frames of its links, roughly."""
+"""Rough distance by which the robot's shapes reach beyond the frames of its links."""
 _GRID_M = 0.5
-# Multiples of four, as Pillow finds the nearest colour of a GIF by the upper six bits of each component alone.
+# The components are multiples of four, as Pillow uses only their upper six bits to find the nearest colour of a GIF.
 _SKY, _GROUND, _LINE = (244, 248, 252), (232, 236, 240), (208, 216, 224)
 _HELD, _FLOWN, _LANDED = (150, 156, 164), (255, 115, 0), (200, 30, 30)
 
 
 @dataclass(frozen=True)
 class Animation:
-    """An animated picture that was written; its duration [s] leaves out how long its last picture is shown."""
+    """An animated picture that was written; its duration [s] does not include the time of the last picture."""
 
     file: Path
     trial: int
@@ -54,9 +54,9 @@ class Animation:
 
 
 def render(directory: Path, output: Path, *, trial: int | None = None, slow: float = 1.0) -> Animation:
-    """Draw a throw of a dataset, by default the first one that has an episode, `slow` times slower than it was.
+    """Draw a throw of a dataset, by default the first one that has an episode, `slow` times slower than real time.
 
-    The file, ``.webp`` or ``.gif``, takes the place of one that is there.
+    `output` is a ``.webp`` or ``.gif`` file, which replaces an existing one.
 
     Raises:
         ConfigError: If there is no such format or trial, or the robot's files cannot be read.
@@ -104,7 +104,7 @@ def _draw_all(config: Config, joints: tuple[str, ...], samples: Samples, row: di
             frames = np.array(renderer.find_frames())
             points += [frames - _ROOM_M, frames + _ROOM_M]
         everything = np.concatenate(points)
-        # The room around the feet reaches below the ground, where nothing is to be seen.
+        # The box around the feet would reach below the ground, where there is nothing to see.
         everything[:, 2] = np.maximum(everything[:, 2], 0)
         camera = camera_on(everything, _WIDTH / _HEIGHT)
         ground = _Ground(camera, everything[:, :2].mean(axis=0))
@@ -118,7 +118,7 @@ def _draw_all(config: Config, joints: tuple[str, ...], samples: Samples, row: di
             ground.trace(picture, ball[released:], _FLOWN)
             seen = renderer.draw(*ground.size, view=camera.view, projection=camera.projection, light=_LIGHT)
             body = images.fromarray(seen)
-            # The drawn robot is its own mask: it is transparent where nothing was drawn.
+            # The picture of the robot is its own mask, because it is transparent where nothing was drawn.
             picture.paste(body, (0, 0), body)
             pictures.append(picture.resize((_WIDTH, _HEIGHT), images.Resampling.LANCZOS))
     return pictures
@@ -127,8 +127,8 @@ def _draw_all(config: Config, joints: tuple[str, ...], samples: Samples, row: di
 def _reduce_colours(pictures: list[Any]) -> list[Any]:
     """Give pictures the 256 colours that a GIF can have.
 
-    Thin lines have so few pixels that their colours would not be chosen: the cross would be as orange as the path. So
-    these colours are set, with those of their smooth edges on the ground.
+    Thin lines have so few pixels that their colours would not be chosen, and the cross would be as orange as the path.
+    So the colours of lines, and of their smooth edges on the ground, are set here.
     """
     ground = np.array(_GROUND)
     fixed = [_SKY, _GROUND, _LINE] + [
@@ -149,9 +149,9 @@ def _place(renderer: Renderer, joints: tuple[str, ...], samples: Samples, number
 
 
 class _Ground:
-    """The ground with lines every half metre, and everything that is drawn on it but robot and ball.
+    """Draws the ground, with lines every half metre, and everything on it but robot and ball.
 
-    Its middle in world [m] has the shape ``(2,)``.
+    `middle` is the middle of the ground in world [m], shape ``(2,)``.
     """
 
     def __init__(self, camera: Camera, middle: NDArray[np.float64]) -> None:
@@ -167,7 +167,7 @@ class _Ground:
             for x, y in ((along, across), (across, along)):
                 line = np.column_stack([x, y, np.zeros_like(x)])
                 line[:, :2] += np.round(middle / _GRID_M) * _GRID_M
-                # Points behind the camera would be projected, too, and appear upside down in the picture.
+                # Points behind the camera are left out, because they would be projected upside down into the picture.
                 pen.line(self._pixels(line[camera.faces(line)]), fill=_LINE, width=1)
 
     def _pixels(self, points: NDArray[np.float64]) -> list[tuple[float, float]]:

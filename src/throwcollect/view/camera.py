@@ -1,4 +1,4 @@
-"""A camera that sees a throw from the robot's right: where it stands, and where in its picture points are."""
+"""Places a camera that sees a throw from the robot's right, and finds the places of points in its picture."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class Camera:
 
     @property
     def view(self) -> list[float]:
-        """World to camera as OpenGL has it, column by column."""
+        """Matrix from world to camera in the convention of OpenGL, column by column."""
         matrix = np.eye(4)
         matrix[:3, :3] = self.axes
         matrix[:3, 3] = -self.axes @ self.eye
@@ -41,7 +41,7 @@ class Camera:
 
     @property
     def projection(self) -> list[float]:
-        """Camera to clip space as OpenGL has it, column by column."""
+        """Matrix from camera to clip space in the convention of OpenGL, column by column."""
         matrix = np.zeros((4, 4))
         matrix[0, 0], matrix[1, 1] = 1 / (_TANGENT * self.aspect), 1 / _TANGENT
         matrix[2, 2] = (_FAR_M + _NEAR_M) / (_NEAR_M - _FAR_M)
@@ -70,7 +70,7 @@ class Camera:
 
 
 def camera_on(points: NDArray[np.float64], aspect: float) -> Camera:
-    """Place the camera so that it has all points in its picture and is as near as that allows.
+    """Place the camera as near as possible with all points in its picture.
 
     The points are in world [m], shape ``(n, 3)``; the aspect is width over height of the picture.
     """
@@ -86,7 +86,7 @@ def camera_on(points: NDArray[np.float64], aspect: float) -> Camera:
     for axis, tangent in ((0, _TANGENT * aspect), (1, _TANGENT)):
         slope = tangent * (1 - 2 * _MARGIN)
         upper, lower = np.max(seen[:, axis] + slope * seen[:, 2]), np.max(-seen[:, axis] + slope * seen[:, 2])
-        # The two outermost lines of this slope, one on each side, meet at the nearest place from which all is seen.
+        # The two outermost lines of this slope, one on each side, meet at the nearest place that sees all points.
         place[axis] = (upper - lower) / 2
         needed.append((upper + lower) / (2 * slope))
     place[2] = max(needed)

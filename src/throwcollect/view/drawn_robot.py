@@ -81,7 +81,7 @@ class DrawnRobot:
             path = Path(package, "package.xml")
             source = self.share / path
             text = source.read_text(encoding="utf-8") if source.exists() else "<package><name></name></package>\n"
-            # URLs of meshes have the name of the directory, but Foxglove searches for the name in `package.xml`.
+            # URLs of meshes contain the name of the directory, but Foxglove looks for the name in `package.xml`.
             renamed = re.sub(r"<name>[^<]*</name>", f"<name>{package}</name>", text, count=1)
             (directory / path).write_text(renamed, encoding="utf-8")
 
@@ -112,7 +112,7 @@ def read_drawn_robot(description: str, tool: str, share: Path) -> DrawnRobot:
                     for material in shape.findall("material"):
                         shape.remove(material)
                     shape.append(_material("tool", _TOOL_RGBA))
-        # A material may be defined in one place of a URDF, and only named in others.
+        # A material may be defined at one place of a URDF, and only named at others.
         colors = {name: rgba for each in robot.iter("material") for name, rgba in _color(each).items() if name}
         shapes = tuple(
             _shape(link.attrib["name"], visual, colors) for link in robot.iter("link") for visual in link.iter("visual")
@@ -164,7 +164,7 @@ def _shape(link: str, visual: ElementTree.Element, colors: dict[str, Rgba]) -> D
         size = (diameter, diameter, float(geometry.attrib["length"]))
     else:
         raise ValueError(f"link {link} has a {geometry.tag}")
-    # Materials need no name, so the colour of the shape's own comes first.
+    # A material need not have a name, so the colour that the shape itself defines comes first.
     found = {} if material is None else colors | _color(material)
     rgba = _DEFAULT_RGBA if material is None else found.get(material.get("name", ""), _DEFAULT_RGBA)
     return DrawnShape(link, position, rotation, size, geometry.tag, mesh, rgba)

@@ -70,7 +70,7 @@ def _scene() -> dict[str, Any]:
         "followMode": "follow-none",
         "followTf": WORLD,
         "cameraState": camera,
-        # The meshes are STL with z up, as ROS has it; the application's default is y.
+        # The meshes are STL files with z up, as usual in ROS; the default of the application is y.
         "scene": {"meshUpAxis": "z_up", "transforms": {"showLabel": False, "axisScale": 0, "lineWidth": 0}},
         "topics": {
             "/view/robot": {"visible": True, "showOutlines": False},
@@ -78,7 +78,7 @@ def _scene() -> dict[str, Any]:
             "/view/throw": {"visible": True, "showOutlines": False},
             "/view/throws": {"visible": True, "showOutlines": False},
             "/view/path": {"visible": False},
-            # The same robot, but with paths of meshes, which not every machine has.
+            # This is the same robot, but with paths of mesh files, which not every machine has.
             "/robot_description": {"visible": False},
         },
         "layers": layers,
@@ -87,7 +87,7 @@ def _scene() -> dict[str, Any]:
 
 def _plot(paths: Sequence[Mapping[str, Any]], title: str) -> dict[str, Any]:
     return {
-        # Lichtblick, which began as a copy of Foxglove, has a name of its own for the title.
+        # Lichtblick, which began as a copy of Foxglove, uses another key for the title.
         "foxglovePanelTitle": title,
         "lichtblickPanelTitle": title,
         "paths": list(paths),

@@ -28,7 +28,7 @@ _OTHERS_ALPHA = 0.25
 _POINT_M, _TEXT_M, _LINE_M, _THIN_LINE_M, _PLANE_M = 0.035, 0.07, 0.012, 0.005, 0.002
 _MARGIN_M = 0.5
 _POINTS_PER_S = 100
-"""Points of a path for each second of it: the eye could not tell more apart."""
+"""Number of points of a path for each second; the eye could not distinguish more."""
 
 
 def shape_markers(name: str, shapes: Sequence[DrawnShape], share: Path, stamp_ns: int) -> Any:
@@ -51,7 +51,7 @@ def shape_markers(name: str, shapes: Sequence[DrawnShape], share: Path, stamp_ns
     markers = []
     for number, shape in enumerate(shapes):
         drawn = _marker(name, kinds[shape.kind], shape.rgba, shape.size, stamp_ns, number=number)
-        # Viewers move a locked marker with its frame, so that the shapes are published only once.
+        # The markers are locked: viewers move them with their frames, so the shapes are published only once.
         drawn.header.frame_id, drawn.frame_locked = shape.link, True
         drawn.mesh_resource = meshes.get(shape.mesh, "")
         _place(drawn, *shape.position)
@@ -62,7 +62,7 @@ def shape_markers(name: str, shapes: Sequence[DrawnShape], share: Path, stamp_ns
 
 
 def throw_markers(throw: ShownThrow) -> Any:
-    """A visualization_msgs/MarkerArray of the throw that is shown, which replaces that of the throw before."""
+    """A visualization_msgs/MarkerArray of the throw that is shown, which replaces the markers of the throw before."""
     array, marker = (get_message(f"visualization_msgs/msg/{name}") for name in ("MarkerArray", "Marker"))
     stamp = throw.start_ns
     ball = _marker("ball", marker.SPHERE, BALL_RGBA, (2 * throw.config.ball.radius_m,) * 3, stamp)
@@ -78,7 +78,7 @@ def all_markers(throws: Sequence[ShownThrow]) -> Any:
     """A visualization_msgs/MarkerArray with thin paths of all throws, and the landing plane of the first."""
     array, marker = (get_message(f"visualization_msgs/msg/{name}") for name in ("MarkerArray", "Marker"))
     stamp = throws[0].start_ns
-    # The first corner is the robot's base, so that the plane reaches there, too.
+    # The first of these points is the robot's base, so that the plane includes it.
     corners = np.concatenate([np.zeros((1, 2)), *(throw.path[:, :2] for throw in throws)])
     low, high = corners.min(axis=0) - _MARGIN_M, corners.max(axis=0) + _MARGIN_M
     plane = _marker("landing plane", marker.CUBE, _PLANE, (*(high - low), _PLANE_M), stamp)
@@ -138,7 +138,8 @@ def _point(name: str, row: Row, stamp_ns: int) -> list[Any]:
     label = _marker(name, marker.TEXT_VIEW_FACING, _LABEL, (0.0, 0.0, _TEXT_M), stamp_ns, number=1)
     label.text = text
     _place(dot, x, y, z)
-    # The label of the release is below its dot: a ball released on its way down has its apex there, too.
+    # The label of the release is below its dot, because the apex of a ball released on its way down is at the same
+    # place.
     _place(label, x, y, z + (-1.5 if name == "release" else 1.5) * _TEXT_M)
     return [dot, label]
 

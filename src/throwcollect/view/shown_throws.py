@@ -1,4 +1,4 @@
-"""The throws of a dataset that are shown, and when."""
+"""Chooses the throws of a dataset that are shown, and the times at which they are shown."""
 
 from __future__ import annotations
 

@@ -10,11 +10,11 @@ from throwcollect.view.shown_throws import ShownThrow
 
 NAME = "throw"
 HARDWARE = "throwcollect"
-"""Hardware of the status. By this and `NAME` a layout names the status that a panel shows."""
+"""Hardware id of the status; a layout names the status for a panel by this and `NAME`."""
 
 
 def throw_facts(throw: ShownThrow) -> Any:
-    """A diagnostic_msgs/DiagnosticArray with the row of a throw, but for columns that are null.
+    """A diagnostic_msgs/DiagnosticArray with the row of a throw, without columns that are null.
 
     Its only status is OK if the trial succeeded, else a warning.
     """

@@ -22,7 +22,7 @@ from throwcollect.view.viewer_recording import ViewRecording
 RECORDING = "throws.mcap"
 LAYOUT = "foxglove.json"
 
-# In ROS, a stamp of 0 asks for the latest transform, and `ViewRecording` takes 0 for no stamp yet.
+# Stamps begin above 0: in ROS, a stamp of 0 means the latest transform, and in `ViewRecording` no stamp yet.
 _FIRST_NS = 1_000_000_000
 _PAUSE_NS = 1_000_000_000
 
@@ -50,7 +50,7 @@ def view(directory: Path, output: Path, trials: Iterable[int] | None = None) -> 
     The directory to write must not exist, or be empty.
 
     Raises:
-        ConfigError: If there is something at `output`, or the robot's files cannot be read.
+        ConfigError: If `output` exists and is not an empty directory, or the robot's files cannot be read.
         DatasetError: If the dataset is damaged or not finished, a trial has no episode, or `output` cannot be written.
     """
     dataset = Dataset.open(directory)
@@ -81,7 +81,7 @@ def view(directory: Path, output: Path, trials: Iterable[int] | None = None) -> 
 
 
 def _schedule(dataset: Dataset, rows: Iterable[Row]) -> list[ShownThrow]:
-    """Schedule throws one after another with a pause, whatever time lies between them in the dataset."""
+    """Schedule throws one after another with a pause, regardless of their times in the dataset."""
     throws, start = [], _FIRST_NS
     for row in rows:
         samples = _samples(dataset, row)

@@ -94,7 +94,7 @@ class ViewRecording:
             self._put_samples(samples(throw), throw.start_ns)
 
     def finish(self, name: str) -> FileSummary:
-        """Write the end of the file, and sum up for a bag's metadata what it holds under its name."""
+        """Write the end of the file, and sum up its contents for a bag's metadata; `name` is the file's name there."""
         self._writer.finish()  # type: ignore[no-untyped-call]
         return FileSummary(name, *self._times, dict(sorted(self._counts.items())))
 
@@ -115,7 +115,7 @@ class ViewRecording:
         self._put("/tf_static", start, transforms_type(transforms=fixed))
         parts = {"tool": [shape for shape in robot.shapes if shape.link == tool]}
         if self._looks is None:
-            # The robot's meshes are large, and the same in all trials.
+            # The robot's meshes are large, and the same in all trials, so they are written only once.
             parts["robot"] = [shape for shape in robot.shapes if shape.link != tool]
         for name, shapes in parts.items():
             self._put(f"/view/{name}", start, shape_markers(name, shapes, robot.share, start))
@@ -130,7 +130,7 @@ class ViewRecording:
         self._times = (self._times[0] or stamp_ns, stamp_ns)
 
     def _put_samples(self, samples: Samples, start_ns: int) -> None:
-        # Throws follow one another here, whatever stamps they have in the dataset.
+        # Throws follow one another in this file, so the stamps of the dataset are replaced.
         stamps = samples.stamps_ns - samples.stamps_ns[0] + start_ns
         recording = Recording(replace(samples, stamps_ns=stamps), {})
         columns = [(self._numbers[topic.name], topic.encode(recording)) for topic in self._topics]

@@ -37,7 +37,7 @@ def find_program() -> str:
 
 
 def call(what: str, *arguments: str, cwd: Path | None = None, places: Mapping[str, Path] = _NO_PLACES) -> str:
-    """Run Apptainer, and return what it prints; the message begins with `what` if it fails.
+    """Run Apptainer, and return its output; if it fails, the message of the error begins with `what`.
 
     `places` has directories for Apptainer, by the end of the name of the environment variable that Apptainer reads,
     such as ``TMPDIR``; a variable that the user has set is left as it is.

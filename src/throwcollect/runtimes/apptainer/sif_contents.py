@@ -1,4 +1,4 @@
-"""Reads and checks what is in a SIF, the file that Apptainer runs."""
+"""Reads and checks the contents of a SIF, the file that Apptainer runs."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def read_labels(sif: Path) -> dict[str, str]:
         raise ConfigError(f"{sif}: {error.strerror}", hint=f"{command('image', 'sif', '-o', sif)} makes it") from error
     except OSError as error:
         raise unreadable(sif, error) from error
-    printed = call(f"{sif}: what it holds cannot be read", "inspect", "--json", str(sif))
+    printed = call(f"{sif}: its labels cannot be read", "inspect", "--json", str(sif))
     return {name: label for name, label in _labels_of(json.loads(printed)).items() if label != UNKNOWN}
 
 

@@ -18,7 +18,7 @@ from throwcollect.runtimes.docker.address import no_answer
 
 # The client raises any of the last three if a connection breaks in the middle of an answer or of a stream.
 ENGINE_ERRORS = (DockerException, HTTPError, OSError, struct.error, json.JSONDecodeError)
-"""The errors that the client raises when the engine refuses, fails or is gone."""
+"""The errors that the client raises when the engine refuses, fails or has ended."""
 
 PATIENCE_S = 30.0
 """Time that a request waits for an answer of the engine by default."""

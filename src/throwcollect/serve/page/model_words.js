@@ -62,7 +62,7 @@ export function describe({ learned_from: name, throws, error, parameters, target
   return texts.join(" ");
 }
 
-/** Rows of the table of errors: what was thrown with, median, what nine of ten stay below, largest. */
+/** Rows of the table of errors: the model that threw, the median, what nine of ten stay below, and the largest. */
 export function tabulate({ trained, adapted }) {
   // A line may be broken only between two units.
   const tell = (errors, name) => [...new Set(byUnit(errors).map((each) => tellMiss(each[name], each.unit).replaceAll(" ", "\u00a0")))].join(", ");

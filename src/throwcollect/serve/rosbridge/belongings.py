@@ -31,7 +31,7 @@ class Belongings(Generic[ABelonging]):
         self._by_name: dict[str, ABelonging] = {}
 
     def lose(self) -> None:
-        """Forget the session, which is gone."""
+        """Forget the session, which has ended."""
         for belonging in self._by_name.values():
             belonging.lose()
 

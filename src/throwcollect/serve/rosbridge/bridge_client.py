@@ -152,7 +152,7 @@ class BridgeClient:
             self._send(frame)
 
     def answer(self, fields: Mapping[str, object], form: Form) -> None:
-        """Send an operation; what is None is left out."""
+        """Send an operation; fields that are None are left out."""
         filled = {name: value for name, value in fields.items() if value is not None}
         self.send(encode(filled, form.compression), form.fragment_size)
 

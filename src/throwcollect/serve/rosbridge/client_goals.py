@@ -41,7 +41,7 @@ class Goal(Errand):
         self.is_cancelled = False
 
     def tell_feedback(self, message: Any) -> None:
-        """Send feedback to the client; what comes after the result is dropped."""
+        """Send feedback to the client; feedback after the result is dropped."""
         if self.is_open:
             self._answer("action_feedback", plain_values(message.feedback, self.form.compression))
 

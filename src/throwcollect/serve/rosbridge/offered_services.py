@@ -40,7 +40,7 @@ class OfferedService:
         """Withdraw the service; nodes that wait for an answer get none."""
         if self._service is not None:
             self._client.session.node.destroy_service(self._service)
-        # This ends callbacks that wait for the client. The service is gone, so their answers are not sent.
+        # This ends callbacks that wait for the client. The service is withdrawn, so their answers are not sent.
         for future, response in self._pending.values():
             future.set_result(response)
         self.lose()

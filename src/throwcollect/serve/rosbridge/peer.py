@@ -27,7 +27,7 @@ class Peer(Protocol):
         """Send a frame, in parts if it is a text longer than ``fragment_size``, unless that is 0."""
 
     def answer(self, fields: Mapping[str, object], form: Form) -> None:
-        """Send an operation; what is None is left out."""
+        """Send an operation; fields that are None are left out."""
 
     def say(self, level: Level, text: str, request: RequestId = None) -> None:
         """Send a status message about a request, if the client wants messages of this level."""

@@ -48,7 +48,7 @@ class Advertised:
         self.publisher = self.client.session.node.create_publisher(message_type, self.topic, qos)
 
     def lose(self) -> None:
-        """Forget the session, which is gone."""
+        """Forget the session, which has ended."""
         self.publisher = None
 
     def close(self) -> None:

@@ -185,7 +185,7 @@ def _names(infos: Iterable[object]) -> list[str]:
 
 
 def _definition(type_name: str) -> str:
-    """Definition of a message as rosbag2 stores it; empty for one that only an installed ROS knows."""
+    """Definition of a message as rosbag2 stores it; empty for a message that only an installed ROS has."""
     try:
         return message_definition(type_name)
     except ValueError:
