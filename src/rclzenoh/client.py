@@ -58,7 +58,7 @@ class Client(Receiver):
         return endpoint.node.context.graph.count(EntityKind.SERVICE, endpoint.name, endpoint.type) > 0
 
     def wait_for_service(self, timeout_sec: float | None = None) -> bool:
-        """Wait until somebody offers the service, for at most ``timeout_sec``, and tell whether somebody does.
+        """Wait until somebody offers the service, for at most ``timeout_sec``; return whether somebody does.
 
         None or a negative time is no limit.
         """

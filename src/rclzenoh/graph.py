@@ -86,7 +86,7 @@ class Graph:
         )
 
     def wait_for(self, condition: Callable[[], bool], timeout_s: float | None, alive: Callable[[], bool]) -> bool:
-        """Wait until a condition is true of the graph, and tell whether it is.
+        """Wait until a condition is true of the graph; return whether it is.
 
         Args:
             condition: What to wait for.

@@ -82,7 +82,7 @@ class ActionClient:
         )
 
     def wait_for_server(self, timeout_sec: float | None = None) -> bool:
-        """Wait until somebody offers the action, for at most ``timeout_sec``, and tell whether somebody does.
+        """Wait until somebody offers the action, for at most ``timeout_sec``; return whether somebody does.
 
         None or a negative time is no limit.
         """

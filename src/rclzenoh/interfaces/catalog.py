@@ -142,7 +142,7 @@ def _add_texts(name: str, texts: dict[str, str]) -> None:
 
 
 def _write_type(field: Field) -> str:
-    """Type of a field of a structure that generators derive: they have neither bounded strings nor fixed arrays."""
+    """Type of a field of a derived structure; these have neither bounded strings nor fixed arrays."""
     bound = "" if field.bound is None else f"<={field.bound}"
     return _short_name(field.type) + (f"[{bound}]" if field.sequence else "")
 

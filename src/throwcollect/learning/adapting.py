@@ -37,7 +37,7 @@ more than its width."""
 _NOT_MIXED_UP = {"m": "m, not cm or mm", "rad": "rad, not degrees"}
 """Units of places, and those that people measure in."""
 _CLEARLY = 3.0
-"""Adapting helps if the sum of squared misses falls by more than the square of so many standard deviations."""
+"""Adapting helps if the sum of squared misses falls by more than the square of this many standard deviations."""
 
 
 class FarThrowError(ConfigError):

@@ -153,7 +153,7 @@ class Model:
         Args:
             simulator: Simulates the world of the dataset.
             targets: Number of targets of each seed.
-            seed: The first seed of their choice; models of one dataset get the same ones.
+            seed: The first seed for choosing targets; models of one dataset get the same targets.
             seeds: Number of seeds, whose medians are taken.
             world: Simulates another world, in which the model is adapted by a few throws; None for none.
             scatter: Standard deviation of noise on the measured ends of those throws, in the unit of the targets.

@@ -19,7 +19,7 @@ _Found = TypeVar("_Found")
 
 
 def select_trials(dataset: Dataset, *, sample: int | None) -> list[int]:
-    """List the trials that have an episode, in order; with `sample`, so many of them, always the same random choice.
+    """List the trials that have an episode, in order; with `sample`, only that many, always the same random choice.
 
     Raises:
         DatasetError: If no trial has an episode.

@@ -26,7 +26,7 @@ _KINDS = (ConfigError, WorkerError, DatasetError, LossError, Interrupted)
 
 @dataclass(frozen=True)
 class Summary(Info):
-    """Summary of a run's dataset; `open` tells whether anybody could join the run."""
+    """Summary of a run's dataset; `open` says whether anybody could join the run."""
 
     open: bool = False
 

@@ -52,23 +52,23 @@ class ComponentSection(Section):
     """
 
     pretty_name: str | None = None
-    """What people are shown; the name by default."""
+    """The name that people see; by default, the name of the component."""
     config: str | None = None
     """Configuration of a collection; relative to the catalogue."""
     session: str | None = None
-    """Configuration of simulations without a coordinator, for clients by hand; relative to the catalogue."""
+    """Configuration of simulations without a coordinator, which clients drive; relative to the catalogue."""
     max_instances: PositiveInt = 1
     """How many instances may live at once."""
     image: Annotated[str, Field(min_length=1)] | None = None
     """Image of a container, which may join a run."""
     command: list[str] | None = None
-    """What it runs; that of the image by default."""
+    """The command that the container runs; by default, that of the image."""
     environment: dict[Variable, str | int | float] = Field(default_factory=dict)
     """Further environment variables."""
     volumes: list[Mount] = Field(default_factory=list)
-    """Directories and files with data of the host that are there in the container, too; not below /data or /key."""
+    """Directories and files of the host that are mounted into the container; not below /data or /key."""
     networks: list[Network] = Field(default_factory=list)
-    """Networks of the engine that it joins."""
+    """Networks of the engine that the container joins."""
     ports: dict[ContainerPort, HostPort] = Field(default_factory=dict)
     """Ports of the container (`80`, `53/udp`) and those of 127.0.0.1 at which they are published."""
     cpus: PositiveFloat | None = None

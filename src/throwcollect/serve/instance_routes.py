@@ -112,7 +112,7 @@ def make_instance_routes(instances: Instances, lookout: Lookout) -> APIRouter:
 
     @router.delete("", status_code=202)
     def delete_all() -> list[str]:
-        """Stop all runs that clients have begun and that live; tells their ids."""
+        """Stop all living runs that clients have begun; returns their ids."""
         return instances.stop_all()
 
     @router.delete("/{instance}", status_code=202)
@@ -129,7 +129,7 @@ def make_instance_routes(instances: Instances, lookout: Lookout) -> APIRouter:
 
 
 def make_id(component: str) -> str:
-    """Make an id for an instance of a component, from its name, as far as that fits, and the present time."""
+    """Make an id for an instance of a component, from the component's name, cut if too long, and the present time."""
     suffix = f"-{time.time_ns() // 1_000_000:x}"
     return component[: LONGEST_NAME - len(suffix)] + suffix
 

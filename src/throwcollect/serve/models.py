@@ -66,7 +66,7 @@ class Models:
     """The models in a directory, which are only read.
 
     Attributes:
-        directory: Each model is in a directory of its own in there. It need not exist.
+        directory: The directory that holds a directory for each model. It need not exist.
     """
 
     directory: Path

@@ -56,7 +56,7 @@ class ProblemResponse(JSONResponse):
 
 
 def problem(status: int, title: str, headers: dict[str, str] | None = None, **facts: Any) -> ProblemResponse:
-    """Make the answer that tells of a problem: where and what, and further ``facts`` that are not None."""
+    """Make the answer that describes a problem: status, title, and those of the further ``facts`` that are not None."""
     content = {"title": title, "status": status, **{key: value for key, value in facts.items() if value is not None}}
     return ProblemResponse(content, status_code=status, headers=headers)
 
@@ -73,7 +73,7 @@ def describe_problems(*statuses: int) -> dict[int | str, dict[str, Any]]:
 
 
 def answer(error: ThrowcollectError) -> ProblemResponse:
-    """Make the answer that tells of one of the product's errors."""
+    """Make the answer that describes one of our own errors."""
     status = next((status for kind, status in _STATUS if isinstance(error, kind)), 500)
     problems = None
     if isinstance(error, ConfigError):

@@ -99,7 +99,7 @@ def find_mesh(package: str, path: str) -> Path:
         ConfigError: If the description of a robot cannot be read.
     """
     root = _find_packages().get(package)
-    # Neither dots nor links may lead out of the package. A path that is not possible for a file raises an error.
+    # Neither dots nor links may lead out of the package. A path that no file can have raises an error.
     with suppress(OSError, ValueError):
         if root is not None and ".." not in PurePosixPath(path).parts:
             file = (root / path).resolve(strict=True)

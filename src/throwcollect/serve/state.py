@@ -36,7 +36,7 @@ class ComponentState:
 
     Attributes:
         name: Its name.
-        pretty_name: What people are shown.
+        pretty_name: The name that people see.
         kind: Whether its instances collect datasets, have simulations for clients alone, or are containers.
         max_instances: How many instances may live at once.
         instances: Ids of those that live.

@@ -51,11 +51,11 @@ class Errands(Generic[AnErrand]):
     def begin(
         self, errand: AnErrand, is_ready: Callable[[], bool], send: Callable[[], object], patience_s: float = READY_S
     ) -> None:
-        """Send a request as soon as the node is found, and watch from then on whether the node is still there.
+        """Send a request as soon as the node is found, and check from then on whether the node still exists.
 
         Args:
-            errand: What is asked.
-            is_ready: Tells whether a node offers the service or action.
+            errand: The request.
+            is_ready: Returns whether a node offers the service or action.
             send: Sends the request; may raise `TypeError` or `ValueError` if the request is malformed.
             patience_s: Time within which the node has to be found [s].
         """

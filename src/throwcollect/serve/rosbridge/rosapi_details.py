@@ -1,4 +1,4 @@
-"""Definitions of messages and services as rosapi tells them: one entry for each message inside."""
+"""Describes messages and services in the form of rosapi: one entry for each message inside."""
 
 from __future__ import annotations
 
