@@ -126,7 +126,7 @@ class BridgeClient:
         """Forget the session, as the router has gone, and tell the client."""
         for part in self._parts:
             part.lose()
-        self.say("error", "the router of the run has gone; requests wait until it is back")
+        self.say("error", "the router of the run has gone; new requests wait until it is back")
 
     def restore(self) -> None:
         """Make everything that the client had again, in a new session."""
