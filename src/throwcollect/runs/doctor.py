@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Literal
 
 from throwcollect import ros_installation
+from throwcollect.build import build_digest
 from throwcollect.engine_packages import PACKAGES
 from throwcollect.errors import ConfigError, MemberError
 from throwcollect.extras import (
@@ -40,6 +41,7 @@ _ROS_ROUTER_PORT = 7447
 """Port at which ROS 2 nodes on rmw_zenoh_cpp look for a router."""
 
 _LEAST_DISK_GIB = 1.0
+_DIGITS = 10
 
 
 def _check_python() -> Check:
@@ -67,10 +69,14 @@ def _check_memory() -> Check:
 
 
 def _check_engine(name: str) -> Check:
-    """Check a physics engine; a missing one is a problem only if no other one is installed."""
+    """Check a physics engine; a missing one is a problem only if no other one is installed.
+
+    Of an installed one, the beginning of its build digest is shown, which two machines compare before one joins a run.
+    """
     package = PACKAGES[name]
     if is_installed(package.module):
-        return Check(package.module, "ok", version(package.distribution))
+        found = f"{version(package.distribution)}, build {build_digest(name)[:_DIGITS]}"
+        return Check(package.module, "ok", found)
     others = any(is_installed(each.module) for each in PACKAGES.values())
     hint = f"not installed, for sim.engine: {name}; try: {MissingExtraError(package.module).hint}"
     return Check(package.module, "note" if others else "problem", hint)

@@ -67,8 +67,8 @@ class JoinToken:
             raise ConfigError(
                 f"run {self.run}: this machine has other sources, another build of the engine {self.engine} or another "
                 "robot model, and would collect other bytes",
-                hint="install the same version on both machines, or the image on both; throwcollect doctor shows what "
-                "is installed",
+                hint="install the same version on both machines, or the image on both; throwcollect doctor shows the "
+                "build of each",
             )
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from throwcollect import members
+from throwcollect.build import build_digest
 from throwcollect.members import names_of
 from throwcollect.robots.talos import TALOS
 from throwcollect.ros.middleware import VARIABLE, _choose_installed
@@ -37,6 +38,9 @@ def test_doctor_finds_no_problem_on_a_machine_that_runs_the_tests(tmp_path: Path
     ]
     assert [check for check in checks.values() if check.status == "problem"] == []
     assert str(tmp_path) in checks["disk"].finding
+    # Two machines whose builds differ cannot simulate for one run.
+    for package, engine in (("pybullet", "bullet"), ("mujoco", "mujoco")):
+        assert checks[package].finding.endswith(f", build {build_digest(engine)[:10]}")
 
 
 def test_doctor_lists_installed_and_missing_extras(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
