@@ -4,6 +4,7 @@ import os
 import runpy
 import shutil
 import subprocess
+import sys
 import time
 from pathlib import Path
 
@@ -28,6 +29,7 @@ def put(
     name: str,
     *,
     version: str = "3.11",
+    fast: bool = False,
     makes: bool = True,
     pip: str = "exit 1",
     fetch: str = "exit 1",
@@ -39,6 +41,7 @@ def put(
         directory: Where it lies.
         name: Its name.
         version: Its version.
+        fast: Whether it was compiled with optimisation.
         makes: Whether it has the modules that make environments.
         pip: What it does as pip.
         fetch: What it does with `fetch_uv.py`.
@@ -51,6 +54,7 @@ case "$1$2$3" in
     -c*ensurepip*) {":" if makes else "exit 1"} ;;
 esac
 case "$1$2$3" in
+    -c*enable-optimizations*) {"exit 0" if fast else "exit 1"} ;;
     -c*"(3, 10) <= sys.version_info < (3, 15)"*) case {version} in 3.1?) exit 0 ;; *) exit 1 ;; esac ;;
     -c*"(3, 10) <= sys.version_info < (3, 12)"*) case {version} in 3.10|3.11) exit 0 ;; *) exit 1 ;; esac ;;
     -c*) case {version} in 3.12|3.13|3.14) exit 0 ;; *) exit 1 ;; esac ;;
@@ -77,6 +81,51 @@ def test_the_first_python_with_wheels_makes_the_environment(commands: Path) -> N
     put(commands, "uv")
     code, out, _ = make_environment()
     assert (code, out.splitlines()[-1]) == (0, "python3.10 -m venv there")
+
+
+def test_of_several_pythons_an_optimised_one_makes_the_environment(
+    commands: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    slow, second, cannot = (tmp_path / name for name in ("slow", "also fast", "cannot"))
+    for directory in (slow, second, cannot):
+        directory.mkdir()
+    put(slow, "python3.11")
+    put(cannot, "python3.11", fast=True, makes=False)
+    monkeypatch.setenv("PATH", f"{slow}:{cannot}::{second}:{commands}")
+    assert make_environment()[1].splitlines()[-1] == "python3.11 -m venv there"
+    put(second, "python3.11", fast=True)
+    put(commands, "python3.11", fast=True)
+    told, made = make_environment()[1].splitlines()
+    assert told.endswith(f" of {second}")
+    assert made == "python3.11 -m venv there"
+    assert make_environment(str(slow / "python3.11"))[1].splitlines()[-1] == made
+    assert str(second) not in make_environment(str(slow / "python3.11"))[1]
+
+
+@pytest.mark.parametrize(
+    ("prefix", "options", "header", "chosen"),
+    [
+        ("/usr", "'--prefix=/usr'", "Python.h", True),
+        ("/opt", "'--prefix=/opt' '--enable-optimizations'", "Python.h", True),
+        ("/opt", "'--prefix=/opt'", "Python.h", False),
+        ("/usr", "'--prefix=/usr'", "another.h", False),
+    ],
+)
+def test_a_python_is_preferred_if_it_was_compiled_with_optimisation_and_has_headers(
+    prefix: str, options: str, header: str, chosen: bool, commands: Path, tmp_path: Path
+) -> None:
+    (tmp_path / header).touch()
+    (tmp_path / "sitecustomize.py").write_text(
+        f"import sys, sysconfig\nsys.base_prefix = {prefix!r}\n"
+        f"sysconfig.get_config_vars()['CONFIG_ARGS'] = {options!r}\n"
+        f"sysconfig.get_path = lambda name: {str(tmp_path)!r}\n"
+    )
+    python = commands / "python3.11"
+    python.write_text(f'#!/bin/sh\n[ "$1" != -c ] || PYTHONPATH={tmp_path} exec {sys.executable} "$@"\necho "$@"\n')
+    python.chmod(0o755)
+    told, made = make_environment()[1].splitlines()
+    assert told.endswith(f" of {commands}") == chosen
+    assert made == "-m venv there"
 
 
 def test_without_a_suitable_python_uv_fetches_one(commands: Path) -> None:
