@@ -322,7 +322,7 @@ def test_json_output_is_one_document_without_messages(
         ["dataset", "info", str(dataset[0])],
     ):
         said = say(*arguments, "--json")
-        assert (arguments, said.code, said.err) == (arguments, 0, "")
+        assert (arguments, said.code, said.err) == (arguments, 0, ""), said.out
         assert json.loads(said.out)
     told = json.loads(say("dataset", "info", str(dataset[0]), "--json").out)
     assert told.items() <= dataset[1].items()
