@@ -102,7 +102,7 @@ class Executor:
         while True:
             if not self.context.ok():
                 raise ExternalShutdownException("the context was shut down")
-            timer, wait = self._next_timer()
+            timer, wait = self._find_next_timer()
             queued = not self._queue.empty()
             # Timers and messages take turns, so that a fast timer cannot keep messages waiting for ever.
             if timer is not None and wait <= 0 and not (self._timer_was_last and queued):
@@ -123,7 +123,7 @@ class Executor:
             if work is not None and work.run():
                 return
 
-    def _next_timer(self) -> tuple[Timer | None, float]:
+    def _find_next_timer(self) -> tuple[Timer | None, float]:
         """The timer that is due first, and the time until then [s]."""
         first, least = None, _FOREVER
         for node in self._nodes:

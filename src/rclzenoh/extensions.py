@@ -32,7 +32,7 @@ def provide_time(node: Node) -> None:
 def spin_some(executor: Executor, timeout_sec: float) -> None:
     """Wait for an input, then call the callbacks of all inputs that have arrived by then, but not of later ones."""
     executor.spin_once(timeout_sec)
-    last = executor.create_task(_nothing)
+    last = executor.create_task(_do_nothing)
     while not last.done():
         executor.spin_once(timeout_sec=0.0)
 
@@ -40,8 +40,8 @@ def spin_some(executor: Executor, timeout_sec: float) -> None:
 def stop_waiting(executor: Executor) -> None:
     """End the wait of `spin_some`, if there is one; for handlers of signals, which run in the thread that spins."""
     # `wake` is not enough: after it, `spin_once` looks for work and then goes on waiting. A task is work.
-    executor.create_task(_nothing)
+    executor.create_task(_do_nothing)
 
 
-def _nothing() -> None:
+def _do_nothing() -> None:
     """Do nothing; as a task, this marks a position among the inputs, or ends a wait."""

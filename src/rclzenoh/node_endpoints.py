@@ -33,7 +33,7 @@ class NodeEndpoints(NodeBase):
         Raises:
             NameValidationException: If the name is invalid.
         """
-        return self._keep(Publisher(self, msg_type, topic, _profile(qos_profile)))
+        return self._keep(Publisher(self, msg_type, topic, _make_profile(qos_profile)))
 
     def create_subscription(
         self,
@@ -53,7 +53,7 @@ class NodeEndpoints(NodeBase):
             NameValidationException: If the name is invalid.
             RuntimeError: If the callback takes neither one argument nor two.
         """
-        return self._keep(Subscription(self, msg_type, topic, callback, _profile(qos_profile), raw=raw))
+        return self._keep(Subscription(self, msg_type, topic, callback, _make_profile(qos_profile), raw=raw))
 
     def create_service(
         self,
@@ -128,5 +128,5 @@ class NodeEndpoints(NodeBase):
         return known
 
 
-def _profile(qos: QoSProfile | int) -> QoSProfile:
+def _make_profile(qos: QoSProfile | int) -> QoSProfile:
     return qos if isinstance(qos, QoSProfile) else QoSProfile(depth=qos)

@@ -51,13 +51,13 @@ class NodeGraph(NodeBase):
 
     def get_publishers_info_by_topic(self, topic_name: str) -> list[TopicEndpointInfo]:
         """All publishers of a topic, given by its absolute, relative or private name."""
-        return self._endpoints_info(EntityKind.PUBLISHER, topic_name)
+        return self._list_endpoints_info(EntityKind.PUBLISHER, topic_name)
 
     def get_subscriptions_info_by_topic(self, topic_name: str) -> list[TopicEndpointInfo]:
         """All subscriptions to a topic, given by its absolute, relative or private name."""
-        return self._endpoints_info(EntityKind.SUBSCRIPTION, topic_name)
+        return self._list_endpoints_info(EntityKind.SUBSCRIPTION, topic_name)
 
-    def _endpoints_info(self, kind: EntityKind, topic_name: str) -> list[TopicEndpointInfo]:
+    def _list_endpoints_info(self, kind: EntityKind, topic_name: str) -> list[TopicEndpointInfo]:
         name = self.resolve_topic_name(topic_name)
         infos = (endpoint_info(token) for token in self.context.graph.tokens(kind) if token.name == name)
         return [info for info in infos if info is not None]

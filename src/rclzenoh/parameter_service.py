@@ -62,10 +62,10 @@ class _Answers:
     def get_types(
         self, request: GetParameterTypes.Request, response: GetParameterTypes.Response
     ) -> GetParameterTypes.Response:
-        response.types = self._read_each(request.names, self._type_of)
+        response.types = self._read_each(request.names, self._find_type)
         return response
 
-    def _type_of(self, name: str) -> int:
+    def _find_type(self, name: str) -> int:
         # `describe_parameter` raises an error if the parameter is not declared. One without a value is no error.
         self._parameters.describe_parameter(name)
         return int(self._parameters.get_parameter_or(name).type_.value)

@@ -107,12 +107,14 @@ def encode(profile: QoSProfile) -> str:
 
     It reads ``reliability:durability:history,depth:deadline:lifespan:liveliness,lease``.
     """
-    reliability = _number(profile.reliability, ReliabilityPolicy.RELIABLE)
-    durability = _number(profile.durability, DurabilityPolicy.VOLATILE)
-    history = _number(profile.history or HistoryPolicy.KEEP_LAST, HistoryPolicy.KEEP_LAST)
+    reliability = _write_number(profile.reliability, ReliabilityPolicy.RELIABLE)
+    durability = _write_number(profile.durability, DurabilityPolicy.VOLATILE)
+    history = _write_number(profile.history or HistoryPolicy.KEEP_LAST, HistoryPolicy.KEEP_LAST)
     depth = "" if profile.depth in (0, _MIDDLEWARE_DEPTH) else str(profile.depth)
-    liveliness = _number(profile.liveliness, LivelinessPolicy.AUTOMATIC)
-    deadline, lifespan, lease = map(_seconds, (profile.deadline, profile.lifespan, profile.liveliness_lease_duration))
+    liveliness = _write_number(profile.liveliness, LivelinessPolicy.AUTOMATIC)
+    deadline, lifespan, lease = map(
+        _write_seconds, (profile.deadline, profile.lifespan, profile.liveliness_lease_duration)
+    )
     return f"{reliability}:{durability}:{history},{depth}:{deadline}:{lifespan}:{liveliness},{lease}"
 
 
@@ -128,10 +130,10 @@ def decode(text: str) -> QoSProfile | None:
             history=HistoryPolicy(read_natural(history or "1")),
             reliability=ReliabilityPolicy(read_natural(reliability or "1")),
             durability=DurabilityPolicy(read_natural(durability or "2")),
-            lifespan=_duration(lifespan),
-            deadline=_duration(deadline),
+            lifespan=_read_duration(lifespan),
+            deadline=_read_duration(deadline),
             liveliness=LivelinessPolicy(read_natural(liveliness or "1")),
-            liveliness_lease_duration=_duration(lease),
+            liveliness_lease_duration=_read_duration(lease),
         )
     except ValueError:
         return None
@@ -141,7 +143,7 @@ _SIZES = (1, 1, 2, 2, 2, 3)
 """Least number of values in each group."""
 
 
-def _duration(chunk: list[str]) -> Duration:
+def _read_duration(chunk: list[str]) -> Duration:
     seconds, nanoseconds = chunk[:2]
     if not seconds and not nanoseconds:
         return Infinite
@@ -149,11 +151,11 @@ def _duration(chunk: list[str]) -> Duration:
     return Duration(nanoseconds=min(total, Infinite.nanoseconds))
 
 
-def _number(policy: IntEnum, default: IntEnum) -> str:
+def _write_number(policy: IntEnum, default: IntEnum) -> str:
     return "" if policy in (0, default) else str(int(policy))
 
 
-def _seconds(duration: Duration) -> str:
+def _write_seconds(duration: Duration) -> str:
     if duration.nanoseconds == 0 or duration == Infinite:
         return ","
     return ",".join(map(str, divmod(duration.nanoseconds, S_TO_NS)))

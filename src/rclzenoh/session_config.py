@@ -63,7 +63,7 @@ def client_config(endpoint: str, key: Key | None = None) -> zenoh.Config:
         ConfigurationError: If the endpoint is malformed, or the key cannot be read.
     """
     config = zenoh.Config()
-    _apply(config, {**_client_settings(endpoint, key), **_SETTINGS}, "endpoint")
+    _apply(config, {**_make_client_settings(endpoint, key), **_SETTINGS}, "endpoint")
     _check_key(config)
     return config
 
@@ -104,7 +104,7 @@ def connect_endpoint() -> str | None:
     """
     if not (os.environ.get(OVERRIDE_VARIABLE) or os.environ.get(CONFIG_FILE_VARIABLE)):
         return None
-    endpoints = _endpoints(environment_config(), "connect")
+    endpoints = _read_endpoints(environment_config(), "connect")
     return endpoints[0] if endpoints else None
 
 
@@ -118,16 +118,16 @@ def is_protected(listens: Sequence[str] = ()) -> bool:
         ConfigurationError: As `environment_config`.
     """
     config = environment_config()
-    routers = _endpoints(config, "connect")
+    routers = _read_endpoints(config, "connect")
     # A session without a router may find anybody, and be found by anybody, so it is not protected.
     # If there is a configuration file, it replaces all defaults of sessions, so `listens` does not apply.
-    listening = _endpoints(config, "listen", () if os.environ.get(CONFIG_FILE_VARIABLE) else listens)
+    listening = _read_endpoints(config, "listen", () if os.environ.get(CONFIG_FILE_VARIABLE) else listens)
     return bool(routers) and all(each.startswith(PROTECTED) for each in (*routers, *listening))
 
 
 def client_override(endpoint: str, key: Key | None = None) -> str:
     """Value of ``ZENOH_CONFIG_OVERRIDE`` that has the effect of `client_config`; it names files and holds no secret."""
-    return ";".join(f"{name}={json.dumps(value)}" for name, value in _client_settings(endpoint, key).items())
+    return ";".join(f"{name}={json.dumps(value)}" for name, value in _make_client_settings(endpoint, key).items())
 
 
 def router_config(endpoint: str, key: Key | None = None) -> zenoh.Config:
@@ -139,7 +139,7 @@ def router_config(endpoint: str, key: Key | None = None) -> zenoh.Config:
     config = zenoh.Config()
     _apply(config, {"mode": "router", "listen/endpoints": [endpoint], **_SETTINGS}, "listen endpoint")
     if endpoint.startswith(PROTECTED) and key is not None:
-        _apply(config, _tls_settings(key, "listen"), "key")
+        _apply(config, _make_tls_settings(key, "listen"), "key")
         _check_key(config)
     return config
 
@@ -149,16 +149,16 @@ def in_words(error: zenoh.ZError) -> str:
     return re.sub(r'^\w+\([^"]*"', "", re.split(r' at /| \(os error|", location: |"\)', str(error))[0])
 
 
-def _client_settings(endpoint: str, key: Key | None) -> Mapping[str, object]:
+def _make_client_settings(endpoint: str, key: Key | None) -> Mapping[str, object]:
     # `listen/endpoints` is set, because a configuration file, as that of rmw_zenoh_cpp, may let clients listen, and
     # they would listen even without a key.
     settings: dict[str, object] = {"mode": "client", "connect/endpoints": [endpoint], "listen/endpoints": []}
     if key is None or not endpoint.startswith(PROTECTED):
         return settings
-    return {**settings, **_tls_settings(key, "connect")}
+    return {**settings, **_make_tls_settings(key, "connect")}
 
 
-def _tls_settings(key: Key, side: Literal["connect", "listen"]) -> Mapping[str, object]:
+def _make_tls_settings(key: Key, side: Literal["connect", "listen"]) -> Mapping[str, object]:
     return {
         f"{_TLS}/root_ca_certificate": str(key.certificate),
         f"{_TLS}/{side}_private_key": str(key.private_key),
@@ -185,7 +185,7 @@ def _check_key(config: zenoh.Config) -> None:
                 raise UnreadableKeyError(Path(path), error.strerror or str(error)) from error
 
 
-def _endpoints(
+def _read_endpoints(
     config: zenoh.Config, side: Literal["connect", "listen"], of_clients: Sequence[str] = ()
 ) -> Sequence[str]:
     """Endpoints that a session of this configuration connects to or listens on.

@@ -153,7 +153,7 @@ class ActionServer:
         Raises:
             RuntimeError: If the event is not possible in its present state.
         """
-        handle.advance(event, self._now_ns())
+        handle.advance(event, self._read_clock_ns())
         self._publish_status()
 
     def publish_feedback(self, handle: ServerGoalHandle, feedback: Message) -> None:
@@ -186,7 +186,7 @@ class ActionServer:
 
     async def _execute(self, handle: ServerGoalHandle, callback: Callable[[ServerGoalHandle], Any]) -> None:
         try:
-            result = await _outcome(callback(handle))
+            result = await _await_outcome(callback(handle))
         except GeneratorExit:
             raise  # The executor has ended, so no result can be sent any more.
         except BaseException:
@@ -213,7 +213,7 @@ class ActionServer:
         key = key_of(request.goal_id)
         answer = None
         if key not in self._goals:
-            answer = await _outcome(self._goal_callback(request.goal))
+            answer = await _await_outcome(self._goal_callback(request.goal))
             if not isinstance(answer, GoalResponse):
                 raise TypeError(f"the goal callback must return a GoalResponse, got {answer!r:.80}")
         # While the callback was waiting, another goal with the same identifier may have been accepted.
@@ -230,19 +230,19 @@ class ActionServer:
 
         async def begin() -> None:
             self._publish_status()
-            await _outcome(self._handle_accepted_callback(handle))
+            await _await_outcome(self._handle_accepted_callback(handle))
 
         submit(self._node.mailbox, begin)
 
     async def _on_cancel(self, request: CancelGoal.Request, response: CancelGoal.Response) -> Message:
-        self._goals.expire(self._now_ns())
+        self._goals.expire(self._read_clock_ns())
         response.return_code, handles = self._goals.select(request.goal_info)
         canceling = []
         for handle in handles:
-            answer = await _outcome(self._cancel_callback(handle))
+            answer = await _await_outcome(self._cancel_callback(handle))
             # The goal may have ended while the callback was waiting.
             if answer is CancelResponse.ACCEPT and handle.can(GoalEvent.CANCEL):
-                handle.advance(GoalEvent.CANCEL, self._now_ns())
+                handle.advance(GoalEvent.CANCEL, self._read_clock_ns())
                 canceling.append(handle.info)
         if canceling:
             self._publish_status()
@@ -252,7 +252,7 @@ class ActionServer:
         return response
 
     async def _on_result(self, request: AnyMessage, response: AnyMessage) -> Message:
-        self._goals.expire(self._now_ns())
+        self._goals.expire(self._read_clock_ns())
         handle = self._goals.get(key_of(request.goal_id))
         if handle is None:
             response.status = GoalStatus.STATUS_UNKNOWN
@@ -261,14 +261,14 @@ class ActionServer:
         return result
 
     def _publish_status(self) -> None:
-        self._goals.expire(self._now_ns())
+        self._goals.expire(self._read_clock_ns())
         status_list = [GoalStatus(goal_info=goal.info, status=goal.status) for goal in self._goals.values()]
         self._status.publish(GoalStatusArray(status_list=status_list))
 
-    def _now_ns(self) -> int:
+    def _read_clock_ns(self) -> int:
         return self._node.get_clock().now().nanoseconds
 
 
-async def _outcome(value: Any) -> Any:
+async def _await_outcome(value: Any) -> Any:
     """Return the value of a callback; if the callback is a coroutine function, wait for it."""
     return await value if hasattr(value, "__await__") else value

@@ -88,7 +88,11 @@ def structure(name: str) -> Structure:
     defaults = _DEFAULTS.get(name, {})
     return Structure(
         {constant: value for constant, _, value in constants},
-        tuple(_field(field, description, defaults.get(field)) for field, description in fields if field != PLACEHOLDER),
+        tuple(
+            _make_field(field, description, defaults.get(field))
+            for field, description in fields
+            if field != PLACEHOLDER
+        ),
     )
 
 
@@ -119,7 +123,7 @@ def message_definition(name: str) -> str:
     texts: dict[str, str] = {}
     _add_texts(name, texts)
     own = texts.pop(name)
-    return own + "".join(f"{_RULE}MSG: {_short_name(each)}\n{text}" for each, text in texts.items())
+    return own + "".join(f"{_RULE}MSG: {_shorten_name(each)}\n{text}" for each, text in texts.items())
 
 
 _RULE = "=" * 80 + "\n"
@@ -144,14 +148,14 @@ def _add_texts(name: str, texts: dict[str, str]) -> None:
 def _write_type(field: Field) -> str:
     """Type of a field of a derived structure; these have neither bounded strings nor fixed arrays."""
     bound = "" if field.bound is None else f"<={field.bound}"
-    return _short_name(field.type) + (f"[{bound}]" if field.sequence else "")
+    return _shorten_name(field.type) + (f"[{bound}]" if field.sequence else "")
 
 
-def _short_name(name: str) -> str:
+def _shorten_name(name: str) -> str:
     return name.replace("/msg/", "/")
 
 
-def _field(name: str, description: tuple[Nodetype, Any], default: Default | None) -> Field:
+def _make_field(name: str, description: tuple[Nodetype, Any], default: Default | None) -> Field:
     kind, content = description
     length: int | None = None
     sequence = kind == _SEQUENCE
@@ -188,7 +192,7 @@ def _require(name: str) -> None:
         constants, fields = _JAZZY[name]
         _add(name, [(field, _read_description(description)) for field, description in fields], constants)
     if name not in _FIELDDEFS:
-        raise ValueError(f"unknown interface {name!r}{_similar(name)}")
+        raise ValueError(f"unknown interface {name!r}{_suggest_similar(name)}")
     _COMPLETE.add(name)
     for _, (field_kind, content) in _FIELDDEFS[name][1]:
         element = content[0] if field_kind in (_ARRAY, _SEQUENCE) else (field_kind, content)
@@ -196,7 +200,7 @@ def _require(name: str) -> None:
             _require(element[1])
 
 
-def _similar(name: str) -> str:
+def _suggest_similar(name: str) -> str:
     files = (path.relative_to(DEFINITIONS).with_suffix("").as_posix() for path in DEFINITIONS.rglob("*.*"))
     near = difflib.get_close_matches(name, {*files, *_FIELDDEFS, *_JAZZY}, n=3)
     return f"; did you mean {' or '.join(map(repr, near))}?" if near else ""
@@ -211,10 +215,10 @@ def _read_description(description: list[Any]) -> tuple[Nodetype, Any]:
     return kind, tuple(content) if kind == _BASE else content
 
 
-def _char_to_uint8(description: Any) -> Any:
+def _replace_char(description: Any) -> Any:
     """Replace ``char``, as rosidl does before it computes a type hash; rosbags does not do that."""
     if isinstance(description, tuple):
-        return tuple(_char_to_uint8(part) for part in description)
+        return tuple(_replace_char(part) for part in description)
     return "uint8" if description == "char" else description
 
 
@@ -235,7 +239,7 @@ def _parse(name: str, text: str) -> None:
 
 
 def _add(name: str, fields: list[tuple[str, object]], constants: list[tuple[str, str, Default]] | None = None) -> None:
-    content = [(field, _char_to_uint8(description)) for field, description in fields]
+    content = [(field, _replace_char(description)) for field, description in fields]
     _FIELDDEFS[name] = (constants or [], content or [(PLACEHOLDER, (_BASE, ("uint8", 0)))])
 
 

@@ -38,7 +38,9 @@ def decoder(name: str) -> Callable[[bytes, bytearray], tuple[Any, int]]:
     return decode
 
 
-def _strings(data: bytes, at: int, count: int, memory: list[tuple[bytes, tuple[str, ...]]]) -> tuple[list[str], int]:
+def _read_strings(
+    data: bytes, at: int, count: int, memory: list[tuple[bytes, tuple[str, ...]]]
+) -> tuple[list[str], int]:
     """Read a sequence of strings after its count, and remember its bytes: joint names are the same every time."""
     start = at - 4
     values = []
@@ -58,7 +60,7 @@ class _Reader(FunctionWriter):
     """Writes a function that reads at position ``at``; operands are expressions that get the values."""
 
     def __init__(self) -> None:
-        super().__init__(frombuffer=np.frombuffer, new=object.__new__, strings=_strings)
+        super().__init__(frombuffer=np.frombuffer, new=object.__new__, strings=_read_strings)
         self.views: dict[str, None] = {}
 
     def run(self, depth: int) -> None:

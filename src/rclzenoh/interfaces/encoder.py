@@ -32,7 +32,7 @@ def encoder(name: str) -> Callable[[Message], bytearray]:
     It raises AttributeError, TypeError, ValueError, OverflowError or ``struct.error`` if a value is not of its field's
     type.
     """
-    writer = _Writer(HEADER=HEADER, PADDING=_PADDING, strings=_strings, check_length=_check_length)
+    writer = _Writer(HEADER=HEADER, PADDING=_PADDING, strings=_write_strings, check_length=_check_length)
     writer.structure(name, "message", 1)
     writer.flush(1)
     source = "\n".join(["def encode(message):", " out = bytearray(HEADER)", *writer.lines, " return out"])
@@ -42,7 +42,7 @@ def encoder(name: str) -> Callable[[Message], bytearray]:
 
 
 @lru_cache(maxsize=512)
-def _strings(values: tuple[str, ...]) -> bytes:
+def _write_strings(values: tuple[str, ...]) -> bytes:
     """A sequence of strings without its count, from a position that is a multiple of four."""
     out = bytearray()
     for value in values:

@@ -54,7 +54,7 @@ def get_service(name: str) -> type[Service]:
     """
     _expect_kind(name, "srv")
     structure(name)  # This refuses an unknown service by its own name instead of that of its request.
-    return _service(name)
+    return _make_service(name)
 
 
 @cache
@@ -68,15 +68,15 @@ def get_action(name: str) -> type[Action]:
     structure(name)
     parts = {part: message_class(f"{name}_{part}") for part in ("Goal", "Result", "Feedback")}
     protocol = {
-        "SendGoalService": _service(f"{name}_SendGoal"),
-        "GetResultService": _service(f"{name}_GetResult"),
+        "SendGoalService": _make_service(f"{name}_SendGoal"),
+        "GetResultService": _make_service(f"{name}_GetResult"),
         "FeedbackMessage": message_class(f"{name}_FeedbackMessage"),
     }
     short = name.rpartition("/")[2]
     return type(short, (Action,), {"TYPE": name, **parts, "Impl": type("Impl", (ActionProtocol,), protocol)})
 
 
-def _service(name: str) -> type[Service]:
+def _make_service(name: str) -> type[Service]:
     parts = {part: message_class(f"{name}_{part}") for part in ("Request", "Response")}
     return type(name.rpartition("/")[2], (Service,), {"TYPE": name, **parts})
 

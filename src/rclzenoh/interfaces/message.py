@@ -40,7 +40,7 @@ class Message:
     @classmethod
     def get_fields_and_field_types(cls) -> dict[str, str]:
         """Names and IDL types of the fields, in order."""
-        return {field.name: _idl_type(field) for field in cls.FIELDS}
+        return {field.name: _write_idl_type(field) for field in cls.FIELDS}
 
     def __eq__(self, other: object) -> bool:
         if type(other) is not type(self):
@@ -51,7 +51,7 @@ class Message:
     __hash__ = None  # type: ignore[assignment]  # mutable
 
     def __repr__(self) -> str:
-        fields = ", ".join(f"{field.name}={_plain(getattr(self, field.name))!r}" for field in self.FIELDS)
+        fields = ", ".join(f"{field.name}={_convert_to_plain(getattr(self, field.name))!r}" for field in self.FIELDS)
         return f"{self.TYPE.replace('/', '.')}({fields})"
 
 
@@ -94,8 +94,8 @@ def message_class(name: str) -> type[AnyMessage]:
         if keyword.iskeyword(field.name):
             raise ValueError(f"{name}: field {field.name!r} is a Python keyword")
         if is_numbers(field):
-            members[field.name] = _array_property(name, field)
-    members["__init__"] = _initialiser(definition.fields)
+            members[field.name] = _make_array_property(name, field)
+    members["__init__"] = _make_initialiser(definition.fields)
     package, _, rest = name.partition("/")
     members["__module__"] = f"{package}.{rest.partition('/')[0]}"
     return type(rest.partition("/")[2], (AnyMessage,), members)
@@ -142,7 +142,7 @@ def as_numbers(value: Any, field: Field, where: str) -> NDArray[Any]:
     return np.ascontiguousarray(array)
 
 
-def _array_property(where: str, field: Field) -> property:
+def _make_array_property(where: str, field: Field) -> property:
     slot = f"_{field.name}"
 
     def assign(message: Message, value: Any) -> None:
@@ -151,7 +151,7 @@ def _array_property(where: str, field: Field) -> property:
     return property(attrgetter(slot), assign)
 
 
-def _initialiser(fields: tuple[Field, ...]) -> Callable[..., None]:
+def _make_initialiser(fields: tuple[Field, ...]) -> Callable[..., None]:
     """``__init__`` written out, because a generic one costs a microsecond per field."""
     known = [field.name for field in fields]
 
@@ -185,11 +185,11 @@ def _initialiser(fields: tuple[Field, ...]) -> Callable[..., None]:
     return initialiser
 
 
-def _plain(value: Any) -> Any:
+def _convert_to_plain(value: Any) -> Any:
     return value.tolist() if isinstance(value, np.ndarray) else value
 
 
-def _idl_type(field: Field) -> str:
+def _write_idl_type(field: Field) -> str:
     name = field.type.replace("/msg/", "/") if field.nested else _IDL_NAMES.get(field.type, field.type)
     if field.type == "string" and field.bound is not None and not field.sequence:
         name = f"string<{field.bound}>"

@@ -20,11 +20,11 @@ def look_up_in(names: Mapping[str, str], find_class: Callable[[str], object], mo
     return find
 
 
-def _full_names(kind: str, by_package: Mapping[str, str]) -> Mapping[str, str]:
+def _make_full_names(kind: str, by_package: Mapping[str, str]) -> Mapping[str, str]:
     return {name: f"{package}/{kind}/{name}" for package, names in by_package.items() for name in names.split()}
 
 
-MESSAGES = _full_names(
+MESSAGES = _make_full_names(
     "msg",
     {
         "action_msgs": "GoalInfo GoalStatus GoalStatusArray",
@@ -50,7 +50,7 @@ MESSAGES = _full_names(
 )
 """Full names of messages."""
 
-SERVICES = _full_names(
+SERVICES = _make_full_names(
     "srv",
     {
         "action_msgs": "CancelGoal",
@@ -65,5 +65,7 @@ SERVICES = _full_names(
 )
 """Full names of services."""
 
-ACTIONS = _full_names("action", {"control_msgs": "FollowJointTrajectory", "simulation_interfaces": "SimulateSteps"})
+ACTIONS = _make_full_names(
+    "action", {"control_msgs": "FollowJointTrajectory", "simulation_interfaces": "SimulateSteps"}
+)
 """Full names of actions."""

@@ -17,7 +17,8 @@ class Leases:
     with it, as long as there is another one.
 
     Some trials are refused by every simulation, and some simulations refuse every trial. So a simulation that refuses
-    trials is doubted at first: others get the trials. It is set aside for good when others could do what it refused.
+    trials is doubted at first: others get the trials. It is set aside for good when other simulations could do several
+    of the trials that it refused.
 
     Args:
         trials: Numbers of the trials to do.
@@ -63,7 +64,7 @@ class Leases:
         return self.ended == self.total
 
     def why_set_aside(self, simulation: str) -> str | None:
-        """Say why a simulation gets no more trials: it refused too many that others could do. None if it gets more."""
+        """Say why a simulation gets no more trials: it refused too many that others could do; None if it gets more."""
         if self._wrong_refusals.get(simulation, 0) < _MOST_IN_A_ROW:
             return None
         return self._refusals[simulation][-1][1]

@@ -68,7 +68,7 @@ def score_model(
         distilled: The map that is distilled for the world of the dataset; None for none.
         processes: How many processes simulate.
     """
-    context = _nominal_context(learned)
+    context = _find_nominal_context(learned)
     plain = leave_out_correction(learned)
     targets = draw_targets(plain.carry_over(context), count, seed)
     given = np.tile(context, (count, 1))
@@ -116,7 +116,7 @@ def _adapt_step_by_step(
     processes: int,
 ) -> dict[int, Adaptation]:
     """Throw in another world, and adapt a map by more and more throws; the keys are the numbers of throws, from 0."""
-    context = _nominal_context(learned)
+    context = _find_nominal_context(learned)
     tries = spread_first(draw_targets(learned.carry_over(context), REAL_THROWS[-1], seed + _APART))
     given = np.tile(context, (len(tries), 1))
     parameters = aim(learned, tries, given).parameters
@@ -146,7 +146,7 @@ def _throw_there(
     Returns:
         How each adaptation hits, and the throws of the last one; both empty if no target can be reached.
     """
-    given = np.tile(_nominal_context(learned), (len(targets), 1))
+    given = np.tile(_find_nominal_context(learned), (len(targets), 1))
     worlds = [learned.correct(each.correction) for each in adaptations.values()]
     reachable = aim(worlds[-1], targets, given).reachable
     targets, given = targets[reachable], given[reachable]
@@ -203,7 +203,7 @@ def spread_first(targets: Array) -> Array:
     return targets[order]
 
 
-def _nominal_context(learned: LearnedMap) -> Array:
+def _find_nominal_context(learned: LearnedMap) -> Array:
     """Scaled context that the configuration has, shape ``(n_context,)``."""
     nominal = np.array([[axis.nominal for axis in learned.axes_of(KeyRole.CONTEXT)]], np.float64)
     inside: Array = np.clip(learned.scale(KeyRole.CONTEXT, nominal)[0], -1.0, 1.0)

@@ -46,8 +46,8 @@ def draw_parameter_matrix(parameters: Sequence[SweptKey], outcomes: Outcomes) ->
                     x=single_precision(parameters[column].values[trials]),
                     y=single_precision(parameters[row].values[trials]),
                     customdata=trials,
-                    xaxis=_axis_name("x", column),
-                    yaxis=_axis_name("y", row),
+                    xaxis=_name_axis("x", column),
+                    yaxis=_name_axis("y", row),
                     mode="markers",
                     marker={"color": style.colour, "symbol": style.symbol, "size": 4, "opacity": 0.8},
                     name=in_words(name),
@@ -60,8 +60,8 @@ def draw_parameter_matrix(parameters: Sequence[SweptKey], outcomes: Outcomes) ->
         figure.add_bar(
             **place_bars(parameter.edges),
             y=parameter.counts.sum(axis=1),
-            xaxis=_axis_name("x", index),
-            yaxis=_axis_name("y", count + index),
+            xaxis=_name_axis("x", index),
+            yaxis=_name_axis("y", count + index),
             marker={"color": NEUTRAL, "opacity": 0.55},
             showlegend=False,
             hovertemplate="%{y} trials near %{x:.4g}<extra></extra>",
@@ -88,12 +88,12 @@ def _matrix_axes(parameters: Sequence[SweptKey]) -> dict[str, object]:
         shared = {"title": title, "tickfont": {"size": 9}, "nticks": 4, "range": _matrix_range(parameter)}
         shared |= {"type": "log", **parameter.ticks} if parameter.logarithmic else {}
         # Each column has its labels below its lowest panel; in the last column, this is the panel with the counts.
-        lowest = _axis_name("y", count - 1 if index < count - 1 else count + index)
-        axes[_axis_name("xaxis", index)] = {**shared, "domain": across, "anchor": lowest, "tickangle": 0}
+        lowest = _name_axis("y", count - 1 if index < count - 1 else count + index)
+        axes[_name_axis("xaxis", index)] = {**shared, "domain": across, "anchor": lowest, "tickangle": 0}
         if index:
-            axes[_axis_name("yaxis", index)] = {**shared, "domain": down, "anchor": "x"}
-        counts = {"domain": down, "anchor": _axis_name("x", index), "showticklabels": False, "showgrid": False}
-        axes[_axis_name("yaxis", count + index)] = {**counts, "rangemode": "tozero"}
+            axes[_name_axis("yaxis", index)] = {**shared, "domain": down, "anchor": "x"}
+        counts = {"domain": down, "anchor": _name_axis("x", index), "showticklabels": False, "showgrid": False}
+        axes[_name_axis("yaxis", count + index)] = {**counts, "rangemode": "tozero"}
     return axes
 
 
@@ -104,7 +104,7 @@ def _matrix_range(parameter: SweptKey) -> list[float]:
     return [float(low - room), float(high + room)]
 
 
-def _axis_name(letter: str, index: int) -> str:
+def _name_axis(letter: str, index: int) -> str:
     """Name of an axis: with ``x`` in a trace, with ``xaxis`` in a layout."""
     return letter if index == 0 else f"{letter}{index + 1}"
 

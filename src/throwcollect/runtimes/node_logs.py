@@ -1,7 +1,8 @@
 """The log files of a run's nodes, one for each node, which is never truncated.
 
 A simulation announces in its log that it is ready for trials, because the log reaches the launcher in all cases: from a
-process, from a container on another machine, and with every middleware. `ready_line` is that announcement.
+process and from a container, with every middleware, and even if the launcher cannot join the ROS graph of the run.
+`ready_line` is that announcement.
 """
 
 from __future__ import annotations

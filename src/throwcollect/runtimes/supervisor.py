@@ -54,7 +54,7 @@ class Supervisor:
         self.host.close()
 
     def start(self, *, found: Collection[str] = ()) -> None:
-        """Start all nodes, except those that were found running, as nodes of a launcher that died.
+        """Start all nodes, except those (`found`) that a launcher that died has left running.
 
         Raises:
             WorkerError: If a node cannot be started.

@@ -143,7 +143,7 @@ class Access:
         # The page itself needs no token, because it holds no secret: it exchanges the code in the printed address.
         if scope["type"] == "http" and _is_public(scope["path"]):
             return too_long, None
-        may_change = self._keys.may_change(_token(scope, headers))
+        may_change = self._keys.may_change(_read_token(scope, headers))
         if may_change is None:
             return (401, "a token is missing, or it is not ours"), None
         if not may_change and scope["type"] == "http" and scope["method"] not in ("GET", "HEAD"):
@@ -156,7 +156,7 @@ def _is_public(path: str) -> bool:
     return path in ("/api/v1/health", "/api/v1/exchange") or not path.startswith(("/api/", "/openapi.json"))
 
 
-def _token(scope: Scope, headers: dict[str, str]) -> str:
+def _read_token(scope: Scope, headers: dict[str, str]) -> str:
     """The token of a request; empty if it has none."""
     scheme, _, given = headers.get("authorization", "").partition(" ")
     if scheme.lower() == "bearer":

@@ -36,13 +36,13 @@ NAME = rf"[a-z0-9][a-z0-9_-]{{0,{LONGEST_NAME - 1}}}"
 """Names of components and ids of instances, which become names of files and containers, and parts of URLs."""
 
 
-def _name(text: str) -> str:
+def _check_name(text: str) -> str:
     if not re.fullmatch(NAME, text):
         raise ValueError(f"should be at most 63 of a-z, 0-9, - and _, got '{text}'")
     return text
 
 
-Name = Annotated[str, AfterValidator(_name)]
+Name = Annotated[str, AfterValidator(_check_name)]
 
 
 class ComponentSection(Section):

@@ -66,7 +66,7 @@ def publish(address: Address) -> Iterator[None]:
         WorkerError: If the lock of that file cannot be opened.
         ConfigError: If runs cannot be remembered.
     """
-    path = _path()
+    path = _find_path()
     try:
         lock = os.open(path.with_name(_LOCK), os.O_RDWR | os.O_CREAT, 0o600)
     except OSError as error:
@@ -119,7 +119,7 @@ def find_server() -> Address | None:
     """
     address = _read()
     # If a server was killed, another process may have got its port or pid. Only the lock proves that a server lives.
-    if address is None or not is_locked(_path().with_name(_LOCK)):
+    if address is None or not is_locked(_find_path().with_name(_LOCK)):
         return None
     try:
         _ask(address, "GET", "/api/v1/health")
@@ -194,12 +194,12 @@ def _ask(address: Address, method: str, path: str) -> dict[str, str]:
 _ADDRESS = TypeAdapter(Address)
 
 
-def _path() -> Path:
+def _find_path() -> Path:
     return state_directory() / _FILE
 
 
 def _read() -> Address | None:
     try:
-        return _ADDRESS.validate_json(_path().read_bytes())
+        return _ADDRESS.validate_json(_find_path().read_bytes())
     except (OSError, ValueError):
         return None

@@ -100,7 +100,7 @@ def add_handlers(app: FastAPI) -> None:
         headers = dict(error.headers or {})
         if "Allow" in headers:
             # Each method has a route of its own, and Starlette names only the method of the first route.
-            headers["Allow"] = ", ".join(sorted(_methods_at(request)))
+            headers["Allow"] = ", ".join(sorted(_list_methods_at(request)))
         return problem(error.status_code, str(error.detail), headers=headers)
 
     @app.exception_handler(RequestValidationError)
@@ -169,6 +169,6 @@ def _find_model_of_body(request: Request) -> type[BaseModel] | None:
     return model if isinstance(model, type) and issubclass(model, BaseModel) else None
 
 
-def _methods_at(request: Request) -> set[str]:
+def _list_methods_at(request: Request) -> set[str]:
     routes = [route for route in request.app.routes if route.matches(request.scope)[0] is not Match.NONE]
     return {method for route in routes for method in getattr(route, "methods", None) or ()}

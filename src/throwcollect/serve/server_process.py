@@ -82,7 +82,7 @@ def serve(
         if bound in (80, 443):
             # Clients leave the default port of a scheme out of the header Host.
             hosts |= known
-        url = f"{scheme}://{_reachable(host)}:{bound}"
+        url = f"{scheme}://{_find_reachable_address(host)}:{bound}"
         certificate = None if tls is None else str(tls.certificate.absolute())
         address = Address(url, keys.full, keys.read_only, os.getpid(), certificate)
         app = Access(make_app(instances, models, keys), keys, hosts, origins)
@@ -195,7 +195,7 @@ def _listen(host: str, port: int | None) -> Iterator[socket.socket]:
         yield listener
 
 
-def _reachable(host: str) -> str:
+def _find_reachable_address(host: str) -> str:
     """Address at which programs of this machine reach a server that listens at ``host``."""
     own = {"0.0.0.0": "127.0.0.1", "::": "::1"}.get(host, host)  # noqa: S104 - nothing is bound here
     return f"[{own}]" if ":" in own else own

@@ -168,9 +168,9 @@ class _Ground:
                 line = np.column_stack([x, y, np.zeros_like(x)])
                 line[:, :2] += np.round(middle / _GRID_M) * _GRID_M
                 # Points behind the camera are left out, because they would be projected upside down into the picture.
-                pen.line(self._pixels(line[camera.faces(line)]), fill=_LINE, width=1)
+                pen.line(self._find_pixels(line[camera.faces(line)]), fill=_LINE, width=1)
 
-    def _pixels(self, points: NDArray[np.float64]) -> list[tuple[float, float]]:
+    def _find_pixels(self, points: NDArray[np.float64]) -> list[tuple[float, float]]:
         return [(float(x), float(y)) for x, y in self._camera.project(points) * self.size]
 
     def picture(self) -> Any:
@@ -180,13 +180,13 @@ class _Ground:
     def trace(self, picture: Any, path: NDArray[np.float64], color: tuple[int, int, int]) -> None:
         """Draw a path of the ball's centre in world [m], shape ``(n, 3)``."""
         if len(path) > 1:
-            drawing.Draw(picture).line(self._pixels(path), fill=color, width=3, joint="curve")
+            drawing.Draw(picture).line(self._find_pixels(path), fill=color, width=3, joint="curve")
 
     def mark(self, picture: Any, ball: NDArray[np.float64], landing: NDArray[np.float64] | None) -> None:
         """Draw the shadow of the ball, and a cross where it landed."""
         pen = drawing.Draw(picture)
-        ((x, y),) = self._pixels(ball[np.newaxis] * [1, 1, 0])
+        ((x, y),) = self._find_pixels(ball[np.newaxis] * [1, 1, 0])
         pen.ellipse((x - 9, y - 3, x + 9, y + 3), fill=_LINE)
         if landing is not None:
             for step in (np.array([0.1, 0.1, 0.0]), np.array([0.1, -0.1, 0.0])):
-                pen.line(self._pixels(np.stack([landing - step, landing + step])), fill=_LANDED, width=3)
+                pen.line(self._find_pixels(np.stack([landing - step, landing + step])), fill=_LANDED, width=3)

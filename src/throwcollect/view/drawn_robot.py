@@ -111,11 +111,13 @@ def read_drawn_robot(description: str, tool: str, share: Path) -> DrawnRobot:
                 for shape in link.findall("visual"):
                     for material in shape.findall("material"):
                         shape.remove(material)
-                    shape.append(_material("tool", _TOOL_RGBA))
+                    shape.append(_make_material("tool", _TOOL_RGBA))
         # A material may be defined at one place of a URDF, and only named at others.
-        colors = {name: rgba for each in robot.iter("material") for name, rgba in _color(each).items() if name}
+        colors = {name: rgba for each in robot.iter("material") for name, rgba in _read_color(each).items() if name}
         shapes = tuple(
-            _shape(link.attrib["name"], visual, colors) for link in robot.iter("link") for visual in link.iter("visual")
+            _read_shape(link.attrib["name"], visual, colors)
+            for link in robot.iter("link")
+            for visual in link.iter("visual")
         )
     except (ElementTree.ParseError, AttributeError, KeyError, ValueError) as error:
         raise DatasetError(f"robot description: cannot be drawn: {error}") from error
@@ -128,35 +130,35 @@ def ball_urdf(ball: BallConfig) -> str:
     shape = ElementTree.SubElement(ElementTree.SubElement(robot, "link", name=BALL), "visual")
     geometry = ElementTree.SubElement(shape, "geometry")
     ElementTree.SubElement(geometry, "sphere", radius=repr(ball.radius_m))
-    shape.append(_material(BALL, BALL_RGBA))
+    shape.append(_make_material(BALL, BALL_RGBA))
     return ElementTree.tostring(robot, encoding="unicode")
 
 
-def _material(name: str, rgba: Rgba) -> ElementTree.Element:
+def _make_material(name: str, rgba: Rgba) -> ElementTree.Element:
     material = ElementTree.Element("material", name=name)
     ElementTree.SubElement(material, "color", rgba=" ".join(map(repr, rgba)))
     return material
 
 
-def _color(material: ElementTree.Element) -> dict[str, Rgba]:
+def _read_color(material: ElementTree.Element) -> dict[str, Rgba]:
     """The name of a material and the colour that it defines, if it defines one."""
     color = material.find("color")
     if color is None:
         return {}
-    r, g, b, a = _numbers(color.attrib["rgba"])
+    r, g, b, a = _read_numbers(color.attrib["rgba"])
     return {material.get("name", ""): (r, g, b, a)}
 
 
-def _shape(link: str, visual: ElementTree.Element, colors: dict[str, Rgba]) -> DrawnShape:
+def _read_shape(link: str, visual: ElementTree.Element, colors: dict[str, Rgba]) -> DrawnShape:
     material = visual.find("material")
     position, rotation = read_origin(visual)
     (geometry,) = visual.findall("geometry/*")
     mesh = ""
     if geometry.tag == "mesh":
-        size = _numbers(geometry.get("scale", "1 1 1"))
+        size = _read_numbers(geometry.get("scale", "1 1 1"))
         mesh = geometry.attrib["filename"].removeprefix(_PACKAGE)
     elif geometry.tag == "box":
-        size = _numbers(geometry.attrib["size"])
+        size = _read_numbers(geometry.attrib["size"])
     elif geometry.tag == "sphere":
         size = (2 * float(geometry.attrib["radius"]),) * 3
     elif geometry.tag == "cylinder":
@@ -165,10 +167,10 @@ def _shape(link: str, visual: ElementTree.Element, colors: dict[str, Rgba]) -> D
     else:
         raise ValueError(f"link {link} has a {geometry.tag}")
     # A material need not have a name, so the colour that the shape itself defines comes first.
-    found = {} if material is None else colors | _color(material)
+    found = {} if material is None else colors | _read_color(material)
     rgba = _DEFAULT_RGBA if material is None else found.get(material.get("name", ""), _DEFAULT_RGBA)
     return DrawnShape(link, position, rotation, size, geometry.tag, mesh, rgba)
 
 
-def _numbers(text: str) -> tuple[float, ...]:
+def _read_numbers(text: str) -> tuple[float, ...]:
     return tuple(map(float, text.split()))

@@ -19,13 +19,14 @@ _SPEED = 0.2
 
 def layout(joints: Sequence[str]) -> bytes:
     """JSON text of the layout, as applications import it; joints are those whose limits are plotted."""
-    shares = [_series(f"/view/limits.position[{index}]", joint) for index, joint in enumerate(joints)]
-    height = _series("/ball/odometry.pose.pose.position.z", "height [m]")
+    shares = [_describe_series(f"/view/limits.position[{index}]", joint) for index, joint in enumerate(joints)]
+    height = _describe_series("/ball/odometry.pose.pose.position.z", "height [m]")
     panels = {
-        _SCENE: _scene(),
-        _BALL: _plot([height, _series("/view/ball_speed.data", "speed [m/s]")], "Ball"),
-        _LIMITS: _plot(
-            [*shares, _series("-1", "lower limit"), _series("1", "upper limit")], "Joint positions within their limits"
+        _SCENE: _describe_scene(),
+        _BALL: _describe_plot([height, _describe_series("/view/ball_speed.data", "speed [m/s]")], "Ball"),
+        _LIMITS: _describe_plot(
+            [*shares, _describe_series("-1", "lower limit"), _describe_series("1", "upper limit")],
+            "Joint positions within their limits",
         ),
         _FACTS: {"topicToRender": "/view/facts", "selectedHardwareId": HARDWARE, "selectedName": NAME},
     }
@@ -34,12 +35,14 @@ def layout(joints: Sequence[str]) -> bytes:
         "globalVariables": {},
         "userNodes": {},
         "playbackConfig": {"speed": _SPEED},
-        "layout": _split("row", _SCENE, _split("column", _FACTS, _split("column", _BALL, _LIMITS, 50), 34), 64),
+        "layout": _describe_split(
+            "row", _SCENE, _describe_split("column", _FACTS, _describe_split("column", _BALL, _LIMITS, 50), 34), 64
+        ),
     }
     return (json.dumps(document, indent=2) + "\n").encode()
 
 
-def _scene() -> dict[str, Any]:
+def _describe_scene() -> dict[str, Any]:
     camera = {
         "perspective": True,
         "distance": 4.6,
@@ -85,7 +88,7 @@ def _scene() -> dict[str, Any]:
     }
 
 
-def _plot(paths: Sequence[Mapping[str, Any]], title: str) -> dict[str, Any]:
+def _describe_plot(paths: Sequence[Mapping[str, Any]], title: str) -> dict[str, Any]:
     return {
         # Lichtblick, which began as a copy of Foxglove, uses another key for the title.
         "foxglovePanelTitle": title,
@@ -102,9 +105,9 @@ def _plot(paths: Sequence[Mapping[str, Any]], title: str) -> dict[str, Any]:
     }
 
 
-def _series(value: str, label: str) -> dict[str, Any]:
+def _describe_series(value: str, label: str) -> dict[str, Any]:
     return {"value": value, "label": label, "enabled": True, "timestampMethod": "receiveTime"}
 
 
-def _split(direction: str, first: Any, second: Any, percentage: int) -> dict[str, Any]:
+def _describe_split(direction: str, first: Any, second: Any, percentage: int) -> dict[str, Any]:
     return {"direction": direction, "first": first, "second": second, "splitPercentage": percentage}

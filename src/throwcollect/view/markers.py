@@ -47,10 +47,10 @@ def shape_markers(name: str, shapes: Sequence[DrawnShape], share: Path, stamp_ns
     """
     array, marker = (get_message(f"visualization_msgs/msg/{kind}") for kind in ("MarkerArray", "Marker"))
     kinds = {"mesh": marker.MESH_RESOURCE, "box": marker.CUBE, "cylinder": marker.CYLINDER, "sphere": marker.SPHERE}
-    meshes = {mesh: _data_url(share / mesh) for mesh in {shape.mesh for shape in shapes if shape.mesh}}
+    meshes = {mesh: _make_data_url(share / mesh) for mesh in {shape.mesh for shape in shapes if shape.mesh}}
     markers = []
     for number, shape in enumerate(shapes):
-        drawn = _marker(name, kinds[shape.kind], shape.rgba, shape.size, stamp_ns, number=number)
+        drawn = _make_marker(name, kinds[shape.kind], shape.rgba, shape.size, stamp_ns, number=number)
         # The markers are locked: viewers move them with their frames, so the shapes are published only once.
         drawn.header.frame_id, drawn.frame_locked = shape.link, True
         drawn.mesh_resource = meshes.get(shape.mesh, "")
@@ -65,12 +65,12 @@ def throw_markers(throw: ShownThrow) -> Any:
     """A visualization_msgs/MarkerArray of the throw that is shown, which replaces the markers of the throw before."""
     array, marker = (get_message(f"visualization_msgs/msg/{name}") for name in ("MarkerArray", "Marker"))
     stamp = throw.start_ns
-    ball = _marker("ball", marker.SPHERE, BALL_RGBA, (2 * throw.config.ball.radius_m,) * 3, stamp)
+    ball = _make_marker("ball", marker.SPHERE, BALL_RGBA, (2 * throw.config.ball.radius_m,) * 3, stamp)
     ball.header.frame_id, ball.frame_locked = BALL, True
     markers = [marker(header=make_header(WORLD, stamp), action=marker.DELETEALL), ball]
-    markers.append(_path("path", throw, stamp, width=_LINE_M, alpha=1.0))
+    markers.append(_make_path("path", throw, stamp, width=_LINE_M, alpha=1.0))
     for point in ("release", "apex", "landing"):
-        markers += _point(point, throw.row, stamp)
+        markers += _make_point(point, throw.row, stamp)
     return array(markers=markers)
 
 
@@ -81,10 +81,10 @@ def all_markers(throws: Sequence[ShownThrow]) -> Any:
     # The first of these points is the robot's base, so that the plane includes it.
     corners = np.concatenate([np.zeros((1, 2)), *(throw.path[:, :2] for throw in throws)])
     low, high = corners.min(axis=0) - _MARGIN_M, corners.max(axis=0) + _MARGIN_M
-    plane = _marker("landing plane", marker.CUBE, _PLANE, (*(high - low), _PLANE_M), stamp)
+    plane = _make_marker("landing plane", marker.CUBE, _PLANE, (*(high - low), _PLANE_M), stamp)
     x, y = (low + high) / 2
     _place(plane, x, y, throws[0].config.scene.landing_height_m - _PLANE_M / 2)
-    thin = [_path("paths", throw, stamp, width=_THIN_LINE_M, alpha=_OTHERS_ALPHA) for throw in throws]
+    thin = [_make_path("paths", throw, stamp, width=_THIN_LINE_M, alpha=_OTHERS_ALPHA) for throw in throws]
     return array(markers=[plane, *thin])
 
 
@@ -105,7 +105,7 @@ def path_cloud(throw: ShownThrow) -> Any:
     )
 
 
-def _path(namespace: str, throw: ShownThrow, stamp_ns: int, *, width: float, alpha: float) -> Any:
+def _make_path(namespace: str, throw: ShownThrow, stamp_ns: int, *, width: float, alpha: float) -> Any:
     """A line, grey while the ball was held, with the colour of the outcome from its release on."""
     point, color = get_message("geometry_msgs/msg/Point"), get_message("std_msgs/msg/ColorRGBA")
     rate, released, last = throw.config.record.rate_hz, throw.row.get("release_time_s"), len(throw.path) - 1
@@ -114,7 +114,7 @@ def _path(namespace: str, throw: ShownThrow, stamp_ns: int, *, width: float, alp
     flown = _SUCCEEDED if throw.row["outcome"] == throw.config.task.success else _FAILED
     colors = {held: color(r=r, g=g, b=b, a=a * alpha) for held, (r, g, b, a) in ((True, _HELD), (False, flown))}
     marker = get_message("visualization_msgs/msg/Marker")
-    line = _marker(
+    line = _make_marker(
         namespace, marker.LINE_STRIP, (*flown[:3], alpha), (width, 0.0, 0.0), stamp_ns, number=throw.row["trial"]
     )
     line.points = [point(x=x, y=y, z=z) for x, y, z in throw.path[chosen].tolist()]
@@ -122,7 +122,7 @@ def _path(namespace: str, throw: ShownThrow, stamp_ns: int, *, width: float, alp
     return line
 
 
-def _point(name: str, row: Row, stamp_ns: int) -> list[Any]:
+def _make_point(name: str, row: Row, stamp_ns: int) -> list[Any]:
     """A dot with a label; nothing if the throw has no such point."""
     state = ball_state(row, name)
     if state is None:
@@ -134,8 +134,8 @@ def _point(name: str, row: Row, stamp_ns: int) -> list[Any]:
         "apex": f"apex {z:.2f} m",
         "landing": f"landing x {x:.2f} m, y {y:.2f} m, {speed:.2f} m/s",
     }[name]
-    dot = _marker(name, marker.SPHERE, _SUCCEEDED, (_POINT_M,) * 3, stamp_ns)
-    label = _marker(name, marker.TEXT_VIEW_FACING, _LABEL, (0.0, 0.0, _TEXT_M), stamp_ns, number=1)
+    dot = _make_marker(name, marker.SPHERE, _SUCCEEDED, (_POINT_M,) * 3, stamp_ns)
+    label = _make_marker(name, marker.TEXT_VIEW_FACING, _LABEL, (0.0, 0.0, _TEXT_M), stamp_ns, number=1)
     label.text = text
     _place(dot, x, y, z)
     # The label of the release is below its dot, because the apex of a ball released on its way down is at the same
@@ -144,7 +144,9 @@ def _point(name: str, row: Row, stamp_ns: int) -> list[Any]:
     return [dot, label]
 
 
-def _marker(namespace: str, kind: int, rgba: Rgba, scale: tuple[float, ...], stamp_ns: int, *, number: int = 0) -> Any:
+def _make_marker(
+    namespace: str, kind: int, rgba: Rgba, scale: tuple[float, ...], stamp_ns: int, *, number: int = 0
+) -> Any:
     r, g, b, a = rgba
     x, y, z = map(float, scale)
     return get_message("visualization_msgs/msg/Marker")(
@@ -161,7 +163,7 @@ def _place(marker: Any, x: float, y: float, z: float) -> None:
     marker.pose.position = get_message("geometry_msgs/msg/Point")(x=float(x), y=float(y), z=float(z))
 
 
-def _data_url(path: Path) -> str:
+def _make_data_url(path: Path) -> str:
     try:
         return f"data:model/{path.suffix[1:].lower()};base64,{base64.b64encode(path.read_bytes()).decode()}"
     except OSError as error:

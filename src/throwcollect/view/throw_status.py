@@ -25,11 +25,11 @@ def throw_facts(throw: ShownThrow) -> Any:
         name=NAME,
         hardware_id=HARDWARE,
         message=": ".join(part for part in (f"trial {row['trial']} {row['outcome']}", row["reason"]) if part),
-        values=[pair(key=key, value=_text(value)) for key, value in row.items() if value is not None],
+        values=[pair(key=key, value=_write_text(value)) for key, value in row.items() if value is not None],
     )
     header = make_header("", throw.start_ns)
     return get_message("diagnostic_msgs/msg/DiagnosticArray")(header=header, status=[shown])
 
 
-def _text(value: object) -> str:
+def _write_text(value: object) -> str:
     return f"{value:.6g}" if isinstance(value, float) else str(value)

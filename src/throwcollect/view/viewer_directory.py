@@ -61,7 +61,7 @@ def view(directory: Path, output: Path, trials: Iterable[int] | None = None) -> 
         path = beside / RECORDING
         with path.open("wb") as stream:
             recording = ViewRecording(stream, config)
-            recording.write(throws, lambda throw: _samples(dataset, throw.row))
+            recording.write(throws, lambda throw: _read_samples(dataset, throw.row))
             summary = recording.finish(RECORDING)
         information = {"rosbag2_bagfile_information": bag_information([summary], recording.channels, {})}
         (beside / METADATA).write_text(to_yaml(information), encoding="utf-8")
@@ -84,13 +84,13 @@ def _schedule(dataset: Dataset, rows: Iterable[Row]) -> list[ShownThrow]:
     """Schedule throws one after another with a pause, regardless of their times in the dataset."""
     throws, start = [], _FIRST_NS
     for row in rows:
-        samples = _samples(dataset, row)
+        samples = _read_samples(dataset, row)
         config = dataset.plan.config_of(dataset.plan.trial(row["trial"]))
         throws.append(ShownThrow(row, config, start, samples.ball_position.copy()))
         start += int(samples.stamps_ns[-1] - samples.stamps_ns[0]) + _PAUSE_NS
     return throws
 
 
-def _samples(dataset: Dataset, row: Row) -> Samples:
+def _read_samples(dataset: Dataset, row: Row) -> Samples:
     with locating_damage(dataset, row["trial"]):
         return dataset.episode(row["trial"]).samples(dataset.joints)

@@ -1,1 +1,1 @@
-"""An engine without contacts, for first trials and for tests: some ten times as fast as Bullet."""
+"""An engine without contacts, for first trials and for tests: some seven times as fast as Bullet."""

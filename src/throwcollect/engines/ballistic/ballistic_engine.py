@@ -52,7 +52,7 @@ class BallisticEngine(Engine):
     _velocity: Vector
 
     def __init__(self) -> None:
-        self._touching = self._told = _FREE
+        self._touching = self._reported = _FREE
         self._orientation = (0.0, 0.0, 0.0, 1.0)
         self._seat = np.zeros((3, 1))
 
@@ -92,7 +92,7 @@ class BallisticEngine(Engine):
         count = len(self._scene.moving)
         self._joints, self._velocities = np.array(state.sample[: 2 * count]).reshape(2, count)
         self.place_ball(ball_of(state.sample))
-        self._touching = self._told = state.touching
+        self._touching = self._reported = state.touching
         place, turn = self._tool_path.along(self._joints[np.newaxis])
         away = np.array(self._position).reshape(3, 1) - place[0]
         self._seat = matmul(turn[0].T, away)
@@ -109,8 +109,8 @@ class BallisticEngine(Engine):
             self._joints, self._velocities = steps.targets[number], steps.velocities[number - 1]
             self._position, self._velocity, self._touching = position, velocity, touching
             # Every engine tells observers only of changes.
-            if touching != self._told:
-                self._told = touching
+            if touching != self._reported:
+                self._reported = touching
                 observer.on_touch(number, touching)
             if number == due:
                 due += steps.stride

@@ -17,7 +17,11 @@ def engine_address() -> str:
 
 
 def is_local() -> bool:
-    """Whether the engine runs on this machine, so that its containers can be reached from here."""
+    """Whether the engine runs on this machine, so that its containers can be reached from here.
+
+    One that is reached by TCP or SSH counts as running elsewhere. Runs are not meant for such an engine
+    (docs/containers.md): it cannot mount directories of this machine.
+    """
     return engine_address().startswith("unix:")
 
 

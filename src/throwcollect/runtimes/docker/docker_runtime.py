@@ -129,10 +129,10 @@ def _choose_middleware(rmw: str | None, image: str, config: Config, launcher: Mi
     """
     if rmw is None:
         problem = f"the image {image} has no rclpy"
-    # Every launcher has the embedded client, which can join this middleware, on another machine, too.
+    # Every launcher has the embedded client, which speaks this protocol, and only has to reach the router.
     elif (found := Middleware("rclpy", rmw)).joining.backend == "embedded":
         return found if config.run.ros != "embedded" else Middleware()
-    # With any other middleware, the launcher has to load the same one, and to be on the machine of the nodes.
+    # With any other middleware, the launcher has to load the same one, and to reach every node.
     elif not is_local():
         problem = f"with {rmw} nodes talk to each other directly, and those at {engine_address()} cannot be reached"
     else:

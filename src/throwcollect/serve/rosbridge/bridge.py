@@ -65,12 +65,12 @@ class Bridge:
     def move(self, connection: Connection | None) -> None:
         """Use another way into the run, whose router has another address; None while the router has no address."""
         self._connection = connection
-        self.submit(_nothing)
+        self.submit(_do_nothing)
 
     def close(self) -> None:
         """End the bridge, and withdraw all that its clients have."""
         self._closing.set()
-        self.submit(_nothing)
+        self.submit(_do_nothing)
         self._thread.join()
 
     @property
@@ -198,5 +198,5 @@ class Bridge:
             self._attempt(session.close)
 
 
-def _nothing() -> None:
+def _do_nothing() -> None:
     """Work that only wakes the bridge."""

@@ -58,7 +58,7 @@ def _read_array(tag: cbor2.CBORTag, _immutable: bool) -> Any:
 
 def plain_values(message: Any, compression: str = "none") -> Any:
     """Turn a message into values for `encode` with the same ``compression``; those for JSON have NumPy arrays."""
-    return plain(message, _json_numbers if compression == "none" else _cbor_numbers)
+    return plain(message, _encode_for_json if compression == "none" else _encode_for_cbor)
 
 
 def encode(fields: object, compression: str = "none") -> Frame:
@@ -81,13 +81,13 @@ def fragments(text: str, size: int, number: str) -> Iterator[str]:
         yield json_text({"op": "fragment", "id": number, "data": part, "num": index, "total": total})
 
 
-def _json_numbers(values: NDArray[Any], kind: str) -> Any:
+def _encode_for_json(values: NDArray[Any], kind: str) -> Any:
     if kind == "uint8":
         return base64.b64encode(values.tobytes()).decode()
     return np.ascontiguousarray(values)
 
 
-def _cbor_numbers(values: NDArray[Any], kind: str) -> Any:
+def _encode_for_cbor(values: NDArray[Any], kind: str) -> Any:
     if kind in ("uint8", "octet"):
         return values.tobytes()
     little = values.astype(values.dtype.newbyteorder("<"), copy=False)

@@ -32,11 +32,11 @@ class Sample:
         # All clients with the same name and compression get the same frame, which is encoded once.
         key = topic, compression
         if key not in self._frames:
-            fields = {"op": "publish", "topic": topic, "msg": self._content(compression)}
+            fields = {"op": "publish", "topic": topic, "msg": self._make_content(compression)}
             self._frames[key] = encode(fields, compression)
         return self._frames[key]
 
-    def _content(self, compression: str) -> Any:
+    def _make_content(self, compression: str) -> Any:
         if compression == "cbor-raw":
             secs, nsecs = divmod(self._received_ns, NS_PER_S)
             return {"secs": secs, "nsecs": nsecs, "bytes": self._data}
@@ -87,7 +87,7 @@ class Feed:
     def renew(self) -> None:
         """Subscribe again if publishers offer another quality of service by now."""
         offered = self._find_offered()
-        if _terms(offered) != _terms(self._offered):
+        if _read_terms(offered) != _read_terms(self._offered):
             self._node.destroy_subscription(self._subscription)
             self._offered = offered
             self._subscribe()
@@ -108,5 +108,5 @@ class Feed:
             listener(sample)
 
 
-def _terms(qos: ros.QoSProfile) -> tuple[object, object]:
+def _read_terms(qos: ros.QoSProfile) -> tuple[object, object]:
     return qos.reliability, qos.durability

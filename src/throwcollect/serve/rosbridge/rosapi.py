@@ -72,57 +72,57 @@ class Rosapi:
     def _node(self) -> ros.Node:
         return self._client.session.node
 
-    def _topics(self) -> dict[str, str]:
+    def _find_topics(self) -> dict[str, str]:
         """Topics that clients may have, with their types."""
-        topics = _visible(self._node.get_topic_names_and_types())
+        topics = _list_visible(self._node.get_topic_names_and_types())
         return {name: types[0] for name, types in topics if not is_guarded(name)}
 
-    def _services(self) -> dict[str, str]:
-        return {name: types[0] for name, types in _visible(self._node.get_service_names_and_types())}
+    def _find_services(self) -> dict[str, str]:
+        return {name: types[0] for name, types in _list_visible(self._node.get_service_names_and_types())}
 
-    def _nodes(self) -> list[tuple[str, str]]:
+    def _find_nodes(self) -> list[tuple[str, str]]:
         """Names and namespaces."""
         found = sorted(set(self._node.get_node_names_and_namespaces()))
         return [(name, namespace) for name, namespace in found if not is_hidden(join(namespace, name))]
 
     def _list_topics(self, _call: Call) -> Values:
-        topics = self._topics()
+        topics = self._find_topics()
         return {"topics": list(topics), "types": list(topics.values())}
 
     def _list_topics_and_definitions(self, call: Call) -> Values:
-        texts = [_definition(type_name) for type_name in self._topics().values()]
+        texts = [_find_definition(type_name) for type_name in self._find_topics().values()]
         return {**self._list_topics(call), "typedefs_full_text": texts}
 
     def _list_topics_of_type(self, call: Call) -> Values:
         wanted = full_name("msg", call.fields.text("type"))
-        return {"topics": [name for name, type_name in self._topics().items() if type_name == wanted]}
+        return {"topics": [name for name, type_name in self._find_topics().items() if type_name == wanted]}
 
     def _find_topic_type(self, call: Call) -> Values:
-        return {"type": self._topics().get(absolute_name(call.fields.text("topic")), "")}
+        return {"type": self._find_topics().get(absolute_name(call.fields.text("topic")), "")}
 
     def _list_publishers(self, call: Call) -> Values:
         infos = self._node.get_publishers_info_by_topic(absolute_name(call.fields.text("topic")))
-        return {"publishers": _names(infos)}
+        return {"publishers": _list_names(infos)}
 
     def _list_subscribers(self, call: Call) -> Values:
         infos = self._node.get_subscriptions_info_by_topic(absolute_name(call.fields.text("topic")))
-        return {"subscribers": _names(infos)}
+        return {"subscribers": _list_names(infos)}
 
     def _list_services(self, _call: Call) -> Values:
-        return {"services": list(self._services())}
+        return {"services": list(self._find_services())}
 
     def _list_services_of_type(self, call: Call) -> Values:
         wanted = full_name("srv", call.fields.text("type"))
-        return {"services": [name for name, type_name in self._services().items() if type_name == wanted]}
+        return {"services": [name for name, type_name in self._find_services().items() if type_name == wanted]}
 
     def _find_service_type(self, call: Call) -> Values:
-        return {"type": self._services().get(absolute_name(call.fields.text("service")), "")}
+        return {"type": self._find_services().get(absolute_name(call.fields.text("service")), "")}
 
-    def _providers(self, name: str, type_name: str | None = None) -> list[str]:
+    def _find_providers(self, name: str, type_name: str | None = None) -> list[str]:
         """Nodes that offer a service of this name, or one of this type."""
         return [
             join(namespace, node)
-            for node, namespace in self._nodes()
+            for node, namespace in self._find_nodes()
             if any(
                 service == name or type_name in types
                 for service, types in self._node.get_service_names_and_types_by_node(node, namespace)
@@ -132,13 +132,13 @@ class Rosapi:
     def _list_providers(self, call: Call) -> Values:
         # The rosapi of ROS 2 takes a type here, although the field is called service; earlier ones take a name.
         wanted = call.fields.text("service")
-        return {"providers": self._providers(absolute_name(wanted), full_name("srv", wanted))}
+        return {"providers": self._find_providers(absolute_name(wanted), full_name("srv", wanted))}
 
     def _find_provider(self, call: Call) -> Values:
-        return {"node": next(iter(self._providers(absolute_name(call.fields.text("service")))), "")}
+        return {"node": next(iter(self._find_providers(absolute_name(call.fields.text("service")))), "")}
 
     def _list_actions(self, _call: Call) -> Values:
-        actions = [name for name, _ in _visible(ros.get_action_names_and_types(self._node))]
+        actions = [name for name, _ in _list_visible(ros.get_action_names_and_types(self._node))]
         # On DDS, the graph also names services that nodes want to call and that no node offers.
         offered = {
             service
@@ -148,18 +148,20 @@ class Rosapi:
         return {"action_servers": [name for name in actions if f"{name}/_action/send_goal" in offered]}
 
     def _list_nodes(self, _call: Call) -> Values:
-        return {"nodes": [join(namespace, name) for name, namespace in self._nodes()]}
+        return {"nodes": [join(namespace, name) for name, namespace in self._find_nodes()]}
 
     def _describe_node(self, call: Call) -> Values:
         namespace, _, name = absolute_name(call.fields.text("node")).rpartition("/")
         owner = (name, namespace or "/")
-        if owner not in self._nodes():
+        if owner not in self._find_nodes():
             # As in the original rosapi, a client that asks for all nodes in turn must not fail if one has just ended.
             return {"subscribing": [], "publishing": [], "services": []}
         return {
-            "subscribing": [each for each, _ in _visible(self._node.get_subscriber_names_and_types_by_node(*owner))],
-            "publishing": [each for each, _ in _visible(self._node.get_publisher_names_and_types_by_node(*owner))],
-            "services": [each for each, _ in _visible(self._node.get_service_names_and_types_by_node(*owner))],
+            "subscribing": [
+                each for each, _ in _list_visible(self._node.get_subscriber_names_and_types_by_node(*owner))
+            ],
+            "publishing": [each for each, _ in _list_visible(self._node.get_publisher_names_and_types_by_node(*owner))],
+            "services": [each for each, _ in _list_visible(self._node.get_service_names_and_types_by_node(*owner))],
         }
 
     def _tell_time(self, _call: Call) -> Values:
@@ -175,16 +177,16 @@ def _describe_service(call: Call, part: Literal["Request", "Response"]) -> Value
     return {"typedefs": describe_service(call.fields.text("type"), part)}
 
 
-def _visible(found: NamesAndTypes) -> list[tuple[str, list[str]]]:
+def _list_visible(found: NamesAndTypes) -> list[tuple[str, list[str]]]:
     return sorted((name, types) for name, types in found if not is_hidden(name))
 
 
-def _names(infos: Iterable[object]) -> list[str]:
+def _list_names(infos: Iterable[object]) -> list[str]:
     names = {join(info.node_namespace, info.node_name) for info in infos}  # type: ignore[attr-defined]
     return sorted(name for name in names if not is_hidden(name))
 
 
-def _definition(type_name: str) -> str:
+def _find_definition(type_name: str) -> str:
     """Definition of a message as rosbag2 stores it; empty for a message that only an installed ROS has."""
     try:
         return message_definition(type_name)

@@ -43,7 +43,7 @@ def _describe(name: str, message_class: Any, seen: list[str]) -> list[Definition
         # In rosapi, -1 stands for no array, and 0 for an array of any length.
         lengths.append(-1 if parts is None else parts[2] or 0)
         examples.append("[]" if parts else "{}" if "/" in kind else str(getattr(message, field)))
-    constants = _constants(name)
+    constants = _find_constants(name)
     package, _, short = name.replace("/", " ").split()
     definition = {
         "type": f"{package}/{short}",
@@ -62,7 +62,7 @@ def _describe(name: str, message_class: Any, seen: list[str]) -> list[Definition
     return found
 
 
-def _constants(name: str) -> Mapping[str, object]:
+def _find_constants(name: str) -> Mapping[str, object]:
     try:
         return structure(name).constants
     except ValueError:

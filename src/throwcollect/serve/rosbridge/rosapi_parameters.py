@@ -84,7 +84,9 @@ class Parameters:
                 call.fail(f"{node}: there is no such node, or it tells nobody of its parameters")
                 return
             # JavaScript writes 1.0 as 1, so numbers for a floating-point parameter are converted.
-            value = _as_floats(wanted) if isinstance(_first(ros.parameter_value_to_python(current)), float) else wanted
+            value = (
+                _as_floats(wanted) if isinstance(_take_first(ros.parameter_value_to_python(current)), float) else wanted
+            )
             request = ros.get_service(_SET).Request()
             request.parameters = [ros.Parameter(name, value=value).to_parameter_msg()]
             try:
@@ -174,7 +176,7 @@ def _as_json(default: str) -> str:
     return default
 
 
-def _first(value: Any) -> Any:
+def _take_first(value: Any) -> Any:
     return next(iter(value), None) if isinstance(value, list | tuple) or hasattr(value, "tolist") else value
 
 
