@@ -53,8 +53,8 @@ $(READY): pyproject.toml | $(VENV)/bin/python
 	@touch $@
 
 $(READY_DEV): pyproject.toml | $(VENV)/bin/python
-	@$(BIN)/python -c 'import sys; sys.version_info < (3, 12) or sys.exit("the tests need pybullet, which has wheels for \
-	Python 3.10 and 3.11 alone, and $(VENV) has another: rm -r $(VENV), then make PYTHON=/path/to/python3.11 test")'
+	@$(BIN)/python -c 'import sys; sys.version_info[:2] == (3, 11) or sys.exit("the tests need Python 3.11, the only one for which there \
+	are wheels of pybullet and of genuine ROS 2, and $(VENV) has another: rm -r $(VENV), then make PYTHON=/path/to/python3.11 test")'
 	$(find_libgomp)
 	@echo "installing about 140 packages into $(VENV): 600 MB to download, 2 GB with the robot's description"
 	$(INSTALL) -e '.[dev]'

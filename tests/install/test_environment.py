@@ -273,6 +273,24 @@ def test_make_runs_the_environment_script_first(target: str, tmp_path: Path) -> 
     assert install.startswith("packaging/install.sh .venv/bin/python -e ")
 
 
+@pytest.mark.parametrize("version", [(3, 10, 13), (3, 12, 1)])
+def test_the_tests_are_not_installed_for_another_python_than_theirs(
+    version: tuple[int, int, int], tmp_path: Path
+) -> None:
+    shutil.copy(ROOT / "Makefile", tmp_path)
+    (tmp_path / "pyproject.toml").touch()
+    python = tmp_path / ".venv" / "bin" / "python"
+    python.parent.mkdir(parents=True)
+    pretends = f"import sys; sys.version_info = {version}; exec(sys.argv[1])"
+    python.write_text(f'#!/bin/sh\nexec {sys.executable} -c "{pretends}" "$2"\n')
+    python.chmod(0o755)
+    environment = {name: value for name, value in os.environ.items() if not name.startswith("MAKE")}
+    words = ["make", "--silent", ".venv/.ready-dev"]
+    said = subprocess.run(words, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
+    assert (said.returncode, said.stdout) == (2, "")
+    assert said.stderr.startswith("the tests need Python 3.11, the only one")
+
+
 def test_an_environment_with_another_python_than_the_named_one_is_not_used(tmp_path: Path) -> None:
     shutil.copy(ROOT / "Makefile", tmp_path)
     (tmp_path / "pyproject.toml").touch()
