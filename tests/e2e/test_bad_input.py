@@ -263,10 +263,10 @@ def test_a_collection_on_a_full_disk_ends_with_an_error_and_can_be_resumed(
     moment: str, small: Path, tmp_path: Path, dataset: tuple[Path, dict[str, object]]
 ) -> None:
     shard = (dataset[0] / "small_00000.mcap").stat().st_size
-    # The finished shard is some kilobytes larger than the part file, because it has a summary.
+    # One of two episodes fits into three quarters of the shard. The finished shard is larger by its summary.
     limit, file = {
         "plan": (1000, "config.yaml"),
-        "collection": (shard // 2, "small_00000.mcap.part"),
+        "collection": (shard * 3 // 4, "small_00000.mcap.part"),
         "finish": (shard - 100, "small_00000.mcap"),
     }[moment]
     # In a collection by nodes, it is the coordinator that runs into the full disk.
@@ -283,6 +283,9 @@ def test_a_collection_on_a_full_disk_ends_with_an_error_and_can_be_resumed(
         resumed = call_here("resume", tmp_path / "data", *INPROCESS, "--json")
         assert resumed.returncode == 0, resumed.stderr
         assert json.loads(resumed.stdout)["digest"] == dataset[1]["digest"]
+        kept = [json.loads(line) for line in (tmp_path / "data" / "logs" / "journal.jsonl").read_text().splitlines()]
+        episodes = {"collection": 1, "finish": 2}[moment]
+        assert [each["episodes"] for each in kept if each["event"] == "recovered"] == [episodes]
 
 
 def test_info_verify_and_digest_refuse_an_incomplete_dataset(

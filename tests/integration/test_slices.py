@@ -270,7 +270,7 @@ def test_slices_need_no_locks(config: Path, whole: Path, tmp_path: Path, monkeyp
         runs.prepare(config, overrides=INPROCESS, output=tmp_path / "one")
 
 
-def test_a_full_disk_ends_the_attempt_and_a_later_one_succeeds(
+def test_a_full_disk_ends_the_attempt_and_a_later_one_goes_on_with_its_episodes(
     frozen: Path, whole: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     full = True
@@ -286,7 +286,10 @@ def test_a_full_disk_ends_the_attempt_and_a_later_one_succeeds(
         collect_slice(frozen, Slice(0, 2), overrides=INPROCESS)
     assert not find_finished(frozen)
     full = False
-    collect(frozen, "0/2", "1/2")
+    onlooker = Listener()
+    collect_slice(frozen, Slice(0, 2), overrides=INPROCESS, onlooker=onlooker)
+    assert any("keeps 1 episode of an earlier collection" in line for line in onlooker.lines)
+    collect(frozen, "1/2")
     join(frozen)
     assert fingerprints(frozen) == fingerprints(whole)
 

@@ -11,6 +11,8 @@ import numpy as np
 import pytest
 from mcap.opcode import Opcode
 from mcap.reader import make_reader
+from mcap.records import Chunk
+from mcap.stream_reader import StreamReader
 from rosbags.highlevel import AnyReader
 from rosbags.interfaces import QosDurability, QosReliability
 from rosbags.rosbag2 import Reader
@@ -101,11 +103,23 @@ def test_seeking_by_time_and_topic_finds_exactly_those_messages(full: Path) -> N
     assert [message.sequence for _, _, message in found] == list(range(25))
 
 
-def test_chunk_indexes_point_at_the_message_indexes(full: Path) -> None:
-    for path in full.glob("*.mcap"):
+def test_chunk_indexes_list_one_chunk_an_episode_and_point_at_its_message_indexes(
+    full: Path, make_collection: Any
+) -> None:
+    collection = make_collection({"trials": 4})
+    stamps = [collection.episode(trial).samples().stamps_ns for trial in range(4)]
+    spans = [(each[0], each[-1]) for each in stamps]
+    for path, expected in zip(sorted(full.glob("*.mcap")), (spans[:3], spans[3:]), strict=True):
         data = path.read_bytes()
         summary = make_reader(io.BytesIO(data)).get_summary()
         assert summary is not None
+        assert summary.statistics is not None
+        # However long an episode is, it is one chunk; the first chunk has the latched messages.
+        first, *episodes = summary.chunk_indexes
+        assert (first.message_start_time, first.message_end_time) == (expected[0][0], expected[0][0])
+        assert [(each.message_start_time, each.message_end_time) for each in episodes] == expected
+        stored = sum(isinstance(each, Chunk) for each in StreamReader(io.BytesIO(data), emit_chunks=True).records)
+        assert stored == summary.statistics.chunk_count == 1 + len(expected)
         for chunk in summary.chunk_indexes:
             assert data[chunk.chunk_start_offset] == Opcode.CHUNK
             end = chunk.chunk_start_offset + chunk.chunk_length

@@ -2,16 +2,17 @@ from __future__ import annotations
 
 import hashlib
 import json
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from throwcollect.cli.dataset.info import show_info
+from throwcollect.cli.dataset.info import describe, show_info
 from throwcollect.dataset.creation import create
 from throwcollect.dataset.inspect import digest, info
 from throwcollect.episode.episode_message import header_to_json
+from throwcollect.episode.record import EpisodeHeader, Samples
 from throwcollect.errors import DatasetError
 
 
@@ -36,9 +37,24 @@ def test_info_counts_trials_episodes_outcomes_samples_and_messages(collection: A
     assert json.loads(json.dumps(asdict(found)))["outcomes"] == found.outcomes
 
 
-def test_info_of_a_dataset_with_only_lost_trials_has_no_landing(collection: Any, tmp_path: Path) -> None:
-    found = info(collection.collect(tmp_path / "dataset", lost=range(7)))
-    assert (found.episodes, found.shards, found.landing, found.outcomes) == (0, 0, None, {"lost": 7})
+def test_info_of_a_dataset_in_which_no_ball_landed_has_no_landing_whatever_the_reason(
+    collection: Any, tmp_path: Path
+) -> None:
+    """A trial without an episode differs from an episode without a landing, whose other columns are filled."""
+
+    def fail(samples: Samples, header: EpisodeHeader) -> tuple[Samples, EpisodeHeader]:
+        # The ball of some stays in the spoon; that of the others leaves it and still flies when time is over.
+        contact = header.contacts[0] if header.trial % 2 else replace(header.contacts[0], end_ns=None)
+        flying = len(samples) - 25
+        return samples[:flying], replace(header, end_reason="timeout", contacts=(contact,), samples=flying)
+
+    collection.refuse(5, "too fast")
+    found = info(collection.collect(tmp_path / "dataset", [0, 1, 2, 3, 4, 6], lost=[4], change=fail))
+    assert found.outcomes == {"not_released": 3, "timeout": 2, "lost": 1, "refused": 1}
+    assert (found.episodes, found.shards, found.landing) == (5, 3, None)
+    assert "landing   no ball landed" in describe(found).splitlines()
+    lost = info(collection.collect(tmp_path / "lost", [0, 1, 2, 3, 4, 6], lost=range(7)))
+    assert (lost.episodes, lost.shards, lost.landing, lost.outcomes) == (0, 0, None, {"lost": 6, "refused": 1})
 
 
 def test_the_digest_of_a_dataset_is_that_of_all_episodes_in_order(collection: Any, dataset: Path) -> None:

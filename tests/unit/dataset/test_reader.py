@@ -21,7 +21,7 @@ import throwcollect
 from throwcollect.dataset.inspect import check_recordings_are_there
 from throwcollect.dataset.mcap_reader import open_mcap
 from throwcollect.dataset.reader import Dataset
-from throwcollect.errors import ConfigError, DatasetError
+from throwcollect.errors import ConfigError, DatasetError, ForeignPlanError
 
 
 @pytest.fixture(scope="module")
@@ -78,6 +78,10 @@ def test_a_trial_without_an_episode_has_a_row_and_says_why_it_has_no_samples(wit
         assert "dataset.recorded" in str(caught.value)
     with pytest.raises(DatasetError, match="trial 4 has no episode: lost: two simulations were lost"):
         _ = lost.ball
+    with pytest.raises(DatasetError, match="trial 4 has no episode: lost: two simulations were lost"):
+        with_gaps.episode(4)
+    with pytest.raises(DatasetError, match=r"no trial 7\n  expected: 0 to 6"):
+        with_gaps.episode(7)
     assert trials(with_gaps.recorded) == [0, 1, 3, 5, 6]
     assert with_gaps.recorded[2].ball.position[-1].tolist() == last_position(with_gaps, 3)
 
@@ -182,24 +186,6 @@ def test_no_recording_stays_open_after_reading(loaded: Dataset) -> None:
     assert not [link for link in Path("/proc/self/fd").iterdir() if link.resolve().suffix == ".mcap"]
 
 
-@pytest.mark.parametrize("problem", ["missing", "unfinished"])
-def test_only_finished_datasets_are_opened(dataset: Path, tmp_path: Path, problem: str) -> None:
-    if problem == "unfinished":
-        (dataset / "metadata.yaml").unlink()
-        with pytest.raises(DatasetError, match="is not finished"):
-            Dataset.open(dataset)
-    else:
-        with pytest.raises(DatasetError, match="holds no dataset"):
-            Dataset.open(tmp_path / "nowhere")
-
-
-def test_a_missing_table_of_throws_is_an_error_that_advises_rebuild(dataset: Path) -> None:
-    (dataset / "throws.parquet").unlink()
-    with pytest.raises(DatasetError, match=r"throws\.parquet: is missing") as caught:
-        Dataset.open(dataset)
-    assert caught.value.hint == f"throwcollect dataset rebuild {dataset}"
-
-
 def test_opening_a_directory_near_a_dataset_names_that_dataset(dataset: Path, tmp_path: Path) -> None:
     for wrong in (dataset.parent, dataset / "throws.parquet"):
         with pytest.raises(DatasetError, match="holds no dataset") as caught:
@@ -236,40 +222,48 @@ def test_episodes_come_in_order_of_trials_without_lost_ones(collection: Any, tmp
     assert dataset.config == collection.config
 
 
-def test_asking_for_the_episode_of_a_lost_trial_is_an_error_with_the_reason(collection: Any, tmp_path: Path) -> None:
-    dataset = Dataset.open(collection.collect(tmp_path / "dataset", lost=[4]))
-    with pytest.raises(DatasetError, match="trial 4 has no episode: lost: two simulations were lost"):
-        dataset.episode(4)
-    with pytest.raises(DatasetError, match="no trial 7"):
-        dataset.episode(7)
-
-
 @pytest.mark.parametrize(
-    ("name", "message"),
+    ("name", "message", "verb"),
     [
-        ("throws.parquet", r"throws\.parquet: is missing"),
-        ("plan.parquet", r"plan\.parquet: is missing"),
-        ("metadata.yaml", "is not finished"),
+        ("throws.parquet", r"throws\.parquet: is missing", "dataset rebuild"),
+        ("plan.parquet", r"plan\.parquet: is missing", "dataset repair"),
+        ("metadata.yaml", r"the dataset is not finished: it has no metadata\.yaml", "resume"),
     ],
 )
-def test_opening_a_dataset_names_the_missing_file(dataset: Path, name: str, message: str) -> None:
+def test_opening_a_dataset_names_the_missing_file_and_the_remedy(
+    dataset: Path, name: str, message: str, verb: str
+) -> None:
     (dataset / name).unlink()
-    with pytest.raises(DatasetError, match=message):
+    with pytest.raises(DatasetError, match=message) as caught:
         Dataset.open(dataset)
+    assert caught.value.hint == f"throwcollect {verb} {dataset}{' OUTPUT' if verb == 'dataset repair' else ''}"
 
 
-@pytest.mark.parametrize("name", ["throws.parquet", "plan.parquet", "metadata.yaml"])
-def test_opening_a_dataset_names_the_damaged_file(dataset: Path, name: str) -> None:
-    (dataset / name).write_bytes(b"\x89 nothing of the kind")
-    with pytest.raises(DatasetError, match=name):
-        Dataset.open(dataset)
-
-
-def test_a_damaged_table_of_throws_is_an_error_that_advises_rebuild(dataset: Path) -> None:
-    (dataset / "throws.parquet").write_bytes(b"")
-    with pytest.raises(DatasetError, match="is damaged") as caught:
+@pytest.mark.parametrize("contents", [b"\x89 nothing of the kind", b""])
+@pytest.mark.parametrize(
+    ("name", "message", "verb"),
+    [
+        ("throws.parquet", "is damaged", "dataset rebuild"),
+        ("plan.parquet", "is damaged", "dataset repair"),
+        ("metadata.yaml", "cannot be read: no UTF-8 text|not the metadata of a rosbag2 bag", "dataset rebuild"),
+    ],
+)
+def test_opening_a_dataset_names_the_damaged_file_and_the_remedy(
+    dataset: Path, contents: bytes, name: str, message: str, verb: str
+) -> None:
+    (dataset / name).write_bytes(contents)
+    with pytest.raises(DatasetError, match=message) as caught:
         throwcollect.load(dataset)
-    assert caught.value.hint == f"throwcollect dataset rebuild {dataset}"
+    assert caught.value.path == dataset / name
+    assert caught.value.hint == f"throwcollect {verb} {dataset}{' OUTPUT' if verb == 'dataset repair' else ''}"
+
+
+def test_opening_a_dataset_whose_plan_is_of_another_configuration_advises_no_new_plan(dataset: Path) -> None:
+    text = (dataset / "config.yaml").read_text()
+    (dataset / "config.yaml").write_text(text.replace("max: 1.2", "max: 1.1"))
+    with pytest.raises(ForeignPlanError, match=r"plan\.parquet: the plan belongs to another configuration") as caught:
+        Dataset.open(dataset)
+    assert caught.value.hint is None
 
 
 @pytest.mark.parametrize(

@@ -3,7 +3,7 @@ from __future__ import annotations
 import os
 import resource
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -24,6 +24,11 @@ MAY_DIFFER = {"README.md", "provenance.json"}
 
 def files_of(directory: Path) -> dict[str, bytes]:
     return {path.name: path.read_bytes() for path in directory.iterdir() if path.is_file()}
+
+
+def recordings_of(directory: Path) -> dict[str, bytes]:
+    """All files but those that say how the dataset was collected."""
+    return {name: data for name, data in files_of(directory).items() if name not in MAY_DIFFER}
 
 
 @contextmanager
@@ -167,42 +172,55 @@ def test_a_dataset_that_cannot_be_written_leaves_no_directory(collection: Any, t
     assert list(tmp_path.iterdir()) == []
 
 
-def test_an_episode_that_does_not_fit_on_the_disk_leaves_the_shard_as_it_was(collection: Any, tmp_path: Path) -> None:
+def test_an_episode_that_does_not_fit_on_the_disk_leaves_the_shard_as_it_was(
+    collection: Any, collected: Path, tmp_path: Path
+) -> None:
     writer = DatasetWriter.create(tmp_path / "dataset", collection.plan)
     collection.fill(writer, [0])
     part = tmp_path / "dataset" / "quick_00000.mcap.part"
-    size = part.stat().st_size
-    with file_size_limit(size + 1000), pytest.raises(DatasetError, match=r"quick_00000\.mcap\.part: cannot be written"):
+    before = part.read_bytes()
+    with (
+        file_size_limit(len(before) + 1000),
+        pytest.raises(DatasetError, match=r"quick_00000\.mcap\.part: cannot be written"),
+    ):
         collection.fill(writer, [1])
-    assert part.stat().st_size == size
+    assert part.read_bytes() == before
     # When there is space again, the failure has no effect.
     collection.fill(writer, range(1, 7))
     writer.finish(wall_s=1.0)
-    assert verify(tmp_path / "dataset") == []
+    assert recordings_of(tmp_path / "dataset") == recordings_of(collected)
 
 
-def test_collecting_can_go_on_after_the_first_episode_did_not_fit_on_the_disk(collection: Any, tmp_path: Path) -> None:
+def test_collecting_can_go_on_after_the_first_episode_did_not_fit_on_the_disk(
+    collection: Any, collected: Path, tmp_path: Path
+) -> None:
     writer = DatasetWriter.create(tmp_path / "dataset", collection.plan)
     with file_size_limit(5000), pytest.raises(DatasetError, match="cannot be written: File too large"):
         collection.fill(writer, [0])
     collection.fill(writer, range(7))
     writer.finish(wall_s=1.0)
-    assert verify(tmp_path / "dataset") == []
+    assert recordings_of(tmp_path / "dataset") == recordings_of(collected)
 
 
-def test_a_shard_that_cannot_be_finished_on_a_full_disk_stays_unfinished(collection: Any, tmp_path: Path) -> None:
+def test_a_shard_that_cannot_be_finished_on_a_full_disk_keeps_all_its_episodes_for_the_next_writer(
+    collection: Any, collected: Path, tmp_path: Path
+) -> None:
     directory = tmp_path / "dataset"
     writer = DatasetWriter.create(directory, collection.plan)
     collection.fill(writer, [0, 1])
-    finished = collection.collect(tmp_path / "elsewhere") / "quick_00000.mcap"
     # The finished file is larger than the open one by its summary.
     with (
-        file_size_limit(finished.stat().st_size - 100),
+        file_size_limit((collected / "quick_00000.mcap").stat().st_size - 100),
         pytest.raises(DatasetError, match=r"quick_00000\.mcap: cannot be written"),
     ):
         collection.fill(writer, [2])
     assert sorted(path.name for path in directory.glob("*.mcap*")) == ["quick_00000.mcap.part"]
     writer.close()
+    found: list[int] = []
+    with closing(DatasetWriter.open(directory)) as successor:
+        assert successor.recover(lambda trial, _: found.append(trial)) == 3
+    assert found == [0, 1, 2]
+    assert (directory / "quick_00000.mcap").read_bytes() == (collected / "quick_00000.mcap").read_bytes()
 
 
 def test_the_writer_refuses_second_refused_and_unknown_episodes(collection: Any, tmp_path: Path) -> None:

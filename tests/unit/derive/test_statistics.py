@@ -72,6 +72,11 @@ def test_statistics_count_and_leave_out_samples_that_are_not_finite(collection: 
     collection.collect(tmp_path / "dataset", change=spoil_efforts)
     found = statistics(tmp_path / "dataset")
     assert found.samples_not_finite == 3
+    whole = [episode.samples() for episode in Dataset.open(tmp_path / "dataset").episodes()]
+    assert found.samples == sum(map(len, whole)) - 3
+    efforts = np.concatenate([each.effort[np.isfinite(each.effort).all(axis=1), 3] for each in whole])
+    signal = found.signals["effort_nm"][TALOS.joints[3]]
+    assert (signal.min, signal.max) == (efforts.min(), efforts.max())
     json.dumps(found.as_dict(), allow_nan=False)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import resource
 import shutil
 import sys
@@ -28,7 +29,7 @@ PLUGINS = Path(__file__).parents[2] / "plugins"
 
 
 @pytest.mark.parametrize("to", FORMATS)
-def test_every_format_has_a_card_with_digest_units_and_the_configuration(
+def test_every_format_has_a_card_with_digest_units_configuration_and_all_files(
     to: str, exported: Export, source: Path
 ) -> None:
     directory = exported(to)
@@ -40,10 +41,10 @@ def test_every_format_has_a_card_with_digest_units_and_the_configuration(
     assert "| landed | 3 |" in card
     assert "| not_released | 1 |" in card
     assert ", ".join(f"`{joint}`" for joint in MOVING) in card
-    named = [
-        name for name in ("trajectories", "throws.parquet", "throws.npz", "throws.hdf5", "data", "meta") if name in card
-    ]
-    assert all((directory / name).exists() for name in named if f"- `{name}" in card)
+    listed = re.findall(r"^- `(.+?)`: ", card.partition("## Files")[2].partition("```")[0], re.MULTILINE)
+    assert sorted(listed) == sorted(
+        f"{path.name}/" if path.is_dir() else path.name for path in directory.iterdir() if path.name != "README.md"
+    )
 
 
 @pytest.mark.parametrize("to", ["parquet", "lerobot"])
@@ -54,6 +55,7 @@ def test_the_card_of_a_hub_dataset_names_its_data_in_the_header(to: str, exporte
     assert fields["license"] == "apache-2.0"
     assert fields["task_categories"] == ["robotics"]
     assert ("LeRobot" in fields["tags"]) == (to == "lerobot")
+    assert fields["configs"]
     for each in fields["configs"]:
         assert list(directory.glob(each["data_files"])), each
 

@@ -32,13 +32,14 @@ OF_A_DMP: dict[str, Any] = {
 }
 
 
-def open_recordings(directory: Path) -> dict[int, Any]:
-    """`robot_throws` of each recording and the number of the throw in it, by trial."""
+def open_recordings(directory: Path, source: Path) -> dict[int, Any]:
+    """`robot_throws` of each recording and the number of the throw in it, by trial: all that have an episode."""
     found = {}
     for path in sorted((directory / "trajectories").iterdir()):
         throws = loadmat(path)["robot_throws"][0, 0]
         for number, trial in enumerate(throws["trial"][:, 0]):
             found[int(trial)] = (throws, number)
+    assert list(found) == Dataset.open(source).recorded["trial"].tolist()
     return found
 
 
@@ -63,7 +64,7 @@ def motion(dmp: Any, times: np.ndarray) -> np.ndarray:
 def test_measured_series_equal_the_samples_of_the_dataset(
     rate_hz: int | None, step: int, exported: Export, source: Path
 ) -> None:
-    found = open_recordings(exported("mat", rate_hz))
+    found = open_recordings(exported("mat", rate_hz), source)
     moving = moving_columns()
     for trial, signals in throws_of(source, step):
         throws, number = found.pop(trial)
@@ -75,7 +76,7 @@ def test_measured_series_equal_the_samples_of_the_dataset(
 
 
 def test_the_exported_path_is_the_commanded_motion_up_to_rest(exported: Export, source: Path) -> None:
-    found = open_recordings(exported("mat"))
+    found = open_recordings(exported("mat"), source)
     for trial, signals in throws_of(source):
         throws, number = found[trial]
         path = throws["qPath"][0, number]
@@ -91,7 +92,7 @@ def test_the_exported_path_is_the_commanded_motion_up_to_rest(exported: Export, 
 
 
 def test_the_exported_targets_are_where_the_throws_landed(exported: Export, source: Path) -> None:
-    found, table = open_recordings(exported("mat")), table_of(source)
+    found, table = open_recordings(exported("mat"), source), table_of(source)
     for trial, (throws, number) in found.items():
         distance, height, angle = throws["targets"][number]
         assert height == 0.0
@@ -102,8 +103,8 @@ def test_the_exported_targets_are_where_the_throws_landed(exported: Export, sour
             assert angle == table["hit_angle_rad"][trial]
 
 
-def test_a_fitted_dmp_moves_as_commanded_up_to_its_error(exported: Export) -> None:
-    for throws, number in open_recordings(exported("mat")).values():
+def test_a_fitted_dmp_moves_as_commanded_up_to_its_error(exported: Export, source: Path) -> None:
+    for throws, number in open_recordings(exported("mat"), source).values():
         dmp, path = throws["DMP"][0, number][0, 0], throws["qPath"][0, number]
         assert list(dmp.dtype.names) == FIELDS
         assert (dmp["N"][0, 0], dmp["fitted"][0, 0]) == (25, 1)
@@ -124,7 +125,7 @@ def test_a_dmp_of_the_configuration_is_exported_with_its_own_weights(make_collec
     export(dataset, tmp_path / "out", to="mat")
     swept = table_of(dataset)["task.trajectory.weights.arm_right_4_joint.5"]
     assert Dataset.open(dataset).config.task.trajectory.family == "dmp"
-    for trial, (throws, number) in open_recordings(tmp_path / "out").items():
+    for trial, (throws, number) in open_recordings(tmp_path / "out", dataset).items():
         dmp, path = throws["DMP"][0, number][0, 0], throws["qPath"][0, number]
         expected = np.array([*WEIGHTS[:5], swept[trial], *WEIGHTS[6:]])
         assert dmp["fitted"][0, 0] == 0

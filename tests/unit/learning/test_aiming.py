@@ -48,6 +48,10 @@ def test_every_target_is_aimed_at_in_its_own_context(targets: np.ndarray) -> Non
         alone = aim(learned, targets[number : number + 1], context[number : number + 1])
         np.testing.assert_array_equal(together.parameters[number], alone.parameters[0])
         np.testing.assert_array_equal(together.nearest_place[number], alone.nearest_place[0])
+    # Drag slows the ball down, so a context that counts for nothing would make throws end elsewhere.
+    drag = learned.unscale(KeyRole.CONTEXT, context)[:, 0]
+    off = np.linalg.norm(land(learned.unscale(KeyRole.PARAMETER, together.parameters), drag) - targets, axis=1)
+    assert np.median(off) < 0.005
 
 
 def test_aimed_parameters_stay_within_their_ranges(targets: np.ndarray) -> None:

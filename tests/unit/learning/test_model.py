@@ -60,7 +60,10 @@ def test_a_model_can_be_learned_from_throws_that_end_close_together(dataset: Dat
     near = dataset
     for number, column in enumerate(TARGETS):
         near = change(near, column, [1.0 + 1e-5 * ((7 * k + number) % COUNT) for k in range(COUNT)])
-    assert fit(near).targets == TARGETS
+    model = fit(near)
+    assert model.targets == TARGETS
+    points = [{key: near.throws[key][k].as_py() for key in KEYS} for k in range(3)]
+    assert model.predict(points) == pytest.approx(np.full((3, 2), 1.0 + 5e-6 * COUNT), abs=5e-3)
 
 
 def test_aiming_at_no_targets_gives_no_aims(model: Model) -> None:

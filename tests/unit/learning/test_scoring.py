@@ -56,21 +56,24 @@ def test_a_model_of_more_throws_hits_better() -> None:
     assert medians[0] > medians[1] > medians[-1]
     assert medians[-1] < 0.001
     assert world.calls == 1
-    assert [each.target for each in found.throws] != []
+    assert len(found.throws) == 25
     errors = [np.linalg.norm(np.subtract(each.place, each.target)) for each in found.throws]
     assert sorted(errors)[12] == pytest.approx(medians[-1])
 
 
 def test_the_same_seed_gives_the_same_score() -> None:
-    assert score(World()) == score(World())
-    assert score(World()).throws != score(World(), seed=1).throws
+    first = score(World())
+    assert score(World()) == first
+    assert score(World(), seed=1).throws != first.throws
 
 
 def test_throws_that_are_refused_or_do_not_land_are_counted_as_missed() -> None:
-    errors = score(World(refused_below_s=0.95, lost_below_s=1.0)).trained[-1].errors
-    assert 0 < errors.missed < 25
-    assert errors.largest is None
-    assert errors.throws == 25
+    both, refused = score(World(refused_below_s=0.95, lost_below_s=1.0)), score(World(refused_below_s=0.95))
+    missed = [found.trained[-1].errors.missed for found in (both, refused)]
+    assert 0 < missed[1] < missed[0] < 25
+    assert missed == [sum(each.place is None for each in found.throws) for found in (both, refused)]
+    errors = both.trained[-1].errors
+    assert (errors.throws, errors.largest) == (25, None)
 
 
 def test_adapting_to_another_world_by_a_few_throws_reduces_misses() -> None:

@@ -20,12 +20,14 @@ def closed(monkeypatch: pytest.MonkeyPatch) -> list[World]:
     return worlds
 
 
-def test_closing_and_deleting_a_replayer_closes_its_world_once(closed: list[World]) -> None:
-    replayer = Replayer(Config.model_validate({"sim": {"engine": "ballistic"}}))
-    replayer.close()
-    assert len(closed) == 1
-    del replayer
-    assert len(closed) == 1
+def test_closing_or_deleting_a_replayer_closes_its_world_once(closed: list[World]) -> None:
+    for close_first in (True, False):
+        replayer = Replayer(Config.model_validate({"sim": {"engine": "ballistic"}}))
+        if close_first:
+            replayer.close()
+            assert len(closed) == 1
+        del replayer
+        assert len(closed) == (1 if close_first else 2)
 
 
 def test_replaying_throws_closes_the_world_afterwards(dataset: Path, closed: list[World]) -> None:

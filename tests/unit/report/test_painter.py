@@ -98,7 +98,8 @@ def test_the_legend_shows_line_and_markers_of_a_trace(tmp_path: Path) -> None:
     assert width > 1.2 * np.ptp(rows[entry])  # a dot alone is as high as it is wide
 
 
-def test_every_outcome_has_a_marker_of_its_own() -> None:
+def test_every_outcome_has_a_symbol_and_a_marker_of_its_own() -> None:
+    """Two outcomes with one symbol would have one marker, so that markers differ says both."""
     names = (*(outcome.value for outcome in ThrowOutcome), REFUSED, "unheard of")
     assert len({MARKERS[style_of(name).symbol] for name in names}) == len(names)
 

@@ -1,18 +1,29 @@
 import json
 import re
 from pathlib import Path
+from typing import Any
 
+import pyarrow.parquet as pq
 import pytest
 from tests.unit.dataset.conftest import Collection
 from typer.testing import CliRunner
 
 from throwcollect.cli.main import dataset_app
+from throwcollect.dataset.reader import Dataset
+from throwcollect.derive.source import source as find_source
+from throwcollect.derive.split import assign
 
 
 def run(*arguments: str | Path) -> str:
     done = CliRunner().invoke(dataset_app, list(map(str, arguments)), catch_exceptions=False)
     assert done.exit_code == 0, done.output
     return done.output
+
+
+def trials_of(directory: Path) -> list[int]:
+    """The trials of the source that a derived dataset has taken."""
+    found: list[int] = pq.read_table(directory / "sources.parquet")["source_trial"].to_pylist()
+    return found
 
 
 @pytest.fixture(scope="module")
@@ -38,12 +49,20 @@ def test_commands_say_how_many_trials_without_an_episode_were_left_out(source: P
         "offered": 11,
         "without_episode": {"lost": 1, "refused": 1},
     }
-    assert run("sample", source, tmp_path / "c", "--count", "2", "--seed", "3").startswith(
-        f"{tmp_path}/c: 2 of 7 trials\n"
-    )
 
 
-def test_a_split_says_how_many_trials_and_cells_each_part_has(source: Path, tmp_path: Path) -> None:
+def test_the_command_sample_takes_the_same_trials_for_the_same_seed_and_others_for_another(
+    source: Path, tmp_path: Path
+) -> None:
+    taken = []
+    for name, seed in (("given", ["--seed", "0"]), ("left out", []), ("other", ["--seed", "1"])):
+        output = tmp_path / name
+        assert run("sample", source, output, "--count", "2", *seed).startswith(f"{output}: 2 of 7 trials\n")
+        taken.append(trials_of(output))
+    assert taken[0] == taken[1] != taken[2]
+
+
+def test_the_command_split_says_what_each_part_has_and_passes_the_seed_on(source: Path, tmp_path: Path) -> None:
     arguments = ("--fractions", "a=0.5,b=0.5", "--cells", "trial=2", "--seed", "1")
     text = run("split", source, tmp_path / "parts", *arguments)
     told = re.findall(rf"^{tmp_path}/parts/([ab]): (\d) of 7 trials in (\d) cells?$", text, flags=re.MULTILINE)
@@ -52,6 +71,11 @@ def test_a_split_says_how_many_trials_and_cells_each_part_has(source: Path, tmp_
     found = json.loads(run("split", source, tmp_path / "again", *arguments, "--json"))
     assert told == [(name, str(part["dataset"]["trials"]), str(part["cells"])) for name, part in found["parts"].items()]
     assert found["without_episode"] == {"lost": 1, "refused": 1}
+    options: Any = {"fractions": "a=0.5,b=0.5", "cells": ["trial=2"]}
+    first, second = (assign(find_source(Dataset.open(source)), **options, seed=seed) for seed in (1, 2))
+    for name, trials in first.items():
+        assert trials_of(tmp_path / "parts" / name) == trials_of(tmp_path / "again" / name) == list(trials)
+    assert first != second
 
 
 def test_stats_prints_a_table_or_json_with_the_same_numbers(source: Path) -> None:
