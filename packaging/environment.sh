@@ -4,7 +4,7 @@
 # It takes PYTHON, or else the first of these that can be had:
 # 1. Python 3.11 or 3.10 of this machine. pybullet, the physics engine of all tests and examples, has wheels for no later one;
 #    pip would compile it for a quarter of an hour, into an engine that computes other bytes. Of several Pythons 3.11 in PATH,
-#    it takes the first one that was compiled with optimisation, which pyenv leaves out: it needs a fifth less time for the tests.
+#    it takes the first one that was compiled with optimisation, which pyenv leaves out: it needs a sixth less time for the tests.
 # 2. Python 3.11 that uv finds or fetches. Where uv is missing, pip fetches that first, into build/uv; and where pip is missing,
 #    as it is with Debian's Python alone, `fetch_uv.py` does.
 # 3. A later Python of this machine, on which MuJoCo simulates. If it cannot make environments, uv makes it.
