@@ -221,8 +221,11 @@ def test_a_new_goal_aborts_the_running_goal(robot: Robot) -> None:
 
 
 def test_the_last_of_several_goals_wins_and_each_gets_its_own_result(robot: Robot) -> None:
+    # While the clock stands still, no goal is reached before the next one comes.
+    robot.put_into(PAUSED)
     futures = [robot.action().send_goal_async(goal(ARM, 0.5, arm_right_4_joint=end)) for end in (-0.6, -1.0, -1.4)]
     handles = [robot.result(future) for future in futures]
+    robot.put_into(PLAYING)
     assert [robot.outcome(handle) for handle in handles] == [PREEMPTED, PREEMPTED, REACHED]
     assert robot.joint(ELBOW) == pytest.approx(-1.4, abs=0.005)
 
@@ -235,6 +238,8 @@ def test_a_goal_of_another_limb_aborts_no_goal(robot: Robot) -> None:
 
 
 def test_a_reset_right_after_a_goal_aborts_it(robot: Robot) -> None:
+    # At full speed, the swing could be over before a busy machine sends the second request.
+    assert robot.set({"sim.real_time_factor": 1.0}).successful
     future = robot.action().send_goal_async(swing())
     reset = robot.ask("simulation_interfaces/srv/ResetSimulation", "reset_simulation")
     handle = robot.result(future)
