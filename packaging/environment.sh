@@ -21,8 +21,8 @@ suits() {
 }
 MAKES=", ensurepip, venv"
 
-# Whether a Python was compiled with optimisation, as those of distributions were, and as others say of themselves; and has the
-# headers that genuine ROS 2 is compiled with.
+# Whether a Python was compiled with optimisation, and has the headers with which the interfaces of genuine ROS 2 are compiled.
+# Pythons in /usr are those of distributions, which optimise without saying so; others have it in the options of their build.
 is_fast() {
     "$1" -c "import os, sys, sysconfig
 fast = sys.base_prefix == '/usr' or '--enable-optimizations' in (sysconfig.get_config_var('CONFIG_ARGS') or '')
@@ -34,8 +34,10 @@ make_with() {
     exec "$1" -m venv "$directory"
 }
 
-# The path of the named one may have blanks.
-if [ -z "$named" ]; then
+if [ -n "$named" ]; then
+    # Its path may have blanks.
+    set -- "$named"
+else
     IFS=:
     for place in $PATH; do
         python=$place/python3.11
@@ -43,8 +45,6 @@ if [ -z "$named" ]; then
     done
     unset IFS
     set -- python3.11 python3.10 python3
-else
-    set -- "$named"
 fi
 for python; do
     suits "$python" "(3, 10)" "(3, 12)" "$MAKES" && make_with "$python" ""
