@@ -223,39 +223,39 @@ def test_episodes_come_in_order_of_trials_without_lost_ones(collection: Any, tmp
 
 
 @pytest.mark.parametrize(
-    ("name", "message", "verb"),
+    ("name", "message", "remedy"),
     [
-        ("throws.parquet", r"throws\.parquet: is missing", "dataset rebuild"),
-        ("plan.parquet", r"plan\.parquet: is missing", "dataset repair"),
-        ("metadata.yaml", r"the dataset is not finished: it has no metadata\.yaml", "resume"),
+        ("throws.parquet", r"throws\.parquet: is missing", "dataset rebuild {}"),
+        ("plan.parquet", r"plan\.parquet: is missing", "dataset repair {} OUTPUT"),
+        ("metadata.yaml", r"the dataset is not finished: it has no metadata\.yaml", "resume {}"),
     ],
 )
 def test_opening_a_dataset_names_the_missing_file_and_the_remedy(
-    dataset: Path, name: str, message: str, verb: str
+    dataset: Path, name: str, message: str, remedy: str
 ) -> None:
     (dataset / name).unlink()
     with pytest.raises(DatasetError, match=message) as caught:
         Dataset.open(dataset)
-    assert caught.value.hint == f"throwcollect {verb} {dataset}{' OUTPUT' if verb == 'dataset repair' else ''}"
+    assert caught.value.hint == f"throwcollect {remedy.format(dataset)}"
 
 
 @pytest.mark.parametrize("contents", [b"\x89 nothing of the kind", b""])
 @pytest.mark.parametrize(
-    ("name", "message", "verb"),
+    ("name", "message", "remedy"),
     [
-        ("throws.parquet", "is damaged", "dataset rebuild"),
-        ("plan.parquet", "is damaged", "dataset repair"),
-        ("metadata.yaml", "cannot be read: no UTF-8 text|not the metadata of a rosbag2 bag", "dataset rebuild"),
+        ("throws.parquet", "is damaged", "dataset rebuild {}"),
+        ("plan.parquet", "is damaged", "dataset repair {} OUTPUT"),
+        ("metadata.yaml", "cannot be read: no UTF-8 text|not the metadata of a rosbag2 bag", "dataset rebuild {}"),
     ],
 )
 def test_opening_a_dataset_names_the_damaged_file_and_the_remedy(
-    dataset: Path, contents: bytes, name: str, message: str, verb: str
+    dataset: Path, contents: bytes, name: str, message: str, remedy: str
 ) -> None:
     (dataset / name).write_bytes(contents)
     with pytest.raises(DatasetError, match=message) as caught:
         throwcollect.load(dataset)
     assert caught.value.path == dataset / name
-    assert caught.value.hint == f"throwcollect {verb} {dataset}{' OUTPUT' if verb == 'dataset repair' else ''}"
+    assert caught.value.hint == f"throwcollect {remedy.format(dataset)}"
 
 
 def test_opening_a_dataset_whose_plan_is_of_another_configuration_advises_no_new_plan(dataset: Path) -> None:
