@@ -299,7 +299,8 @@ def test_logs_follow_a_run_to_its_end(config: Path, records: Records, tmp_path: 
     assert records.get(run).status == "ended"
     lines = out.splitlines()
     assert {line.split(" | ")[0].rstrip() for line in lines} == {"router", "coordinator", "sim_0", "sim_1"}
-    assert "sim_1       | sim_1 is ready" in lines
+    # On a busy machine, one of them may be told to end before it is ready, as the other has done all trials.
+    assert {"sim_0       | sim_0 is ready", "sim_1       | sim_1 is ready"} & set(lines)
     assert any(line.startswith("coordinator | 12/12 throws: 12 landed") for line in lines)
     assert sorted(call_here("logs", "--run", run).stdout.splitlines()) == sorted(lines)
     only = call_here("logs", "sim_1").stdout.splitlines()
