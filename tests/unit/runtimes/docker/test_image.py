@@ -9,6 +9,7 @@ import subprocess
 import tarfile
 import tempfile
 from collections.abc import Iterator
+from fnmatch import fnmatch
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -104,7 +105,7 @@ def test_the_build_context_holds_only_what_the_dockerfile_copies(said: list[str]
     engine = Engine("base")
     build(engine, "mine", base="base", wheelhouse=wheelhouse, say=said.append)
     for source in COPIED:
-        assert any(name.startswith(source.removesuffix("*")) for name in engine.context), source
+        assert any(fnmatch(name, f"{source}*") for name in engine.context), source
     files = {name for name, member in engine.context.items() if member.isfile()}
     assert {Path(name).name for name in files if name.startswith("docker/wheelhouse/")} == {
         "numpy-2.whl",
@@ -136,7 +137,7 @@ def test_the_dockerignore_file_excludes_nothing_that_the_dockerfile_copies() -> 
     patterns = (ROOT / ".dockerignore").read_text().splitlines()
     sent = exclude_paths(str(ROOT), patterns)
     # A directory of wheels exists only if somebody has filled one.
-    for source in (each for each in COPIED if not each.endswith("*")):
+    for source in (each for each in COPIED if "*" not in each):
         assert any(path == source or path.startswith(f"{source}/") for path in sent), source
 
 
