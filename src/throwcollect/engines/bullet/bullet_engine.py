@@ -141,13 +141,16 @@ class BulletEngine(Engine):
         aim, mode = pybullet.setJointMotorControlArray, pybullet.POSITION_CONTROL
         take_step, points_on = pybullet.stepSimulation, pybullet.getContactPoints
         drag, due, stride = steps.drag_kgpm, steps.first_sample, steps.stride
-        last_pressing = self._pressing
-        number = 0
+        last_pressing, nothing = self._pressing, set[Surface]()
+        number, last_aim = 0, None
         # Bullet reads lists twice as fast as arrays.
-        for position, velocity in zip(steps.targets[:-1].tolist(), steps.velocities.tolist(), strict=True):
+        for now_aim in zip(steps.targets[:-1].tolist(), steps.velocities.tolist(), strict=True):
             # A motor gets the position of the beginning of the step and the velocity that leads from there to the
-            # target, so that it follows without lag.
-            aim(robot, joints, mode, position, velocity, forces, position_gains, velocity_gains, client)
+            # target, so that it follows without lag. It keeps them, so a joint that stands still is aimed only once.
+            if now_aim != last_aim:
+                last_aim = now_aim
+                position, velocity = now_aim
+                aim(robot, joints, mode, position, velocity, forces, position_gains, velocity_gains, client)
             if drag:
                 # Drag is applied before every step, because Bullet forgets external forces after each.
                 self._apply_drag(drag)
@@ -155,7 +158,7 @@ class BulletEngine(Engine):
             number += 1
             # Bullet also lists points that are close without touching; those have no normal force (field 9).
             points = points_on(ball, _ANY_BODY, _ANY_LINK, _ANY_LINK, client)
-            pressing = {(point[2], point[4]) for point in points if point[9] > 0}
+            pressing = {(point[2], point[4]) for point in points if point[9] > 0} if points else nothing
             if pressing != last_pressing:
                 self._pressing = last_pressing = pressing
                 self._tell_touch(number, observer)
