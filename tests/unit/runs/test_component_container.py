@@ -7,6 +7,7 @@ from contextlib import suppress
 from dataclasses import replace
 from datetime import datetime, timezone
 from pathlib import Path
+from unittest.mock import Mock
 
 import pytest
 from tests.unit.runtimes.docker.engine import Engine, engine_at
@@ -22,7 +23,7 @@ from throwcollect.runs.control import down
 from throwcollect.runs.records import OpenRun, Records
 from throwcollect.runs.run_record import Kind, Origin, RunRecord
 from throwcollect.runs.state_directory import STATE_VARIABLE
-from throwcollect.runtimes.docker import component
+from throwcollect.runtimes.docker import component, docker_engine
 from throwcollect.runtimes.docker import watch as docker_watch
 from throwcollect.runtimes.docker.component import find_way
 from throwcollect.runtimes.docker.container_options import JOINED_LABEL, NODE_LABEL, RUN_LABEL
@@ -168,5 +169,6 @@ def test_a_container_cannot_join_a_run_that_it_cannot_reach(tmp_path: Path, monk
     with pytest.raises(ConfigError, match="is on Fast DDS"):
         find_way("talos", "local", fast_dds, SPEC)
     monkeypatch.setenv("DOCKER_HOST", "tcp://far.example:2376")
-    with pytest.raises(ConfigError, match="its nodes are processes of this machine"):
+    monkeypatch.setattr(docker_engine, "connect", lambda: Mock(info=lambda: {"Name": "far"}))
+    with pytest.raises(ConfigError, match="processes of this machine, which containers on far cannot reach"):
         find_way("talos", "local", Connection("tls/127.0.0.1:7447", RunKey(tmp_path)), SPEC)

@@ -5,6 +5,7 @@ from dataclasses import replace
 from http.server import BaseHTTPRequestHandler
 from importlib.metadata import EntryPoint, EntryPoints, version
 from pathlib import Path
+from unittest.mock import Mock
 
 import pytest
 
@@ -14,6 +15,7 @@ from throwcollect.members import names_of
 from throwcollect.robots.talos import TALOS
 from throwcollect.ros.middleware import VARIABLE, _choose_installed
 from throwcollect.runs.doctor import examine
+from throwcollect.runtimes.docker import docker_engine
 from throwcollect.runtimes.docker.image import SOURCES_LABEL, default_tag
 
 PLUGINS = Path(__file__).parents[2] / "plugins"
@@ -168,6 +170,14 @@ def test_doctor_reports_the_docker_engine_and_its_image(tmp_path: Path, monkeypa
             f"{outdated}; throwcollect image build makes it anew",
         )
         server.shutdown()
+
+
+def test_doctor_notes_a_docker_engine_on_another_machine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("DOCKER_HOST", "ssh://lab")
+    monkeypatch.setattr(docker_engine, "connect", lambda **_: Mock(info=lambda: {"Name": "lab"}))
+    (check,) = [check for check in examine(tmp_path) if check.name == "docker"]
+    problem = "the Docker engine at ssh://lab is on another machine, lab, without directories of this one"
+    assert (check.status, check.finding) == ("note", f"{problem}; runs use processes")
 
 
 def test_doctor_notes_a_python_without_wheels_of_bullet(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,3 +1,4 @@
+import socket
 from collections.abc import Callable
 from pathlib import Path
 from unittest.mock import Mock
@@ -184,23 +185,39 @@ def test_containers_use_middleware_of_their_image_that_the_launcher_can_join(
 
 
 @pytest.mark.parametrize(
-    ("rmw", "host", "problem"),
+    ("rmw", "problem"),
     [
-        (None, None, "has no rclpy"),
-        ("rmw_fastrtps_cpp", "tcp://192.0.2.7:2375", "those at tcp://192.0.2.7:2375 cannot"),
+        (None, f"the image {default_tag()} has no rclpy"),
+        ("rmw_cyclonedds_cpp", "has rclpy with rmw_cyclonedds_cpp, and a launcher with rmw_fastrtps_cpp cannot join"),
     ],
 )
 def test_requested_rclpy_that_containers_cannot_have_is_an_error(
-    engine, monkeypatch: pytest.MonkeyPatch, rmw: str | None, host: str | None, problem: str
+    engine, monkeypatch: pytest.MonkeyPatch, rmw: str | None, problem: str
 ) -> None:
     monkeypatch.setattr(docker_image, "ensure", lambda *_, **__: None)
     monkeypatch.setattr(docker_image, "rmw_of", lambda *_: rmw)
     monkeypatch.setattr(runtime_choice, "choose_middleware", lambda _: FAST_DDS)
-    if host is not None:
-        monkeypatch.setenv("DOCKER_HOST", host)
     with pytest.raises(ConfigError, match=problem) as caught:
         runtime_choice.choose(Config(run=RunConfig(runtime="docker", ros="rclpy")), say=print, warn=print)
     assert "run.ros" in str(caught.value)
+
+
+@pytest.mark.parametrize("host", ["tcp://192.0.2.7:2375", "ssh://lab"])
+def test_an_engine_on_another_machine_is_not_used(choose, monkeypatch: pytest.MonkeyPatch, host: str) -> None:
+    monkeypatch.setenv("DOCKER_HOST", host)
+    monkeypatch.setattr(docker_engine, "connect", lambda **_: Mock(info=lambda: {"Name": "lab"}))
+    problem = f"the Docker engine at {host} is on another machine, lab, without directories of this one"
+    assert choose("auto") == ("local", [f"runtime: local processes (auto, as {problem})"])
+    with pytest.raises(WorkerError, match=problem) as caught:
+        choose("docker")
+    assert caught.value.hint == "run throwcollect on lab, or use processes: --runtime local"
+
+
+def test_an_engine_of_this_machine_is_used_by_tcp_too(choose, engine, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("DOCKER_HOST", "tcp://127.0.0.1:2375")
+    here = {"Name": socket.gethostname()}
+    monkeypatch.setattr(docker_engine, "connect", lambda **_: Mock(info=lambda: here))
+    assert choose("docker") == ("docker", [f"runtime: Docker containers of {default_tag()}"])
 
 
 @pytest.mark.parametrize(

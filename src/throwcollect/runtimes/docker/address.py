@@ -16,15 +16,6 @@ def engine_address() -> str:
     return os.environ.get("DOCKER_HOST") or _DEFAULT_HOST
 
 
-def is_local() -> bool:
-    """Whether the engine runs on this machine, so that its containers can be reached from here.
-
-    One that is reached by TCP or SSH counts as running elsewhere. Runs are not meant for such an engine
-    (docs/containers.md): it cannot mount directories of this machine.
-    """
-    return engine_address().startswith("unix:")
-
-
 def has_socket() -> bool:
     """Whether the engine's socket exists; true also for an engine that has no socket in the file system."""
     path = engine_address().removeprefix("unix://")

@@ -17,7 +17,6 @@ from throwcollect.ros.connection import Connection
 from throwcollect.ros.middleware import RMW_VARIABLE
 from throwcollect.run_key import RunKey
 from throwcollect.runtimes.docker import engine_clock
-from throwcollect.runtimes.docker.address import engine_address, is_local
 from throwcollect.runtimes.docker.checks import check_container
 from throwcollect.runtimes.docker.container_options import (
     API_VERSION,
@@ -27,7 +26,7 @@ from throwcollect.runtimes.docker.container_options import (
     RunPlace,
     container_options,
 )
-from throwcollect.runtimes.docker.docker_engine import ENGINE_ERRORS, connect
+from throwcollect.runtimes.docker.docker_engine import ENGINE_ERRORS, connect, find_other_machine
 from throwcollect.runtimes.docker.docker_nodes import LOG_S, end_in_words
 from throwcollect.runtimes.docker.engine_clock import EngineClock
 from throwcollect.runtimes.docker.node_container import NodeContainer
@@ -66,6 +65,7 @@ def find_way(run: str, runtime: str, connection: Connection, spec: ContainerSpec
 
     Raises:
         ConfigError: If the container cannot join the run.
+        WorkerError: If the engine does not say where it runs.
     """
     if connection.middleware.is_fast_dds:
         raise ConfigError(
@@ -76,10 +76,9 @@ def find_way(run: str, runtime: str, connection: Connection, spec: ContainerSpec
         place = RunPlace(run, "")
         endpoint = f"{connection.endpoint.partition('/')[0]}/{ROUTER}:{ROUTER_PORT}"
         return Way(run, _environment(connection, endpoint), place.key_mount(read_only=True), place.network)
-    if not is_local():
-        raise ConfigError(
-            f"run {run}: its nodes are processes of this machine, which containers at {engine_address()} cannot reach"
-        )
+    if (other := find_other_machine()) is not None:
+        problem = f"run {run}: its nodes are processes of this machine, which containers on {other} cannot reach"
+        raise ConfigError(problem)
     if spec.section.ports or spec.section.networks:
         raise ConfigError(
             f"run {run}: its nodes are processes, so a container that joins it has this machine's network and no other",

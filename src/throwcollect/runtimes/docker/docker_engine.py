@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import json
+import socket
 import struct
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 
 from docker.client import DockerClient
 from docker.errors import APIError, DockerException
@@ -14,7 +15,7 @@ from urllib3.exceptions import HTTPError
 from urllib3.exceptions import TimeoutError as PoolTimeoutError
 
 from throwcollect.errors import WorkerError
-from throwcollect.runtimes.docker.address import no_answer
+from throwcollect.runtimes.docker.address import engine_address, no_answer
 
 # The client raises any of the last three if a connection breaks in the middle of an answer or of a stream.
 ENGINE_ERRORS = (DockerException, HTTPError, OSError, struct.error, json.JSONDecodeError)
@@ -36,6 +37,22 @@ def connect(*, timeout_s: float = PATIENCE_S) -> DockerClient:
         return DockerClient.from_env(timeout=timeout_s)
     except ENGINE_ERRORS as error:
         raise no_answer(in_words(error)) from error
+
+
+def find_other_machine() -> str | None:
+    """Find the name of the machine on which the engine runs; None if that is this machine.
+
+    Containers on another machine have no directories of this one, and processes of this one do not reach them. An
+    engine with a socket in the file system is here; one that is reached by TCP or SSH says where it is.
+
+    Raises:
+        WorkerError: If no engine answers.
+    """
+    if engine_address().startswith("unix:"):
+        return None
+    with closing(connect()) as client, engine_errors("the Docker engine does not say where it runs"):
+        name = str(client.info()["Name"])
+    return None if name == socket.gethostname() else name
 
 
 def in_words(error: BaseException) -> str:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from throwcollect.errors import ConfigError, Problem, WorkerError
 from throwcollect.extras import is_installed
 from throwcollect.ros.middleware import Middleware
-from throwcollect.runtimes.docker.address import check_socket, engine_address, has_socket, is_local
+from throwcollect.runtimes.docker.address import check_socket, engine_address, has_socket
 from throwcollect.runtimes.runtime import Check, HeldRun, Place, Runtime
 
 if TYPE_CHECKING:
@@ -61,6 +61,7 @@ class DockerRuntime(Runtime):
 
         name = image(config)
         with closing(connect(timeout_s=PATIENCE_S if config.run.runtime == "docker" else _PROBE_S)) as client:
+            _refuse_other_machine()
             ensure(client, name, say=say)
             if is_outdated(client, name):
                 _handle_outdated_image(client, name, config, warn)
@@ -73,6 +74,7 @@ class DockerRuntime(Runtime):
 
         try:
             with closing(connect(timeout_s=_PROBE_S)) as client, engine_errors("the Docker engine fails"):
+                _refuse_other_machine()
                 engine = client.version()["Version"]
                 found = f"Docker {engine} answers at {engine_address()}"
                 if not is_there(client, default_tag()):
@@ -121,22 +123,37 @@ class DockerRuntime(Runtime):
         return remove(connect(), run, volumes=volumes)
 
 
+def _refuse_other_machine() -> None:
+    """Refuse an engine of another machine.
+
+    Raises:
+        WorkerError: If the engine runs on another machine, or does not answer.
+    """
+    from throwcollect.runtimes.docker.docker_engine import find_other_machine
+
+    if (other := find_other_machine()) is not None:
+        raise WorkerError(
+            f"the Docker engine at {engine_address()} is on another machine, {other}, without directories of this one",
+            hint=f"run throwcollect on {other}, or use processes: --runtime local",
+        )
+
+
 def _choose_middleware(rmw: str | None, image: str, config: Config, launcher: Middleware) -> Middleware:
     """Choose the middleware of containers: one that the image has, and over which the launcher can join the nodes.
 
     Raises:
-        ConfigError: If the configuration asks for rclpy, but the image has none, or the launcher could not join nodes.
+        ConfigError: If the configuration asks for rclpy, but the image has none that the launcher can join.
     """
     if rmw is None:
         problem = f"the image {image} has no rclpy"
     # Every launcher has the embedded client, which speaks this protocol, and only has to reach the router.
     elif (found := Middleware("rclpy", rmw)).joining.backend == "embedded":
         return found if config.run.ros != "embedded" else Middleware()
-    # With any other middleware, the launcher has to load the same one, and to reach every node.
-    elif not is_local():
-        problem = f"with {rmw} nodes talk to each other directly, and those at {engine_address()} cannot be reached"
+    # With any other middleware, nodes talk to each other directly, and the launcher has to load the same one.
+    elif launcher.rmw == rmw:
+        return found
     else:
-        return found if launcher.rmw == rmw else Middleware()
+        problem = f"the image {image} has rclpy with {rmw}, and a launcher with {launcher.rmw} cannot join its nodes"
     if config.run.ros == "rclpy":
         raise ConfigError([Problem(problem, key="run.ros")], expected="embedded, or auto")
     return Middleware()
