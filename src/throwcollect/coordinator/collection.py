@@ -365,8 +365,7 @@ class TrialCollection:
     def _tell_set_aside(self) -> None:
         aside = {name: reason for name in self._names if (reason := self._leases.why_set_aside(name)) is not None}
         for simulation in aside.keys() - self._set_aside.keys():
-            why = f"it refused trials that other simulations could do: {aside[simulation]}"
-            self.warn(f"{simulation}: gets no more trials, because {why}")
+            self.warn(f"{simulation}: gets no more trials, because {aside[simulation]}")
         self._set_aside = aside
 
     def _give_back(self, simulation: str, trial: int, reason: str, given_up: list[str] | None) -> None:

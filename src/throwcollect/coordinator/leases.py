@@ -64,10 +64,10 @@ class Leases:
         return self.ended == self.total
 
     def why_set_aside(self, simulation: str) -> str | None:
-        """Say why a simulation gets no more trials: it refused too many that others could do; None if it gets more."""
+        """Say why a simulation gets no more trials; None if it gets more."""
         if self._wrong_refusals.get(simulation, 0) < _MOST_IN_A_ROW:
             return None
-        return self._refusals[simulation][-1][1]
+        return f"it refused trials that other simulations could do: {self._refusals[simulation][-1][1]}"
 
     def explain_hopelessness(self, simulations: Collection[str]) -> str | None:
         """Say why none of these simulations will ever do a trial: none ever did, and all refuse. Else None."""

@@ -21,7 +21,7 @@ from throwcollect.coordinator.prepare import (
     prepare,
     read_listed_points,
 )
-from throwcollect.dataset.configuration import read_config
+from throwcollect.dataset.configuration import read_config, unfitting_plan
 from throwcollect.dataset.directory import CONFIG, METADATA, PLAN, SHARD_SUFFIX, SOURCES, TRIALS, config_path
 from throwcollect.dataset.lock import hold_lock
 from throwcollect.dataset.manifest import is_as_written
@@ -229,10 +229,7 @@ def _read_stored_plan(directory: Path, stored: Config | None, config: Config) ->
         return Plan.read(directory / PLAN, stored or config)
     except DatasetError as error:
         if stored is not None and isinstance(error, ForeignPlanError) and not is_as_written(directory, CONFIG):
-            raise ForeignPlanError(
-                f"{error.message} than {CONFIG}; one of the two was changed, and nothing says which",
-                hint=f"restore {CONFIG}, or remove {PLAN} if it is the one that is wrong",
-            ) from error
+            raise unfitting_plan(error) from error
         if stored is None:
             # The configuration is missing, too, so nothing tells whether the given one is that of the dataset.
             hint = f"{command('up', 'CONFIG', '--resume', directory)}, with the CONFIG that the dataset was begun with"

@@ -8,7 +8,7 @@ from throwcollect.config.loader import load
 from throwcollect.config.schema import Config
 from throwcollect.dataset.directory import CONFIG, PLAN, SOURCES, config_path, has_files
 from throwcollect.dataset.manifest import was_changed
-from throwcollect.errors import ConfigError, DatasetError
+from throwcollect.errors import ConfigError, DatasetError, ForeignPlanError
 from throwcollect.files import is_there
 from throwcollect.wording import command
 
@@ -25,6 +25,14 @@ def read_config(directory: Path) -> Config:
     except ConfigError as error:
         refuse_damaged_config(directory, error)
         raise
+
+
+def unfitting_plan(error: ForeignPlanError) -> ForeignPlanError:
+    """The error for a plan of another configuration than the one beside it, where nothing says which was changed."""
+    return ForeignPlanError(
+        f"{error.message} than {CONFIG}; one of the two was changed, and nothing says which",
+        hint=f"restore {CONFIG}, or remove {PLAN} if it is the one that is wrong",
+    )
 
 
 def refuse_damaged_config(directory: Path, error: ConfigError) -> None:

@@ -13,6 +13,7 @@ from throwcollect.config.schema import Config
 from throwcollect.config.target_columns import is_target
 from throwcollect.config.values import reason_not_sweepable
 from throwcollect.dataset.bag import refuse_other_directory
+from throwcollect.dataset.configuration import unfitting_plan
 from throwcollect.dataset.directory import CONFIG, PLAN, SHARD_SUFFIX, THROWS, TRIALS, config_path
 from throwcollect.dataset.misses import read_targets
 from throwcollect.dataset.rebuild import read_earlier_rows, reason_lost
@@ -127,10 +128,7 @@ def _read_or_remake_plan(directory: Path, config: Config, remake: Remake, remark
             return plan
         reason = f"trial {min(wrong)} has another digest than its values and seed"
     except ForeignPlanError as error:
-        raise DatasetError(
-            f"{error.message} than {CONFIG}; one of the two was changed, and nothing says which",
-            hint=f"restore {CONFIG}, or remove {PLAN} if it is the one that is wrong",
-        ) from error
+        raise unfitting_plan(error) from error
     except DatasetError as error:
         reason = error.details
     try:

@@ -154,8 +154,7 @@ class NodeCollection:
         self._supervisor.replace(progress.hung)
         for name in progress.set_aside.keys() - self._set_aside:
             self._set_aside.add(name)
-            why = f"it refused trials that other simulations could do: {progress.set_aside[name]}"
-            self._session.warn(f"{name} gets no more trials, because {why}")
+            self._session.warn(f"{name} gets no more trials, because {progress.set_aside[name]}")
 
     def _check_that_nodes_meet(self, progress: Progress) -> None:
         """Start all nodes again if they do not see each other, which at times happens on DDS.

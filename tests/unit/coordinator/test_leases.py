@@ -119,7 +119,7 @@ def do_all(leases: Leases) -> list[int]:
 def test_a_simulation_that_refuses_every_trial_is_set_aside_and_loses_none() -> None:
     leases = Leases(range(60), retries=3)
     assert do_all(leases) == []
-    assert leases.why_set_aside("hole") == "no"
+    assert leases.why_set_aside("hole") == "it refused trials that other simulations could do: no"
     assert leases.why_set_aside("well") is None
 
 
