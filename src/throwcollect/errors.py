@@ -188,6 +188,12 @@ class OutputError(ThrowcollectError):
     exit_code = 6
 
 
+class UnreachableError(ThrowcollectError):
+    """The router of a run does not answer; it may be about to be started again."""
+
+    exit_code = 7
+
+
 class MemberError(ThrowcollectError):
     """A robot, task, format or other part of another package fails where it is used; the message names that package."""
 

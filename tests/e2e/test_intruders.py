@@ -22,6 +22,7 @@ import pytest
 from rclzenoh.session_config import OVERRIDE_VARIABLE, client_override
 from tests.e2e.collection import FAST, Running, call, journal, start, write_config
 from throwcollect.dataset.directory import CARD
+from throwcollect.errors import UnreachableError
 from throwcollect.run_key import RunKey
 from throwcollect.runs.records import Records
 from throwcollect.runs.run_record import RunRecord
@@ -213,7 +214,7 @@ def test_another_user_cannot_start_a_node_in_the_run(scene: Scene) -> None:
     (scene.home / "other.yaml").write_text((scene.running.directory.parent / "small.yaml").read_text())
     for node in (["sim", "other.yaml", "--name", "evil"], ["coordinator", "data", "--config", "other.yaml"]):
         said = scene.as_nobody(POSE, *node)
-        assert said.returncode == 1, said
+        assert said.returncode == UnreachableError.exit_code, said
         assert re.search(r"no Zenoh session within [\d.]+ s; connecting to", said.stderr), said
 
 

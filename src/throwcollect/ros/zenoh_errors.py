@@ -7,7 +7,7 @@ from contextlib import contextmanager
 
 from rclzenoh.exceptions import ConfigurationError, NoRouterError, UnreadableKeyError
 from rclzenoh.session_config import OVERRIDE_VARIABLE
-from throwcollect.errors import ConfigError, ThrowcollectError
+from throwcollect.errors import ConfigError, UnreachableError
 from throwcollect.run_key import unreadable_key
 
 
@@ -17,7 +17,7 @@ def zenoh_errors() -> Iterator[None]:
 
     Raises:
         ConfigError: If the session cannot be opened as it is asked for.
-        ThrowcollectError: If there is no router.
+        UnreachableError: If there is no router.
     """
     try:
         yield
@@ -27,7 +27,7 @@ def zenoh_errors() -> Iterator[None]:
     except ConfigurationError as error:
         raise ConfigError(error.message, expected=error.expected) from error
     except NoRouterError as error:
-        raise ThrowcollectError(
+        raise UnreachableError(
             error.message,
             evidence=error.reason,
             hint="start a router: python -m throwcollect.ros.router, or ros2 run rmw_zenoh_cpp rmw_zenohd; "

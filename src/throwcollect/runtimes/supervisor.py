@@ -9,7 +9,7 @@ from collections.abc import Callable, Collection, Iterable, Sequence
 from types import TracebackType
 
 from throwcollect.config.run import RunConfig
-from throwcollect.errors import Interrupted, WorkerError
+from throwcollect.errors import Interrupted, UnreachableError, WorkerError
 from throwcollect.runtimes.nodes import NodeExit, NodeHost, NodeRole, NodeSpec
 from throwcollect.runtimes.runtime import NodeState, Status
 from throwcollect.wording import format_count
@@ -106,7 +106,7 @@ class Supervisor:
                 continue
             self._last_end[node.name] = node.reason
             is_main = self._roster[node.name].role is NodeRole.MAIN
-            if is_main and not (_killed(node) and self._schedule_restart(node)):
+            if is_main and not (_may_go_on(node) and self._schedule_restart(node)):
                 end = node
             elif is_main:
                 news.append(f"{node.name} was lost ({node.reason}) and is started again")
@@ -238,11 +238,18 @@ class Supervisor:
             )
 
 
-def _killed(node: NodeExit) -> bool:
-    """Whether a signal ended a node: no node itself returns such an exit code."""
-    # A killed process has minus the number of the signal as its exit code, a container 128 plus the number. In a
-    # container, 130 would be SIGINT, but a node that was interrupted also returns 130 by itself, so it does not count.
-    return node.code is not None and (node.code < 0 or node.code > Interrupted.exit_code)
+def _may_go_on(node: NodeExit) -> bool:
+    """Whether the main node may come to its end if it is started again: it was killed, or did not find the router.
+
+    The router is started again as well, but on a busy machine it may come too late for a node that starts meanwhile.
+    """
+    if node.code is None:
+        return False
+    # No node itself returns the exit code of one that was killed. A killed process has minus the number of the signal
+    # as its exit code, a container 128 plus the number. In a container, 130 would be SIGINT, but a node that was
+    # interrupted also returns 130 by itself, so it does not count.
+    was_killed = node.code < 0 or node.code > Interrupted.exit_code
+    return was_killed or node.code == UnreachableError.exit_code
 
 
 def _quote_last_line(node: NodeExit) -> str:

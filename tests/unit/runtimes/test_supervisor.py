@@ -8,7 +8,7 @@ import pytest
 
 from throwcollect.config.run import RunConfig
 from throwcollect.config.schema import Config
-from throwcollect.errors import WorkerError
+from throwcollect.errors import UnreachableError, WorkerError
 from throwcollect.ros.middleware import Middleware
 from throwcollect.run_key import RunKey
 from throwcollect.runtimes import supervisor as module
@@ -301,8 +301,10 @@ def test_a_frozen_node_is_ended_after_three_seconds(name: str, runtime: FakeRunt
     assert runtime.signals == [(name, signal.SIGKILL)]
 
 
-@pytest.mark.parametrize("code", [-9, 137])
-def test_a_coordinator_that_was_killed_is_restarted(code: int, runtime: FakeRuntime, clock: Clock) -> None:
+@pytest.mark.parametrize("code", [-9, 137, UnreachableError.exit_code])
+def test_a_coordinator_that_was_killed_or_found_no_router_is_restarted(
+    code: int, runtime: FakeRuntime, clock: Clock
+) -> None:
     supervisor = supervise(runtime, restarts=1)
     runtime.die(COORDINATOR, code)
     end, news = supervisor.poll()
