@@ -22,7 +22,8 @@ _FROZEN_S = 3.0
 """A node that is stopped for this long counts as lost. A shorter stop is allowed: somebody may examine the node."""
 
 _RESTARTS_BEFORE_READY = 1
-"""A simulation that was never ready is started again only this often, because further attempts rarely help."""
+"""A simulation that was never ready is started again only this often, because further attempts rarely help, unless it
+only found no router."""
 
 
 class Supervisor:
@@ -197,7 +198,8 @@ class Supervisor:
         """Plan the next start of a node that ended, or give the node up; return whether it will be started again."""
         count = self._restarts.get(node.name, 0)
         worked = self._roster[node.name].role is not NodeRole.EXPENDABLE or node.name in self._ready
-        if count >= (self._run.restarts if worked else min(_RESTARTS_BEFORE_READY, self._run.restarts)):
+        may_work = worked or node.code == UnreachableError.exit_code
+        if count >= (self._run.restarts if may_work else min(_RESTARTS_BEFORE_READY, self._run.restarts)):
             self._given_up[node.name] = node
             return False
         self._restarts[node.name] = count + 1

@@ -204,6 +204,17 @@ def test_a_simulation_that_was_never_ready_is_restarted_only_once(runtime: FakeR
     assert "is given up" in supervisor.poll()[1][0]
 
 
+def test_a_simulation_that_found_no_router_is_restarted_as_often_as_others(runtime: FakeRuntime, clock: Clock) -> None:
+    supervisor = Supervisor(runtime, RunConfig(restarts=3), roster(runtime, 2))
+    supervisor.start()
+    for _ in range(3):
+        runtime.die("sim_0", UnreachableError.exit_code)
+        assert "is started again" in supervisor.poll()[1][0]
+        wait_for_start(supervisor, runtime, clock, "sim_0")
+    runtime.die("sim_0", UnreachableError.exit_code)
+    assert "is given up" in supervisor.poll()[1][0]
+
+
 def test_a_run_without_simulations_left_fails_with_the_log_of_the_last(runtime: FakeRuntime, clock: Clock) -> None:
     supervisor = supervise(runtime, restarts=0)
     runtime.die("sim_0")
