@@ -35,9 +35,10 @@ class RunConfig(Section):
     simulations: Annotated[int, Field(ge=0, le=256)] = 2
     """Number of simulations, unless `-n` says otherwise; 0 only with `listen`, if other machines run all of them."""
     runtime: RuntimeName = "auto"
-    """Where the nodes run: in processes (`local`) or in containers; `auto` takes containers if an engine answers.
+    """Where the nodes run: in processes (`local`) or in containers.
 
-    `inprocess` takes one simulation without nodes: for tests, breakpoints and Python programs."""
+    `auto` takes containers if an engine of this machine answers. `inprocess` takes one simulation without nodes: for
+    tests, breakpoints and Python programs."""
     router_port: Annotated[int, Field(ge=0, le=65535)] = 0
     """TCP port of the router on the loopback interface; 7447 is the one ROS nodes look for.
 
