@@ -10,6 +10,8 @@ from pathlib import Path
 from uuid import uuid4
 
 from docker.client import DockerClient
+from docker.errors import APIError
+from docker.models.containers import Container
 
 from tests.e2e.collection import FAST, write_config
 from throwcollect.config.loader import load
@@ -81,6 +83,19 @@ class Collection:
 
     def status(self, node: str) -> str:
         return next(each.status for each in self.supervisor.states() if each.name == node)
+
+
+def pause(container: Container) -> None:
+    """Pause a container; on a busy machine, the kernel may need several tries to freeze it."""
+    for tries_left in reversed(range(10)):
+        try:
+            container.pause()
+        except APIError as error:
+            if not tries_left or "unable to freeze" not in str(error):
+                raise
+            time.sleep(0.2)
+        else:
+            return
 
 
 def new_run() -> str:

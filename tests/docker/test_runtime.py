@@ -18,7 +18,17 @@ from docker.client import DockerClient
 from docker.errors import NotFound
 from docker.models.containers import Container
 
-from tests.docker.collection import TRIALS, Collection, collecting, config_file, config_for, key_in, new_run, place_of
+from tests.docker.collection import (
+    TRIALS,
+    Collection,
+    collecting,
+    config_file,
+    config_for,
+    key_in,
+    new_run,
+    pause,
+    place_of,
+)
 from tests.docker.cut_line import CutLine
 from tests.e2e.collection import collect_here
 from throwcollect.coordinator.prepare import prepare
@@ -130,7 +140,7 @@ def test_simulations_that_are_killed_paused_or_out_of_memory_are_named_and_repla
         container(client, collection, "sim_0").exec_run(["python3", "-c", MEMORY_HOG])
         collection.until(lambda: any("ran out of memory (limit 400m)" in line for line in collection.news))
         collection.until_more_is_written()
-        container(client, collection, "sim_0").pause()
+        pause(container(client, collection, "sim_0"))
         collection.until(lambda: any("sim_0 is frozen" in line for line in collection.news))
         collection.until_more_is_written()
         assert collection.finish() == digest

@@ -13,6 +13,7 @@ from pathlib import Path
 import docker
 import pytest
 
+from tests.docker.collection import pause
 from tests.e2e.collection import FAST, Running, call, call_here, collect_here, fingerprints, start, write_config
 from throwcollect.runtimes.docker.container_options import KEY_LABEL
 from throwcollect.runtimes.docker.image import default_tag
@@ -78,7 +79,7 @@ def test_resume_completes_a_collection_after_kills_and_pauses_at_random(
             if harm in nodes:
                 nodes[harm].kill()
         elif victim := nodes.get(f"sim_{victims.pop()}"):
-            victim.pause() if harm == "pause" else victim.kill()
+            pause(victim) if harm == "pause" else victim.kill()
         time.sleep(chance.uniform(0.2, 2.0))
     assert running.process.poll() is None, running.finish()
     running.process.send_signal(signal.SIGKILL)
