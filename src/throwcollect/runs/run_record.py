@@ -11,7 +11,15 @@ from pydantic import JsonValue
 
 from throwcollect.coordinator.progress import Progress
 from throwcollect.dataset.summary import Info
-from throwcollect.errors import ConfigError, DatasetError, Interrupted, LossError, ThrowcollectError, WorkerError
+from throwcollect.errors import (
+    ConfigError,
+    DatasetError,
+    Interrupted,
+    LossError,
+    ThrowcollectError,
+    UnreachableError,
+    WorkerError,
+)
 from throwcollect.ros.middleware import Middleware
 from throwcollect.run_key import RunKey
 from throwcollect.runtimes.runtime import NodeState, Place
@@ -21,7 +29,7 @@ VERSION: Literal[1] = 1
 Kind = Literal["collection", "session", "container"]
 """A run collects a dataset, or offers simulations to clients, or is a container of the catalogue."""
 _EMBEDDED = Middleware()
-_KINDS = (ConfigError, WorkerError, DatasetError, LossError, Interrupted)
+_KINDS = (ConfigError, WorkerError, DatasetError, LossError, UnreachableError, Interrupted)
 
 
 @dataclass(frozen=True)

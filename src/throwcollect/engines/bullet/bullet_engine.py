@@ -142,14 +142,14 @@ class BulletEngine(Engine):
         take_step, points_on = pybullet.stepSimulation, pybullet.getContactPoints
         drag, due, stride = steps.drag_kgpm, steps.first_sample, steps.stride
         last_pressing, nothing = self._pressing, set[Surface]()
-        number, last_aim = 0, None
+        number, last_wanted = 0, None
         # Bullet reads lists twice as fast as arrays.
-        for now_aim in zip(steps.targets[:-1].tolist(), steps.velocities.tolist(), strict=True):
+        for wanted in zip(steps.targets[:-1].tolist(), steps.velocities.tolist(), strict=True):
             # A motor gets the position of the beginning of the step and the velocity that leads from there to the
-            # target, so that it follows without lag. It keeps them, so a joint that stands still is aimed only once.
-            if now_aim != last_aim:
-                last_aim = now_aim
-                position, velocity = now_aim
+            # target, so that it follows without lag. It keeps both, so while the arm stands still nothing is sent.
+            if wanted != last_wanted:
+                last_wanted = wanted
+                position, velocity = wanted
                 aim(robot, joints, mode, position, velocity, forces, position_gains, velocity_gains, client)
             if drag:
                 # Drag is applied before every step, because Bullet forgets external forces after each.
