@@ -71,7 +71,7 @@ def find_offences(code: str, words: list[str]) -> Iterator[str]:
     for name in sorted(set(list_names(parse(code))) - set(ALLOWED)):
         parts = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", name).replace("_", " ")
         yield from (f"{name}: {word}" for word in find_words(parts, words))
-    # Most modules have none of the words in any place, and taking a module apart takes a hundred times as long.
+    # Most modules have none of the words anywhere, and taking one apart takes far longer than this search.
     for text in list_texts(code) if find_words(code, words) else ():
         yield from (f"{text:.60}: {word}" for word in find_words(text, words))
 

@@ -11,15 +11,7 @@ from pydantic import JsonValue
 
 from throwcollect.coordinator.progress import Progress
 from throwcollect.dataset.summary import Info
-from throwcollect.errors import (
-    ConfigError,
-    DatasetError,
-    Interrupted,
-    LossError,
-    ThrowcollectError,
-    UnreachableError,
-    WorkerError,
-)
+from throwcollect.errors import ConfigError, DatasetError, Interrupted, LossError, ThrowcollectError, WorkerError
 from throwcollect.ros.middleware import Middleware
 from throwcollect.run_key import RunKey
 from throwcollect.runtimes.runtime import NodeState, Place
@@ -29,7 +21,7 @@ VERSION: Literal[1] = 1
 Kind = Literal["collection", "session", "container"]
 """A run collects a dataset, or offers simulations to clients, or is a container of the catalogue."""
 _EMBEDDED = Middleware()
-_KINDS = (ConfigError, WorkerError, DatasetError, LossError, UnreachableError, Interrupted)
+_KINDS = (ConfigError, WorkerError, DatasetError, LossError, Interrupted)
 
 
 @dataclass(frozen=True)
