@@ -5,7 +5,6 @@ import runpy
 import shutil
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pytest
@@ -236,13 +235,11 @@ def test_a_named_python_is_the_only_candidate(commands: Path) -> None:
         assert f"python{version} -m venv there" in make_environment(str(blank / f"python{version}"))[1]
 
 
-def test_without_python_and_uv_the_script_fails_at_once_with_one_sentence(commands: Path) -> None:
-    began = time.monotonic()
+def test_without_python_and_uv_the_script_fails_with_one_sentence(commands: Path) -> None:
     code, out, err = make_environment()
     assert (code, out, err.count("\n")) == (1, "", 1)
     assert err.startswith("no Python from 3.10 to 3.14 that can make environments is here (python3.11, python3.10,")
     assert "make PYTHON=" in err
-    assert time.monotonic() - began < 1 + 0.5 * os.getloadavg()[0]
 
 
 def test_a_real_python_that_is_too_old_is_refused(tmp_path: Path) -> None:

@@ -1,6 +1,7 @@
-"""What `pip install throwcollect` without extras can do, in a fresh environment of another Python than the tests'.
+"""What `pip install throwcollect` without extras can do, in a fresh environment.
 
-One Python is tried in each run; `THROWCOLLECT_TRY_PYTHONS=3.10,3.12,3.13` asks for others.
+One Python is tried in each run, if possible another one than that of the tests; `THROWCOLLECT_TRY_PYTHONS=3.10,3.12,3.13`
+asks for others.
 
 A few commands start as users start them. The others are forked off a process of that environment which has imported
 what most of them import, because importing takes most of the time of a command.
@@ -22,17 +23,16 @@ from throwcollect import compute_statistics, filter_dataset
 
 ROOT = Path(__file__).parents[2]
 KNOWN = ("3.13", "3.12", "3.10")
+OWN = f"{sys.version_info.major}.{sys.version_info.minor}"
 OF_THE_MOMENT = ("README.md", "provenance.json")
 """Files that say when and where a dataset was made."""
 QUICKSTART = str(ROOT / "configs" / "quickstart.yaml")
 
 
 def find_python(version: str) -> str | None:
-    """Path of a Python of this version, in the path or of pyenv."""
-    of_pyenv = sorted(
-        Path(os.environ.get("PYENV_ROOT", Path.home() / ".pyenv")).glob(f"versions/{version}.*/bin/python")
-    )
-    for python in (shutil.which(f"python{version}"), *map(str, of_pyenv)):
+    """Path of a Python of this version, in the path or beside the one that runs the tests, as pyenv and uv lay them."""
+    beside = sorted(Path(sys.base_prefix).parent.glob(f"*{version}.*/bin/python"))
+    for python in (shutil.which(f"python{version}"), *map(str, beside)):
         if python and subprocess.run([python, "-c", "import venv"], capture_output=True, check=False).returncode == 0:
             return python
     return None
@@ -41,15 +41,14 @@ def find_python(version: str) -> str | None:
 def choose_versions() -> tuple[str, ...]:
     if asked := os.environ.get("THROWCOLLECT_TRY_PYTHONS"):
         return tuple(asked.split(","))
-    return next(((version,) for version in KNOWN if find_python(version)), (KNOWN[0],))
+    return (next(filter(find_python, KNOWN), OWN),)
 
 
 @pytest.fixture(scope="module", params=choose_versions())
 def environment(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A fresh environment with the wheel of these sources and nothing but what it depends on."""
-    python = find_python(request.param)
-    if python is None:
-        pytest.skip(f"no Python {request.param} is here")
+    python = sys.executable if request.param == OWN else find_python(request.param)
+    assert python, f"no Python {request.param} is here"
     directory = tmp_path_factory.mktemp("light")
     source = directory / "source"
     source.mkdir()

