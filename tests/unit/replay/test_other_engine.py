@@ -10,6 +10,7 @@ from throwcollect.dataset.reader import Dataset
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.replay.other_engine import Deviation, Distribution, distributions, simulate_with
 from throwcollect.report.throw.deviations import check_picture, write_deviations
+from throwcollect.simulator import Simulator
 
 
 def test_a_distribution_covers_only_values_that_both_throws_have() -> None:
@@ -42,6 +43,20 @@ def test_replaying_with_the_same_or_an_unknown_engine_is_refused(
     with pytest.raises(ConfigError, match="--engine physx: there is no such engine") as refused:
         simulate_with(tmp_path, "physx", [0])
     assert "expected: mujoco, ballistic" in str(refused.value)
+
+
+def test_deviations_are_those_of_the_rows_of_both_engines(dataset: Path) -> None:
+    found = list(simulate_with(dataset, "ballistic", [4, 1]))
+    assert [each.trial for each in found] == [4, 1]
+    stored = {row["trial"]: row for row in Dataset.open(dataset).throws.to_pylist()}
+    with Simulator(dataset / "config.yaml", overrides=["sim.engine=ballistic"]) as simulator:
+        for each in found:
+            row = stored[each.trial]
+            again = simulator.throw({"task.duration_s": row["task.duration_s"]})
+            assert (each.stored, each.again) == (row["outcome"], again.outcome)
+            for column in ("release_speed_mps", "flight_time_s", "landing_x_m"):
+                assert each.values[column] == pytest.approx(again.row[column] - row[column], abs=1e-12)
+            assert not each.values.keys() & {"trial", "outcome", "task.duration_s"}
 
 
 def test_a_picture_that_cannot_be_written_is_refused_with_the_reason(tmp_path: Path) -> None:

@@ -1,11 +1,13 @@
-"""The arguments of the check of a dataset."""
+"""The check of a dataset in one call: its arguments, and the throws that it simulates again."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
 import pytest
+from tests.unit.dataset.conftest import Collection
 
+from throwcollect.dataset.findings import Finding
 from throwcollect.errors import ConfigError
 from throwcollect.replay.verification import verify_dataset
 
@@ -21,3 +23,23 @@ from throwcollect.replay.verification import verify_dataset
 def test_verify_refuses_wrong_numbers_of_throws_and_processes(dataset: Path, arguments, message: str) -> None:
     with pytest.raises(ConfigError, match=f"^{message}$"):
         verify_dataset(dataset, **arguments)
+
+
+def test_throws_that_come_out_differently_are_found(make_collection: type[Collection], tmp_path: Path) -> None:
+    # No simulation has made these throws.
+    directory = make_collection({"sim": {"engine": "ballistic"}}).collect(tmp_path / "data", lost=[2])
+    before = verify_dataset(directory, replay=0)
+    after = verify_dataset(directory, replay=7)
+    assert after[: len(before)] == before
+    assert [(each.file, each.place) for each in after[len(before) :]] == [
+        (f"quick_0000{trial // 3}.mcap", f"trial {trial}") for trial in (0, 1, 3, 4, 5, 6)
+    ]
+    assert all(each.problem.startswith("comes out differently: ") for each in after[len(before) :])
+
+
+def test_a_dataset_without_an_episode_cannot_be_replayed(make_collection: type[Collection], tmp_path: Path) -> None:
+    collection = make_collection({"sim": {"engine": "ballistic"}, "trials": 1})
+    directory = collection.collect(tmp_path / "data", lost=[0])
+    assert verify_dataset(directory, replay=1)[-1] == Finding(
+        "", "", f"cannot be replayed: {directory}: no trial has an episode"
+    )
