@@ -1,7 +1,7 @@
 """What `pip install throwcollect` without extras can do, in a fresh environment.
 
-One Python is tried in each run, if possible another one than that of the tests; `THROWCOLLECT_TRY_PYTHONS=3.10,3.12,3.13`
-asks for others.
+One Python is tried in each run, if possible another one than that of the tests; others are tried with
+`THROWCOLLECT_TRY_PYTHONS=3.10,3.12,3.13`.
 
 A few commands start as users start them. The others are forked off a process of that environment which has imported
 what most of them import, because importing takes most of the time of a command.

@@ -7,6 +7,7 @@ import math
 import pyarrow as pa
 
 from throwcollect.config.schema import Config
+from throwcollect.config.shape import unit_of_key
 from throwcollect.dataset.bag import to_yaml
 from throwcollect.dataset.directory import TRIALS
 from throwcollect.dataset.misses import summarise_misses
@@ -105,14 +106,14 @@ def _list_ranges(config: Config, throws: pa.Table) -> list[str]:
     # Only swept keys have dots.
     for name in (name for name in throws.column_names if "." in name):
         lowest, highest = find_range(throws[name]) or (math.nan, math.nan)
-        rows.append(f"| `{name}` | {lowest:g} | {highest:g} |")
+        rows.append(f"| `{name}` | {unit_of_key(name)} | {lowest:g} | {highest:g} |")
     return [
         "## What varies",
         "",
         *_tell_drawing(config),
         "",
-        "| key | lowest | highest |",
-        "|---|---|---|",
+        "| key | unit | lowest | highest |",
+        "|---|---|---|---|",
         *rows,
         "",
     ]

@@ -9,6 +9,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 from ruamel.yaml import YAML
+from tests.unit.dataset.conftest import Collection
 
 import throwcollect
 from throwcollect.config.loader import load
@@ -25,7 +26,6 @@ def test_the_data_card_has_the_header_that_hubs_of_datasets_read(dataset: Path) 
     assert fields["configs"] == [{"config_name": "throws", "data_files": "throws.parquet"}]
     assert fields["size_categories"] == ["n<1K"]
     assert "| landed | 7 |" in text
-    assert "| `task.duration_s` | " in text
 
 
 def test_the_data_card_says_how_the_collection_was_run(dataset: Path) -> None:
@@ -36,6 +36,15 @@ def test_the_data_card_says_how_the_collection_was_run(dataset: Path) -> None:
         "| wall time | 1.5 s |",
     ):
         assert fact in text
+
+
+def test_the_data_card_tells_between_which_values_each_key_varies_and_in_which_unit(
+    make_collection: type[Collection], tmp_path: Path
+) -> None:
+    swept = {"task.end.arm_right_4_joint": {"values": [-0.75, -0.5]}, "ball.mass_kg": {"values": [0.08, 0.125]}}
+    collection = make_collection({"trials": 4, "sweep": {"sampler": "grid", "parameters": swept}})
+    text = (collection.collect(tmp_path / "data") / "README.md").read_text()
+    assert "| `task.end.arm_right_4_joint` | rad | -0.75 | -0.5 |\n| `ball.mass_kg` | kg | 0.08 | 0.125 |\n" in text
 
 
 def test_the_data_card_counts_only_trials_with_an_episode_as_throws(dataset: Path) -> None:
