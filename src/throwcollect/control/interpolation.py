@@ -130,11 +130,12 @@ def _prepend_start(waypoints: Waypoints, start: JointState, start_ns: int) -> Wa
         np.vstack((still if start.velocities is None else start.velocities, waypoints.velocities)),
         np.vstack((still, waypoints.accelerations)),
         np.concatenate((waypoints.content[:1], waypoints.content)),
+        np.concatenate((waypoints.content[:1], waypoints.departure)),
     )
 
 
 def _make_splines(waypoints: Waypoints, durations_ns: NDArray[np.int64]) -> Curve:
-    content = np.minimum(waypoints.content[:-1], waypoints.content[1:])
+    content = np.minimum(waypoints.departure[:-1], waypoints.content[1:])
     seconds = (durations_ns / 1e9)[:, np.newaxis]
     # The highest degree of any segment decides the size of the tables. Lower ones leave their higher coefficients at 0.
     degree = (1, 3, 5)[int(content.max(initial=LINE))]

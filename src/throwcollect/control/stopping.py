@@ -38,10 +38,12 @@ def brake(
     braking = np.minimum(seconds, stopping_s)
     towards = np.where(stopping_s < _LONGEST_S, -np.sign(velocities) * deceleration, -velocities / _LONGEST_S)
     moves = seconds < stopping_s
+    content = np.full(count, QUINTIC)
     return Waypoints(
         times_ns,
         positions + velocities * braking + towards / 2 * braking**2,
         np.where(moves, velocities + towards * braking, 0.0),
         np.where(moves, towards, 0.0),
-        np.full(count, QUINTIC),
+        content,
+        content,
     )

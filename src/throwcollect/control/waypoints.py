@@ -12,7 +12,7 @@ from throwcollect.control.controller_reports import JointState
 from throwcollect.control.goal import Trajectory, TrajectoryPoint, Values
 
 LINE, CUBIC, QUINTIC = 0, 1, 2
-"""Content of a point: positions alone, velocities too, accelerations too."""
+"""What a point has, named after the curve that it allows: positions alone, velocities too, accelerations too."""
 
 
 @dataclass(frozen=True)
@@ -24,7 +24,9 @@ class Waypoints:
         positions: [rad], shape ``(n_points, n_joints)``.
         velocities: [rad/s], shape ``(n_points, n_joints)``; 0 where a point has none.
         accelerations: [rad/s²], shape ``(n_points, n_joints)``; 0 where a point has none.
-        content: Content of each point, shape ``(n_points,)``: `LINE`, `CUBIC` or `QUINTIC`.
+        content: What each point has as the end of a segment, shape ``(n_points,)``: `LINE`, `CUBIC` or `QUINTIC`.
+        departure: The same as the start of the next segment: a point from which the next one is integrated counts as
+            having what that takes, as upstream, which completes it only when it comes to that segment.
     """
 
     times_ns: NDArray[np.int64]
@@ -32,6 +34,7 @@ class Waypoints:
     velocities: NDArray[np.float64]
     accelerations: NDArray[np.float64]
     content: NDArray[np.int64]
+    departure: NDArray[np.int64]
 
     @classmethod
     def single(
@@ -44,7 +47,8 @@ class Waypoints:
         still = np.zeros(len(positions))
         rows = [still if row is None else row for row in (positions, velocities, accelerations)]
         p, v, a = (row[np.newaxis] for row in rows)
-        return cls(np.zeros(1, np.int64), p, v, a, np.zeros(1, np.int64))
+        line = np.array([LINE])
+        return cls(np.zeros(1, np.int64), p, v, a, line, line)
 
 
 def arrange(
@@ -72,7 +76,7 @@ def arrange(
     content[moving] = CUBIC
     # Accelerations without velocities do not count, as upstream's quintic needs both.
     content[[index for index in accelerating if content[index] == CUBIC]] = QUINTIC
-    waypoints = Waypoints(times_ns, positions, velocities, accelerations, content)
+    waypoints = Waypoints(times_ns, positions, velocities, accelerations, content, content)
     return waypoints if len(placed) == len(points) else _integrate(waypoints, points, columns, start, start_ns)
 
 
@@ -91,6 +95,7 @@ def _integrate(
 ) -> Waypoints:
     """Fill in positions, and velocities too where a point has accelerations alone, by the trapezoidal rule."""
     positions, velocities, content = waypoints.positions.copy(), waypoints.velocities.copy(), waypoints.content.copy()
+    departure = content.copy()
     still = np.zeros(positions.shape[1])
     # If the time of the first point has passed, the joints count as being there, so nothing is integrated backwards.
     time_ns = min(start_ns, int(waypoints.times_ns[0]))
@@ -103,7 +108,12 @@ def _integrate(
                 gained = (a + waypoints.accelerations[index]) / 2 * seconds
                 velocities[index, columns] = (v + gained)[columns]
             content[index] = QUINTIC if len(point.accelerations) else CUBIC
+            departure[index] = content[index]
+            if index:
+                # The velocity of the point before is 0 if it has none; so is its acceleration, if that is needed, too.
+                is_quintic = not len(point.velocities) or len(points[index - 1].accelerations)
+                departure[index - 1] = QUINTIC if is_quintic else CUBIC
             positions[index, columns] = (p + (v + velocities[index]) / 2 * seconds)[columns]
         time_ns = int(waypoints.times_ns[index])
         p, v, a = positions[index], velocities[index], waypoints.accelerations[index]
-    return replace(waypoints, positions=positions, velocities=velocities, content=content)
+    return replace(waypoints, positions=positions, velocities=velocities, content=content, departure=departure)
