@@ -30,11 +30,14 @@ class TimeSource:
                 self._use_sim_time(bool(parameter.value))
 
     def _use_sim_time(self, active: bool) -> None:
+        if active == (self._subscription is not None):
+            # A node that sets its clock itself goes on if it is told what it does already.
+            return
         self._clock.activate(active)
-        if active and self._subscription is None:
+        if self._subscription is None:
             qos = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
             self._subscription = self._node.create_subscription(Clock, CLOCK_TOPIC, self._on_clock, qos)
-        elif not active and self._subscription is not None:
+        else:
             self._node.destroy_subscription(self._subscription)
             self._subscription = None
 

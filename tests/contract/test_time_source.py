@@ -5,7 +5,7 @@ import time
 import pytest
 
 from tests.contract.rig import ON_RCLPY
-from throwcollect.ros import Parameter, get_message
+from throwcollect.ros import Parameter, Time, get_message, provide_time
 
 Clock = get_message("rosgraph_msgs/msg/Clock")
 
@@ -60,6 +60,14 @@ def test_timers_run_on_simulated_time(rig, simulation):
     simulation(15, node)
     rig.rest(0.05)
     assert calls == [110, 15]
+
+
+def test_a_node_that_provides_its_time_shows_it_also_after_use_sim_time_is_set_to_false(rig):
+    node = rig.node("node")
+    provide_time(node)
+    node.get_clock().set_ros_time_override(Time(nanoseconds=12))
+    assert node.set_parameters([Parameter("use_sim_time", value=False)])[0].successful
+    assert node.get_clock().now().nanoseconds == 12
 
 
 def test_use_sim_time_must_be_a_bool(rig):

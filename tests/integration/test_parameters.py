@@ -67,6 +67,17 @@ def test_descriptions_of_parameters_come_from_the_configuration(robot: Robot) ->
     assert {name: range_of(described[name]) for name in spans} == spans
 
 
+@pytest.mark.parametrize("node", [None, ARM, "controller_manager"])
+def test_nodes_of_a_simulation_take_no_time_from_others(robot: Robot, node: str | None) -> None:
+    refused = robot.set({"use_sim_time": True}, node=node)
+    assert (refused.successful, refused.reason) == (False, "use_sim_time: this node makes its time itself")
+    # A dumped file of parameters says so.
+    assert robot.set({"use_sim_time": False}, node=node).successful
+    handle = robot.send(goal(ARM, 0.1))
+    assert handle.accepted
+    assert handle.stamp.sec < 1000
+
+
 def test_parameters_of_controllers_are_described(robot: Robot) -> None:
     names = [name for name in robot.parameters("list_parameters", node=ARM).result.names if name not in FOREIGN]
     described = robot.parameters("describe_parameters", node=ARM, names=names).descriptors

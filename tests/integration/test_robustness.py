@@ -167,7 +167,7 @@ def ask(session: Any, key: str, payload: bytes, attachment: bytes | None, unansw
 
 def assert_works(robot: Robot) -> None:
     """A trial as a coordinator has it, from the parameters to the result."""
-    assert robot.set({"sim.real_time_factor": 0.0, "trial.controllers": [""], "use_sim_time": False}).successful
+    assert robot.set({"sim.real_time_factor": 0.0, "trial.controllers": [""]}).successful
     if robot.state() != PLAYING:
         robot.put_into(PLAYING)
     robot.reset()

@@ -7,6 +7,7 @@ from throwcollect.ros.msg import ControllerState
 from throwcollect.ros.srv import ListControllers
 from throwcollect.sim.controller_parameters import COMMAND_INTERFACES, state_interfaces
 from throwcollect.sim.limb_controller import LimbController
+from throwcollect.sim.own_time import make_own_time
 from throwcollect.sim.simulation import Simulation
 
 _TYPE = "joint_trajectory_controller/JointTrajectoryController"
@@ -17,6 +18,7 @@ class ControllerManager(Node):
 
     def __init__(self, parent: Node, simulation: Simulation) -> None:
         super().__init__("controller_manager", namespace=parent.get_namespace(), context=parent.context)
+        make_own_time(self)
         hz = simulation.config.sim.physics_hz
         self._controllers = [_describe(limb, hz) for limb in simulation.limbs.values()]
         self.create_service(ListControllers, "~/list_controllers", self._list)

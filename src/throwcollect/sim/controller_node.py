@@ -7,12 +7,13 @@ import math
 import time
 
 from throwcollect.control import REPEATED, ControllerState
-from throwcollect.ros import DurabilityPolicy, Node, QoSProfile, pass_on_log, provide_time
+from throwcollect.ros import DurabilityPolicy, Node, QoSProfile, pass_on_log
 from throwcollect.ros.msg import JointTrajectory, JointTrajectoryControllerState, SpeedScalingFactor
 from throwcollect.ros.srv import QueryTrajectoryState
 from throwcollect.sim.controller_action import ControllerAction
 from throwcollect.sim.controller_messages import nanoseconds, read_trajectory, state_message
 from throwcollect.sim.controller_parameters import ParameterFace
+from throwcollect.sim.own_time import make_own_time
 from throwcollect.sim.simulation import Simulation
 
 _SPEED = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -33,7 +34,7 @@ class ControllerNode(Node):
     def __init__(self, parent: Node, simulation: Simulation, controller: str) -> None:
         limb = simulation.limbs[controller]
         super().__init__(limb.name, namespace=parent.get_namespace(), context=parent.context)
-        provide_time(self)
+        make_own_time(self)
         self.controller = controller
         self._simulation = simulation
         self._limb = limb

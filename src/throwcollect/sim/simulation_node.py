@@ -27,7 +27,6 @@ from throwcollect.ros import (
     Time,
     get_message,
     graph_changes,
-    provide_time,
 )
 from throwcollect.ros.msg import SetParametersResult, String, UInt8MultiArray
 from throwcollect.run_key import Signer
@@ -35,6 +34,7 @@ from throwcollect.sim import descriptors
 from throwcollect.sim.controller_manager import ControllerManager
 from throwcollect.sim.controller_node import ControllerNode
 from throwcollect.sim.lease_queue import LeaseQueue
+from throwcollect.sim.own_time import make_own_time
 from throwcollect.sim.present_trial import NO_TRIAL, TrialSetup
 from throwcollect.sim.simulation import Simulation, StateCode
 from throwcollect.sim.simulation_control import SimulationControl
@@ -86,8 +86,7 @@ class SimulationNode(Node):
         self._require_own_namespace()
         self._simulation = simulation
         config = simulation.config
-        # The simulation makes its own time, so the node sets its clock and does not subscribe to one.
-        provide_time(self)
+        make_own_time(self)
         self._runner = TrialRunner(simulation)
         self._description = self._runner.channels.robot
         self._publish_latched(self._runner.channels)
@@ -138,7 +137,7 @@ class SimulationNode(Node):
         """Publish what has happened since the last call: time, samples, feedback, results, the episode."""
         simulation = self._simulation
         now = Time(nanoseconds=simulation.now_ns)
-        for node in (self, *self._controllers.values()):
+        for node in (self, *self.companions):
             node.get_clock().set_ros_time_override(now)
         for name, result in simulation.pop_results():
             self._controllers[name].action.finish(result)
