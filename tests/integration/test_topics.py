@@ -123,4 +123,6 @@ def test_a_listener_gets_the_controller_state_of_every_control_period(robot: Rob
     assert last.reference.positions[column] == pytest.approx(-1.0, abs=1e-3)
     assert last.feedback.positions[column] == pytest.approx(-1.0, abs=0.01)
     assert last.output.positions[column] == pytest.approx(-1.0, abs=1e-3)
+    assert len(last.reference.accelerations) == len(last.joint_names)
+    assert len(last.reference.effort) == 0
     assert last.speed_scaling_factor == 1.0

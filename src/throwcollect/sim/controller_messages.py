@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from throwcollect.control import ControllerState, JointTolerance, Trajectory, TrajectoryGoal, TrajectoryPoint
 from throwcollect.ros.action import FollowJointTrajectory
 from throwcollect.ros.msg import Duration, JointTrajectory, JointTrajectoryControllerState, JointTrajectoryPoint, Time
@@ -51,7 +53,8 @@ def state_message(state: ControllerState) -> JointTrajectoryControllerState:
     """Make a control_msgs/msg/JointTrajectoryControllerState."""
     message = JointTrajectoryControllerState(
         joint_names=list(state.joint_names),
-        reference=_point_message(state.desired),
+        # Upstream copies all else of it; feedback of a goal has the efforts, too.
+        reference=_point_message(replace(state.desired, effort=())),
         feedback=_point_message(state.actual),
         error=_point_message(state.error),
         output=_point_message(state.output),
