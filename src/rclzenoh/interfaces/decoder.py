@@ -1,7 +1,8 @@
 """Writes, for one structure, a Python function that makes messages from CDR.
 
 The body is copied once into memory of its own, in which number sequences of the message are views that may be changed.
-Sequences that claim to be longer than the data end up beyond it, which is noticed when they are read or at the end.
+A sequence of numbers that claims to be longer than the data ends up beyond it, which is noticed when more is read or at
+the end. Other sequences are made element by element, so their claim is compared with the data before the first one.
 """
 
 from __future__ import annotations
@@ -137,6 +138,10 @@ class _Reader(FunctionWriter):
             self.strings(operand, count, depth)
             return
         values, item = self.name("values"), self.name("item")
+        if field.length is None:
+            # Every element takes a byte at least.
+            self.line(depth, f"if {count} > len(body) - at:")
+            self.line(depth + 1, "raise IndexError('a sequence that is longer than the data')")
         self.line(depth, f"{operand} = {values} = []")
         self.line(depth, f"for _ in range({count}):")
         self.loop_body(field, item, depth + 1)

@@ -15,6 +15,8 @@ from collections.abc import Callable, Sequence
 from functools import cache, lru_cache
 from typing import Any
 
+import numpy as np
+
 from rclzenoh.interfaces.catalog import Field, structure
 from rclzenoh.interfaces.layout import Alignment, FunctionWriter
 from rclzenoh.interfaces.message import DTYPES, Message
@@ -32,7 +34,14 @@ def encoder(name: str) -> Callable[[Message], bytearray]:
     It raises AttributeError, TypeError, ValueError, OverflowError or ``struct.error`` if a value is not of its field's
     type.
     """
-    writer = _Writer(HEADER=HEADER, PADDING=_PADDING, strings=_write_strings, check_length=_check_length)
+    writer = _Writer(
+        HEADER=HEADER,
+        PADDING=_PADDING,
+        strings=_write_strings,
+        check_length=_check_length,
+        check_bool=_check_bool,
+        check_list=_check_list,
+    )
     writer.structure(name, "message", 1)
     writer.flush(1)
     source = "\n".join(["def encode(message):", " out = bytearray(HEADER)", *writer.lines, " return out"])
@@ -60,6 +69,20 @@ def _check_length(values: Sequence[Any], field: Field) -> None:
     for bounded in (values,) if field.length is None else values:
         if len(bounded) > field.bound:
             raise ValueError(f"{field.name}: expected at most {field.bound}, got {len(bounded)}")
+
+
+def _check_bool(value: object) -> object:
+    """Refuse what is no truth value, as `struct` takes anything for one."""
+    if not isinstance(value, bool | np.bool_):
+        raise TypeError(f"expected a bool, got {value!r}")
+    return value
+
+
+def _check_list(values: Sequence[str]) -> tuple[str, ...]:
+    """Refuse a single string in place of a sequence, as its letters are strings, too."""
+    if isinstance(values, str):
+        raise TypeError(f"expected a sequence of strings, got {values!r}")
+    return tuple(values)
 
 
 class _Writer(FunctionWriter):
@@ -95,7 +118,7 @@ class _Writer(FunctionWriter):
             self.line(depth, f"out += {text}")
             self.at = Alignment(1, 0)
         else:
-            self.scalar(field.type, operand, depth)
+            self.scalar(field.type, f"check_bool({operand})" if field.type == "bool" else operand, depth)
 
     def check(self, field: Field, operand: str, depth: int) -> None:
         name = self.name("field")
@@ -129,7 +152,7 @@ class _Writer(FunctionWriter):
             self.scalar("uint32", f"len({values})", depth)
         if field.type == "string":
             self.align(4, depth)
-            self.line(depth, f"out += strings(tuple({values}))")
+            self.line(depth, f"out += strings(check_list({values}))")
             self.at = Alignment(1, 0)
             return
         self.flush(depth)

@@ -157,6 +157,28 @@ def test_a_field_of_another_type_is_refused(field, value, error):
         serialize(header)
 
 
+def test_a_string_in_place_of_a_sequence_of_strings_is_refused():
+    with pytest.raises(TypeError, match="expected a sequence of strings, got 'abc'"):
+        serialize(get_message("sensor_msgs/msg/JointState")(name="abc"))
+
+
+def test_a_value_in_place_of_a_bool_is_refused():
+    response = message_class("std_srvs/srv/Trigger_Response")
+    with pytest.raises(TypeError, match="expected a bool, got 'no'"):
+        serialize(response(success="no"))
+    assert serialize(response(success=np.True_)) == serialize(response(success=True))
+
+
+@pytest.mark.parametrize("claimed", [1000, 2**32 - 1])
+def test_a_sequence_that_claims_to_be_longer_than_the_data_is_refused_before_its_first_element(claimed):
+    # Reading its elements, arrays of three numbers, would notice nothing.
+    mesh = get_message("shape_msgs/msg/Mesh")
+    data = b"\x00\x01\x00\x00" + claimed.to_bytes(4, "little")
+    with pytest.raises(ValueError, match="a sequence that is longer than the data"):
+        deserialize(data + bytes(900), mesh)
+    assert len(deserialize(b"\x00\x01\x00\x00\x03\x00\x00\x00" + bytes(40), mesh).triangles) == 3
+
+
 def test_a_number_that_does_not_fit_is_refused():
     time = get_message("builtin_interfaces/msg/Time")(sec=2**31)
     with pytest.raises(ValueError, match="builtin_interfaces/msg/Time cannot be serialised"):
