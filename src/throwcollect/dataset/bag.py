@@ -27,6 +27,8 @@ from throwcollect.errors import DatasetError
 from throwcollect.files import read_text
 
 VERSION = 9
+BAG_SECTION = "rosbag2_bagfile_information"
+"""The only section of the file."""
 _MOST_BYTES = 10_000_000
 _ROS_DISTRO = "jazzy"
 """Release whose interface definitions the messages follow."""
@@ -145,7 +147,7 @@ def read_bag_metadata(directory: Path) -> Mapping[str, Any]:
             found = find_next_command(directory)
             raise DatasetError(f"the dataset {found.state}: it has no {METADATA}", path=directory, hint=found.command)
         raise DatasetError("holds no dataset", path=directory, hint=_name_nearby(directory))
-    bag = from_yaml(path).get("rosbag2_bagfile_information")
+    bag = from_yaml(path).get(BAG_SECTION)
     if not isinstance(bag, dict):
         raise DatasetError("not the metadata of a rosbag2 bag", path=path)
     return bag

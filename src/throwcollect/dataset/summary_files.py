@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pyarrow as pa
 
-from throwcollect.dataset.bag import bag_information, to_yaml
+from throwcollect.dataset.bag import BAG_SECTION, bag_information, to_yaml
 from throwcollect.dataset.dataset_digest import combine_digests
 from throwcollect.dataset.directory import CONFIG, FORMAT, MANIFEST, METADATA, PLAN, SOURCES, THROWS, TRIALS
 from throwcollect.dataset.manifest import entry_of, entry_of_file, manifest_text
@@ -49,7 +49,7 @@ def write_description(
     custom = {"throwcollect.format": FORMAT, "throwcollect.digest": digest}
     bag = bag_information([summary for summary, _ in recordings], channels.all, custom)
     # The manifest covers metadata.yaml, which is written after it, so the entry is made of these bytes.
-    metadata = to_yaml({"rosbag2_bagfile_information": bag}).encode()
+    metadata = to_yaml({BAG_SECTION: bag}).encode()
     with replacing(directory / THROWS) as descriptor:
         waiting = bytearray()
 

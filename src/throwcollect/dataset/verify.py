@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from throwcollect.config.schema import Config
-from throwcollect.dataset.bag import FileSummary, bag_information, read_bag_metadata
+from throwcollect.dataset.bag import BAG_SECTION, FileSummary, bag_information, from_yaml, read_bag_metadata
 from throwcollect.dataset.dataset_digest import combine_digests
 from throwcollect.dataset.directory import (
     CARD,
@@ -87,6 +87,8 @@ def verify(
     bag, findings = None, []
     try:
         bag = read_bag_metadata(directory)
+        if unknown := sorted(map(str, set(from_yaml(directory / METADATA)) - {BAG_SECTION})):
+            findings.append(Finding(METADATA, "", f"has unknown sections: {_shorten(unknown)}"))
     except DatasetError as error:
         if not (directory / METADATA).exists():
             raise
@@ -226,7 +228,7 @@ def _find_bag_problems(bag: Mapping[str, Any], checks: Mapping[str, ShardReport]
         yield from _find_file_problems(bag, summaries)
         return
     for key, value in expected.items():
-        if bag.get(key) != value:
+        if not _are_same(bag.get(key), value):
             yield Finding(METADATA, key, f"is {_shorten(bag.get(key))}, the files give {_shorten(value)}")
 
 
@@ -236,9 +238,18 @@ def _find_file_problems(bag: Mapping[str, Any], summaries: list[FileSummary]) ->
     for summary in summaries:
         (expected,) = bag_information([summary], (), {})["files"]
         found = next((each for each in known if each.get("path") == summary.path), None)
-        if found != expected:
+        if not _are_same(found, expected):
             problem = f"is {_shorten(found)}, the file gives {_shorten(expected)}"
             yield Finding(METADATA, f"files: {summary.path}", problem)
+
+
+def _are_same(value: object, other: object) -> bool:
+    """Compare plain values with their types: readers in C++ do not take 9.0 or `true` for a whole number."""
+    if isinstance(value, dict) and isinstance(other, dict):
+        return value.keys() == other.keys() and all(_are_same(value[key], other[key]) for key in other)
+    if isinstance(value, list) and isinstance(other, list):
+        return len(value) == len(other) and all(map(_are_same, value, other))
+    return type(value) is type(other) and value == other
 
 
 def _find_digest_problems(

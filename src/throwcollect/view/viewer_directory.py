@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from throwcollect.dataset.bag import bag_information, to_yaml
+from throwcollect.dataset.bag import BAG_SECTION, bag_information, to_yaml
 from throwcollect.dataset.damage import locating_damage
 from throwcollect.dataset.directory import METADATA
 from throwcollect.dataset.reader import Dataset
@@ -63,7 +63,7 @@ def view(directory: Path, output: Path, trials: Iterable[int] | None = None) -> 
             recording = ViewRecording(stream, config)
             recording.write(throws, lambda throw: _read_samples(dataset, throw.row))
             summary = recording.finish(RECORDING)
-        information = {"rosbag2_bagfile_information": bag_information([summary], recording.channels, {})}
+        information = {BAG_SECTION: bag_information([summary], recording.channels, {})}
         (beside / METADATA).write_text(to_yaml(information), encoding="utf-8")
         (beside / LAYOUT).write_bytes(layout(tuple(config.task.end)))
         robot.copy_package(beside)

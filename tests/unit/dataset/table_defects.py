@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -153,6 +154,21 @@ def add_bag_key(directory: Path) -> None:
     replace_text(directory / "metadata.yaml", "  version: 9", "  version: 9\n  colour: red")
 
 
+def change_bag_number_type(directory: Path) -> None:
+    replace_text(directory / "metadata.yaml", "  version: 9", "  version: 9.0")
+
+
+def change_bag_file_number_type(directory: Path) -> None:
+    path = directory / "metadata.yaml"
+    before, files, after = path.read_text().partition("  files:")
+    path.write_text(before + files + re.sub(r"message_count: (\d+)", r"message_count: \1.0", after, count=1))
+
+
+def add_bag_section(directory: Path) -> None:
+    path = directory / "metadata.yaml"
+    path.write_text(path.read_text() + "colours: 3\n")
+
+
 TABLE_DEFECTS: dict[Callable[[Path], None], tuple[str, str, str]] = {
     change_landing: ("quick_00000.mcap", "trial 2", r"landing_x_m = 1\.25, the episode gives"),
     change_outcome: (SHARD, "trial 4", "outcome = 'timeout', the episode gives 'landed'"),
@@ -187,6 +203,9 @@ TABLE_DEFECTS: dict[Callable[[Path], None], tuple[str, str, str]] = {
     change_bag_file_count: ("metadata.yaml", "files", "the files give"),
     change_bag_format: ("metadata.yaml", "throwcollect.format", "is '7'"),
     add_bag_key: ("metadata.yaml", "", "unknown keys: .*colour"),
+    add_bag_section: ("metadata.yaml", "", "unknown sections: .*colours"),
+    change_bag_number_type: ("metadata.yaml", "version", "is 9.0, the files give 9"),
+    change_bag_file_number_type: ("metadata.yaml", "files", r"is \[.*\d\.0, .*the files give"),
 }
 """File, place and problem of the finding that each defect must give."""
 
