@@ -36,6 +36,9 @@ _REACH_M = 0.02
 _FOLLOW_RAD = 0.02
 """With the default gains, motors that are not saturated stay within 0.0002 rad of their commands."""
 _AT_LIMIT = 0.999
+_CHANGE_RADPS2 = 20.0
+"""How fast a joint's velocity may leave, between two samples, the range between the velocities of both. With motors
+below their limits, 0.8 rad/s² were seen, and a motion that is recorded without its velocities is off by hundreds."""
 
 
 def find_joint_problems(trial: RecordedTrial) -> Iterator[str]:
@@ -74,6 +77,24 @@ def find_joint_problems(trial: RecordedTrial) -> Iterator[str]:
         joint = trajectory.joints[int(errors.max(axis=0).argmax())]
         said = f"departs from the trajectory of the trial by {errors.max():.3g} rad"
         yield f"{joint} {said}, although its torque is below its limit"
+    excess = _measure_velocity_excess(samples.position[:followed, moving], samples.velocity[:followed, moving], trial)
+    if excess.size and excess.max() > _CHANGE_RADPS2:
+        joint = trajectory.joints[int(excess.max(axis=0).argmax())]
+        yield f"{joint} moves otherwise than its velocities say"
+
+
+def _measure_velocity_excess(
+    positions: NDArray[np.float64], velocities: NDArray[np.float64], trial: RecordedTrial
+) -> NDArray[np.float64]:
+    """Measure by how much the mean velocity from one sample to the next is outside the range of their velocities.
+
+    Returns:
+        Excess by the time between samples [rad/s²], negative inside the range, shape ``(n_samples - 1, n_joints)``.
+    """
+    hz = trial.config.record.rate_hz
+    middle, half = (velocities[1:] + velocities[:-1]) / 2, np.abs(np.diff(velocities, axis=0)) / 2
+    excess: NDArray[np.float64] = (np.abs(np.diff(positions, axis=0) * hz - middle) - half) * hz
+    return excess
 
 
 def _compute_motor_positions(trial: RecordedTrial) -> NDArray[np.float64]:

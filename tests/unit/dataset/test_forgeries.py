@@ -122,6 +122,10 @@ FORGERIES: dict[str, tuple[Forgery, str]] = {
     "cut as rest in flight": (cut("rest"), "ended as rest, but the ball moved at"),
     "cut as rest at the start": (cut("rest", slice(90)), "ended as rest, but the arm moved until"),
     "another end": (in_header(end_reason=lambda _: "timeout"), "although the ball crossed the landing plane"),
+    "no velocities": (
+        in_samples("velocity", slice(None), slice(None), lambda _: 0.0),
+        "moves otherwise than its velocities",
+    ),
     "swapped trials": (swap_trials, "departs from the trajectory of the trial by"),
     "other start": (in_samples("position", slice(0, 3), ELBOW, lambda was: was + 0.1), "rad away from the start"),
     "other motion": (in_samples("position", slice(50, 60), ELBOW, lambda was: was + 0.1), "although its torque is"),
