@@ -15,7 +15,7 @@ from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.summary import Info
 from throwcollect.errors import DatasetError
 from throwcollect.files import is_there
-from throwcollect.sweep.arrow_column import find_range
+from throwcollect.sweep.arrow_column import find_range, find_rows
 from throwcollect.wording import command, join_names
 
 _MOST_NAMED = 5
@@ -52,7 +52,7 @@ def summary(dataset: Dataset) -> Info:
         episodes=episodes,
         outcomes=count_outcomes(dataset.throws),
         wanted=dataset.config.until.wanted if dataset.config.until else None,
-        landing=_find_landing_area(dataset.throws) if dataset.config.task.throws else None,
+        landing=_find_landing_area(dataset.throws, dataset.config.task.success) if dataset.config.task.throws else None,
         samples=samples,
         # An episode of n samples lasts n - 1 intervals.
         duration_s=(samples - episodes) / dataset.config.record.rate_hz,
@@ -68,8 +68,10 @@ def summary(dataset: Dataset) -> Info:
     )
 
 
-def _find_landing_area(throws: pa.Table) -> Mapping[str, tuple[float, float]] | None:
-    ranges = {axis: find_range(throws[f"landing_{axis}"]) for axis in ("x_m", "y_m")}
+def _find_landing_area(throws: pa.Table, success: str) -> Mapping[str, tuple[float, float]] | None:
+    """Find where the throws of this outcome ended; a ball that hit the robot first may cross the landing plane, too."""
+    rows = find_rows(throws["outcome"], success)
+    ranges = {axis: find_range(throws[f"landing_{axis}"], rows) for axis in ("x_m", "y_m")}
     found = {axis: each for axis, each in ranges.items() if each is not None}
     return found if len(found) == len(ranges) else None
 

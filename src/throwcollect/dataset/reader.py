@@ -167,9 +167,10 @@ class Dataset(Sequence[Throw]):
 
     @property
     def landings(self) -> NamedArray:
-        """Where the ball of each throw landed, x, y and z of its centre in world [m]; NaN where it did not.
+        """Where the ball of each throw crossed the landing plane, x, y and z of its centre in world [m]; else NaN.
 
-        The bounds are the smallest and largest of these throws.
+        A ball that touched robot or tool after its release may cross it, too; the column `outcome` tells. The bounds
+        are the smallest and largest of all these throws.
 
         Raises:
             ConfigError: If nothing lands in the task.

@@ -85,14 +85,29 @@ def read_validity(column: pa.Array) -> NDArray[np.bool_]:
     return np.unpackbits(np.frombuffer(bits, np.uint8), bitorder="little")[slice(*ends)].astype(np.bool_)
 
 
-def find_range(column: pa.ChunkedArray) -> tuple[float, float] | None:
-    """Find the least and the largest number of a column, as ``pyarrow.compute.min_max`` does; None if all are null."""
+def find_range(column: pa.ChunkedArray, rows: NDArray[np.bool_] | None = None) -> tuple[float, float] | None:
+    """Find the least and the largest number of a column, as ``pyarrow.compute.min_max`` does; None if all are null.
+
+    Args:
+        column: The column.
+        rows: Which rows count, shape ``(n_rows,)``; None for all.
+    """
     if column.null_count == len(column):
         return None
     whole = column.combine_chunks()
-    numbers = read_numbers(whole)[read_validity(whole)]
+    valid = read_validity(whole)
+    numbers = read_numbers(whole)[valid if rows is None else valid & rows]
+    if not len(numbers):
+        return None
     # Like Arrow, these functions leave out NaN, which may stand in tables that others have written.
     return np.fmin.reduce(numbers).item(), np.fmax.reduce(numbers).item()
+
+
+def find_rows(column: pa.ChunkedArray, value: object) -> NDArray[np.bool_]:
+    """Find the rows in which a column has a value, shape ``(n_rows,)``."""
+    starts = range(0, len(column), _VALUES_AT_ONCE)
+    pieces = (column.slice(start, _VALUES_AT_ONCE).to_pylist() for start in starts)
+    return np.fromiter((each == value for piece in pieces for each in piece), np.bool_, len(column))
 
 
 def count_values(column: pa.ChunkedArray) -> Counter[Any]:

@@ -12,7 +12,7 @@ from throwcollect.cli.dataset.info import describe, show_info
 from throwcollect.dataset.creation import create
 from throwcollect.dataset.inspect import digest, info
 from throwcollect.episode.episode_message import header_to_json
-from throwcollect.episode.record import EpisodeHeader, Samples
+from throwcollect.episode.record import Contact, EpisodeHeader, Samples
 from throwcollect.errors import DatasetError
 
 
@@ -35,6 +35,24 @@ def test_info_counts_trials_episodes_outcomes_samples_and_messages(collection: A
         max(each.position[0] for each in landings),
     )
     assert json.loads(json.dumps(asdict(found)))["outcomes"] == found.outcomes
+
+
+def test_the_landing_area_of_info_is_that_of_throws_that_landed(collection: Any, tmp_path: Path) -> None:
+    farthest = max(range(7), key=lambda trial: collection.result(collection.episode(trial)).landing.position[0])
+
+    def touch(samples: Samples, header: EpisodeHeader) -> tuple[Samples, EpisodeHeader]:
+        """The ball of the farthest throw touches the arm in its flight."""
+        if header.trial != farthest:
+            return samples, header
+        (held,) = header.contacts
+        touched = Contact("arm_right_7_link", held.end_ns + 100_000_000, held.end_ns + 120_000_000)
+        return samples, replace(header, contacts=(held, touched))
+
+    found = info(collection.collect(tmp_path / "dataset", change=touch))
+    assert found.outcomes == {"landed": 6, "self_hit": 1}
+    others = [collection.result(collection.episode(trial)).landing for trial in range(7) if trial != farthest]
+    assert found.landing is not None
+    assert found.landing["x_m"][1] == max(each.position[0] for each in others)
 
 
 def test_info_of_a_dataset_in_which_no_ball_landed_has_no_landing_whatever_the_reason(

@@ -27,6 +27,7 @@ from throwcollect.report.throw.episodes import (
 from throwcollect.report.throw.landings import Landings, read_landings
 from throwcollect.robots.description import robot_of
 from throwcollect.tasks.throw.flight import BALLISTIC_TOLERANCE_M
+from throwcollect.wording import format_count
 
 
 def report_throws(dataset: Dataset, outcomes: Outcomes) -> TaskReport:
@@ -46,9 +47,9 @@ def report_throws(dataset: Dataset, outcomes: Outcomes) -> TaskReport:
     motion = read_motion(dataset, _choose_middle(paths)) if paths else None
     return TaskReport(
         subject=f"simulated throw{'s' if len(throws) > 1 else ''} of a ball by {robot.introduction}",
-        tiles=tuple(_show_key_numbers(landings, outcomes)),
+        tiles=tuple(_show_key_numbers(planned, outcomes)),
         results=(
-            _show_landings(landings, outcomes, coverage, height_m=height_m),
+            _show_landings(landings, planned, outcomes, coverage, height_m=height_m),
             _show_releases(landings, outcomes),
         ),
         episodes=(
@@ -75,17 +76,21 @@ def _show_key_numbers(landings: Landings, outcomes: Outcomes) -> Iterator[Tile]:
 
 
 def _show_landings(
-    landings: Landings, outcomes: Outcomes, coverage: Coverage | None, *, height_m: float | None
+    landings: Landings, planned: Landings, outcomes: Outcomes, coverage: Coverage | None, *, height_m: float | None
 ) -> ReportSection:
+    """Show where balls crossed the landing plane; `planned` are those that were thrown as planned."""
     title = "Where the balls land"
     if not len(landings):
         return ReportSection("landing", "Landings", title, "No ball crossed the landing plane.")
-    x, y, distance = landings.x_m, landings.y_m, landings.distance_m
-    text = (
-        f"{len(landings):,} of {len(outcomes.codes):,} balls crossed the landing plane"
-        f"{'' if height_m is None else f' at z = {height_m:g} m'}, {distance.min():.2f} to {distance.max():.2f} m from "
-        f"the robot: x {x.min():.2f} to {x.max():.2f} m, y {y.min():.2f} to {y.max():.2f} m."
-    )
+    text = f"{len(planned):,} of {len(outcomes.codes):,} throws landed"
+    if len(planned):
+        x, y, distance = planned.x_m, planned.y_m, planned.distance_m
+        text += (
+            f"{'' if height_m is None else f' at z = {height_m:g} m'}, {distance.min():.2f} to {distance.max():.2f} m "
+            f"from the robot: x {x.min():.2f} to {x.max():.2f} m, y {y.min():.2f} to {y.max():.2f} m"
+        )
+    others = len(landings) - len(planned)
+    text += f". {format_count(others, 'further ball')} crossed the landing plane, too." if others else "."
     figure = throw_figures.draw_landing_map(landings, outcomes)
     above = Panel("map", "Landings from above", figure, _say_how_many(landings), picture="landing_map")
     return ReportSection("landing", "Landings", title, text, ((above, *_show_targets(coverage)),))
@@ -173,8 +178,8 @@ def _show_physics(residuals: Residuals) -> ReportSection:
     exact = int((residuals.distance_m == 0).sum())
     exactly = f", {exact:,} agree to the last bit (drawn at {throw_figures.FLOOR_M:g} m)" if exact else ""
     text = (
-        f"{compared} were compared, sample by sample, with ballistic motion from their release: the largest distance "
-        f"is {residuals.finite_m.max():.1e} m{exactly}. "
+        f"{compared} were compared, sample by sample, with ballistic motion in steps of the physics, from shortly "
+        f"after their release on: the largest distance is {residuals.finite_m.max():.1e} m{exactly}. "
     )
     # NaN counts as a departure, too.
     above = int((~(residuals.distance_m <= BALLISTIC_TOLERANCE_M)).sum())
