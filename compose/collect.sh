@@ -12,6 +12,12 @@ if [ ! -f "$config" ]; then
     echo "$0: $config: no such file" >&2
     exit 2
 fi
+case $simulations in
+'' | *[!0-9]* | 0)
+    echo "$0: $simulations simulations; a whole number from 1 on is wanted" >&2
+    exit 2
+    ;;
+esac
 if [ -e "$output" ]; then
     echo "$0: $output exists already" >&2
     exit 2

@@ -95,6 +95,9 @@ def test_the_exit_code_is_that_of_the_collection(environment: dict[str, str], tm
     done = run(environment, SCRIPT, tmp_path / "wrong.yaml", "1", tmp_path / "data")
     assert done.returncode == 2, done.stdout + done.stderr
     assert "wrong.yaml:2: trials: should be" in done.stdout + done.stderr
+    none = run(environment, SCRIPT, tmp_path / "wrong.yaml", "0", tmp_path / "data")
+    assert (none.returncode, none.stderr.count("\n")) == (2, 1)
+    assert "0 simulations; a whole number from 1 on is wanted" in none.stderr
     assert leftovers() == before
 
 

@@ -78,7 +78,8 @@ def coordinator(
     plan = prepare_or_resume(config, directory)
     print(f"plan: {format_count(len(plan.trials), 'trial')}{more_trials(plan)}; dataset: {directory}", flush=True)
     try:
-        run(directory)
+        # Compose alone looks after the simulations, and does not tell when none can be started.
+        run(directory, patience_s=plan.config.run.start_timeout_s)
     except LossError:
         # The dataset is finished even so.
         typer.echo(describe(info(directory)))

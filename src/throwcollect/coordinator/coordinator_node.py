@@ -54,6 +54,11 @@ class Coordinator(Node):
         self.create_timer(_DISCOVERY_PERIOD_S, self._discover)
         self.create_timer(_REPORT_PERIOD_S, self.report)
 
+    @property
+    def sees_simulations(self) -> bool:
+        """Whether a simulation is in the ROS graph."""
+        return bool(self._simulations)
+
     def report(self) -> Progress:
         """Publish the progress, and return it."""
         hung = {simulation.name for simulation in self._simulations.values() if simulation.hung}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import math
 import signal
 import time
 from collections.abc import Callable
@@ -12,6 +13,7 @@ from types import FrameType
 from throwcollect import ros
 from throwcollect.coordinator.collection import TrialCollection
 from throwcollect.coordinator.coordinator_node import Coordinator
+from throwcollect.errors import WorkerError
 from throwcollect.heartbeat import Heartbeat
 from throwcollect.interruption import stop_signals
 from throwcollect.ros.self_check import check_answers
@@ -22,16 +24,20 @@ _TELL_EVERY_S = 10.0
 """Real time between two lines of progress in the log; it is published on its topic more often."""
 
 
-def run(directory: Path) -> None:
+def run(directory: Path, *, patience_s: float = math.inf) -> None:
     """Collect all trials of a dataset's plan that have no episode yet, and finish the dataset.
 
     SIGINT, SIGTERM and SIGHUP drain: running trials are finished and written within `run.grace_s`, none is started.
 
+    Args:
+        directory: Its directory.
+        patience_s: How long to go on while no simulation is there [s]. A launcher looks after its simulations itself.
+
     Raises:
         DatasetError: If the directory holds no plan, or cannot be written, or a trial came out otherwise when it was
             simulated again.
-        WorkerError: If every simulation refuses every trial, trials cannot be simulated again, or ROS 2 does not
-            answer.
+        WorkerError: If every simulation refuses every trial, trials cannot be simulated again, ROS 2 does not
+            answer, or no simulation is there for too long.
         LossError: If the dataset is finished, and trials of it are lost.
         Interrupted: If a signal ended the collection before its last trial.
     """
@@ -66,7 +72,7 @@ def run(directory: Path) -> None:
             executor.spin_once(timeout_sec=_IDLE_S)
 
         try:
-            _collect(node, collection, executor, heartbeat, is_to_drain=lambda: asked)
+            _collect(node, collection, executor, heartbeat, is_to_drain=lambda: asked, patience_s=patience_s)
             collection.finish(meanwhile=keep_answering, say=_say)
         finally:
             node.destroy_node()
@@ -80,9 +86,14 @@ def _collect(
     heartbeat: Heartbeat,
     *,
     is_to_drain: Callable[[], bool],
+    patience_s: float,
 ) -> None:
-    """Collect until all trials have ended or, after a request to drain, those that run."""
-    told = time.monotonic()
+    """Collect until all trials have ended or, after a request to drain, those that run.
+
+    Raises:
+        WorkerError: If no simulation is there for longer than `patience_s`.
+    """
+    told = seen = time.monotonic()
     while not collection.finished:
         heartbeat.beat()
         if is_to_drain():
@@ -93,6 +104,13 @@ def _collect(
         if collection.backlog:
             collection.write_one()
         collection.look_after()
+        if node.sees_simulations:
+            seen = time.monotonic()
+        elif time.monotonic() > seen + patience_s:
+            raise WorkerError(
+                f"no simulation was there for {patience_s:g} s (run.start_timeout_s)",
+                hint="what the simulations print says why",
+            )
         if time.monotonic() >= told + _TELL_EVERY_S:
             told = time.monotonic()
             _say(node.report().line)
