@@ -101,8 +101,15 @@ def id_of(records: Records, named: str) -> str:
     this raises an error, because choosing one would be a guess.
 
     Raises:
-        ConfigError: If there is no such run, or more than one.
+        ConfigError: If there is no such run, or more than one, or the name is empty.
     """
+    # A variable of a shell that is not set is empty. It would mean the current directory, and every id begins with it.
+    if not named:
+        raise ConfigError(
+            "the name of the run is empty",
+            expected="the id of a run, the beginning of its id, or the directory of its dataset",
+            hint="throwcollect ps -a lists all",
+        )
     ids = records.ids()
     # A whole id comes first, because it may also be the beginning of another one.
     if named in ids:

@@ -149,6 +149,17 @@ def test_an_ambiguous_id_means_the_only_living_run(
     assert re.findall(r"\((\w+)\): /", str(told.value))[2:] in (["ended", "died"], ["died", "ended"])
 
 
+@pytest.mark.parametrize("select", [find, find_to_watch])
+def test_an_empty_name_selects_no_run(
+    select: Callable[[Records, str], Run], records: Records, make: Make, tmp_path: Path
+) -> None:
+    # An empty path is the current directory, into which this run collects; every id begins with an empty text.
+    make("a", "lives", directory=str(tmp_path))
+    with pytest.raises(ConfigError, match="the name of the run is empty"):
+        select(records, "")
+    assert select(records, ".").id == "a-0123"
+
+
 def test_without_an_id_the_only_living_run_is_changed(records: Records, make: Make) -> None:
     with pytest.raises(ConfigError, match=r"no run lives\n  try: throwcollect up -d starts one"):
         find(records, None)
