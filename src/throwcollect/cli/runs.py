@@ -267,14 +267,11 @@ def _list_held_nodes(runtime: str, held: HeldRun) -> list[tuple[str, ...]]:
 
 
 def _handle(name: str) -> str:
-    """Find the noun for the handle of a node; "pid" if this machine does not know the runtime."""
-    from throwcollect.runtimes.registry import get_runtime
+    """Find the noun for the handle of a node; "pid" if this machine cannot use the runtime."""
+    from throwcollect.runtimes.registry import find_runtime
     from throwcollect.runtimes.runtime import Runtime
 
-    try:
-        return get_runtime(name).handle
-    except ConfigError:
-        return Runtime.handle
+    return (find_runtime(name) or Runtime).handle
 
 
 def _make_table(rows: Sequence[tuple[tuple[str, ...], list[tuple[str, ...]]]]) -> Iterable[str]:

@@ -26,6 +26,7 @@ from throwcollect.runs.run_selection import (
 from throwcollect.runs.state_directory import STATE_VARIABLE
 from throwcollect.runtimes.docker import docker_engine as docker_engine
 from throwcollect.runtimes.docker.container_options import NODE_LABEL, RUN_LABEL
+from throwcollect.runtimes.runtime import NodeState
 
 NOW = datetime.now(timezone.utc)
 Make = Callable[..., RunRecord]
@@ -381,6 +382,21 @@ def test_without_the_docker_package_no_held_runs_are_found(monkeypatch: pytest.M
     monkeypatch.setattr("throwcollect.runtimes.docker.docker_engine.connect", import_client)
     monkeypatch.setattr("throwcollect.runtimes.docker.docker_runtime.is_installed", lambda _: False)
     assert find_held_runs() == {}
+
+
+def test_a_runtime_that_cannot_be_loaded_does_not_keep_runs_from_being_listed(
+    records: Records, make: Make, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def import_runtime(_family: str, _name: str) -> None:
+        raise ModuleNotFoundError("No module named 'docker'", name="docker")
+
+    make("a", "lives", runtime="docker", nodes=(NodeState("sim_0", "running", 0, "1234", None),))
+    make("b", "died", runtime="docker")
+    monkeypatch.setattr("throwcollect.runtimes.registry.load_member", import_runtime)
+    assert find_held_runs() == {}
+    assert [(run.id, len(run.nodes)) for run in records.all()] == [("a-0123", 1), ("b-0123", 0)]
+    ps()
+    assert "pid 1234" in capsys.readouterr().out
 
 
 def test_without_a_docker_engine_no_held_runs_are_found(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
