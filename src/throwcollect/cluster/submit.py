@@ -160,27 +160,34 @@ def _submit(scripts: BatchScripts, submission: Submission, slices: tuple[int, ..
         scripts.logs.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise unwritable(scripts.logs, error) from error
-    if submission.live:
-        text = scripts.live(submission.tasks)
-        array, joining = slurm.submit(_write(directory, _COLLECT, text)), ""
-        message = f"submitted job {array}: one run on {format_count(submission.tasks, 'node')}"
-    else:
-        text = scripts.collect(submission.tasks, format_indexes(slices)) if slices else ""
-        join = _write(directory, _JOIN, scripts.join())
-        if slices:
-            array = slurm.submit(_write(directory, _COLLECT, text))
-            with ExitStack() as undo:
-                # If submitting the other job fails, no record names the array, and the files of its tasks are removed.
-                undo.callback(slurm.cancel, [array])
-                # The joining job starts after all tasks, however they end, and reports what is missing then.
-                joining = slurm.submit(join, f"--dependency=afterany:{array}", "--kill-on-invalid-dep=yes")
-                undo.pop_all()
-            message = f"submitted job {array}: {format_count(len(slices), 'task')}; job {joining} joins their slices"
+    with ExitStack() as undo:
+
+        def submit_job(script: Path, *options: str) -> str:
+            job = slurm.submit(script, *options)
+            # Until the record names the job, nobody finds it again, and what fails removes the files that it needs.
+            undo.callback(slurm.cancel, [job])
+            return job
+
+        if submission.live:
+            text = scripts.live(submission.tasks)
+            array, joining = submit_job(_write(directory, _COLLECT, text)), ""
+            message = f"submitted job {array}: one run on {format_count(submission.tasks, 'node')}"
         else:
-            array, joining = "", slurm.submit(join)
-            message = f"submitted job {joining}, which joins the slices; all of them are finished"
-    job = Job(array, joining, slices, datetime.now(timezone.utc))
-    write_submission(directory, replace(submission, jobs=(*submission.jobs, job)))
+            text = scripts.collect(submission.tasks, format_indexes(slices)) if slices else ""
+            join = _write(directory, _JOIN, scripts.join())
+            if slices:
+                array = submit_job(_write(directory, _COLLECT, text))
+                # The joining job starts after all tasks, however they end, and reports what is missing then.
+                joining = submit_job(join, f"--dependency=afterany:{array}", "--kill-on-invalid-dep=yes")
+                message = (
+                    f"submitted job {array}: {format_count(len(slices), 'task')}; job {joining} joins their slices"
+                )
+            else:
+                array, joining = "", submit_job(join)
+                message = f"submitted job {joining}, which joins the slices; all of them are finished"
+        job = Job(array, joining, slices, datetime.now(timezone.utc))
+        write_submission(directory, replace(submission, jobs=(*submission.jobs, job)))
+        undo.pop_all()
     onlooker.say(message)
     return Submitted(directory, text, job)
 
