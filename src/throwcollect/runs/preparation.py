@@ -194,44 +194,46 @@ def _plan_again(request: RunRequest, onlooker: Onlooker, *, check: bool) -> RunR
     """
     from throwcollect.coordinator.resume import has_all_trials, resume
 
-    def choose_runtime() -> None:
-        # This fails before anything is written if nothing can be simulated here, so a finished dataset stays finished.
-        nonlocal request
-        request = _choose_runtime(request, onlooker)
+    with ExitStack() as undo:
 
-    plan = resume(
-        request.config,
-        request.directory,
-        sweep_directory=request.sweep_directory,
-        processes=request.processes,
-        check=check,
-        before_writing=choose_runtime,
-        onlooker=onlooker,
-    )
-    if has_all_trials(request.directory, plan):
-        onlooker.say(f"{request.directory}: every trial has ended, nothing is left to do")
-        return None
+        def choose_runtime() -> None:
+            # This fails before anything is written if nothing can be simulated here, so a finished dataset stays so.
+            nonlocal request
+            request = _choose_runtime(request, undo, onlooker)
+
+        plan = resume(
+            request.config,
+            request.directory,
+            sweep_directory=request.sweep_directory,
+            processes=request.processes,
+            check=check,
+            before_writing=choose_runtime,
+            onlooker=onlooker,
+        )
+        if has_all_trials(request.directory, plan):
+            onlooker.say(f"{request.directory}: every trial has ended, nothing is left to do")
+            return None
+        # From here on, `prepare_run` closes what the runtime has begun.
+        undo.pop_all()
     return replace(request, plan=plan)
 
 
-def _choose_runtime(request: RunRequest, onlooker: Onlooker) -> RunRequest:
-    """Choose the runtime of a run that continues a dataset.
+def _choose_runtime(request: RunRequest, undo: ExitStack, onlooker: Onlooker) -> RunRequest:
+    """Choose the runtime of a run that continues a dataset; `undo` gets what ends the work that the runtime begins.
 
     Raises:
         ConfigError: If the dataset would be in a volume, where a collection cannot be continued.
         WorkerError: If the runtime that is asked for cannot be used.
     """
     config = request.config
-    with ExitStack() as undo:
-        if (begun := begin(config) if request.ahead else None) is not None:
-            undo.callback(begun.runtime.close)
-        choice = choose(config, say=onlooker.say, warn=onlooker.warn, begun=begun)
-        if (volume := config.containers.volume) and choice.runtime.has_volumes:
-            raise ConfigError(
-                [Problem(f"a dataset in the volume {volume} cannot be resumed from here", key="containers.volume")],
-                expected="a dataset in a directory",
-            )
-        undo.pop_all()
+    if (begun := begin(config) if request.ahead else None) is not None:
+        undo.callback(begun.runtime.close)
+    choice = choose(config, say=onlooker.say, warn=onlooker.warn, begun=begun)
+    if (volume := config.containers.volume) and choice.runtime.has_volumes:
+        raise ConfigError(
+            [Problem(f"a dataset in the volume {volume} cannot be resumed from here", key="containers.volume")],
+            expected="a dataset in a directory",
+        )
     return replace(request, begun=begun, choice=choice)
 
 
