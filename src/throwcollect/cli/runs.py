@@ -241,7 +241,9 @@ def _describe_status(run: Run, record: RunRecord) -> str:
 
 
 def _make_unrecorded_row(runtime: str, held: HeldRun) -> tuple[str, ...]:
-    simulations = sum(node.name.startswith("sim_") for node in held.nodes)
+    from throwcollect.runtimes.nodes import is_simulation
+
+    simulations = sum(is_simulation(node.name) for node in held.nodes)
     return held.run_id, runtime, str(simulations), "-", "unrecorded", held.source
 
 

@@ -28,6 +28,7 @@ from throwcollect.runtimes.nodes import (
     NodeHost,
     NodeRole,
     NodeSpec,
+    is_simulation,
     simulation_name,
     simulation_nodes,
 )
@@ -163,7 +164,7 @@ class NodeCollection:
             WorkerError: If they still do not see each other after that, because the run would never end.
         """
         states = self._supervisor.states()
-        ready = any(state.status == "running" for state in states if state.name not in (ROUTER, COORDINATOR))
+        ready = any(state.status == "running" for state in states if is_simulation(state.name))
         if progress.simulations or progress.ended or not ready:
             self._apart_since = math.inf
             return

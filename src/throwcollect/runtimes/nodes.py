@@ -29,14 +29,22 @@ LAUNCHER = "launcher"
 """Name of the launcher's node; the launcher never runs in a container."""
 
 
+_SIMULATION = "sim_"
+
+
 def simulation_name(index: int) -> str:
     """Name of a simulation's node, counted from 0."""
-    return f"sim_{index}"
+    return f"{_SIMULATION}{index}"
 
 
 def simulation_name_of(host: str) -> str:
     """Name of the only simulation on a host, as in a container."""
-    return "sim_" + re.sub(r"[^a-z0-9_]", "_", host.lower())
+    return _SIMULATION + re.sub(r"[^a-z0-9_]", "_", host.lower())
+
+
+def is_simulation(name: str) -> bool:
+    """Whether a node of this name is a simulation."""
+    return name.startswith(_SIMULATION)
 
 
 class NodeRole(Enum):
