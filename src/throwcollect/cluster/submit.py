@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import os
 import shutil
 from collections.abc import Sequence
-from contextlib import ExitStack, suppress
+from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from datetime import datetime, timezone
 from pathlib import Path
@@ -26,9 +25,10 @@ from throwcollect.cluster.submission import (
 from throwcollect.config.loader import load_locating_errors
 from throwcollect.config.schema import Config
 from throwcollect.coordinator.onlooker import Onlooker
-from throwcollect.coordinator.prepare import prepare
+from throwcollect.coordinator.prepare import describe_plan, prepare
 from throwcollect.coordinator.resume import refuse_changes
-from throwcollect.dataset.directory import CONFIG, PLAN, TRIALS
+from throwcollect.dataset.creation import remove_plan
+from throwcollect.dataset.directory import PLAN
 from throwcollect.errors import ConfigError, Problem
 from throwcollect.files import unwritable, write_file
 from throwcollect.own_process import make_command
@@ -233,17 +233,11 @@ def _freeze(config: Config, directory: Path, sweep_directory: Path, onlooker: On
         onlooker.say(f"takes the plan in {directory}")
         return
     plan = prepare(config, directory, sweep_directory=sweep_directory, processes=count_cores(), onlooker=onlooker)
-    refused = len(plan.trials.refused)
-    note = f", {refused} refused by calculation" if refused else ""
-    onlooker.say(f"plan: {format_count(len(plan.trials), 'trial')}{note}; dataset: {directory}")
+    onlooker.say(f"plan: {describe_plan(plan)}; dataset: {directory}")
 
 
 def _remove(directory: Path, *, made: bool, planned: bool) -> None:
     """Remove the files of a submission that failed."""
-    with suppress(OSError):
-        shutil.rmtree(directory / CLUSTER, ignore_errors=True)
-        if planned:
-            for name in (CONFIG, PLAN, TRIALS):
-                (directory / name).unlink(missing_ok=True)
-        if made:
-            os.rmdir(directory)
+    shutil.rmtree(directory / CLUSTER, ignore_errors=True)
+    if planned:
+        remove_plan(directory, made=made)
