@@ -14,6 +14,7 @@
     ├── DatasetError                 exit 4   a dataset is missing, torn or contradicts itself
     │   └── ForeignPlanError         exit 4   a plan was made for another configuration
     ├── OutputError                  exit 6   everything is done, but the result could not be printed
+    ├── UnreachableError             exit 7   the router of a run does not answer; it may be about to be started again
     ├── MemberError                  exit 1   a part of another package fails where it is used (`throwcollect.members`)
     ├── RequestError                 exit 1   a running simulation cannot do what a client asks
     └── Interrupted                  exit 130 stopped by the user; finished episodes are on disk

@@ -297,7 +297,7 @@ def test_a_published_router_listens_only_on_the_loopback_interface(bare: Any, cl
             bare(f"run.router_port={port}")
     runtime = bare(f"run.router_port={port}")
     runtime.start(NodeSpec(ROUTER, ("router", "--listen", runtime.listen), NodeRole.EXPENDABLE))
-    until(lambda: runtime.log_tail(ROUTER) != "")
+    until(lambda: runtime.logs.tail(ROUTER) != "")
     assert runtime.endpoint is not None
     assert split_address(runtime.endpoint) == ("127.0.0.1", port)
     socket.create_connection(("127.0.0.1", port), 5).close()
@@ -314,8 +314,8 @@ def test_a_node_gets_the_key_as_private_files_that_the_engine_does_not_show(
     key = key_in(tmp_path).private_key.read_text()
     runtime = bare()
     runtime.start(NodeSpec(ROUTER, ("router", "--listen", runtime.listen), NodeRole.EXPENDABLE))
-    until(lambda: runtime.log_tail(ROUTER) != "")
-    assert runtime.log_tail(ROUTER) == "router listening on tls/router:7447"
+    until(lambda: runtime.logs.tail(ROUTER) != "")
+    assert runtime.logs.tail(ROUTER) == "router listening on tls/router:7447"
     router = client.containers.get(runtime.handle(ROUTER))
     script = "stat -c '%a %u' /key/*; touch /key/new; cat /key/key.pem"
     said = router.exec_run(["sh", "-c", script]).output.decode()
@@ -363,7 +363,7 @@ def test_a_container_gets_the_configured_mounts_environment_and_networks(
             "containers.router.options={ulimits: {nofile: 99}, tmpfs: {/tmp: size=1m}}",
         )
         runtime.start(NodeSpec(ROUTER, ("router", "--listen", runtime.listen), NodeRole.EXPENDABLE))
-        until(lambda: runtime.log_tail(ROUTER) != "")
+        until(lambda: runtime.logs.tail(ROUTER) != "")
         script = (
             "cat /extra; echo $ANSWER; ulimit -n; grep Cpus_allowed_list /proc/self/status; grep ' /tmp ' /proc/mounts"
         )
@@ -390,12 +390,12 @@ def test_the_runtime_reconnects_to_the_engine_after_an_interruption(
 ) -> None:
     runtime = bare(through=connect())
     runtime.start(NodeSpec(ROUTER, ("router", "--listen", runtime.listen), NodeRole.EXPENDABLE))
-    until(lambda: runtime.log_tail(ROUTER) != "")
+    until(lambda: runtime.logs.tail(ROUTER) != "")
     handle = runtime.handle(ROUTER)
     line.interrupt()
     client.containers.get(handle).kill("SIGTERM")
     assert wait_for_end(runtime).reason == "exit code 0"
-    assert runtime.log_tail(ROUTER) == "router listening on tls/router:7447"
+    assert runtime.logs.tail(ROUTER) == "router listening on tls/router:7447"
 
 
 @pytest.mark.parametrize(("trouble", "evidence"), [("cut", "Connection refused\n"), ("clog", "")])
@@ -411,7 +411,7 @@ def test_a_silent_engine_is_an_error_that_names_containers_that_may_run_on(
     monkeypatch.setattr("throwcollect.runtimes.docker.engine_clock.SILENCE_S", 3.0)
     runtime = bare(through=connect())
     runtime.start(NodeSpec(ROUTER, ("router", "--listen", runtime.listen), NodeRole.EXPENDABLE))
-    until(lambda: runtime.log_tail(ROUTER) != "")
+    until(lambda: runtime.logs.tail(ROUTER) != "")
     handle = runtime.handle(ROUTER)
     getattr(line, trouble)()
     with pytest.raises(WorkerError, match=r"engine has not answered for \d+ s; .* safe in \S+") as caught:

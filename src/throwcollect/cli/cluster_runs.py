@@ -65,7 +65,7 @@ def print_logs(run: ClusterRun, tasks: list[str], *, until_end: bool = False) ->
 def print_events(run: ClusterRun, *, as_json: bool) -> None:
     """Print each change of the state of a task, until the run ends; as JSON, one document a line."""
 
-    def tell(line: str, **document: object) -> None:
+    def print_event(line: str, **document: object) -> None:
         typer.echo(json.dumps(document) if as_json else line)
 
     before: dict[int | None, str] = {}
@@ -76,10 +76,10 @@ def print_events(run: ClusterRun, *, as_json: bool) -> None:
             # Slurm forgets a task some minutes after its end, which is no event if the end was printed.
             if before.get(index) != now and (index in states or before.get(index) != "ended"):
                 who = "all tasks" if index is None else f"task {index}"
-                tell(f"{who}: {now}", event="task", task=index, state=now)
+                print_event(f"{who}: {now}", event="task", task=index, state=now)
             before[index] = now
-    end = "finished" if look.complete else "over"
-    tell(end, event=end)
+    last = "finished" if look.complete else "over"
+    print_event(last, event=last)
 
 
 def end(run: ClusterRun) -> None:

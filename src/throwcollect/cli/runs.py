@@ -241,7 +241,9 @@ def _describe_status(run: Run, record: RunRecord) -> str:
 
 
 def _make_unrecorded_row(runtime: str, held: HeldRun) -> tuple[str, ...]:
-    simulations = sum(node.name.startswith("sim_") for node in held.nodes)
+    from throwcollect.runtimes.nodes import is_simulation
+
+    simulations = sum(is_simulation(node.name) for node in held.nodes)
     return held.run_id, runtime, str(simulations), "-", "unrecorded", held.source
 
 
@@ -267,14 +269,11 @@ def _list_held_nodes(runtime: str, held: HeldRun) -> list[tuple[str, ...]]:
 
 
 def _handle(name: str) -> str:
-    """Find the noun for the handle of a node; "pid" if this machine does not know the runtime."""
-    from throwcollect.runtimes.registry import get_runtime
+    """Find the noun for the handle of a node; "pid" if this machine cannot use the runtime."""
+    from throwcollect.runtimes.registry import find_runtime
     from throwcollect.runtimes.runtime import Runtime
 
-    try:
-        return get_runtime(name).handle
-    except ConfigError:
-        return Runtime.handle
+    return (find_runtime(name) or Runtime).handle
 
 
 def _make_table(rows: Sequence[tuple[tuple[str, ...], list[tuple[str, ...]]]]) -> Iterable[str]:

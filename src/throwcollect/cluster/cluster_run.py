@@ -260,7 +260,8 @@ def find_cluster_run(named: str | None) -> ClusterRun | None:
     """
     if named is not None:
         directory = Path(named)
-        return ClusterRun.open(directory.absolute()) if is_submitted(directory) else None
+        # An empty name would be the path of the current directory.
+        return ClusterRun.open(directory.absolute()) if named and is_submitted(directory) else None
     here = [each for each in find_queued() if each.is_relative_to(Path.cwd())]
     return ClusterRun.open(here[0]) if len(here) == 1 else None
 

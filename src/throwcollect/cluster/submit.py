@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import os
 import shutil
 from collections.abc import Sequence
-from contextlib import ExitStack, suppress
+from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from datetime import datetime, timezone
 from pathlib import Path
@@ -26,9 +25,10 @@ from throwcollect.cluster.submission import (
 from throwcollect.config.loader import load_locating_errors
 from throwcollect.config.schema import Config
 from throwcollect.coordinator.onlooker import Onlooker
-from throwcollect.coordinator.prepare import prepare
+from throwcollect.coordinator.prepare import describe_plan, prepare
 from throwcollect.coordinator.resume import refuse_changes
-from throwcollect.dataset.directory import CONFIG, PLAN, TRIALS
+from throwcollect.dataset.creation import remove_plan
+from throwcollect.dataset.directory import PLAN
 from throwcollect.errors import ConfigError, Problem
 from throwcollect.files import unwritable, write_file
 from throwcollect.own_process import make_command
@@ -160,27 +160,34 @@ def _submit(scripts: BatchScripts, submission: Submission, slices: tuple[int, ..
         scripts.logs.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise unwritable(scripts.logs, error) from error
-    if submission.live:
-        text = scripts.live(submission.tasks)
-        array, joining = slurm.submit(_write(directory, _COLLECT, text)), ""
-        message = f"submitted job {array}: one run on {format_count(submission.tasks, 'node')}"
-    else:
-        text = scripts.collect(submission.tasks, format_indexes(slices)) if slices else ""
-        join = _write(directory, _JOIN, scripts.join())
-        if slices:
-            array = slurm.submit(_write(directory, _COLLECT, text))
-            with ExitStack() as undo:
-                # If submitting the other job fails, no record names the array, and the files of its tasks are removed.
-                undo.callback(slurm.cancel, [array])
-                # The joining job starts after all tasks, however they end, and reports what is missing then.
-                joining = slurm.submit(join, f"--dependency=afterany:{array}", "--kill-on-invalid-dep=yes")
-                undo.pop_all()
-            message = f"submitted job {array}: {format_count(len(slices), 'task')}; job {joining} joins their slices"
+    with ExitStack() as undo:
+
+        def submit_job(script: Path, *options: str) -> str:
+            job = slurm.submit(script, *options)
+            # Until the record names the job, nobody finds it again, and what fails removes the files that it needs.
+            undo.callback(slurm.cancel, [job])
+            return job
+
+        if submission.live:
+            text = scripts.live(submission.tasks)
+            array, joining = submit_job(_write(directory, _COLLECT, text)), ""
+            message = f"submitted job {array}: one run on {format_count(submission.tasks, 'node')}"
         else:
-            array, joining = "", slurm.submit(join)
-            message = f"submitted job {joining}, which joins the slices; all of them are finished"
-    job = Job(array, joining, slices, datetime.now(timezone.utc))
-    write_submission(directory, replace(submission, jobs=(*submission.jobs, job)))
+            text = scripts.collect(submission.tasks, format_indexes(slices)) if slices else ""
+            join = _write(directory, _JOIN, scripts.join())
+            if slices:
+                array = submit_job(_write(directory, _COLLECT, text))
+                # The joining job starts after all tasks, however they end, and reports what is missing then.
+                joining = submit_job(join, f"--dependency=afterany:{array}", "--kill-on-invalid-dep=yes")
+                message = (
+                    f"submitted job {array}: {format_count(len(slices), 'task')}; job {joining} joins their slices"
+                )
+            else:
+                array, joining = "", submit_job(join)
+                message = f"submitted job {joining}, which joins the slices; all of them are finished"
+        job = Job(array, joining, slices, datetime.now(timezone.utc))
+        write_submission(directory, replace(submission, jobs=(*submission.jobs, job)))
+        undo.pop_all()
     onlooker.say(message)
     return Submitted(directory, text, job)
 
@@ -226,17 +233,11 @@ def _freeze(config: Config, directory: Path, sweep_directory: Path, onlooker: On
         onlooker.say(f"takes the plan in {directory}")
         return
     plan = prepare(config, directory, sweep_directory=sweep_directory, processes=count_cores(), onlooker=onlooker)
-    refused = len(plan.trials.refused)
-    note = f", {refused} refused by calculation" if refused else ""
-    onlooker.say(f"plan: {format_count(len(plan.trials), 'trial')}{note}; dataset: {directory}")
+    onlooker.say(f"plan: {describe_plan(plan)}; dataset: {directory}")
 
 
 def _remove(directory: Path, *, made: bool, planned: bool) -> None:
     """Remove the files of a submission that failed."""
-    with suppress(OSError):
-        shutil.rmtree(directory / CLUSTER, ignore_errors=True)
-        if planned:
-            for name in (CONFIG, PLAN, TRIALS):
-                (directory / name).unlink(missing_ok=True)
-        if made:
-            os.rmdir(directory)
+    shutil.rmtree(directory / CLUSTER, ignore_errors=True)
+    if planned:
+        remove_plan(directory, made=made)

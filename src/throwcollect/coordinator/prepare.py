@@ -24,6 +24,7 @@ from throwcollect.sweep.points import Points
 from throwcollect.sweep.rounds import Rounds
 from throwcollect.sweep.trials import Trials
 from throwcollect.tasks.task import trajectory_of
+from throwcollect.wording import format_count
 
 _MANY_TRIALS = 500
 """From this number of trials on, starting processes that check them side by side saves time."""
@@ -155,6 +156,13 @@ def _replace_by_nominal_robot(config: Config) -> Config:
     return config.model_copy(
         update={"robot": defaults.model_copy(update=kept), "tool": tool, "ball": type(config.ball)()}
     )
+
+
+def describe_plan(plan: Plan) -> str:
+    """Write the number of a plan's trials, how many of them the robot cannot do, and whether more will follow."""
+    refused = len(plan.trials.refused)
+    note = f", {refused} refused by calculation (see `throwcollect plan`)" if refused else ""
+    return f"{format_count(len(plan.trials), 'trial')}{note}{more_trials(plan)}"
 
 
 def more_trials(plan: Plan) -> str:

@@ -59,6 +59,18 @@ def refuse_taken(directory: Path) -> None:
         )
 
 
+def remove_plan(directory: Path, *, made: bool) -> None:
+    """Remove the files of a plan that `create` has written and, if the directory was made for them, the directory.
+
+    Files that are gone already, or that cannot be removed, are no error, because this cleans up after one.
+    """
+    with suppress(OSError):
+        for name in (CONFIG, PLAN, TRIALS):
+            (directory / name).unlink(missing_ok=True)
+        if made:
+            directory.rmdir()
+
+
 def _fill(directory: Path, plan: Plan, listed: Points | None, *, made: bool) -> None:
     refuse_taken(directory)
     with ExitStack() as undo:

@@ -19,7 +19,7 @@ from throwcollect.runs.run_selection import require_living
 from throwcollect.runtimes.runtime import Host, Place
 
 if TYPE_CHECKING:
-    from throwcollect.runtimes.docker.component import Way
+    from throwcollect.runtimes.docker.component import JoinOptions
 
 DESCRIPTION = "robot.urdf"
 """File in the directory of the run that describes the robot for viewers."""
@@ -54,7 +54,7 @@ def check_order(order: ContainerOrder) -> None:
         from throwcollect.runtimes.docker.checks import check_container
         from throwcollect.runtimes.docker.docker_engine import connect
     if order.joins is not None:
-        _find_way(Records().get(order.joins), order.spec)
+        _find_join_options(Records().get(order.joins), order.spec)
     with closing(connect(timeout_s=_ANSWER_S)) as client:
         check_container(client, order.spec, order.component)
 
@@ -76,8 +76,8 @@ def launch_container(
     def host(place: Place) -> Host:
         from throwcollect.runtimes.docker.component import ComponentContainer
 
-        way = None if order.joins is None else _wait_for_way(order.joins, order.spec, interruptions)
-        return ComponentContainer(place, order.component, order.spec, way, goes_on=_goes_on, warn=onlooker.warn)
+        joining = None if order.joins is None else _wait_for_router(order.joins, order.spec, interruptions)
+        return ComponentContainer(place, order.component, order.spec, joining, goes_on=_goes_on, warn=onlooker.warn)
 
     launch_host(run, host, onlooker=onlooker, interruptions=interruptions)
 
@@ -89,8 +89,8 @@ def _goes_on(run: str) -> bool:
         return False
 
 
-def _wait_for_way(run: str, spec: ContainerSpec, interruptions: Callable[[], int]) -> Way:
-    """Wait for the way into a run, which may just be starting.
+def _wait_for_router(run: str, spec: ContainerSpec, interruptions: Callable[[], int]) -> JoinOptions:
+    """Wait until a container can join a run, which may just be starting, and return the options for that.
 
     Raises:
         ConfigError: If the container cannot join the run.
@@ -98,22 +98,22 @@ def _wait_for_way(run: str, spec: ContainerSpec, interruptions: Callable[[], int
         WorkerError: If the launcher of the run died.
         Interrupted: If somebody asked to stop.
     """
-    while (way := _find_way(Records().get(run), spec)) is None:
+    while (joining := _find_join_options(Records().get(run), spec)) is None:
         if interruptions():
             raise Interrupted("stopped before the container was started")
         time.sleep(_POLL_S)
-    return way
+    return joining
 
 
-def _find_way(run: Run, spec: ContainerSpec) -> Way | None:
-    """The way into a run; None while the run has no router yet.
+def _find_join_options(run: Run, spec: ContainerSpec) -> JoinOptions | None:
+    """Find the options with which a container joins a run; None while the run has no router yet.
 
     Raises:
         ConfigError: If the container cannot join the run.
         ConflictError: If the run has ended, or has no router to join.
         WorkerError: If the launcher of the run died.
     """
-    from throwcollect.runtimes.docker.component import find_way
+    from throwcollect.runtimes.docker.component import find_join_options
     from throwcollect.runtimes.registry import get_runtime
 
     record = require_living(run)
@@ -121,4 +121,4 @@ def _find_way(run: Run, spec: ContainerSpec) -> Way | None:
         raise ConflictError(f"run {run.id}: has no router that a container could join")
     if not record.runtime or run.connection is None:
         return None
-    return find_way(run.id, record.runtime, run.connection, spec)
+    return find_join_options(run.id, record.runtime, run.connection, spec)

@@ -84,10 +84,13 @@ def down(named: str | Run | None, *, volumes: bool = False) -> tuple[str, list[s
         _end_launcher(records, record)
     taken = records.take(run)
     if taken is None:
-        raise WorkerError(f"run {run}: its launcher does not end", evidence=f"its pid is {record and record.launcher}")
-    lived_in = record.runtime if record is not None else held[run][0] if run in held else ""
+        evidence = None if record is None else f"its pid is {record.launcher}"
+        raise WorkerError(f"run {run}: its launcher does not end", evidence=evidence)
+    runtime = held[run][0] if run in held else ""
+    if record is not None:
+        runtime = record.runtime
     try:
-        removed = get_runtime(lived_in).remove(run, volumes=volumes) if lived_in else []
+        removed = get_runtime(runtime).remove(run, volumes=volumes) if runtime else []
     except ThrowcollectError:
         # The record stays, so that the command can be repeated.
         taken.close()

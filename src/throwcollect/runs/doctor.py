@@ -29,6 +29,7 @@ from throwcollect.members import explain_failure, load_member, names_of
 from throwcollect.robots.description import joint_model
 from throwcollect.robots.robot import Robot
 from throwcollect.robots.talos import TALOS
+from throwcollect.ros.middleware import VARIABLE, uses_rclpy
 from throwcollect.runtimes.registry import get_runtime
 from throwcollect.runtimes.runtime import Check
 from throwcollect.wording import format_count, join_names
@@ -144,14 +145,9 @@ def _check_embedded() -> Check:
         return Check("embedded", "problem", f"Zenoh is not installed; try: {MissingExtraError('zenoh').hint}")
     found = f"Zenoh {version('eclipse-zenoh')}"
     try:
-        # Importing from `throwcollect.ros` loads the chosen backend, which may fail.
-        from throwcollect.ros.middleware import VARIABLE, uses_rclpy
-
         chosen = "rclpy" if uses_rclpy() else "the embedded backend"
     except ConfigError as error:
         return Check("embedded", "problem", f"{found}; {'; try: '.join(filter(None, [error.message, error.hint]))}")
-    except ImportError as error:
-        return Check("embedded", "problem", f"{found}, but rclpy is chosen and cannot be imported: {error}")
     value = os.environ.get(VARIABLE)
     return Check("embedded", "ok", f"{found}; nodes run on {chosen}, as {VARIABLE} is {value or 'not set'}")
 

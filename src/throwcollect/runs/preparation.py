@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from contextlib import ExitStack, suppress
+from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from datetime import datetime, timezone
 from pathlib import Path
@@ -15,7 +15,7 @@ from throwcollect.config.loader import load_locating_errors
 from throwcollect.config.schema import Config
 from throwcollect.coordinator.onlooker import SILENT, Onlooker
 from throwcollect.dataset.configuration import read_config, refuse_damaged_config, refuse_lost_config
-from throwcollect.dataset.directory import CONFIG, PLAN, TRIALS, config_path
+from throwcollect.dataset.directory import config_path
 from throwcollect.dataset.lock import hold_lock
 from throwcollect.errors import ConfigError, Problem
 from throwcollect.ros.middleware import Middleware
@@ -25,7 +25,7 @@ from throwcollect.runs.run_record import Origin, RunRecord
 from throwcollect.runs.run_selection import busy_error, find_left_in
 from throwcollect.runs.runtime_choice import RuntimeChoice, begin, choose
 from throwcollect.runtimes.ports import reserve_port
-from throwcollect.wording import command, format_count
+from throwcollect.wording import command
 
 if TYPE_CHECKING:
     # This import takes long; it is made after the runtime has begun its work, so that both run at the same time.
@@ -194,44 +194,46 @@ def _plan_again(request: RunRequest, onlooker: Onlooker, *, check: bool) -> RunR
     """
     from throwcollect.coordinator.resume import has_all_trials, resume
 
-    def choose_runtime() -> None:
-        # This fails before anything is written if nothing can be simulated here, so a finished dataset stays finished.
-        nonlocal request
-        request = _choose_runtime(request, onlooker)
+    with ExitStack() as undo:
 
-    plan = resume(
-        request.config,
-        request.directory,
-        sweep_directory=request.sweep_directory,
-        processes=request.processes,
-        check=check,
-        before_writing=choose_runtime,
-        onlooker=onlooker,
-    )
-    if has_all_trials(request.directory, plan):
-        onlooker.say(f"{request.directory}: every trial has ended, nothing is left to do")
-        return None
+        def choose_runtime() -> None:
+            # This fails before anything is written if nothing can be simulated here, so a finished dataset stays so.
+            nonlocal request
+            request = _choose_runtime(request, undo, onlooker)
+
+        plan = resume(
+            request.config,
+            request.directory,
+            sweep_directory=request.sweep_directory,
+            processes=request.processes,
+            check=check,
+            before_writing=choose_runtime,
+            onlooker=onlooker,
+        )
+        if has_all_trials(request.directory, plan):
+            onlooker.say(f"{request.directory}: every trial has ended, nothing is left to do")
+            return None
+        # From here on, `prepare_run` closes what the runtime has begun.
+        undo.pop_all()
     return replace(request, plan=plan)
 
 
-def _choose_runtime(request: RunRequest, onlooker: Onlooker) -> RunRequest:
-    """Choose the runtime of a run that continues a dataset.
+def _choose_runtime(request: RunRequest, undo: ExitStack, onlooker: Onlooker) -> RunRequest:
+    """Choose the runtime of a run that continues a dataset; `undo` gets what ends the work that the runtime begins.
 
     Raises:
         ConfigError: If the dataset would be in a volume, where a collection cannot be continued.
         WorkerError: If the runtime that is asked for cannot be used.
     """
     config = request.config
-    with ExitStack() as undo:
-        if (begun := begin(config) if request.ahead else None) is not None:
-            undo.callback(begun.runtime.close)
-        choice = choose(config, say=onlooker.say, warn=onlooker.warn, begun=begun)
-        if (volume := config.containers.volume) and choice.runtime.has_volumes:
-            raise ConfigError(
-                [Problem(f"a dataset in the volume {volume} cannot be resumed from here", key="containers.volume")],
-                expected="a dataset in a directory",
-            )
-        undo.pop_all()
+    if (begun := begin(config) if request.ahead else None) is not None:
+        undo.callback(begun.runtime.close)
+    choice = choose(config, say=onlooker.say, warn=onlooker.warn, begun=begun)
+    if (volume := config.containers.volume) and choice.runtime.has_volumes:
+        raise ConfigError(
+            [Problem(f"a dataset in the volume {volume} cannot be resumed from here", key="containers.volume")],
+            expected="a dataset in a directory",
+        )
     return replace(request, begun=begun, choice=choice)
 
 
@@ -297,17 +299,21 @@ def prepare_run(
         directory = run.directory / "data" if volume else request.directory
         is_new = not directory.exists()
         plan = plan or _make_plan(request, directory, onlooker)
+        # These imports would take long, but making the plan has made them already.
+        from throwcollect.coordinator.prepare import describe_plan
+        from throwcollect.dataset.creation import remove_plan
+
         held.enter_context(hold_lock(directory, alone=False))
         # A resumed dataset had its files before this run, so they are removed only if the plan is new.
         if request.plan is None:
-            undo.callback(_remove_plan, directory, is_new=is_new)
+            undo.callback(remove_plan, directory, made=is_new)
         choice = choice or choose(config, say=onlooker.say, warn=onlooker.warn, begun=begun)
         record = _make_record(run, request, choice, directory, volume)
         # A host checks image, mounts, networks and ports when it is made, so errors show before the run is launched.
         choice.runtime.host(record.place(run.key), config, warn=onlooker.warn).close()
         run.write(record)
         _warn_if_others_may_join(config, choice.middleware, onlooker)
-        onlooker.say(f"plan: {_describe_plan(plan)}; dataset: {f'volume {volume}' if volume else directory}")
+        onlooker.say(f"plan: {describe_plan(plan)}; dataset: {f'volume {volume}' if volume else directory}")
         return PreparedRun(
             records,
             run,
@@ -335,14 +341,6 @@ def _make_plan(request: RunRequest, directory: Path, onlooker: Onlooker) -> Plan
         processes=request.processes,
         onlooker=onlooker,
     )
-
-
-def _describe_plan(plan: Plan) -> str:
-    from throwcollect.coordinator.prepare import more_trials
-
-    refused = len(plan.trials.refused)
-    note = f", {refused} refused by calculation (see `throwcollect plan`)" if refused else ""
-    return f"{format_count(len(plan.trials), 'trial')}{note}{more_trials(plan)}"
 
 
 def _make_record(
@@ -373,12 +371,3 @@ def _warn_if_others_may_join(config: Config, middleware: Middleware, onlooker: O
         onlooker.warn("on Fast DDS, whoever finds the router's port may join and disturb this run; episodes are signed")
     elif not middleware.keeps_others_out:
         onlooker.warn(f"{middleware.rmw}: anybody on its network may join and disturb this run; episodes are signed")
-
-
-def _remove_plan(directory: Path, *, is_new: bool) -> None:
-    """Remove the files of a plan and, if the directory was made for them, the directory."""
-    with suppress(OSError):
-        for name in (CONFIG, PLAN, TRIALS):
-            (directory / name).unlink(missing_ok=True)
-        if is_new:
-            directory.rmdir()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import ExitStack
+from enum import Enum
 from pathlib import Path
 from types import TracebackType
 from typing import cast
@@ -17,6 +18,13 @@ from throwcollect.runs.run_record import RunRecord, Summary
 from throwcollect.runs.token import JoinToken
 from throwcollect.runtimes.ports import format_endpoint, reach_from_elsewhere
 from throwcollect.runtimes.runtime import Place, Runtime
+
+
+class _Fate(Enum):
+    """What became of a prepared run, as the words of the error if somebody launches it afterwards."""
+
+    LAUNCHED = "was launched already"
+    GIVEN_UP = "was given up when its block was left"
 
 
 class PreparedRun:
@@ -53,7 +61,7 @@ class PreparedRun:
         self._runtime = runtime
         self._held = held or ExitStack()
         self._undo = undo or ExitStack()
-        self._over = ""
+        self._fate: _Fate | None = None
 
     def __enter__(self) -> PreparedRun:
         return self
@@ -61,7 +69,8 @@ class PreparedRun:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self._over = self._over or "was given up when its block was left"
+        if self._fate is None:
+            self._fate = _Fate.GIVEN_UP
         # The directory stays locked until the files that were made in it are removed.
         with self._held:
             self._undo.close()
@@ -137,9 +146,9 @@ class PreparedRun:
         Raises:
             ConflictError: If the run was launched already, or given up.
         """
-        if self._over:
+        if self._fate is not None:
             raise ConflictError(
-                f"run {self._run.run}: {self._over}", expected="a run that is prepared and not launched"
+                f"run {self._run.run}: {self._fate.value}", expected="a run that is prepared and not launched"
             )
-        self._over = "was launched already"
+        self._fate = _Fate.LAUNCHED
         self._undo.pop_all()

@@ -38,7 +38,7 @@ from throwcollect.runs.run_record import VERSION, RunRecord
 from throwcollect.runs.state_directory import is_locked, state_directory, unusable
 from throwcollect.runtimes.node_logs import NodeLogs
 from throwcollect.runtimes.nodes import LAUNCHER
-from throwcollect.runtimes.registry import get_runtime
+from throwcollect.runtimes.registry import find_runtime
 from throwcollect.runtimes.runtime import NodeState, Place
 from throwcollect.units import NS_PER_S
 from throwcollect.wording import command
@@ -349,11 +349,11 @@ class Records:
 
 
 def _may_outlive(record: RunRecord) -> bool:
-    """Whether nodes of a run may outlive its launcher; true also if its runtime is not installed here."""
-    try:
-        return bool(record.runtime) and get_runtime(record.runtime).outlives_launcher
-    except ConfigError:
-        return True
+    """Whether nodes of a run may outlive its launcher; true also if its runtime cannot be used here."""
+    if not record.runtime:
+        return False
+    runtime = find_runtime(record.runtime)
+    return runtime is None or runtime.outlives_launcher
 
 
 def _key(runs: Path, run: str) -> RunKey:

@@ -12,7 +12,7 @@ from throwcollect.errors import ConfigError, ConflictError, NotFoundError, Worke
 from throwcollect.members import names_of
 from throwcollect.runs.records import Records, Run
 from throwcollect.runs.run_record import RunRecord
-from throwcollect.runtimes.registry import get_runtime
+from throwcollect.runtimes.registry import find_runtime, get_runtime
 from throwcollect.runtimes.runtime import HeldRun
 from throwcollect.wording import command
 
@@ -101,8 +101,15 @@ def id_of(records: Records, named: str) -> str:
     this raises an error, because choosing one would be a guess.
 
     Raises:
-        ConfigError: If there is no such run, or more than one.
+        ConfigError: If there is no such run, or more than one, or the name is empty.
     """
+    # A variable of a shell that is not set is empty. It would mean the current directory, and every id begins with it.
+    if not named:
+        raise ConfigError(
+            "the name of the run is empty",
+            expected="the id of a run, the beginning of its id, or the directory of its dataset",
+            hint="throwcollect ps -a lists all",
+        )
     ids = records.ids()
     # A whole id comes first, because it may also be the beginning of another one.
     if named in ids:
@@ -228,4 +235,6 @@ def require_living(run: Run) -> RunRecord:
 
 def find_held_runs() -> dict[str, tuple[str, HeldRun]]:
     """Find all runs of which a runtime holds nodes or a network; by the id of a run, the runtime's name and the run."""
-    return {held.run_id: (name, held) for name in names_of("runtimes") for held in get_runtime(name).find_held()}
+    # A runtime that cannot be used here, as a package is missing or broken, does not keep others from being asked.
+    usable = {name: runtime for name in names_of("runtimes") if (runtime := find_runtime(name)) is not None}
+    return {held.run_id: (name, held) for name, runtime in usable.items() for held in runtime.find_held()}

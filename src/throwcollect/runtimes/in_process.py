@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 from throwcollect.errors import Interrupted, LossError, ThrowcollectError
 from throwcollect.runtimes.nodes import COORDINATOR, simulation_name
-from throwcollect.runtimes.runtime import NodeState, Place, Runtime, Session
+from throwcollect.runtimes.runtime import NodeState, Place, Runtime, Session, make_interruption_error
 
 if TYPE_CHECKING:
     from throwcollect.config.schema import Config
@@ -79,8 +79,7 @@ class InProcess:
             finally:
                 simulation.close()
             if not collection.complete:
-                message = f"interrupted; finished throws are in {directory}, the dataset is not complete"
-                raise Interrupted(message, hint=self._place.way_on)
+                raise make_interruption_error(self._place)
 
             def wait() -> None:
                 """Wait for a moment for the process that simulates some trials again.

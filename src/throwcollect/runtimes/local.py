@@ -22,16 +22,16 @@ from throwcollect.runtimes.nodes import (
     NodeExit,
     NodeHost,
     NodeSpec,
+    describe_end,
     library_environment,
     node_environment,
     protocol_of,
 )
 from throwcollect.runtimes.ports import format_endpoint, reach_from_here, reserve_port
-from throwcollect.runtimes.runtime import Place, Runtime, Session
+from throwcollect.runtimes.runtime import Place, Runtime
 
 if TYPE_CHECKING:
     from throwcollect.config.schema import Config
-    from throwcollect.dataset.summary import Info
 
 _KILLED_S = 5.0
 """Time that a process has to end after SIGKILL."""
@@ -103,13 +103,6 @@ class LocalNodes(NodeHost):
         self._owns_server = server is None
         self._processes: dict[str, ForkedNode] = {}
 
-    def collect(self, session: Session) -> Info | None:
-        """See `runtime.Host.collect`."""
-        # This imports ROS, so it has to wait until the backend is chosen.
-        from throwcollect.runtimes.node_collection import NodeCollection
-
-        return NodeCollection(self, session).run_to_the_end()
-
     @property
     def endpoint(self) -> str:
         """See `NodeHost.endpoint`."""
@@ -146,7 +139,7 @@ class LocalNodes(NodeHost):
         ended = [(name, code) for name, process in self._processes.items() if (code := process.poll()) is not None]
         for name, _ in ended:
             del self._processes[name]
-        return [NodeExit(name, code, _reason(code), self.log_tail(name)) for name, code in ended]
+        return [NodeExit(name, code, describe_end(code), self.logs.tail(name)) for name, code in ended]
 
     def frozen(self) -> frozenset[str]:
         """Names of the nodes that a signal has stopped, and none has continued."""
@@ -183,10 +176,6 @@ class LocalNodes(NodeHost):
 
 def _make_server(middleware: Middleware) -> NodeServer:
     return NodeServer({**os.environ, **library_environment(middleware)})
-
-
-def _reason(code: int) -> str:
-    return f"ended by {signal.Signals(-code).name}" if code < 0 else f"exit code {code}"
 
 
 def _is_stopped(pid: int) -> bool:

@@ -17,7 +17,7 @@ from throwcollect.config.schema import Config
 from throwcollect.config.yaml_nodes import compose
 from throwcollect.coordinator.progress import Progress
 from throwcollect.dataset.summary import Info
-from throwcollect.errors import DatasetError, Interrupted, LossError, WorkerError
+from throwcollect.errors import DatasetError, LossError, WorkerError
 from throwcollect.ros import IntegerRange
 from throwcollect.ros.fast_dds import SERVER_REST_S
 from throwcollect.runtimes.nodes import (
@@ -28,11 +28,12 @@ from throwcollect.runtimes.nodes import (
     NodeHost,
     NodeRole,
     NodeSpec,
+    is_simulation,
     simulation_name,
     simulation_nodes,
 )
 from throwcollect.runtimes.run_listener import RunListener
-from throwcollect.runtimes.runtime import Session
+from throwcollect.runtimes.runtime import Session, make_interruption_error
 from throwcollect.runtimes.supervisor import Supervisor
 
 SIMULATIONS = "simulations"
@@ -133,8 +134,7 @@ class NodeCollection:
         # The dataset is finished even if trials are lost; the launcher reports the loss from the summary.
         finished = end is not None and end.code in (0, LossError.exit_code)
         if self._session.interruptions() and not finished:
-            message = f"interrupted; finished throws are in {place.dataset}, the dataset is not complete"
-            raise Interrupted(message, hint=place.way_on)
+            raise make_interruption_error(place)
         if end is not None and not finished:
             kind = DatasetError if end.code == DatasetError.exit_code else WorkerError
             hint = place.way_on if kind is WorkerError else None
@@ -163,7 +163,7 @@ class NodeCollection:
             WorkerError: If they still do not see each other after that, because the run would never end.
         """
         states = self._supervisor.states()
-        ready = any(state.status == "running" for state in states if state.name not in (ROUTER, COORDINATOR))
+        ready = any(state.status == "running" for state in states if is_simulation(state.name))
         if progress.simulations or progress.ended or not ready:
             self._apart_since = math.inf
             return

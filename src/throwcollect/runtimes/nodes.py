@@ -16,7 +16,7 @@ from throwcollect.own_process import SERIAL_LIBRARIES
 from throwcollect.ros.connection import Connection
 from throwcollect.ros.middleware import Middleware
 from throwcollect.runtimes.node_logs import NodeLogs
-from throwcollect.runtimes.runtime import Place
+from throwcollect.runtimes.runtime import Place, Session
 
 if TYPE_CHECKING:
     # Modules that need only the names of nodes should not wait for these imports.
@@ -29,14 +29,22 @@ LAUNCHER = "launcher"
 """Name of the launcher's node; the launcher never runs in a container."""
 
 
+_SIMULATION = "sim_"
+
+
 def simulation_name(index: int) -> str:
     """Name of a simulation's node, counted from 0."""
-    return f"sim_{index}"
+    return f"{_SIMULATION}{index}"
 
 
 def simulation_name_of(host: str) -> str:
     """Name of the only simulation on a host, as in a container."""
-    return "sim_" + re.sub(r"[^a-z0-9_]", "_", host.lower())
+    return _SIMULATION + re.sub(r"[^a-z0-9_]", "_", host.lower())
+
+
+def is_simulation(name: str) -> bool:
+    """Whether a node of this name is a simulation."""
+    return name.startswith(_SIMULATION)
 
 
 class NodeRole(Enum):
@@ -96,6 +104,18 @@ class NodeExit:
     log: str
 
 
+def describe_end(code: int) -> str:
+    """How a node ended, for `NodeExit.reason`; a code below 0 is the number of the signal that ended it, negated."""
+    if code >= 0:
+        return f"exit code {code}"
+    try:
+        name = signal.Signals(-code).name
+    except ValueError:
+        # Signals in real time have no names, but for the first and the last one.
+        name = f"signal {-code}"
+    return f"ended by {name}"
+
+
 class NodeHost(ABC):
     """Starts, watches and ends the nodes of one run.
 
@@ -120,6 +140,13 @@ class NodeHost(ABC):
         if (endpoint := self.endpoint) is None:
             return None
         return Connection(endpoint, self.place.key, self.config.run.domain_id, self.place.middleware)
+
+    def collect(self, session: Session) -> Info | None:
+        """See `runtime.Host.collect`."""
+        # This imports ROS, so it has to wait until the backend is chosen.
+        from throwcollect.runtimes.node_collection import NodeCollection
+
+        return NodeCollection(self, session).run_to_the_end()
 
     def open(self) -> tuple[str, ...]:
         """Make everything that the nodes need, such as a network.
@@ -178,14 +205,6 @@ class NodeHost(ABC):
     def ready(self, name: str) -> bool:
         """Whether a simulation has ever been ready for trials."""
         return self.logs.said_ready(name)
-
-    def forget_readiness(self, name: str) -> None:
-        """Take note that a node has ended for good, so that a new node of the same name does not count as ready."""
-        self.logs.skip(name)
-
-    def log_tail(self, name: str) -> str:
-        """Last lines that a node printed."""
-        return self.logs.tail(name)
 
     @abstractmethod
     def signal(self, name: str, number: signal.Signals) -> None:

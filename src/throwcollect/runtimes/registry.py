@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from throwcollect.errors import ConfigError, Problem
-from throwcollect.extras import explain_missing
+from throwcollect.extras import MissingExtraError, explain_missing
 from throwcollect.members import load_member, names_of
 from throwcollect.runtimes.runtime import Runtime
 from throwcollect.wording import join_names
@@ -25,3 +25,14 @@ def get_runtime(name: str) -> Runtime:
     with explain_missing():
         runtime: Runtime = load_member("runtimes", name)()
     return runtime
+
+
+def find_runtime(name: str) -> Runtime | None:
+    """Make the runtime of this name; None if it cannot be used here, as it or a package that it needs is missing.
+
+    This is for runs that are only looked at: other machines, or packages that were removed, may have begun them.
+    """
+    try:
+        return get_runtime(name)
+    except (ConfigError, MissingExtraError):
+        return None

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar, Literal, Protocol
 
 from throwcollect.engine_packages import PACKAGES, require_engine
+from throwcollect.errors import Interrupted
 from throwcollect.members import load_member
 from throwcollect.ros.middleware import Middleware
 from throwcollect.run_key import RunKey
@@ -109,6 +110,12 @@ class Place:
     def way_on(self) -> str | None:
         """The command that goes on with the dataset once the run is over; None where no command can, as in a volume."""
         return command("resume", self.directory) if self.collects and not self.volume else None
+
+
+def make_interruption_error(place: Place) -> Interrupted:
+    """The error that somebody stopped a collection before every trial had ended."""
+    message = f"interrupted; finished throws are in {place.dataset}, the dataset is not complete"
+    return Interrupted(message, hint=place.way_on)
 
 
 @dataclass(frozen=True)

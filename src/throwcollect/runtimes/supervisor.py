@@ -79,7 +79,8 @@ class Supervisor:
             self._ready.discard(name)
         self.host.stop(removed)
         for name in removed:
-            self.host.forget_readiness(name)
+            # A later node of the same name does not count as ready because this one was.
+            self.host.logs.skip(name)
         # If no simulation that was ready is left, the new ones need a new deadline: the old one may have passed.
         if not self._ready:
             self._start_deadline = time.monotonic() + self._run.start_timeout_s
@@ -235,7 +236,7 @@ class Supervisor:
         if names and not self._ready and time.monotonic() > self._start_deadline:
             raise WorkerError(
                 f"no simulation was ready within {self._run.start_timeout_s:g} s (run.start_timeout_s)",
-                evidence=self.host.log_tail(names[0]) or None,
+                evidence=self.host.logs.tail(names[0]) or None,
                 hint=hint,
             )
 

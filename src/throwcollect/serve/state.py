@@ -19,6 +19,7 @@ from throwcollect.dataset.summary import Info
 from throwcollect.errors import ConfigError
 from throwcollect.runs.records import Records, Run
 from throwcollect.runs.run_record import Kind, Planning
+from throwcollect.runtimes.nodes import is_simulation
 from throwcollect.runtimes.runtime import NodeState
 from throwcollect.serve.catalogue import Catalogue, Component
 from throwcollect.serve.resumption import can_be_resumed
@@ -230,7 +231,7 @@ def describe(run: Run) -> InstanceState:
 
 def simulations_of(nodes: Sequence[NodeState]) -> list[str]:
     """Names of the simulations among the nodes of a run that are running."""
-    return [node.name for node in nodes if node.name.startswith("sim_") and node.status == "running"]
+    return [node.name for node in nodes if is_simulation(node.name) and node.status == "running"]
 
 
 def _find_status(run: Run) -> Status:

@@ -11,7 +11,8 @@ import pyarrow.parquet as pq
 import pytest
 
 from throwcollect.cluster import cluster_run
-from throwcollect.cluster.cluster_run import ProgressOfSlices, SlicesLook
+from throwcollect.cluster.cluster_run import ProgressOfSlices, SlicesLook, find_cluster_run
+from throwcollect.cluster.submission import Submission, write_submission
 
 
 @pytest.fixture
@@ -40,3 +41,13 @@ def test_the_speed_counts_only_trials_that_ended_since_the_first_look(
 def test_the_first_look_at_a_finished_dataset_counts_all_outcomes(run: Any) -> None:
     progress = ProgressOfSlices(run).at(SlicesLook(frozenset(), (), None, complete=True))
     assert (progress.ended, progress.outcomes) == (30, {"landed": 27, "not_released": 3})
+
+
+def test_an_empty_name_is_not_that_of_a_submitted_dataset(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "cluster").mkdir()
+    write_submission(tmp_path, Submission("small", 2, ("throwcollect",), None))
+    monkeypatch.chdir(tmp_path)
+    found = find_cluster_run(".")
+    assert found is not None
+    assert found.directory == tmp_path
+    assert find_cluster_run("") is None

@@ -8,9 +8,10 @@ import pytest
 from tests.e2e.collection import CONFIG, FAST, write_config
 
 from throwcollect.cluster import slurm
+from throwcollect.cluster import submit as module
 from throwcollect.cluster.submit import submit
 from throwcollect.coordinator.onlooker import SILENT
-from throwcollect.errors import ConfigError, WorkerError
+from throwcollect.errors import ConfigError, DatasetError, WorkerError
 
 
 def test_an_array_whose_joining_job_is_refused_is_cancelled(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -30,6 +31,27 @@ def test_an_array_whose_joining_job_is_refused_is_cancelled(tmp_path: Path, monk
     with pytest.raises(WorkerError, match="too many jobs"):
         submit(config, tmp_path / "data", 2, onlooker=SILENT)
     assert cancelled == ["12"]
+    assert not (tmp_path / "data").exists()
+
+
+@pytest.mark.parametrize(("live", "jobs"), [(False, ["2", "1"]), (True, ["1"])])
+def test_jobs_are_cancelled_if_they_cannot_be_recorded(
+    live: bool, jobs: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_: object) -> None:
+        raise DatasetError("cannot be written: No space left on device")
+
+    config = write_config(tmp_path, trials=4, text=CONFIG + "record: {{trials_per_shard: 2}}\n", sim=FAST)
+    numbers, cancelled = iter("123"), list[str]()
+    monkeypatch.setattr(slurm, "submit", lambda *_: next(numbers))
+    monkeypatch.setattr(slurm, "check", lambda _: None)
+    monkeypatch.setattr(slurm, "find_largest_array", lambda: None)
+    monkeypatch.setattr(slurm, "cancel", cancelled.extend)
+    monkeypatch.setattr(module, "write_submission", fail)
+    with pytest.raises(DatasetError, match="No space left"):
+        submit(config, tmp_path / "data", 2, live=live, onlooker=SILENT)
+    # The joining job waits for the end of the array, so it is the first one to be cancelled.
+    assert cancelled == jobs
     assert not (tmp_path / "data").exists()
 
 

@@ -25,7 +25,7 @@ from throwcollect.runs.run_record import Kind, Origin, RunRecord
 from throwcollect.runs.state_directory import STATE_VARIABLE
 from throwcollect.runtimes.docker import component, docker_engine
 from throwcollect.runtimes.docker import watch as docker_watch
-from throwcollect.runtimes.docker.component import find_way
+from throwcollect.runtimes.docker.component import find_join_options
 from throwcollect.runtimes.docker.container_options import JOINED_LABEL, NODE_LABEL, RUN_LABEL
 
 SPEC = ContainerSpec("nodes", ("listen",), NodeContainerConfig())
@@ -151,24 +151,24 @@ def test_an_order_for_a_container_that_cannot_work_is_refused(
 
 def test_a_container_joins_a_run_of_containers_over_the_network_of_the_run(tmp_path: Path) -> None:
     connection = Connection("tls/172.18.0.2:7447", RunKey(tmp_path), 7)
-    way = find_way("talos", "docker", connection, SPEC)
-    assert (way.network, way.key["Source"], way.key["ReadOnly"]) == (
+    options = find_join_options("talos", "docker", connection, SPEC)
+    assert (options.network, options.key["Source"], options.key["ReadOnly"]) == (
         "throwcollect-talos",
         "throwcollect-talos-key",
         True,
     )
-    assert "tls/router:7447" in way.environment["ZENOH_CONFIG_OVERRIDE"]
-    assert (way.environment["ROS_DOMAIN_ID"], way.environment["RMW_IMPLEMENTATION"]) == ("7", "rmw_zenoh_cpp")
-    way = find_way("talos", "local", connection, SPEC)
-    assert (way.network, way.key["Source"], way.key["Target"]) == (None, str(tmp_path), "/key")
-    assert "tls/172.18.0.2:7447" in way.environment["ZENOH_CONFIG_OVERRIDE"]
+    assert "tls/router:7447" in options.environment["ZENOH_CONFIG_OVERRIDE"]
+    assert (options.environment["ROS_DOMAIN_ID"], options.environment["RMW_IMPLEMENTATION"]) == ("7", "rmw_zenoh_cpp")
+    options = find_join_options("talos", "local", connection, SPEC)
+    assert (options.network, options.key["Source"], options.key["Target"]) == (None, str(tmp_path), "/key")
+    assert "tls/172.18.0.2:7447" in options.environment["ZENOH_CONFIG_OVERRIDE"]
 
 
 def test_a_container_cannot_join_a_run_that_it_cannot_reach(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     fast_dds = Connection("udp/127.0.0.1:11811", RunKey(tmp_path), 0, Middleware("rclpy", "rmw_fastrtps_cpp"))
     with pytest.raises(ConfigError, match="is on Fast DDS"):
-        find_way("talos", "local", fast_dds, SPEC)
+        find_join_options("talos", "local", fast_dds, SPEC)
     monkeypatch.setenv("DOCKER_HOST", "tcp://far.example:2376")
     monkeypatch.setattr(docker_engine, "connect", lambda: Mock(info=lambda: {"Name": "far"}))
     with pytest.raises(ConfigError, match="processes of this machine, which containers on far cannot reach"):
-        find_way("talos", "local", Connection("tls/127.0.0.1:7447", RunKey(tmp_path)), SPEC)
+        find_join_options("talos", "local", Connection("tls/127.0.0.1:7447", RunKey(tmp_path)), SPEC)

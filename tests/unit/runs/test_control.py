@@ -1,5 +1,7 @@
+import os
 import threading
 from collections.abc import Iterator
+from dataclasses import replace
 from datetime import datetime, timezone
 from pathlib import Path
 
@@ -10,7 +12,7 @@ from throwcollect.errors import ConfigError, WorkerError
 from throwcollect.ros import Context, Node, SingleThreadedExecutor
 from throwcollect.ros.router import router
 from throwcollect.run_key import RunKey
-from throwcollect.runs import control
+from throwcollect.runs import control, records
 from throwcollect.runs.control import scale
 from throwcollect.runs.records import Records, Run
 from throwcollect.runs.run_record import RunRecord
@@ -107,3 +109,18 @@ def test_scaling_without_a_router_is_an_error(nowhere: str | None, monkeypatch: 
 def test_a_run_in_one_process_cannot_be_scaled() -> None:
     with pytest.raises(ConfigError, match="run a-0123: has one simulation, as all runs of the runtime inprocess have"):
         scale(living(None, runtime="inprocess"), 2)
+
+
+def test_a_launcher_that_does_not_end_is_named_unless_the_record_of_its_run_is_damaged(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run = Records().new("a")
+    run.write(replace(living(None).record, run=run.run, launcher=os.getpid()))
+    monkeypatch.setattr(records, "_LOCK_PATIENCE_S", 0.0)
+    monkeypatch.setattr(control, "_end_launcher", lambda *_: None)
+    for pid in (f"its pid is {os.getpid()}", None):
+        with pytest.raises(WorkerError, match=f"run {run.run}: its launcher does not end") as caught:
+            control.down(run.run)
+        assert caught.value.evidence == pid
+        (tmp_path / "state" / "runs" / f"{run.run}.json").write_text("{")
+    run.close()

@@ -26,6 +26,7 @@ from throwcollect.runs.run_selection import (
 from throwcollect.runs.state_directory import STATE_VARIABLE
 from throwcollect.runtimes.docker import docker_engine as docker_engine
 from throwcollect.runtimes.docker.container_options import NODE_LABEL, RUN_LABEL
+from throwcollect.runtimes.runtime import NodeState
 
 NOW = datetime.now(timezone.utc)
 Make = Callable[..., RunRecord]
@@ -147,6 +148,17 @@ def test_an_ambiguous_id_means_the_only_living_run(
     ) as told:
         look(records, "a")
     assert re.findall(r"\((\w+)\): /", str(told.value))[2:] in (["ended", "died"], ["died", "ended"])
+
+
+@pytest.mark.parametrize("select", [find, find_to_watch])
+def test_an_empty_name_selects_no_run(
+    select: Callable[[Records, str], Run], records: Records, make: Make, tmp_path: Path
+) -> None:
+    # An empty path is the current directory, into which this run collects; every id begins with an empty text.
+    make("a", "lives", directory=str(tmp_path))
+    with pytest.raises(ConfigError, match="the name of the run is empty"):
+        select(records, "")
+    assert select(records, ".").id == "a-0123"
 
 
 def test_without_an_id_the_only_living_run_is_changed(records: Records, make: Make) -> None:
@@ -370,6 +382,21 @@ def test_without_the_docker_package_no_held_runs_are_found(monkeypatch: pytest.M
     monkeypatch.setattr("throwcollect.runtimes.docker.docker_engine.connect", import_client)
     monkeypatch.setattr("throwcollect.runtimes.docker.docker_runtime.is_installed", lambda _: False)
     assert find_held_runs() == {}
+
+
+def test_a_runtime_that_cannot_be_loaded_does_not_keep_runs_from_being_listed(
+    records: Records, make: Make, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def import_runtime(_family: str, _name: str) -> None:
+        raise ModuleNotFoundError("No module named 'docker'", name="docker")
+
+    make("a", "lives", runtime="docker", nodes=(NodeState("sim_0", "running", 0, "1234", None),))
+    make("b", "died", runtime="docker")
+    monkeypatch.setattr("throwcollect.runtimes.registry.load_member", import_runtime)
+    assert find_held_runs() == {}
+    assert [(run.id, len(run.nodes)) for run in records.all()] == [("a-0123", 1), ("b-0123", 0)]
+    ps()
+    assert "pid 1234" in capsys.readouterr().out
 
 
 def test_without_a_docker_engine_no_held_runs_are_found(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

@@ -103,6 +103,12 @@ def test_a_node_that_a_signal_ends_is_reported_with_that_signal(runtime: LocalNo
     runtime.signal("node", signal.SIGKILL)
 
 
+def test_a_node_that_a_signal_without_a_name_ends_is_reported_with_its_number(runtime: LocalNodes) -> None:
+    runtime.start(node("import os; os.kill(os.getpid(), 35)"))
+    end = wait_for_end(runtime)
+    assert (end.code, end.reason) == (-35, "ended by signal 35")
+
+
 def test_the_readiness_and_the_log_of_a_node_outlive_it(runtime: LocalNodes) -> None:
     assert not runtime.ready("node")
     runtime.start(node("print('node is ready', flush=True); import time; time.sleep(60)"))
@@ -110,7 +116,7 @@ def test_the_readiness_and_the_log_of_a_node_outlive_it(runtime: LocalNodes) -> 
     runtime.signal("node", signal.SIGTERM)
     wait_for_end(runtime)
     assert runtime.ready("node")
-    assert runtime.log_tail("node") == "node is ready"
+    assert runtime.logs.tail("node") == "node is ready"
 
 
 def test_a_node_that_a_signal_stops_is_frozen_until_it_continues(runtime: LocalNodes) -> None:
@@ -125,7 +131,7 @@ def test_a_node_that_a_signal_stops_is_frozen_until_it_continues(runtime: LocalN
 def test_a_node_that_ignores_requests_is_ended_by_force(runtime: LocalNodes) -> None:
     deaf = "import signal, time; signal.signal(signal.SIGTERM, signal.SIG_IGN); print('deaf', flush=True)"
     runtime.start(node(f"{deaf}; time.sleep(60)"))
-    until(lambda: runtime.log_tail("node") == "deaf")
+    until(lambda: runtime.logs.tail("node") == "deaf")
     process = psutil.Process(int(runtime.handle("node") or 0))
     runtime.stop(["node"], grace_s=0.1)
     assert not process.is_running()
@@ -152,4 +158,4 @@ def test_the_port_of_the_router_is_reserved_until_the_router_starts(runtime: Loc
         other.bind((host, port))
     runtime.start(node(f"import socket; socket.create_server(('{host}', {port})); print('bound')", "router"))
     wait_for_end(runtime)
-    assert runtime.log_tail("router") == "bound"
+    assert runtime.logs.tail("router") == "bound"

@@ -13,6 +13,7 @@ from throwcollect.ros.middleware import Middleware
 from throwcollect.run_key import RunKey
 from throwcollect.runtimes import supervisor as module
 from throwcollect.runtimes.node_collection import roster
+from throwcollect.runtimes.node_logs import NodeLogs
 from throwcollect.runtimes.nodes import COORDINATOR, ROUTER, NodeExit, NodeHost, NodeSpec
 from throwcollect.runtimes.runtime import NodeState, Place
 from throwcollect.runtimes.supervisor import Supervisor
@@ -35,6 +36,23 @@ class Clock:
         self.on_sleep()
 
 
+class FakeLogs(NodeLogs):
+    """Logs without files."""
+
+    def __init__(self) -> None:
+        super().__init__(Path("/logs"))
+        self.ready_ones: set[str] = set()
+
+    def skip(self, name: str) -> None:
+        self.ready_ones.discard(name)
+
+    def said_ready(self, name: str) -> bool:
+        return name in self.ready_ones
+
+    def tail(self, name: str) -> str:
+        return f"log of {name}"
+
+
 class FakeRuntime(NodeHost):
     """A host of nodes that do what the test says."""
 
@@ -48,7 +66,7 @@ class FakeRuntime(NodeHost):
         self.signals: list[tuple[str, signal.Signals]] = []
         self.stopped: list[tuple[str, float]] = []
         self.alive: list[str] = []
-        self.ready_ones: set[str] = set()
+        self.logs: FakeLogs = FakeLogs()
         self.paused: set[str] = set()
         self.closed = False
         self._ends: list[NodeExit] = []
@@ -74,15 +92,6 @@ class FakeRuntime(NodeHost):
 
     def frozen(self) -> frozenset[str]:
         return frozenset(self.paused)
-
-    def ready(self, name: str) -> bool:
-        return name in self.ready_ones
-
-    def forget_readiness(self, name: str) -> None:
-        self.ready_ones.discard(name)
-
-    def log_tail(self, name: str) -> str:
-        return f"log of {name}"
 
     def signal(self, name: str, number: signal.Signals) -> None:
         self.signals.append((name, number))
@@ -122,7 +131,7 @@ def supervise(runtime: FakeRuntime, *, found: Collection[str] = (), simulations:
     """A supervisor whose simulations are ready."""
     supervisor = Supervisor(runtime, RunConfig(**run), roster(runtime, simulations))
     supervisor.start(found=found)
-    runtime.ready_ones |= set(SIMULATIONS)
+    runtime.logs.ready_ones |= set(SIMULATIONS)
     supervisor.poll()
     return supervisor
 
@@ -196,7 +205,7 @@ def test_a_simulation_without_restarts_left_is_given_up_while_others_go_on(runti
 def test_a_simulation_that_was_never_ready_is_restarted_only_once(runtime: FakeRuntime, clock: Clock) -> None:
     supervisor = Supervisor(runtime, RunConfig(restarts=10), roster(runtime, 2))
     supervisor.start()
-    runtime.ready_ones.add("sim_1")
+    runtime.logs.ready_ones.add("sim_1")
     runtime.die("sim_0")
     assert "is started again" in supervisor.poll()[1][0]
     wait_for_start(supervisor, runtime, clock, "sim_0")
@@ -292,7 +301,7 @@ def test_time_in_which_an_engine_creates_containers_is_not_start_time(
 def test_a_run_with_one_ready_simulation_passes_the_start_timeout(runtime: FakeRuntime, clock: Clock) -> None:
     supervisor = Supervisor(runtime, RunConfig(start_timeout_s=7), roster(runtime, 2))
     supervisor.start()
-    runtime.ready_ones.add("sim_1")
+    runtime.logs.ready_ones.add("sim_1")
     clock.now += 100
     supervisor.poll()
     assert [state(supervisor, name).status for name in SIMULATIONS] == ["starting", "running"]

@@ -2,11 +2,20 @@
 
 from __future__ import annotations
 
+import gzip
 import hashlib
 import json
+import re
 import tarfile
+import zlib
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from lzma import LZMAError
 from pathlib import Path
 from typing import IO, Any
+
+import zstandard
 
 from throwcollect.errors import ConfigError
 from throwcollect.files import unreadable
@@ -18,8 +27,14 @@ _LAYER = f"{_OCI}.layer.v1.tar"
 _COMPRESSIONS = {b"\x1f\x8b": "gzip", b"\x28\xb5": "zstd"}
 """How a layer is compressed, by its first two bytes; most engines save layers as they are."""
 _PIECE_BYTES = 1 << 20
-_DAMAGED = (tarfile.TarError, EOFError, LookupError, TypeError, AttributeError, ValueError)
-"""Errors that `check_archive` gets while reading, if a file is no archive or holds no image."""
+_SHA256 = "sha256:"
+_DIGEST = re.compile(r"(?:sha256:)?([0-9a-f]{64})")
+"""The beginning of the name of a file that is called after its contents."""
+_DAMAGED = (
+    *(tarfile.TarError, zlib.error, LZMAError, zstandard.ZstdError, EOFError),
+    *(LookupError, TypeError, AttributeError, ValueError),
+)
+"""Errors that reading gets if a file is no archive, is damaged or holds no image."""
 
 
 def check_archive(archive: Path) -> None:
@@ -30,17 +45,16 @@ def check_archive(archive: Path) -> None:
         DatasetError: If this user may not read the file.
     """
     try:
-        with tarfile.open(archive) as files:
-            images = _read_json(files, "manifest.json")
-            configs = [_read_json(files, image["Config"]) for image in images]
-        # `[None]` stands for an image without an entry point. The image with ROS 2 starts a script before the command.
-        entry_points = [config["config"].get("Entrypoint") or [None] for config in configs]
+        with _refuse_damage(f"{archive}: is no archive of an image"):
+            with tarfile.open(archive) as files:
+                images = _read_json(files, "manifest.json")
+                configs = [_read_json(files, image["Config"]) for image in images]
+            # `[None]` stands for an image without an entry point. With ROS 2, a script is started before the command.
+            entry_points = [config["config"].get("Entrypoint") or [None] for config in configs]
     except (FileNotFoundError, IsADirectoryError) as error:
         raise ConfigError(f"{archive}: {error.strerror}", hint=_HINT) from error
     except OSError as error:
         raise unreadable(archive, error) from error
-    except _DAMAGED as error:
-        raise ConfigError(f"{archive}: is no archive of an image", hint=_HINT) from error
     if len(entry_points) != 1:
         raise ConfigError(f"{archive}: holds {len(entry_points)} images", expected="one", hint=_HINT)
     if entry_points[0][-1] != _ENTRY_POINT:
@@ -59,35 +73,88 @@ def unpack_archive(archive: Path, directory: Path) -> None:
     """
     blobs = directory / "blobs" / "sha256"
     blobs.mkdir(parents=True)
-    try:
-        with tarfile.open(archive) as files:
-            (image,) = _read_json(files, "manifest.json")
-            config = {"mediaType": f"{_OCI}.config.v1+json", **_store(_open(files, image["Config"]), blobs)}
-            layers = []
-            for name in image["Layers"]:
-                compression = _COMPRESSIONS.get(_open(files, name).read(2))
-                kind = f"{_LAYER}+{compression}" if compression else _LAYER
-                layers.append({"mediaType": kind, **_store(_open(files, name), blobs)})
-    except _DAMAGED as error:
-        raise ConfigError(f"{archive}: is damaged", hint=_HINT) from error
+    damaged = f"{archive}: is damaged"
+    with _refuse_damage(damaged), tarfile.open(archive) as files:
+        (image,) = _read_json(files, "manifest.json")
+        stored = _store(_open(files, image["Config"]), blobs)
+        config = {"mediaType": f"{_OCI}.config.v1+json", **stored.reference}
+        # Most programs name the configuration after its digest, and it holds the digests of all layers, unpacked.
+        if (named := _DIGEST.match(Path(image["Config"]).name)) and named[1] != stored.path.name:
+            raise ConfigError(damaged, hint=_HINT)
+        digests = json.loads(stored.path.read_bytes())["rootfs"]["diff_ids"]
+        layers = []
+        for name, digest in zip(image["Layers"], digests, strict=True):
+            compression = _COMPRESSIONS.get(_open(files, name).read(2))
+            kind = f"{_LAYER}+{compression}" if compression else _LAYER
+            stored = _store(_open(files, name), blobs)
+            layers.append({"mediaType": kind, **stored.reference})
+            if _digest_unpacked(stored.path, compression) != digest:
+                raise ConfigError(damaged, hint=_HINT)
     manifest = {"schemaVersion": 2, "mediaType": f"{_OCI}.manifest.v1+json", "config": config, "layers": layers}
     written = directory / "manifest.json"
     written.write_text(json.dumps(manifest), encoding="utf-8")
     with written.open("rb") as file:
-        index = [{"mediaType": manifest["mediaType"], **_store(file, blobs)}]
+        index = [{"mediaType": manifest["mediaType"], **_store(file, blobs).reference}]
     (directory / "index.json").write_text(json.dumps({"schemaVersion": 2, "manifests": index}), encoding="utf-8")
     (directory / "oci-layout").write_text(json.dumps({"imageLayoutVersion": "1.0.0"}), encoding="utf-8")
 
 
-def _store(file: IO[bytes], blobs: Path) -> dict[str, str | int]:
-    """Copy a file to the path that its digest gives, and return digest and size, by which a manifest refers to it."""
+@contextmanager
+def _refuse_damage(message: str) -> Iterator[None]:
+    """Turn the errors of reading a damaged archive, or something else than an archive, into one with this message.
+
+    Raises:
+        ConfigError: If the block gets such an error.
+    """
+    try:
+        yield
+    except _DAMAGED as error:
+        raise ConfigError(message, hint=_HINT) from error
+    except OSError as error:
+        # Those of the system have a number; gzip and bzip2 raise this error, without one, for damaged contents.
+        if error.errno is not None:
+            raise
+        raise ConfigError(message, hint=_HINT) from error
+
+
+@dataclass(frozen=True)
+class _StoredFile:
+    """A file of a layout of OCI, whose name is its digest in hexadecimal digits."""
+
+    path: Path
+    size: int
+
+    @property
+    def reference(self) -> dict[str, str | int]:
+        """Digest and size, by which a manifest refers to the file."""
+        return {"digest": f"{_SHA256}{self.path.name}", "size": self.size}
+
+
+def _store(file: IO[bytes], blobs: Path) -> _StoredFile:
+    """Copy a file to the path that its digest gives."""
     new, digest, size = blobs / "new", hashlib.sha256(), 0
     with new.open("wb") as copy:
         while piece := file.read(_PIECE_BYTES):
             digest.update(piece)
             size += copy.write(piece)
-    new.replace(blobs / digest.hexdigest())
-    return {"digest": f"sha256:{digest.hexdigest()}", "size": size}
+    return _StoredFile(new.replace(blobs / digest.hexdigest()), size)
+
+
+def _digest_unpacked(layer: Path, compression: str | None) -> str:
+    """Compute the digest of a stored layer without its compression, by which the configuration of an image names it."""
+    if compression is None:
+        return f"{_SHA256}{layer.name}"
+    digest = hashlib.sha256()
+    with layer.open("rb") as packed, _unpack(packed, compression) as file:
+        while piece := file.read(_PIECE_BYTES):
+            digest.update(piece)
+    return f"{_SHA256}{digest.hexdigest()}"
+
+
+def _unpack(packed: IO[bytes], compression: str) -> gzip.GzipFile | zstandard.ZstdDecompressionReader:
+    if compression == "gzip":
+        return gzip.open(packed)
+    return zstandard.ZstdDecompressor().stream_reader(packed, read_across_frames=True)
 
 
 def _read_json(files: tarfile.TarFile, name: str) -> Any:

@@ -23,7 +23,7 @@ def has_socket() -> bool:
 
 
 def check_socket() -> None:
-    """Raise the error of `engine.connect` if the engine's socket does not exist, without importing the client.
+    """Raise the error of `docker_engine.connect` if the engine's socket does not exist, without importing the client.
 
     Raises:
         WorkerError: If the socket does not exist.

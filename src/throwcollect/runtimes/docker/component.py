@@ -45,7 +45,7 @@ _OVER_S = 3.0
 
 
 @dataclass(frozen=True)
-class Way:
+class JoinOptions:
     """Everything that a container needs to join the ROS graph of a run; `run` is the id of that run.
 
     Attributes:
@@ -60,7 +60,7 @@ class Way:
     network: str | None
 
 
-def find_way(run: str, runtime: str, connection: Connection, spec: ContainerSpec) -> Way:
+def find_join_options(run: str, runtime: str, connection: Connection, spec: ContainerSpec) -> JoinOptions:
     """Find out how a container can join a run of a runtime; processes of this machine join that run by `connection`.
 
     Raises:
@@ -75,7 +75,7 @@ def find_way(run: str, runtime: str, connection: Connection, spec: ContainerSpec
     if runtime == "docker":
         place = RunPlace(run, "")
         endpoint = f"{connection.endpoint.partition('/')[0]}/{ROUTER}:{ROUTER_PORT}"
-        return Way(run, _environment(connection, endpoint), place.key_mount(read_only=True), place.network)
+        return JoinOptions(run, _environment(connection, endpoint), place.key_mount(read_only=True), place.network)
     if (other := find_other_machine()) is not None:
         problem = f"run {run}: its nodes are processes of this machine, which containers on {other} cannot reach"
         raise ConfigError(problem)
@@ -86,7 +86,7 @@ def find_way(run: str, runtime: str, connection: Connection, spec: ContainerSpec
             hint="leave them out in the catalogue, or have the run in containers: run.runtime: docker",
         )
     key = Mount(target=str(KEY.directory), source=str(connection.key.directory), type="bind", read_only=True)
-    return Way(run, _environment(connection, connection.endpoint), key, None)
+    return JoinOptions(run, _environment(connection, connection.endpoint), key, None)
 
 
 def _environment(connection: Connection, endpoint: str) -> Mapping[str, str]:
@@ -99,7 +99,7 @@ class ComponentContainer:
 
     Args:
         place: The place of the run that consists of this container.
-        way: The way into a run that the container joins; None if it joins none.
+        joining: The options for the run that the container joins; None if it joins none.
         goes_on: Returns whether the run with an id goes on; it is called again and again.
         warn: Gets a line of text when the engine is silent for long.
 
@@ -113,14 +113,14 @@ class ComponentContainer:
         place: Place,
         component: str,
         spec: ContainerSpec,
-        way: Way | None,
+        joining: JoinOptions | None,
         *,
         goes_on: Callable[[str], bool],
         warn: Callable[[str], None],
     ) -> None:
         self.cleared = False
         self._spec = spec
-        self._way = way
+        self._joining = joining
         self._goes_on = goes_on
         self._place = RunPlace(place.run, str(place.directory))
         self._logs = NodeLogs(place.logs)
@@ -180,7 +180,7 @@ class ComponentContainer:
     @property
     def _networks(self) -> list[str]:
         """Networks that the container joins; none means that of this machine, or the engine's default."""
-        own = [self._way.network] if self._way is not None and self._way.network is not None else []
+        own = [self._joining.network] if self._joining is not None and self._joining.network is not None else []
         # The engine publishes ports only from a network with a way out, which the network of a run may not have.
         out = ["bridge"] if own and self._spec.section.ports and not self._spec.section.networks else []
         return [*out, *self._spec.section.networks, *own]
@@ -188,23 +188,23 @@ class ComponentContainer:
     @property
     def _is_left_behind(self) -> bool:
         """Whether the run that the container has joined has ended."""
-        return self._way is not None and not self._goes_on(self._way.run)
+        return self._joining is not None and not self._goes_on(self._joining.run)
 
     def _options(self) -> dict[str, Any]:
-        way, spec = self._way, self._spec
+        joining, spec = self._joining, self._spec
         options = container_options(
             self._place,
             spec.image,
             CONTAINER,
             spec.section,
-            environment={} if way is None else way.environment,
-            mounts=[] if way is None else [way.key],
+            environment={} if joining is None else joining.environment,
+            mounts=[] if joining is None else [joining.key],
         )
         if spec.command is not None:
             options["command"] = list(spec.command)
-        if way is not None:
-            options["labels"] |= {JOINED_LABEL: way.run}
-        if way is not None and way.network is None:
+        if joining is not None:
+            options["labels"] |= {JOINED_LABEL: joining.run}
+        if joining is not None and joining.network is None:
             options["network_mode"] = "host"
             del options["ports"]
         elif self._networks:
@@ -240,7 +240,7 @@ class ComponentContainer:
             container.wait_log(LOG_S)
             # The end of the joined run may have made the container fail; the record of that run shows it a bit later.
             deadline = time.monotonic() + _OVER_S
-            while state.code != 0 and self._way and not self._is_left_behind and time.monotonic() < deadline:
+            while state.code != 0 and self._joining and not self._is_left_behind and time.monotonic() < deadline:
                 time.sleep(_POLL_S)
             if state.code == 0 or self._is_left_behind:
                 return True
@@ -248,7 +248,7 @@ class ComponentContainer:
                 f"the container of {self._spec.image} has ended: {end_in_words(state, self._spec.section.memory)}",
                 evidence=self._logs.tail(CONTAINER) or None,
             )
-        if self._way is not None and self._is_left_behind:
-            session.say(f"run {self._way.run} has ended, so the container that had joined it ends, too")
+        if self._joining is not None and self._is_left_behind:
+            session.say(f"run {self._joining.run} has ended, so the container that had joined it ends, too")
             return True
         return False

@@ -19,7 +19,7 @@ from throwcollect.ros.connection import Connection
 from throwcollect.ros.middleware import Middleware
 from throwcollect.run_key import RunKey
 from throwcollect.runtimes.docker.image import default_tag
-from throwcollect.runtimes.nodes import COORDINATOR, ROUTER, NodeSpec, node_environment, protocol_of
+from throwcollect.runtimes.nodes import COORDINATOR, ROUTER, NodeSpec, is_simulation, node_environment, protocol_of
 from throwcollect.runtimes.ports import LOOPBACK
 from throwcollect.version import __version__
 
@@ -107,7 +107,7 @@ def image(config: Config) -> str:
 
 def section_of(config: Config, name: str) -> NodeContainerConfig:
     """The section of the configuration for a node's container."""
-    return config.containers.sim if name not in (ROUTER, COORDINATOR) else getattr(config.containers, name)
+    return config.containers.sim if is_simulation(name) else getattr(config.containers, name)
 
 
 def publishes_port(config: Config) -> bool:

@@ -36,9 +36,9 @@ from throwcollect.runtimes.docker.node_container import NodeContainer
 from throwcollect.runtimes.docker.volume import dataset_info, place_directory, place_key
 from throwcollect.runtimes.docker.watch import ContainerState, EngineWatch
 from throwcollect.runtimes.node_logs import NodeLogs
-from throwcollect.runtimes.nodes import ROUTER, NodeExit, NodeHost, NodeSpec, protocol_of
+from throwcollect.runtimes.nodes import ROUTER, NodeExit, NodeHost, NodeSpec, describe_end, protocol_of
 from throwcollect.runtimes.ports import LOOPBACK, format_endpoint
-from throwcollect.runtimes.runtime import Place, Session
+from throwcollect.runtimes.runtime import Place
 from throwcollect.wording import command
 
 LOG_S = 2.0
@@ -96,13 +96,6 @@ class DockerNodes(NodeHost):
             self._clock.attend(self._client)
             self._image_id = check(self._client, self._place, config)
             undo.pop_all()
-
-    def collect(self, session: Session) -> Info | None:
-        """See `runtime.Host.collect`."""
-        # This imports ROS, so it has to wait until the backend is chosen.
-        from throwcollect.runtimes.node_collection import NodeCollection
-
-        return NodeCollection(self, session).run_to_the_end()
 
     def open(self) -> tuple[str, ...]:
         """Make the run's network and volumes if they do not exist, watch its containers, and take over existing ones.
@@ -312,7 +305,7 @@ class DockerNodes(NodeHost):
     def _find_end(self, node: NodeContainer) -> NodeExit | None:
         """How a node ended; None while it runs, or its last lines are not yet in its log."""
         if node.failure is not None:
-            return NodeExit(node.name, None, f"cannot be started: {node.failure}", self.log_tail(node.name))
+            return NodeExit(node.name, None, f"cannot be started: {node.failure}", self.logs.tail(node.name))
         state = self._opened.state(node.handle)
         if state is None or not state.ended:
             self._ended_at.pop(node.name, None)
@@ -322,7 +315,7 @@ class DockerNodes(NodeHost):
             return None
         self._ended_at.pop(node.name, None)
         memory = section_of(self.config, node.name).memory
-        return NodeExit(node.name, state.code, end_in_words(state, memory), self.log_tail(node.name))
+        return NodeExit(node.name, state.code, end_in_words(state, memory), self.logs.tail(node.name))
 
     def _end(self, node: NodeContainer, grace_s: int) -> None:
         if not node.wait_begun(_BEGIN_S):
@@ -342,7 +335,6 @@ def end_in_words(state: ContainerState, memory: str | None) -> str:
     # `out_of_memory` alone proves nothing: the kernel may have killed another process, and the container went on.
     if state.out_of_memory and state.code == _SIGNALLED + signal.SIGKILL:
         return "ran out of memory" + (f" (limit {memory})" if memory else "")
-    if state.code > _SIGNALLED and state.code != Interrupted.exit_code:
-        with suppress(ValueError):
-            return f"ended by {signal.Signals(state.code - _SIGNALLED).name}"
-    return f"exit code {state.code}"
+    number = state.code - _SIGNALLED
+    signalled = number in signal.valid_signals() and state.code != Interrupted.exit_code
+    return describe_end(-number if signalled else state.code)

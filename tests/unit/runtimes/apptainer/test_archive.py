@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import bz2
 import gzip
 import hashlib
 import io
 import json
+import lzma
 import tarfile
 from collections.abc import Callable
 from pathlib import Path
@@ -22,12 +24,16 @@ PLAIN, PACKED, LINKED = "a/layer.tar", "b/layer.tar", "c/layer.tar"
 
 def write_archive(path: Path, *entry_points: str, manifest: bytes | None = None) -> Path:
     """An archive with an image without layers for each entry point."""
-    files = {
-        f"{number}.json": json.dumps({"config": {"Entrypoint": [name]}}) for number, name in enumerate(entry_points)
-    }
+    files = {f"{number}.json": describe_image(entry_point=name) for number, name in enumerate(entry_points)}
     images = [{"Config": name, "Layers": []} for name in files]
-    contents = {name: text.encode() for name, text in files.items()}
-    return write_files(path, {**contents, "manifest.json": manifest or json.dumps(images).encode()})
+    return write_files(path, {**files, "manifest.json": manifest or json.dumps(images).encode()})
+
+
+def describe_image(*layers: bytes, entry_point: str = "throwcollect") -> bytes:
+    """The configuration of an image with layers of these contents, without compression."""
+    digests = [f"sha256:{hashlib.sha256(layer).hexdigest()}" for layer in layers]
+    image = {"config": {"Entrypoint": [entry_point]}, "rootfs": {"type": "layers", "diff_ids": digests}}
+    return json.dumps(image).encode()
 
 
 def write_files(path: Path, contents: dict[str, bytes], links: dict[str, str] | None = None) -> Path:
@@ -50,8 +56,8 @@ def write_files(path: Path, contents: dict[str, bytes], links: dict[str, str] | 
 def test_an_image_is_unpacked_into_the_layout_of_oci(
     compress: Callable[[bytes], bytes], ending: str, tmp_path: Path
 ) -> None:
-    config = json.dumps({"config": {"Entrypoint": ["throwcollect"]}}).encode()
     plain, packed = bytes(10_000), compress(b"more" * 1000)
+    config = describe_image(plain, b"more" * 1000, plain)
     image = {"Config": "it.json", "Layers": [PLAIN, PACKED, LINKED]}
     files = {"it.json": config, PLAIN: plain, PACKED: packed, "manifest.json": json.dumps([image]).encode()}
     # A Docker engine stores a repeated layer as a link.
@@ -83,6 +89,54 @@ def test_an_archive_that_is_cut_off_is_refused_as_damaged(tmp_path: Path) -> Non
     archive.write_bytes(archive.read_bytes()[:50_000])
     with pytest.raises(ConfigError, match=r"image\.tar: is damaged"):
         unpack_archive(archive, tmp_path / "image")
+
+
+def test_an_image_whose_description_has_another_digest_than_its_name_says_is_refused(tmp_path: Path) -> None:
+    description = describe_image()
+    right, wrong = hashlib.sha256(description).hexdigest(), "0" * 64
+
+    def unpack(name: str, target: str) -> None:
+        manifest = json.dumps([{"Config": name, "Layers": []}]).encode()
+        archive = write_files(tmp_path / "image.tar", {name: description, "manifest.json": manifest})
+        unpack_archive(archive, tmp_path / target)
+
+    # Docker, Podman and other programs name it differently.
+    for number, name in enumerate(("it.json", f"{right}.json", f"blobs/sha256/{right}", f"sha256:{right}")):
+        unpack(name, f"right {number}")
+    for number, name in enumerate((f"{wrong}.json", f"blobs/sha256/{wrong}")):
+        with pytest.raises(ConfigError, match=r"image\.tar: is damaged"):
+            unpack(name, f"wrong {number}")
+
+
+@pytest.mark.parametrize("compress", [bytes, gzip.compress, zstandard.ZstdCompressor().compress])
+def test_a_layer_that_is_not_what_the_image_says_is_refused_as_damaged(
+    compress: Callable[[bytes], bytes], tmp_path: Path
+) -> None:
+    manifest = json.dumps([{"Config": "it.json", "Layers": [PLAIN]}]).encode()
+    files = {"it.json": describe_image(bytes(9_999) + b"1"), "manifest.json": manifest, PLAIN: compress(bytes(10_000))}
+    archive = write_files(tmp_path / "image.tar", files)
+    with pytest.raises(ConfigError, match=r"image\.tar: is damaged"):
+        unpack_archive(archive, tmp_path / "image")
+
+
+def read_whole(archive: Path, directory: Path) -> None:
+    check_archive(archive)
+    unpack_archive(archive, directory)
+
+
+@pytest.mark.parametrize("pack", [gzip.compress, bz2.compress, lzma.compress])
+def test_a_compressed_archive_in_which_any_byte_is_wrong_is_refused(
+    pack: Callable[[bytes], bytes], tmp_path: Path
+) -> None:
+    layer = b"".join(hashlib.sha256(bytes([number])).digest() for number in range(256))
+    manifest = json.dumps([{"Config": "it.json", "Layers": [PLAIN]}]).encode()
+    files = {"manifest.json": manifest, "it.json": describe_image(layer), PLAIN: layer}
+    whole = pack(write_files(tmp_path / "image.tar", files).read_bytes())
+    archive = tmp_path / "packed.tar"
+    for place in range(20, len(whole) - 200, 97):
+        archive.write_bytes(whole[:place] + bytes([whole[place] ^ 0xFF]) + whole[place + 1 :])
+        with pytest.raises(ConfigError, match=r"packed\.tar: (is damaged|is no archive of an image)"):
+            read_whole(archive, tmp_path / f"image at {place}")
 
 
 def test_a_file_that_is_no_archive_of_our_image_is_refused(tmp_path: Path) -> None:

@@ -183,3 +183,21 @@ def test_a_late_engine_is_reported_as_no_answer_in_time(
     ends: list[NodeExit] = []
     until(lambda: ends.extend(runtime.exits()) or ends)
     assert [end.reason for end in ends] == ["cannot be started: no answer in time"]
+
+
+@pytest.mark.parametrize(
+    ("code", "words"),
+    [
+        (0, "exit code 0"),
+        (128, "exit code 128"),
+        # A node that is asked to stop ends with this code by itself.
+        (130, "exit code 130"),
+        (137, "ended by SIGKILL"),
+        (163, "ended by signal 35"),
+        (255, "exit code 255"),
+        (None, "its container was removed"),
+    ],
+)
+def test_the_end_of_a_container_is_told_by_its_signal_or_its_exit_code(code: int | None, words: str) -> None:
+    state = docker_watch.ContainerState("exited", code)
+    assert module.end_in_words(state, None) == words

@@ -104,6 +104,7 @@ def test_a_build_uses_the_target_and_the_arguments_of_the_dockerfile(said: list[
 def test_the_build_context_holds_only_what_the_dockerfile_copies(said: list[str], wheelhouse: Path) -> None:
     engine = Engine("base")
     build(engine, "mine", base="base", wheelhouse=wheelhouse, say=said.append)
+    assert "src" in COPIED
     for source in COPIED:
         assert any(fnmatch(name, f"{source}*") for name in engine.context), source
     files = {name for name, member in engine.context.items() if member.isfile()}
@@ -136,6 +137,7 @@ def test_files_of_the_build_context_are_readable_even_from_a_private_clone(tmp_p
 def test_the_dockerignore_file_excludes_nothing_that_the_dockerfile_copies() -> None:
     patterns = (ROOT / ".dockerignore").read_text().splitlines()
     sent = exclude_paths(str(ROOT), patterns)
+    assert "src" in COPIED
     # A directory of wheels exists only if somebody has filled one.
     for source in (each for each in COPIED if "*" not in each):
         assert any(path == source or path.startswith(f"{source}/") for path in sent), source
