@@ -42,6 +42,8 @@ class Supervisor:
         self._due: dict[str, float] = {}
         self._given_up: dict[str, NodeExit] = {}
         self._ready: set[str] = set()
+        self._has_worked: set[str] = set()
+        """Simulations that were ready once, perhaps before their last start."""
         self._frozen_since: dict[str, float] = {}
         self._start_deadline = math.inf
         self._hung: frozenset[str] = frozenset()
@@ -77,12 +79,13 @@ class Supervisor:
             for memory in (self._restarts, self._last_end, self._due, self._given_up, self._frozen_since):
                 memory.pop(name, None)
             self._ready.discard(name)
+            self._has_worked.discard(name)
         self.host.stop(removed)
         for name in removed:
             # A later node of the same name does not count as ready because this one was.
             self.host.logs.skip(name)
         # If no simulation that was ready is left, the new ones need a new deadline: the old one may have passed.
-        if not self._ready:
+        if not self._has_worked:
             self._start_deadline = time.monotonic() + self._run.start_timeout_s
         for name in self._roster:
             if name not in before:
@@ -102,6 +105,7 @@ class Supervisor:
         news = self._end_frozen()
         # Readiness is noted before ends are handled: a simulation that was ready once may be restarted more often.
         self._ready |= {name for name in self._expendables if name not in self._ready and self.host.ready(name)}
+        self._has_worked |= self._ready
         for node in self.host.exits():
             if node.name not in self._roster:
                 # The node was taken over from an earlier launcher, which had already removed it from the roster.
@@ -198,12 +202,16 @@ class Supervisor:
     def _schedule_restart(self, node: NodeExit) -> bool:
         """Plan the next start of a node that ended, or give the node up; return whether it will be started again."""
         count = self._restarts.get(node.name, 0)
-        worked = self._roster[node.name].role is not NodeRole.EXPENDABLE or node.name in self._ready
+        worked = self._roster[node.name].role is not NodeRole.EXPENDABLE or node.name in self._has_worked
         may_work = worked or node.code == UnreachableError.exit_code
         if count >= (self._run.restarts if may_work else min(_RESTARTS_BEFORE_READY, self._run.restarts)):
             self._given_up[node.name] = node
             return False
         self._restarts[node.name] = count + 1
+        if node.name in self._ready:
+            # What was printed until now says nothing of the next start.
+            self._ready.discard(node.name)
+            self.host.logs.skip(node.name)
         rest = min(_FIRST_BACKOFF_S * 2**count, _LONGEST_BACKOFF_S)
         self._due[node.name] = time.monotonic() + max(rest, self._roster[node.name].rest_s)
         return True
@@ -229,11 +237,11 @@ class Supervisor:
                 evidence=last.log or None,
                 hint=hint,
             )
-        if not self._ready and not any(map(self.host.handle, names)):
+        if not self._has_worked and not any(map(self.host.handle, names)):
             # No container of a simulation runs yet, so the engine is slow. The host has a time limit for the engine, so
             # this deadline begins anew.
             self._start_deadline = time.monotonic() + self._run.start_timeout_s
-        if names and not self._ready and time.monotonic() > self._start_deadline:
+        if names and not self._has_worked and time.monotonic() > self._start_deadline:
             raise WorkerError(
                 f"no simulation was ready within {self._run.start_timeout_s:g} s (run.start_timeout_s)",
                 evidence=self.host.logs.tail(names[0]) or None,

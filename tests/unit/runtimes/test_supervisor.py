@@ -174,8 +174,11 @@ def test_a_lost_node_is_restarted_and_reported(runtime: FakeRuntime, clock: Cloc
     assert news == ["sim_1 was lost (exit code 3) and is started again; its log ends: last words"]
     assert state(supervisor, "sim_1") == NodeState("sim_1", "restarting", 1, None, "exit code 3")
     wait_for_start(supervisor, runtime, clock, "sim_1")
-    assert state(supervisor, "sim_1") == NodeState("sim_1", "running", 1, "id of sim_1", "exit code 3")
+    assert state(supervisor, "sim_1") == NodeState("sim_1", "starting", 1, "id of sim_1", "exit code 3")
     assert supervisor.poll() == (None, [])
+    runtime.logs.ready_ones.add("sim_1")
+    assert supervisor.poll() == (None, [])
+    assert state(supervisor, "sim_1") == NodeState("sim_1", "running", 1, "id of sim_1", "exit code 3")
 
 
 def test_the_wait_before_a_restart_doubles_up_to_ten_seconds(runtime: FakeRuntime, clock: Clock) -> None:
