@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 import logging
-from collections import deque
 from collections.abc import Callable, Mapping
 from typing import Protocol
 
@@ -13,6 +12,7 @@ from throwcollect.serve.rosbridge.bridge_session import BridgeSession
 from throwcollect.serve.rosbridge.client_goals import Goal, Goals
 from throwcollect.serve.rosbridge.codec import Frame, encode, fragments, read_frame
 from throwcollect.serve.rosbridge.file_server import GET_FILE, give_file
+from throwcollect.serve.rosbridge.inbox import Inbox
 from throwcollect.serve.rosbridge.offered_actions import OfferedAction
 from throwcollect.serve.rosbridge.offered_services import OfferedService
 from throwcollect.serve.rosbridge.offers import Offers
@@ -30,6 +30,7 @@ Operation = Callable[[BridgeRequest], None]
 _logger = logging.getLogger(__name__)
 
 _LEVELS = ("none", "error", "warning", "info")
+_LOSS = "too many requests wait for the router of the run; further ones are dropped until it is back"
 _numbers = itertools.count()
 
 
@@ -61,7 +62,8 @@ class BridgeClient:
         self._host = host
         self._send = send
         self._read_only = read_only
-        self._frames: deque[Frame] = deque()
+        self._inbox = Inbox()
+        self._was_told_of_loss = False
         self._level = "error"
         self._is_closed = False
         self._questions = Questions(self)
@@ -106,11 +108,19 @@ class BridgeClient:
     @property
     def waiting(self) -> int:
         """Number of received frames that wait to be handled."""
-        return len(self._frames)
+        return len(self._inbox)
 
     def receive(self, frame: Frame) -> None:
-        """Take a frame of the client; if something is wrong with it, the client gets a status message."""
-        self._frames.append(frame)
+        """Take a frame of the client; if something is wrong with it, the client gets a status message.
+
+        Without a router, frames wait. If too many wait, further ones are dropped, and the client is told once.
+        """
+        if self._inbox.is_full and not self._host.is_connected:
+            if not self._was_told_of_loss:
+                self._was_told_of_loss = True
+                self._host.submit(lambda: self.say("error", _LOSS))
+            return
+        self._inbox.put(frame)
         self._host.submit(self.work_off)
 
     def close(self) -> None:
@@ -119,8 +129,8 @@ class BridgeClient:
 
     def work_off(self) -> None:
         """Handle the frames of the client; without a router, they wait."""
-        while self._frames and self._host.is_connected and not self._is_closed:
-            self._handle(self._frames.popleft())
+        while self._inbox and self._host.is_connected and not self._is_closed:
+            self._handle(self._inbox.take())
 
     def lose(self) -> None:
         """Forget the session, as the router has gone, and tell the client."""
@@ -130,6 +140,7 @@ class BridgeClient:
 
     def restore(self) -> None:
         """Make everything that the client had again, in a new session."""
+        self._was_told_of_loss = False
         for part in self._parts:
             part.restore()
         # This message cancels the error that `lose` has sent, so clients that only want errors get it, too.
@@ -164,7 +175,7 @@ class BridgeClient:
     def _close(self) -> None:
         if not self._is_closed:
             self._is_closed = True
-            self._frames.clear()
+            self._inbox.clear()
             self._host.forget(self)
             for part in self._parts:
                 part.close()

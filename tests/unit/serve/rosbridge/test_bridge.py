@@ -15,7 +15,8 @@ from throwcollect.ros import Context, Node, SingleThreadedExecutor, get_message,
 from throwcollect.ros.connection import Connection
 from throwcollect.ros.router import router
 from throwcollect.run_key import RunKey
-from throwcollect.serve.rosbridge import Bridge
+from throwcollect.serve.rosbridge import Bridge, inbox
+from throwcollect.serve.rosbridge.inbox import Inbox
 
 String: Any = get_message("std_msgs/msg/String")
 
@@ -97,6 +98,36 @@ def test_topics_services_and_actions_of_a_client_survive_a_router_restart(router
     assert {"/slow", "/act/_action/send_goal"} <= set(dict(talker.node.get_service_names_and_types()))
     bridge.close()
     talker.context.try_shutdown()
+
+
+def test_requests_beyond_a_limit_are_dropped_without_a_router_and_the_client_is_told_once(
+    routers: Routers, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(inbox, "_MOST_FRAMES", 3)
+    bridge = Bridge(None)
+    party = Party(bridge)
+    for number in range(6):
+        party.ask(op="call_service", id=number, service="rosapi/get_time")
+    assert "further ones are dropped" in party.next(op="status")["msg"]
+    bridge.move(routers.connection)
+    party.next(id=2)
+    party.ask(op="call_service", id="after", service="rosapi/get_time")
+    party.next(id="after")
+    assert [each["id"] for each in party.got() if each["op"] == "service_response"] == [0, 1, 2, "after"]
+    assert len([each for each in party.got() if each.get("level") == "error"]) == 1
+    bridge.close()
+
+
+def test_requests_without_a_router_are_limited_in_bytes(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(inbox, "_MOST_BYTES", 10)
+    waiting = Inbox()
+    for frame, is_full in (("1234", False), ("567890", True)):
+        waiting.put(frame)
+        assert waiting.is_full == is_full
+    assert (waiting.take(), waiting.is_full) == ("1234", False)
+    waiting.put("1234")
+    waiting.clear()
+    assert (len(waiting), waiting.is_full) == (0, False)
 
 
 def test_each_bridge_is_in_its_own_run(routers: Routers, bridge: Bridge, connection: Connection) -> None:
