@@ -42,6 +42,10 @@ class ClientHost(Protocol):
         """The bridge's place in the ROS graph."""
 
     @property
+    def offered(self) -> set[str]:
+        """The services by which one knows what the clients of the bridge offer."""
+
+    @property
     def is_connected(self) -> bool:
         """Whether the bridge has a place in the ROS graph by now."""
 
@@ -104,6 +108,11 @@ class BridgeClient:
     def session(self) -> BridgeSession:
         """The place of the bridge in the ROS graph."""
         return self._host.session
+
+    @property
+    def offered(self) -> set[str]:
+        """The services by which one knows what the clients of the bridge offer."""
+        return self._host.offered
 
     @property
     def waiting(self) -> int:

@@ -130,6 +130,24 @@ def test_requests_without_a_router_are_limited_in_bytes(monkeypatch: pytest.Monk
     assert (len(waiting), waiting.is_full) == (0, False)
 
 
+def test_a_client_keeps_its_service_after_a_router_restart_although_another_asks_for_it_first(routers: Routers) -> None:
+    bridge = Bridge(routers.connection)
+    # The bridge restores clients in this order, and handles what the first one has asked meanwhile.
+    greedy, owner = Party(bridge), Party(bridge)
+    offer = {"op": "advertise_service", "service": "/same", "type": "std_srvs/Trigger"}
+    owner.ask(**offer)
+    owner.call("rosapi/get_time")
+    routers.end()
+    assert greedy.next(op="status")["msg"].startswith("the router of the run has gone")
+    greedy.ask(**offer)
+    bridge.move(replace(routers.connection, endpoint=routers.begin("tcp/127.0.0.1:0")))
+    greedy.next(op="status", level="info")
+    assert "/same is offered already" in greedy.next(op="status", level="error")["msg"]
+    greedy.ask(op="call_service", service="/same")
+    assert owner.next(op="call_service")["service"] == "/same"
+    bridge.close()
+
+
 def test_each_bridge_is_in_its_own_run(routers: Routers, bridge: Bridge, connection: Connection) -> None:
     other = Bridge(None)
     party, stranger = Party(other), Party(bridge)
