@@ -81,8 +81,8 @@ def make_view_routes(instances: Instances) -> APIRouter:
     async def tell_throws(socket: WebSocket, instance: str) -> None:
         try:
             run = await asyncio.to_thread(instances.get, instance)
-        except ThrowcollectError:
-            await refuse(socket, NOT_FOUND, f"no run {instance}")
+        except ThrowcollectError as error:
+            await refuse(socket, NOT_FOUND, error.message)
             return
         await socket.accept()
         watch = watches.setdefault(instance, ThrowWatch(run))
