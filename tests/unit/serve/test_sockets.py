@@ -98,7 +98,7 @@ def end_of(speak: Callable[[WebSocket], Coroutine[Any, Any, None]]) -> tuple[int
     return end.value.code, end.value.reason
 
 
-def logged(caplog: pytest.LogCaptureFixture) -> list[BaseException | None]:
+def find_logged(caplog: pytest.LogCaptureFixture) -> list[BaseException | None]:
     """The errors that were logged with their traceback."""
     found = [each for each in caplog.records if each.name.startswith("throwcollect.serve")]
     assert all(each.levelno == logging.ERROR for each in found)
@@ -112,7 +112,7 @@ def test_an_unexpected_error_closes_the_socket_and_gets_into_the_log(caplog: pyt
         raise error
 
     assert end_of(fail) == (1011, "internal error")
-    assert logged(caplog) == [error]
+    assert find_logged(caplog) == [error]
 
 
 def test_an_error_of_our_own_closes_the_socket_with_its_message_alone(caplog: pytest.LogCaptureFixture) -> None:
@@ -120,7 +120,7 @@ def test_an_error_of_our_own_closes_the_socket_with_its_message_alone(caplog: py
         raise WorkerError("the simulation does not answer")
 
     assert end_of(fail) == (4503, "the simulation does not answer")
-    assert logged(caplog) == []
+    assert find_logged(caplog) == []
 
 
 def test_sending_to_a_socket_that_was_closed_before_is_no_error_for_the_log(caplog: pytest.LogCaptureFixture) -> None:
@@ -129,4 +129,4 @@ def test_sending_to_a_socket_that_was_closed_before_is_no_error_for_the_log(capl
         await socket.send_text("more")
 
     assert end_of(speak_on) == (4404, "gone")
-    assert logged(caplog) == []
+    assert find_logged(caplog) == []
