@@ -79,16 +79,16 @@ class BridgeClient:
         self._reassembly = Reassembly()
         rosapi = Rosapi(self, self._questions).answers
         self._answers: Mapping[str, Answer] = {**rosapi, GET_FILE: give_file}
-        self._looking: Mapping[str, Operation] = {
+        self._reading_operations: Mapping[str, Operation] = {
             "subscribe": subscriptions.subscribe,
             "unsubscribe": subscriptions.unsubscribe,
             "call_service": self._call_service,
-            "fragment": self._take_part,
+            "fragment": self._add_fragment,
             "set_level": self._set_level,
             "status": self._take_status,
             "auth": self._authenticate,
         }
-        self._acting: Mapping[str, Operation] = {
+        self._changing_operations: Mapping[str, Operation] = {
             "advertise": publishers.advertise,
             "unadvertise": publishers.unadvertise,
             "publish": publishers.publish,
@@ -101,7 +101,7 @@ class BridgeClient:
             "unadvertise_action": actions.unadvertise,
             "action_feedback": actions.pass_on(OfferedAction.publish_feedback),
             "action_result": actions.pass_on(OfferedAction.end),
-            "action_status": actions.pass_on(OfferedAction.settle),
+            "action_status": actions.pass_on(OfferedAction.take_status),
         }
 
     @property
@@ -130,13 +130,13 @@ class BridgeClient:
                 self._host.submit(lambda: self.say("error", _LOSS))
             return
         self._inbox.put(frame)
-        self._host.submit(self.work_off)
+        self._host.submit(self.handle_frames)
 
     def close(self) -> None:
         """Withdraw all that the client had."""
         self._host.submit(self._close)
 
-    def work_off(self) -> None:
+    def handle_frames(self) -> None:
         """Handle the frames of the client; without a router, they wait."""
         while self._inbox and self._host.is_connected and not self._is_closed:
             self._handle(self._inbox.take())
@@ -155,7 +155,7 @@ class BridgeClient:
         # This message cancels the error that `lose` has sent, so clients that only want errors get it, too.
         if self._level != "none":
             self.answer({"op": "status", "level": "info", "msg": "the router of the run is back"}, Form())
-        self.work_off()
+        self.handle_frames()
 
     def later(self, seconds: float, action: Callable[[], None]) -> None:
         """Call an action after a time [s]."""
@@ -194,11 +194,12 @@ class BridgeClient:
         try:
             request = read_frame(frame)
             number = request.id
-            operation = self._looking.get(request.op) or self._acting.get(request.op)
+            operation = self._reading_operations.get(request.op) or self._changing_operations.get(request.op)
             if operation is None:
-                raise ConfigError(f"no operation {request.op}", expected=", ".join([*self._looking, *self._acting]))
+                known = [*self._reading_operations, *self._changing_operations]
+                raise ConfigError(f"no operation {request.op}", expected=", ".join(known))
             # A client that sends a goal waits for a result, so `_send_goal` refuses with a result instead of a status.
-            if request.op in self._acting and request.op != "send_action_goal":
+            if request.op in self._changing_operations and request.op != "send_action_goal":
                 self._require_writing(request.op)
             operation(request)
         except ThrowcollectError as error:
@@ -245,7 +246,7 @@ class BridgeClient:
         if self._read_only:
             raise ConfigError(f"{what}: this client may only look", expected="the token of those who may act")
 
-    def _take_part(self, request: BridgeRequest) -> None:
+    def _add_fragment(self, request: BridgeRequest) -> None:
         frame = self._reassembly.add(request)
         if frame is not None:
             self._handle(frame)
