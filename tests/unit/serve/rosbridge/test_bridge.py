@@ -184,7 +184,11 @@ def test_a_closed_bridge_withdraws_its_topics_and_ignores_requests(routers: Rout
     wait_for(lambda: talker.node.count_publishers("/mine"))
     bridge.close()
     wait_for(lambda: not talker.node.count_publishers("/mine"))
-    party.ask(op="publish", topic="/mine", msg={})
+    party.ask(op="advertise", topic="/mine", type="std_msgs/String")
+    # A bridge that still handles requests answers this one.
+    party.ask(op="call_service", service="rosapi/get_time")
     party.client.close()
     bridge.close()
+    assert party.got() == []
+    assert talker.node.count_publishers("/mine") == 0
     talker.context.try_shutdown()
