@@ -14,7 +14,13 @@ from throwcollect.ros.graph_names import make_own_name
 from throwcollect.ros.router_endpoint import answers
 from throwcollect.runs.records import Records, Run
 from throwcollect.runs.run_record import RunRecord
-from throwcollect.runs.run_selection import find_held_runs, find_run_to_change, id_of, require_living
+from throwcollect.runs.run_selection import (
+    find_held_runs,
+    find_run_to_change,
+    id_of,
+    require_living,
+    require_simulations,
+)
 from throwcollect.runtimes.nodes import LAUNCHER
 from throwcollect.runtimes.registry import get_runtime
 from throwcollect.wording import command
@@ -103,12 +109,12 @@ def scale(run: Run, simulations: int) -> None:
     """Ask the launcher of a run for another number of simulations.
 
     Raises:
-        ConfigError: If the run has ended, cannot be scaled, or the launcher refuses that number.
+        ConflictError: If the run has ended, or is a container, which has no simulations.
+        ConfigError: If it cannot be scaled, or the launcher refuses that number.
         WorkerError: If the launcher died, or does not answer.
     """
     record = require_living(run)
-    if record.kind == "container":
-        raise ConfigError(f"run {run.id}: is a container, and has no simulations")
+    require_simulations(run)
     if record.runtime and not get_runtime(record.runtime).can_be_scaled:
         raise ConfigError(f"run {run.id}: has one simulation, as all runs of the runtime {record.runtime} have")
     record.middleware.joining.settle()

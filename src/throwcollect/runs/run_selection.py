@@ -233,6 +233,16 @@ def require_living(run: Run) -> RunRecord:
     return run.record
 
 
+def require_simulations(run: Run) -> None:
+    """Refuse a run that is a container of the catalogue, as it has no simulations.
+
+    Raises:
+        ConflictError: If the run is one.
+    """
+    if run.record.kind == "container":
+        raise ConflictError(f"run {run.id}: is a container, and has no simulations")
+
+
 def find_held_runs() -> dict[str, tuple[str, HeldRun]]:
     """Find all runs of which a runtime holds nodes or a network; by the id of a run, the runtime's name and the run."""
     # A runtime that cannot be used here, as a package is missing or broken, does not keep others from being asked.

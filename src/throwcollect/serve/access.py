@@ -13,6 +13,7 @@ import secrets
 import time
 from collections.abc import Awaitable, Callable, MutableMapping
 from dataclasses import dataclass, field
+from enum import Enum
 from http import HTTPStatus
 from typing import Any
 from urllib.parse import parse_qs, quote
@@ -31,8 +32,6 @@ _MOST_SOCKETS = 128
 _TOO_MANY = 503, f"{_MOST_SOCKETS} sockets are open, which is the limit"
 MAY_ONLY_LOOK = 403, "this token may only look"
 """Status and sentence for a request to change something with the token that may only look."""
-_GROUPS = {True: "full", False: "read-only", None: "anybody"}
-"""How the log calls clients, by whether they may change anything."""
 _PLAIN = "/-_.~{}:@!$&'()*+,;="
 _CODE_S = 600.0
 """Time for which a one-time code can be exchanged."""
@@ -49,6 +48,14 @@ _HEADERS = (
 _AUDIT = logging.getLogger("throwcollect.serve")
 
 
+class Rights(Enum):
+    """What a client may do; the values are the names of the groups of clients in the log."""
+
+    CHANGE = "full"
+    LOOK = "read-only"
+    NONE = "anybody"
+
+
 @dataclass
 class Keys:
     """The tokens of a server, and one-time codes for the full one.
@@ -62,13 +69,15 @@ class Keys:
     read_only: str = field(default_factory=lambda: secrets.token_urlsafe(32))
     _codes: dict[str, float] = field(default_factory=dict)
 
-    def may_change(self, token: str) -> bool | None:
-        """Whether the owner of a token may change anything; None if it is no token of this server."""
+    def rights_of(self, token: str) -> Rights:
+        """What the owner of a token may do; nothing if it is no token of this server."""
         # Both comparisons are always made, and take the same time for any token, so that the time reveals nothing.
         given = token.encode()
         full = hmac.compare_digest(given, self.full.encode())
         read_only = hmac.compare_digest(given, self.read_only.encode())
-        return full if full or read_only else None
+        if full:
+            return Rights.CHANGE
+        return Rights.LOOK if read_only else Rights.NONE
 
     def new_code(self) -> str:
         """Make a code for an address: it can be exchanged for the full token once, within ten minutes."""
@@ -104,10 +113,10 @@ class Access:
             await self._app(scope, receive, send)
             return
         headers = {name.decode("latin-1"): value.decode("latin-1") for name, value in scope["headers"]}
-        refusal, may_change = self._judge(scope, headers)
-        scope.setdefault("state", {})["may_change"] = bool(may_change)
+        refusal, rights = self._judge(scope, headers)
+        scope.setdefault("state", {})["may_change"] = rights is Rights.CHANGE
         host = headers.get("host", "")
-        answer = _Answer(scope, send, _GROUPS[may_change], _write_policy(host if host in self._hosts else None))
+        answer = _Answer(scope, send, rights.value, _write_policy(host if host in self._hosts else None))
         if refusal is not None:
             await _refuse(scope, receive, answer, *refusal)
         elif scope["type"] == "http":
@@ -126,29 +135,28 @@ class Access:
             finally:
                 self._sockets -= 1
 
-    def _judge(self, scope: Scope, headers: dict[str, str]) -> tuple[tuple[int, str] | None, bool | None]:
+    def _judge(self, scope: Scope, headers: dict[str, str]) -> tuple[tuple[int, str] | None, Rights]:
         """Decide on a request.
 
         Returns:
-            Status and sentence of a refusal, or None; and whether the client may change anything, None if it has shown
-            no token.
+            Status and sentence of a refusal, or None; and what the client may do.
         """
         # Host and Origin come first: a foreign page must not even learn whether a token is right.
         if headers.get("host", "") not in self._hosts:
-            return (421, "this server is not known by that name"), None
+            return (421, "this server is not known by that name"), Rights.NONE
         if "origin" in headers and headers["origin"] not in self._origins:
-            return (403, "pages of another origin may not connect"), None
+            return (403, "pages of another origin may not connect"), Rights.NONE
         length = headers.get("content-length", "0")
         too_long = None if length.isdecimal() and int(length) <= _MOST_BODY else _TOO_LONG
         # The page itself needs no token, because it holds no secret: it exchanges the code in the printed address.
         if scope["type"] == "http" and _is_public(scope["path"]):
-            return too_long, None
-        may_change = self._keys.may_change(_read_token(scope, headers))
-        if may_change is None:
-            return (401, "a token is missing, or it is not ours"), None
-        if not may_change and scope["type"] == "http" and scope["method"] not in ("GET", "HEAD"):
-            return MAY_ONLY_LOOK, False
-        return too_long, may_change
+            return too_long, Rights.NONE
+        rights = self._keys.rights_of(_read_token(scope, headers))
+        if rights is Rights.NONE:
+            return (401, "a token is missing, or it is not ours"), rights
+        if rights is Rights.LOOK and scope["type"] == "http" and scope["method"] not in ("GET", "HEAD"):
+            return MAY_ONLY_LOOK, rights
+        return too_long, rights
 
 
 def _is_public(path: str) -> bool:

@@ -17,7 +17,7 @@ from throwcollect.serve.bridges import Bridges
 from throwcollect.serve.dataset_routes import make_dataset_routes
 from throwcollect.serve.instance_routes import make_component_routes, make_instance_routes, make_log_routes
 from throwcollect.serve.instances import Instances
-from throwcollect.serve.live import keep_letting_go
+from throwcollect.serve.live import keep_restoring_abandoned
 from throwcollect.serve.model_routes import make_model_routes
 from throwcollect.serve.models import Models
 from throwcollect.serve.problem_responses import add_handlers, describe_problems, problem
@@ -50,7 +50,7 @@ def make_app(instances: Instances, models: Models, keys: Keys) -> FastAPI:
     """Make the application, which belongs behind `access.Access`."""
     app = FastAPI(
         title="throwcollect",
-        lifespan=_let_go_meanwhile,
+        lifespan=_restore_speeds_meanwhile,
         version=__version__,
         openapi_url="/openapi.json",
         docs_url=None,
@@ -79,11 +79,11 @@ def make_app(instances: Instances, models: Models, keys: Keys) -> FastAPI:
 
 
 @asynccontextmanager
-async def _let_go_meanwhile(_: FastAPI) -> AsyncIterator[None]:
-    """Let go of simulations that nobody watches any more, as long as the application lives."""
-    letting_go = asyncio.create_task(keep_letting_go())
+async def _restore_speeds_meanwhile(_: FastAPI) -> AsyncIterator[None]:
+    """Restore the speed of simulations that nobody watches any more, as long as the application lives."""
+    restoring = asyncio.create_task(keep_restoring_abandoned())
     yield
-    letting_go.cancel()
+    restoring.cancel()
 
 
 def _make_public_routes(keys: Keys) -> APIRouter:

@@ -96,17 +96,17 @@ def make_instance_routes(instances: Instances, lookout: Lookout) -> APIRouter:
     @router.put(
         "/{instance}", status_code=202, responses={200: {"model": InstanceState, "description": "It was begun before"}}
     )
-    def put(instance: str, wish: InstanceRequest, response: Response) -> InstanceState:
+    def put(instance: str, request: InstanceRequest, response: Response) -> InstanceState:
         """Begin an instance of a component; the same request again changes nothing."""
-        run, new = instances.put(instance, wish.origin)
+        run, new = instances.put(instance, request.origin)
         if not new:
             response.status_code = 200
         return describe(run)
 
     @router.post("", status_code=202)
-    def post(wish: InstanceRequest, response: Response) -> InstanceState:
+    def post(request: InstanceRequest, response: Response) -> InstanceState:
         """Begin an instance of a component, with an id that is chosen here."""
-        run, _ = instances.put(make_id(wish.component), wish.origin)
+        run, _ = instances.put(make_id(request.component), request.origin)
         response.headers["Location"] = f"/api/v1/instances/{run.id}"
         return describe(run)
 

@@ -26,7 +26,7 @@ from throwcollect.runs.background import begin_container, begin_run
 from throwcollect.runs.component_container import ContainerOrder
 from throwcollect.runs.records import Records, Run
 from throwcollect.runs.run_record import Origin, RunRecord
-from throwcollect.runs.run_selection import require_living
+from throwcollect.runs.run_selection import require_living, require_simulations
 from throwcollect.runs.state_directory import state_directory
 from throwcollect.serve.catalogue import NAME, Catalogue, Component
 from throwcollect.serve.live import name_node
@@ -83,7 +83,7 @@ class Instances:
         component = self.catalogue.get(origin.component)
         if not re.fullmatch(NAME, instance):
             raise ConfigError(f"no instance can have the id {instance!r}", expected="at most 63 of a-z, 0-9, - and _")
-        _check_wish(origin, component)
+        _check_request(origin, component)
         overrides = _write_overrides(origin)
         with _one_at_a_time():
             with suppress(NotFoundError):
@@ -167,12 +167,11 @@ class Instances:
 
         Raises:
             NotFoundError: If there is no such run.
-            ConflictError: If it has ended, or its launcher died.
+            ConflictError: If it has ended, its launcher died, or it is a container.
             ConfigError: If it cannot be scaled.
             WorkerError: If its launcher does not answer.
         """
         run = self.get(instance)
-        _check_simulations(run)
         _require_living(run)
         control.scale(run, simulations)
         return run.now()
@@ -188,7 +187,7 @@ class Instances:
             WorkerError: If a simulation does not answer.
         """
         run = self.get(instance)
-        _check_simulations(run)
+        require_simulations(run)
         own = description_of(run)
         if urdf is not None:
             check_appearance(own, urdf)
@@ -246,17 +245,7 @@ def _refuse_taken(directory: Path) -> None:
         raise ConflictError(error.problems, hint="choose another id") from error
 
 
-def _check_simulations(run: Run) -> None:
-    """Refuse a run that is a container of the catalogue, as it has no simulations.
-
-    Raises:
-        ConflictError: If the run is one.
-    """
-    if run.record.kind == "container":
-        raise ConflictError(f"run {run.id}: is a container, and has no simulations")
-
-
-def _check_wish(origin: Origin, component: Component) -> None:
+def _check_request(origin: Origin, component: Component) -> None:
     """Refuse a request with fields that do not fit the kind of component.
 
     Raises:

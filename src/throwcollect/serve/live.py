@@ -42,7 +42,7 @@ class Hold:
     simulation: str
     lock: int
 
-    def let_go(self) -> None:
+    def restore_speed(self) -> None:
         """Stop watching; the last watcher gives the simulation the speed of its configuration again."""
         try:
             # This turns the shared lock into an exclusive one, which fails if there is another watcher.
@@ -59,14 +59,14 @@ class Hold:
                 # The run was forgotten, or its configuration was removed, so it has no slow simulation.
                 pass
             except WorkerError:
-                # The simulation may be busy: the file stays, so that `let_go_of_left` tries again.
+                # The simulation may be busy: the file stays, so that `restore_abandoned` tries again.
                 return
             _find_lock_path(self.run, self.simulation).unlink(missing_ok=True)
         finally:
             os.close(self.lock)
 
 
-def take(run: Run, simulation: str) -> Hold:
+def slow_down(run: Run, simulation: str) -> Hold:
     """Slow a simulation down to real time.
 
     Raises:
@@ -83,27 +83,27 @@ def take(run: Run, simulation: str) -> Hold:
     try:
         _set_speed(run, simulation, _REAL_TIME)
     except ThrowcollectError:
-        # The simulation may have slowed down nevertheless. The file stays, so `let_go_of_left` restores the speed.
+        # The simulation may have slowed down nevertheless. The file stays, so `restore_abandoned` restores the speed.
         os.close(lock)
         raise
     return Hold(run, simulation, lock)
 
 
-async def keep_letting_go() -> None:
-    """Call `let_go_of_left` every few seconds, for simulations whose server was killed or that did not answer."""
+async def keep_restoring_abandoned() -> None:
+    """Call `restore_abandoned` every few seconds, for simulations whose server was killed or that did not answer."""
     while True:
-        await asyncio.to_thread(let_go_of_left)
+        await asyncio.to_thread(restore_abandoned)
         await asyncio.sleep(_SWEEP_S)
 
 
-def let_go_of_left() -> None:
-    """Let go of simulations that nobody watches any more."""
+def restore_abandoned() -> None:
+    """Give simulations that nobody watches any more the speed of their configuration again."""
     # If records cannot be read for a while, a later attempt finds the same files.
     with suppress(ThrowcollectError, OSError):
         for run in Records().all():
             for note in sorted(_find_lock_path(run, "").glob("*")) if run.status == "running" else ():
                 with suppress(FileNotFoundError):
-                    Hold(run, note.name, os.open(note, os.O_RDWR)).let_go()
+                    Hold(run, note.name, os.open(note, os.O_RDWR)).restore_speed()
 
 
 def _find_lock_path(run: Run, simulation: str) -> Path:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 from collections.abc import Coroutine
 from typing import Any
 
-from starlette.websockets import WebSocket
+from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from throwcollect.errors import ThrowcollectError
 
@@ -18,9 +19,13 @@ FULL = 1013
 """Close code of a socket beyond the largest number; a later attempt may succeed."""
 FAILED = 4503
 """Close code of a socket to something that does not answer."""
+BROKEN = 1011
+"""Close code of a socket whose server met an unexpected error, which is in its log."""
 # A control frame carries 125 bytes (RFC 6455, 5.5), and the close code takes two of them.
 _MOST_REASON = 123
 """Bytes of a reason that fit into a frame."""
+
+_logger = logging.getLogger(__name__)
 
 
 async def refuse(socket: WebSocket, code: int, reason: str) -> None:
@@ -39,7 +44,10 @@ def _cut(reason: str) -> str:
 
 
 async def keep_telling(socket: WebSocket, telling: Coroutine[Any, Any, object]) -> None:
-    """Let ``telling`` send to a client until the client has left, or there is nothing more to send."""
+    """Let ``telling`` send to a client until the client has left, or there is nothing more to send.
+
+    If ``telling`` fails, the socket is closed with a code; an unexpected error gets into the log, too.
+    """
 
     async def wait_until_gone() -> None:
         # Messages of the client are ignored, but only reading shows that it has left.
@@ -54,5 +62,19 @@ async def keep_telling(socket: WebSocket, telling: Coroutine[Any, Any, object]) 
             task.cancel()
         await asyncio.wait(tasks)
     for error in (task.exception() for task in tasks if not task.cancelled()):
-        if isinstance(error, ThrowcollectError):
-            await socket.close(FAILED, _cut(error.message))
+        # This error means that the client has left while something was sent to it.
+        if error is not None and not isinstance(error, WebSocketDisconnect):
+            await _end(socket, error)
+
+
+async def _end(socket: WebSocket, error: BaseException) -> None:
+    """Close a socket because of an error, and log the error if it is unexpected."""
+    is_expected = isinstance(error, ThrowcollectError)
+    code, reason = (FAILED, error.message) if isinstance(error, ThrowcollectError) else (BROKEN, "internal error")
+    try:
+        await socket.close(code, _cut(reason))
+    except (RuntimeError, WebSocketDisconnect):
+        # The socket was closed before, and sending to a closed socket fails with a RuntimeError.
+        is_expected = is_expected or isinstance(error, RuntimeError)
+    if not is_expected:
+        _logger.error("telling a client failed", exc_info=error)

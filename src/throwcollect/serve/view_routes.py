@@ -11,7 +11,7 @@ from fastapi.responses import FileResponse
 from throwcollect.errors import NotFoundError, ThrowcollectError
 from throwcollect.serve.access import MAY_ONLY_LOOK
 from throwcollect.serve.instances import Instances
-from throwcollect.serve.live import take
+from throwcollect.serve.live import slow_down
 from throwcollect.serve.problem_responses import describe_bytes
 from throwcollect.serve.robot_files import (
     MeshFile,
@@ -81,8 +81,8 @@ def make_view_routes(instances: Instances) -> APIRouter:
     async def tell_throws(socket: WebSocket, instance: str) -> None:
         try:
             run = await asyncio.to_thread(instances.get, instance)
-        except ThrowcollectError:
-            await refuse(socket, NOT_FOUND, f"no run {instance}")
+        except ThrowcollectError as error:
+            await refuse(socket, NOT_FOUND, error.message)
             return
         await socket.accept()
         watch = watches.setdefault(instance, ThrowWatch(run))
@@ -100,7 +100,7 @@ def make_view_routes(instances: Instances) -> APIRouter:
             await refuse(socket, MAY_NOT, MAY_ONLY_LOOK[1])
             return
         try:
-            hold = await asyncio.to_thread(lambda: take(instances.get(instance), simulation))
+            hold = await asyncio.to_thread(lambda: slow_down(instances.get(instance), simulation))
         except ThrowcollectError as error:
             await refuse(socket, NOT_FOUND if isinstance(error, NotFoundError) else FAILED, error.message)
             return
@@ -109,7 +109,7 @@ def make_view_routes(instances: Instances) -> APIRouter:
             # Nothing is ever sent: the simulation stays slow as long as the client is connected.
             await keep_telling(socket, asyncio.Event().wait())
         finally:
-            await asyncio.to_thread(hold.let_go)
+            await asyncio.to_thread(hold.restore_speed)
 
     return router
 

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 from collections.abc import AsyncIterator, Callable
-from contextlib import asynccontextmanager, suppress
+from contextlib import asynccontextmanager
 from dataclasses import replace
 
 from throwcollect.errors import ThrowcollectError
 from throwcollect.serve.state import STATES, WholeState
 
 _LOOK_S = 0.2
+_logger = logging.getLogger(__name__)
 
 
 class StateWatch:
@@ -71,8 +73,18 @@ class StateWatch:
                 self._looking = None
 
     async def _keep_looking(self) -> None:
+        is_logged = False
         while True:
             await asyncio.sleep(_LOOK_S)
-            # If records cannot be read for a while, such as on a full disk, listeners keep the last state.
-            with suppress(ThrowcollectError, OSError):
+            try:
                 await self.current()
+            except (ThrowcollectError, OSError):
+                # If records cannot be read for a while, such as on a full disk, listeners keep the last state.
+                pass
+            except Exception:
+                # One error must not end this loop, which serves all listeners. One that lasts is logged only once.
+                if not is_logged:
+                    _logger.exception("the state cannot be read")
+                is_logged = True
+            else:
+                is_logged = False

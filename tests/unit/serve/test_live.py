@@ -14,7 +14,7 @@ from throwcollect.errors import NotFoundError, WorkerError
 from throwcollect.runs.records import Records, Run
 from throwcollect.runtimes.runtime import NodeState
 from throwcollect.serve import live
-from throwcollect.serve.live import let_go_of_left, take
+from throwcollect.serve.live import restore_abandoned, slow_down
 
 SIM = NodeState("sim_0", "running", 0, "7", "")
 
@@ -62,17 +62,17 @@ def test_the_last_watcher_restores_the_speed(
     remember: Remember, tmp_path: Path, state: Path, simulation: Simulation
 ) -> None:
     run = make(remember, tmp_path)
-    one, other = take(run, "sim_0"), take(run, "sim_0")
-    one.let_go()
+    one, other = slow_down(run, "sim_0"), slow_down(run, "sim_0")
+    one.restore_speed()
     assert simulation.asked == [SLOW, SLOW]
     # Another server that starts meanwhile does not restore the speed of a watched simulation.
-    let_go_of_left()
+    restore_abandoned()
     assert simulation.asked == [SLOW, SLOW]
     assert notes(state) == ["sim_0"]
-    other.let_go()
+    other.restore_speed()
     assert simulation.asked == [SLOW, SLOW, FAST]
     assert notes(state) == []
-    take(run, "sim_0").let_go()
+    slow_down(run, "sim_0").restore_speed()
     assert simulation.asked[3:] == [SLOW, FAST]
 
 
@@ -80,7 +80,7 @@ def test_the_restored_speed_is_that_of_the_configuration(
     remember: Remember, tmp_path: Path, simulation: Simulation
 ) -> None:
     run = make(remember, tmp_path, more="sim: {real_time_factor: 3.0}\nrun: {simulations: 1, root_namespace: true}\n")
-    take(run, "sim_0").let_go()
+    slow_down(run, "sim_0").restore_speed()
     assert simulation.asked == [("/sim_0", 1.0), ("/sim_0", 3.0)]
 
 
@@ -88,8 +88,8 @@ def test_the_next_server_restores_speeds_after_a_killed_one(
     remember: Remember, tmp_path: Path, state: Path, simulation: Simulation
 ) -> None:
     # Closing the lock stands for the death of the server that held it.
-    os.close(take(make(remember, tmp_path), "sim_0").lock)
-    let_go_of_left()
+    os.close(slow_down(make(remember, tmp_path), "sim_0").lock)
+    restore_abandoned()
     assert simulation.asked == [SLOW, FAST]
     assert notes(state) == []
 
@@ -97,14 +97,14 @@ def test_the_next_server_restores_speeds_after_a_killed_one(
 def test_restoring_the_speed_is_tried_again_if_a_simulation_does_not_answer(
     remember: Remember, tmp_path: Path, state: Path, simulation: Simulation
 ) -> None:
-    hold = take(make(remember, tmp_path), "sim_0")
+    hold = slow_down(make(remember, tmp_path), "sim_0")
     simulation.answers = False
-    hold.let_go()
+    hold.restore_speed()
     assert notes(state) == ["sim_0"]
-    let_go_of_left()
+    restore_abandoned()
     assert notes(state) == ["sim_0"]
     simulation.answers = True
-    let_go_of_left()
+    restore_abandoned()
     assert simulation.asked == [SLOW, FAST]
     assert notes(state) == []
 
@@ -116,9 +116,9 @@ def test_the_speed_is_restored_even_if_slowing_down_failed(
     run = make(remember, tmp_path)
     simulation.answers, simulation.agrees = way != "silent", way != "unwilling"
     with pytest.raises(WorkerError, match="does not answer" if way == "silent" else "cannot change its speed: no"):
-        take(run, "sim_0")
+        slow_down(run, "sim_0")
     simulation.answers = simulation.agrees = True
-    let_go_of_left()
+    restore_abandoned()
     # The simulation may have slowed down although it did not answer.
     assert simulation.asked[-1] == FAST
     assert notes(state) == []
@@ -131,7 +131,7 @@ def test_only_running_simulations_can_be_slowed_down(
     over = make(remember, tmp_path, "over", **make_end_fields())
     for each, name in ((run, "sim_1"), (run, "../key"), (run, ""), (over, "sim_0")):
         with pytest.raises(NotFoundError, match="no simulation"):
-            take(each, name)
+            slow_down(each, name)
     assert simulation.asked == []
 
 
@@ -142,7 +142,7 @@ def test_a_vanished_run_is_not_asked_to_restore_its_speed(
     directory.mkdir(parents=True)
     (directory / "config.yaml").write_text(CONFIG)
     opened = remember("a", nodes=(SIM,))
-    hold = take(Records().get("a"), "sim_0")
+    hold = slow_down(Records().get("a"), "sim_0")
     opened.forget()
-    hold.let_go()
+    hold.restore_speed()
     assert simulation.asked == [SLOW]

@@ -52,15 +52,48 @@ def test_each_library_has_its_licence() -> None:
     assert all((path / "LICENSE").is_file() for path in VENDOR.iterdir() if path.is_dir())
 
 
+def find_hosts(text: str) -> list[str]:
+    """Other hosts that a text names, each with its scheme."""
+    return [host for found in _HOST.findall(text) if (host := found.strip("\"'(")) not in _NAMESPACES]
+
+
+def find_imports(path: Path) -> list[str]:
+    """What a module imports."""
+    return _IMPORT.findall(path.read_text(encoding="utf-8"))
+
+
+@pytest.mark.parametrize(
+    ("text", "host"),
+    [
+        ('fetch("https://example.org/x")', "https://example.org"),
+        ("new WebSocket(`wss://example.org`)", "wss://example.org"),
+        ("@import url(//example.org/x.css);", "//example.org"),
+        ('<script src="//example.org/x.js">', "//example.org"),
+        ('<svg xmlns="http://www.w3.org/2000/svg">', None),
+        ("// a comment", None),
+    ],
+)
+def test_hosts_are_found_in_every_form(text: str, host: str | None) -> None:
+    assert find_hosts(text) == ([] if host is None else [host])
+
+
 @pytest.mark.parametrize("path", OWN, ids=lambda path: path.name)
 def test_no_file_of_the_page_names_another_host(path: Path) -> None:
-    hosts = [host.strip("\"'(") for host in _HOST.findall(path.read_text(encoding="utf-8"))]
-    assert [host for host in hosts if host not in _NAMESPACES] == []
+    assert find_hosts(path.read_text(encoding="utf-8")) == []
+
+
+def test_imports_are_found_in_every_form(tmp_path: Path) -> None:
+    module = tmp_path / "module.js"
+    module.write_text('import "./a.js";\nimport { b } from "./b.js";\nimport {\n  c,\n} from \'./c.js\';\n')
+    assert find_imports(module) == ["./a.js", "./b.js", "./c.js"]
+    main = find_imports(PAGE / "main.js")
+    assert len(main) == (PAGE / "main.js").read_text(encoding="utf-8").count(' from "./')
+    assert {"./connection.js", "./scene.js"} <= set(main)
 
 
 @pytest.mark.parametrize("path", SCRIPTS, ids=lambda path: path.name)
 def test_modules_import_only_existing_files(path: Path) -> None:
-    for target in _IMPORT.findall(path.read_text(encoding="utf-8")):
+    for target in find_imports(path):
         assert target.startswith("."), f"{path.name} imports {target}, and browsers find paths alone"
         assert (path.parent / target).is_file(), f"{path.name} imports {target}"
 
@@ -87,6 +120,7 @@ def test_the_page_has_the_elements_that_its_scripts_look_for(tags: list[tuple[st
     asked = {
         name for path in OWN for name in re.findall(r"(?<![.\w])get\(\"([\w-]+)\"\)", path.read_text(encoding="utf-8"))
     }
+    assert {"components", "instances"} <= asked
     assert asked - set(ids) == set()
 
 

@@ -1,20 +1,25 @@
-"""Sockets that only send, on the real server."""
+"""Sockets that only send."""
 
 from __future__ import annotations
 
 import asyncio
+import logging
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Coroutine, Iterator
+from contextlib import suppress
 from dataclasses import dataclass, field
+from typing import Any
 
 import pytest
 import uvicorn
 from starlette.applications import Starlette
 from starlette.routing import WebSocketRoute
-from starlette.websockets import WebSocket
+from starlette.testclient import TestClient
+from starlette.websockets import WebSocket, WebSocketDisconnect
 from websockets.sync.client import connect
 
+from throwcollect.errors import WorkerError
 from throwcollect.serve.server_process import WEBSOCKETS
 from throwcollect.serve.sockets import keep_telling
 
@@ -75,3 +80,53 @@ def test_a_client_that_never_reads_does_not_block_others(teller: Teller) -> None
         assert stalled < 30 < reading
         time.sleep(0.5)
         assert teller.told[0] == stalled
+
+
+def end_of(speak: Callable[[WebSocket], Coroutine[Any, Any, None]]) -> tuple[int, str]:
+    """Close code and reason of a socket on which a function sends."""
+
+    async def tell(socket: WebSocket) -> None:
+        await socket.accept()
+        await keep_telling(socket, speak(socket))
+        # A socket that nobody has closed would hold up the test for ever.
+        with suppress(RuntimeError):
+            await socket.close(4000, "left open")
+
+    client = TestClient(Starlette(routes=[WebSocketRoute("/", tell)]))
+    with client.websocket_connect("/") as socket, pytest.raises(WebSocketDisconnect) as end:
+        socket.receive_text()
+    return end.value.code, end.value.reason
+
+
+def find_logged(caplog: pytest.LogCaptureFixture) -> list[BaseException | None]:
+    """The errors that were logged with their traceback."""
+    found = [each for each in caplog.records if each.name.startswith("throwcollect.serve")]
+    assert all(each.levelno == logging.ERROR for each in found)
+    return [each.exc_info[1] for each in found if each.exc_info]
+
+
+def test_an_unexpected_error_closes_the_socket_and_gets_into_the_log(caplog: pytest.LogCaptureFixture) -> None:
+    error = TypeError("a mistake")
+
+    async def fail(_: WebSocket) -> None:
+        raise error
+
+    assert end_of(fail) == (1011, "internal error")
+    assert find_logged(caplog) == [error]
+
+
+def test_an_error_of_our_own_closes_the_socket_with_its_message_alone(caplog: pytest.LogCaptureFixture) -> None:
+    async def fail(_: WebSocket) -> None:
+        raise WorkerError("the simulation does not answer")
+
+    assert end_of(fail) == (4503, "the simulation does not answer")
+    assert find_logged(caplog) == []
+
+
+def test_sending_to_a_socket_that_was_closed_before_is_no_error_for_the_log(caplog: pytest.LogCaptureFixture) -> None:
+    async def speak_on(socket: WebSocket) -> None:
+        await socket.close(4404, "gone")
+        await socket.send_text("more")
+
+    assert end_of(speak_on) == (4404, "gone")
+    assert find_logged(caplog) == []

@@ -20,12 +20,12 @@ class World:
     def __init__(self) -> None:
         self.instances = 0
         self.looks = 0
-        self.fails = False
+        self.error: Exception | None = None
 
     def look(self) -> WholeState:
         self.looks += 1
-        if self.fails:
-            raise ConfigError("the disk is full")
+        if self.error is not None:
+            raise self.error
         return WholeState([ComponentState("a", "A", "session", 1, [str(self.instances)], [])], [])
 
 
@@ -105,18 +105,23 @@ def test_thirty_watchers_share_one_loop_that_reads_the_records() -> None:
     run(scenario)
 
 
-def test_watching_goes_on_after_records_were_unreadable() -> None:
+@pytest.mark.parametrize("error", [ConfigError("the disk is full"), OSError("it is gone"), TypeError("a mistake")])
+def test_watching_goes_on_after_an_error_which_is_logged_once_if_it_is_unexpected(
+    error: Exception, caplog: pytest.LogCaptureFixture
+) -> None:
     async def scenario(world: World, watch: StateWatch) -> None:
         async with aclosing(watch.states()) as states:
             await anext(states)
-            world.fails = True
+            world.error = error
             before = world.looks
             while world.looks < before + 3:
                 await asyncio.sleep(0.005)
-            world.fails, world.instances = False, 1
+            world.error, world.instances = None, 1
             assert await read(states) == (2, "1")
 
     run(scenario)
+    logged = [each.exc_info[1] for each in caplog.records if each.name == watching.__name__ and each.exc_info]
+    assert logged == ([error] if isinstance(error, TypeError) else [])
 
 
 def test_an_older_state_is_never_returned_after_a_newer_one() -> None:

@@ -1,7 +1,6 @@
 """rosbridge v2: web pages and programs without ROS take part in the ROS graph of a run over a WebSocket."""
 
 from throwcollect.serve.rosbridge.bridge import Bridge
-from throwcollect.serve.rosbridge.bridge_client import BridgeClient
 from throwcollect.serve.rosbridge.websocket import attend
 
-__all__ = ["Bridge", "BridgeClient", "attend"]
+__all__ = ["Bridge", "attend"]

@@ -42,6 +42,8 @@ class Bridge:
         self._session: BridgeSession | None = None
         self._joined: Connection | None = None
         self._clients: list[BridgeClient] = []
+        # This outlives a session, as the offers of clients do.
+        self.offered: set[str] = set()
         self._work: SimpleQueue[Callable[[], None]] = SimpleQueue()
         # The number orders timers of equal time, because functions cannot be compared.
         self._timers: list[tuple[float, int, Callable[[], None]]] = []

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 import logging
-from collections import deque
 from collections.abc import Callable, Mapping
 from typing import Protocol
 
@@ -13,6 +12,7 @@ from throwcollect.serve.rosbridge.bridge_session import BridgeSession
 from throwcollect.serve.rosbridge.client_goals import Goal, Goals
 from throwcollect.serve.rosbridge.codec import Frame, encode, fragments, read_frame
 from throwcollect.serve.rosbridge.file_server import GET_FILE, give_file
+from throwcollect.serve.rosbridge.inbox import Inbox
 from throwcollect.serve.rosbridge.offered_actions import OfferedAction
 from throwcollect.serve.rosbridge.offered_services import OfferedService
 from throwcollect.serve.rosbridge.offers import Offers
@@ -30,6 +30,7 @@ Operation = Callable[[BridgeRequest], None]
 _logger = logging.getLogger(__name__)
 
 _LEVELS = ("none", "error", "warning", "info")
+_LOSS = "too many requests wait for the router of the run; further ones are dropped until it is back"
 _numbers = itertools.count()
 
 
@@ -39,6 +40,10 @@ class ClientHost(Protocol):
     @property
     def session(self) -> BridgeSession:
         """The bridge's place in the ROS graph."""
+
+    @property
+    def offered(self) -> set[str]:
+        """The services by which one knows what the clients of the bridge offer."""
 
     @property
     def is_connected(self) -> bool:
@@ -61,7 +66,8 @@ class BridgeClient:
         self._host = host
         self._send = send
         self._read_only = read_only
-        self._frames: deque[Frame] = deque()
+        self._inbox = Inbox()
+        self._was_told_of_loss = False
         self._level = "error"
         self._is_closed = False
         self._questions = Questions(self)
@@ -73,16 +79,16 @@ class BridgeClient:
         self._reassembly = Reassembly()
         rosapi = Rosapi(self, self._questions).answers
         self._answers: Mapping[str, Answer] = {**rosapi, GET_FILE: give_file}
-        self._looking: Mapping[str, Operation] = {
+        self._reading_operations: Mapping[str, Operation] = {
             "subscribe": subscriptions.subscribe,
             "unsubscribe": subscriptions.unsubscribe,
             "call_service": self._call_service,
-            "fragment": self._take_part,
+            "fragment": self._add_fragment,
             "set_level": self._set_level,
             "status": self._take_status,
             "auth": self._authenticate,
         }
-        self._acting: Mapping[str, Operation] = {
+        self._changing_operations: Mapping[str, Operation] = {
             "advertise": publishers.advertise,
             "unadvertise": publishers.unadvertise,
             "publish": publishers.publish,
@@ -95,7 +101,7 @@ class BridgeClient:
             "unadvertise_action": actions.unadvertise,
             "action_feedback": actions.pass_on(OfferedAction.publish_feedback),
             "action_result": actions.pass_on(OfferedAction.end),
-            "action_status": actions.pass_on(OfferedAction.settle),
+            "action_status": actions.pass_on(OfferedAction.take_status),
         }
 
     @property
@@ -104,23 +110,36 @@ class BridgeClient:
         return self._host.session
 
     @property
+    def offered(self) -> set[str]:
+        """The services by which one knows what the clients of the bridge offer."""
+        return self._host.offered
+
+    @property
     def waiting(self) -> int:
         """Number of received frames that wait to be handled."""
-        return len(self._frames)
+        return len(self._inbox)
 
     def receive(self, frame: Frame) -> None:
-        """Take a frame of the client; if something is wrong with it, the client gets a status message."""
-        self._frames.append(frame)
-        self._host.submit(self.work_off)
+        """Take a frame of the client; if something is wrong with it, the client gets a status message.
+
+        Without a router, frames wait. If too many wait, further ones are dropped, and the client is told once.
+        """
+        if self._inbox.is_full and not self._host.is_connected:
+            if not self._was_told_of_loss:
+                self._was_told_of_loss = True
+                self._host.submit(lambda: self.say("error", _LOSS))
+            return
+        self._inbox.put(frame)
+        self._host.submit(self.handle_frames)
 
     def close(self) -> None:
         """Withdraw all that the client had."""
         self._host.submit(self._close)
 
-    def work_off(self) -> None:
+    def handle_frames(self) -> None:
         """Handle the frames of the client; without a router, they wait."""
-        while self._frames and self._host.is_connected and not self._is_closed:
-            self._handle(self._frames.popleft())
+        while self._inbox and self._host.is_connected and not self._is_closed:
+            self._handle(self._inbox.take())
 
     def lose(self) -> None:
         """Forget the session, as the router has gone, and tell the client."""
@@ -130,12 +149,13 @@ class BridgeClient:
 
     def restore(self) -> None:
         """Make everything that the client had again, in a new session."""
+        self._was_told_of_loss = False
         for part in self._parts:
             part.restore()
         # This message cancels the error that `lose` has sent, so clients that only want errors get it, too.
         if self._level != "none":
             self.answer({"op": "status", "level": "info", "msg": "the router of the run is back"}, Form())
-        self.work_off()
+        self.handle_frames()
 
     def later(self, seconds: float, action: Callable[[], None]) -> None:
         """Call an action after a time [s]."""
@@ -164,7 +184,7 @@ class BridgeClient:
     def _close(self) -> None:
         if not self._is_closed:
             self._is_closed = True
-            self._frames.clear()
+            self._inbox.clear()
             self._host.forget(self)
             for part in self._parts:
                 part.close()
@@ -174,11 +194,12 @@ class BridgeClient:
         try:
             request = read_frame(frame)
             number = request.id
-            operation = self._looking.get(request.op) or self._acting.get(request.op)
+            operation = self._reading_operations.get(request.op) or self._changing_operations.get(request.op)
             if operation is None:
-                raise ConfigError(f"no operation {request.op}", expected=", ".join([*self._looking, *self._acting]))
+                known = [*self._reading_operations, *self._changing_operations]
+                raise ConfigError(f"no operation {request.op}", expected=", ".join(known))
             # A client that sends a goal waits for a result, so `_send_goal` refuses with a result instead of a status.
-            if request.op in self._acting and request.op != "send_action_goal":
+            if request.op in self._changing_operations and request.op != "send_action_goal":
                 self._require_writing(request.op)
             operation(request)
         except ThrowcollectError as error:
@@ -225,7 +246,7 @@ class BridgeClient:
         if self._read_only:
             raise ConfigError(f"{what}: this client may only look", expected="the token of those who may act")
 
-    def _take_part(self, request: BridgeRequest) -> None:
+    def _add_fragment(self, request: BridgeRequest) -> None:
         frame = self._reassembly.add(request)
         if frame is not None:
             self._handle(frame)

@@ -85,7 +85,7 @@ class OfferedAction:
             fill(result, {} if values is None else values)
         self._finish(number, result, request.natural_or("status", _SUCCEEDED) if has_succeeded else _ABORTED)
 
-    def settle(self, request: BridgeRequest) -> None:
+    def take_status(self, request: BridgeRequest) -> None:
         """Take note of the state of a goal; if it has ended, finish it with an empty result, as the client sends none.
 
         Raises:

@@ -38,18 +38,20 @@ class Offers(Belongings[ABelonging]):
         """Offer a service or an action; it replaces an earlier offer of this client with the same name.
 
         Raises:
-            ConfigError: If there is no such type, ROS does not allow the name, or a node offers it already.
+            ConfigError: If there is no such type, ROS does not allow the name, or a node or another client offers it
+                already.
         """
         given = request.text(self._kind)
         name = absolute_name(given)
         # The new offer is made before the old one is withdrawn, so that a malformed request changes nothing.
         offered = self._make(self._client, given, request.text("type"))
         if name in self._by_name:
-            self._by_name.pop(name).close()
-        elif self._client.session.is_offered_by_others(name + self._probe):
+            self._withdraw(name)
+        elif self._is_taken(name):
             raise ConfigError(f"{request.op}: {name} is offered already", expected="another name")
         offered.open()
         self._by_name[name] = offered
+        self._client.offered.add(name + self._probe)
 
     def unadvertise(self, request: BridgeRequest) -> None:
         """Withdraw something.
@@ -57,12 +59,26 @@ class Offers(Belongings[ABelonging]):
         Raises:
             ConfigError: If the client does not offer it.
         """
-        self._find(request).close()
-        del self._by_name[absolute_name(request.text(self._kind))]
+        self._find(request)
+        self._withdraw(absolute_name(request.text(self._kind)))
+
+    def close(self) -> None:
+        """Withdraw everything."""
+        for name in list(self._by_name):
+            self._withdraw(name)
 
     def pass_on(self, operation: Callable[[ABelonging, BridgeRequest], None]) -> Callable[[BridgeRequest], None]:
         """Make a function that passes a request of the client to the offer that the request names."""
         return lambda request: operation(self._find(request), request)
+
+    def _withdraw(self, name: str) -> None:
+        self._client.offered.discard(name + self._probe)
+        self._by_name.pop(name).close()
+
+    def _is_taken(self, name: str) -> bool:
+        # All clients offer through the one node of the bridge, so the graph does not tell their offers apart.
+        service = name + self._probe
+        return service in self._client.offered or self._client.session.is_offered_by_others(service)
 
     def _find(self, request: BridgeRequest) -> ABelonging:
         name = absolute_name(request.text(self._kind))

@@ -20,6 +20,10 @@ class Peer(Protocol):
     def session(self) -> BridgeSession:
         """The place of the bridge in the ROS graph."""
 
+    @property
+    def offered(self) -> set[str]:
+        """The services by which one knows what the clients of the bridge offer; all clients share this set."""
+
     def later(self, seconds: float, action: Callable[[], None]) -> None:
         """Call an action after a time [s]."""
 

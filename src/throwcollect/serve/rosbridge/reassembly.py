@@ -50,10 +50,14 @@ class Reassembly:
             frame.parts[number] = data
             frame.size += len(data) + _OF_A_PART
             self._size += len(data) + _OF_A_PART
-        if frame.total != total or self._size > LONGEST_FRAME:
+        if frame.total != total:
             self._drop(request.id)
-            what = f"total is {total}, and was {frame.total}" if frame.total != total else "the parts are too long"
-            raise ConfigError(f"fragment: {what}", expected=f"at most {LONGEST_FRAME} characters together")
+            raise ConfigError(f"fragment: total is {total}, and was {frame.total}", expected="the same in all parts")
+        if self._size > LONGEST_FRAME:
+            self._drop(request.id)
+            raise ConfigError(
+                "fragment: the parts are too long", expected=f"at most {LONGEST_FRAME} characters together"
+            )
         if len(frame.parts) < total:
             return None
         self._drop(request.id)

@@ -37,31 +37,35 @@ class RateLimit:
         self._send = send
         self._later = later
         self._queue: deque[Sample] = deque()
-        self._wish = SubscriptionRequest()
+        self._request = SubscriptionRequest()
         self._due = 0.0
         self._waits = False
 
-    def change(self, wish: SubscriptionRequest) -> None:
+    def change(self, request: SubscriptionRequest) -> None:
         """Use another rate and form from now on."""
-        self._wish = wish
-        self._queue = deque(self._queue, maxlen=wish.queue_length)
+        self._request = request
+        self._queue = deque(self._queue, maxlen=request.queue_length)
         # A shorter interval takes effect at once, and not only after the next sample.
-        self._due = min(self._due, time.monotonic() + wish.throttle_s)
+        self._due = min(self._due, time.monotonic() + request.throttle_s)
 
     def offer(self, sample: Sample) -> None:
         """Send a sample, keep it until it is due, or leave it out."""
         now = time.monotonic()
         if now >= self._due and not self._queue:
             self._let_through(sample, now)
-        elif self._wish.queue_length:
+        elif self._request.queue_length:
             self._queue.append(sample)
             self._wait(now)
+
+    def clear(self) -> None:
+        """Forget the samples that wait; a timer that still runs then finds none."""
+        self._queue.clear()
 
     def _let_through(self, sample: Sample, now: float) -> None:
         # Waiting samples are sent at even intervals, so the next interval begins when this sample was due, and not at
         # `now`, as the timer may be late.
-        is_late = now - self._due < self._wish.throttle_s and self._wish.queue_length
-        self._due = (self._due if is_late else now) + self._wish.throttle_s
+        is_late = now - self._due < self._request.throttle_s and self._request.queue_length
+        self._due = (self._due if is_late else now) + self._request.throttle_s
         self._send(sample)
 
     def _wait(self, now: float) -> None:
@@ -86,20 +90,20 @@ class SubscribedTopic:
         self._given = given
         self._topic = open_topic(given)
         self.type_name = type_name
-        self.wishes: dict[object, SubscriptionRequest] = {}
+        self.requests: dict[object, SubscriptionRequest] = {}
         self._merged = SubscriptionRequest()
         self._feed: Feed | None = None
         self._pace = RateLimit(self._send, client.later)
 
-    def want(self, name: object, wish: SubscriptionRequest) -> None:
+    def want(self, name: object, request: SubscriptionRequest) -> None:
         """Add one subscription of the client, or change it."""
-        self.wishes[name] = wish
+        self.requests[name] = request
         self._merge()
 
     def leave(self, name: object) -> None:
         """Remove one subscription of the client."""
-        del self.wishes[name]
-        if self.wishes:
+        del self.requests[name]
+        if self.requests:
             self._merge()
 
     def open(self) -> None:
@@ -107,23 +111,26 @@ class SubscribedTopic:
         self._feed = self._client.session.listen(self._topic, self.type_name, self._pace.offer)
 
     def lose(self) -> None:
-        """Forget the session, which has ended."""
+        """Forget the session, which has ended, and all messages that came by it."""
         self._feed = None
+        self._pace.clear()
 
     def close(self) -> None:
         """Listen no more."""
         if self._feed is not None:
             self._feed.remove(self._pace.offer)
             self._feed = None
+        # Nothing may come after the client has unsubscribed, also no message that waits for its time.
+        self._pace.clear()
 
     def _merge(self) -> None:
-        wishes = self.wishes.values()
+        requests = self.requests.values()
         self._merged = SubscriptionRequest(
-            min(wish.throttle_s for wish in wishes),
-            max(wish.queue_length for wish in wishes),
+            min(request.throttle_s for request in requests),
+            max(request.queue_length for request in requests),
             Form(
-                max((wish.form.compression for wish in wishes), key=COMPRESSIONS.index),
-                min((wish.form.fragment_size for wish in wishes if wish.form.fragment_size), default=0),
+                max((request.form.compression for request in requests), key=COMPRESSIONS.index),
+                min((request.form.fragment_size for request in requests if request.form.fragment_size), default=0),
             ),
         )
         self._pace.change(self._merged)
@@ -146,14 +153,14 @@ class Subscriptions(Belongings[SubscribedTopic]):
         Raises:
             ConfigError: If there is no such topic, it has another type, or clients may not subscribe to it.
         """
-        given, wanted = request.text("topic"), request.text_or("type", "")
+        given = request.text("topic")
         topic = open_topic(given)
-        wish = SubscriptionRequest(
+        wanted = SubscriptionRequest(
             request.natural_or("throttle_rate", 0) / 1000,
             request.natural_or("queue_length", 0),
             request.form(),
         )
-        type_name = self._client.session.type_of(topic, wanted)
+        type_name = self._client.session.type_of(topic, request.text_or("type", ""))
         subscription = self._by_name.get(given)
         if subscription is not None and subscription.type_name != type_name:
             raise ConfigError(
@@ -161,11 +168,11 @@ class Subscriptions(Belongings[SubscribedTopic]):
             )
         if subscription is None:
             subscription = SubscribedTopic(self._client, given, type_name)
-            subscription.want(request.id, wish)
+            subscription.want(request.id, wanted)
             subscription.open()
             self._by_name[given] = subscription
         else:
-            subscription.want(request.id, wish)
+            subscription.want(request.id, wanted)
 
     def unsubscribe(self, request: BridgeRequest) -> None:
         """End one subscription to a topic, or all if none is named.
@@ -175,11 +182,11 @@ class Subscriptions(Belongings[SubscribedTopic]):
         """
         given = request.text("topic")
         subscription = self._by_name.get(given)
-        if subscription is None or (request.id is not None and request.id not in subscription.wishes):
+        if subscription is None or (request.id is not None and request.id not in subscription.requests):
             which = "" if request.id is None else f" with the id {request.id}"
             raise ConfigError(f"unsubscribe: there is no subscription to {given}{which}")
-        for name in list(subscription.wishes) if request.id is None else [request.id]:
+        for name in list(subscription.requests) if request.id is None else [request.id]:
             subscription.leave(name)
-        if not subscription.wishes:
+        if not subscription.requests:
             subscription.close()
             del self._by_name[given]

@@ -81,7 +81,7 @@ async def attend(websocket: WebSocket, bridge: Bridge, *, read_only: bool) -> No
     client = bridge.attach(outbox.put, read_only=read_only)
     sending = asyncio.create_task(_send_all(websocket, outbox))
     try:
-        await _receive_all(websocket, client)
+        await _receive_all(websocket, bridge, client)
     finally:
         client.close()
         sending.cancel()
@@ -89,7 +89,7 @@ async def attend(websocket: WebSocket, bridge: Bridge, *, read_only: bool) -> No
             await sending
 
 
-async def _receive_all(websocket: WebSocket, client: BridgeClient) -> None:
+async def _receive_all(websocket: WebSocket, bridge: Bridge, client: BridgeClient) -> None:
     while True:
         message = await websocket.receive()
         if message["type"] == "websocket.disconnect":
@@ -101,7 +101,8 @@ async def _receive_all(websocket: WebSocket, client: BridgeClient) -> None:
             return
         client.receive(frame)
         # If a client sends faster than the bridge works, its frames are not read for a while, so TCP makes it wait.
-        while client.waiting > _MOST_WAITING:
+        # Without a router the bridge handles none, but only reading shows that the client has left.
+        while client.waiting > _MOST_WAITING and bridge.is_connected:
             await asyncio.sleep(_POLL_S)
 
 

@@ -6,6 +6,7 @@ import json
 import threading
 import time
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +24,7 @@ from throwcollect.ros.middleware import Middleware, uses_rclpy
 from throwcollect.ros.router import router
 from throwcollect.run_key import RunKey
 from throwcollect.serve.rosbridge import Bridge, attend
+from throwcollect.serve.server_process import WEBSOCKETS
 
 PATIENCE_S = 30.0
 
@@ -102,15 +104,20 @@ def _nothing_fails(caplog: pytest.LogCaptureFixture) -> Iterator[None]:
     assert [each.exc_info for each in caplog.records if each.name.startswith("throwcollect.serve")] == []
 
 
-@pytest.fixture(scope="session")
-def url(bridge: Bridge) -> Iterator[str]:
-    """Address of the bridge, over WebSockets."""
+@contextmanager
+def serve_by_websocket(bridge: Bridge) -> Iterator[str]:
+    """Serve a bridge over WebSockets, and give its address."""
 
     async def route(websocket: WebSocket) -> None:
         await attend(websocket, bridge, read_only=False)
 
     app = Starlette(routes=[WebSocketRoute("/", route)])
-    options: dict[str, Any] = {"lifespan": "off", "ws_per_message_deflate": False, "timeout_graceful_shutdown": 1}
+    options: dict[str, Any] = {
+        "lifespan": "off",
+        "ws": WEBSOCKETS,
+        "ws_per_message_deflate": False,
+        "timeout_graceful_shutdown": 1,
+    }
     config = uvicorn.Config(app, port=0, log_level="warning", **options)
     server = uvicorn.Server(config)
     thread = threading.Thread(target=server.run, daemon=True)
@@ -119,6 +126,13 @@ def url(bridge: Bridge) -> Iterator[str]:
     yield f"ws://127.0.0.1:{server.servers[0].sockets[0].getsockname()[1]}/"
     server.should_exit = True
     thread.join()
+
+
+@pytest.fixture(scope="session")
+def url(bridge: Bridge) -> Iterator[str]:
+    """Address of the bridge, over WebSockets."""
+    with serve_by_websocket(bridge) as address:
+        yield address
 
 
 @pytest.fixture

@@ -145,11 +145,13 @@ def test_fragments_that_do_not_fit_together_are_refused() -> None:
         with pytest.raises(ConfigError, match="fragment: "):
             whole.add(wrong)
     assert whole.add(part(0, 2)) is None
-    with pytest.raises(ConfigError, match="total is 3, and was 2"):
+    with pytest.raises(ConfigError, match="total is 3, and was 2") as refusal:
         whole.add(part(1, 3))
+    assert refusal.value.expected == "the same in all parts"
     assert whole.add(part(0, 2, "x" * (LONGEST_FRAME // 2))) is None
-    with pytest.raises(ConfigError, match="the parts are too long"):
+    with pytest.raises(ConfigError, match="the parts are too long") as refusal:
         whole.add(part(0, 2, "x" * (LONGEST_FRAME // 2), name="b"))
+    assert refusal.value.expected == f"at most {LONGEST_FRAME} characters together"
     assert whole.add(part(1, 2, "y")) == "x" * (LONGEST_FRAME // 2) + "y"
     assert whole.add(part(0, 1, "x" * (LONGEST_FRAME - 100))) is not None
 

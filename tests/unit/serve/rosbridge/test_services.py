@@ -156,3 +156,31 @@ def test_two_clients_call_each_other(bridge: Bridge, party: Party) -> None:
     party.ask(op="service_response", id=asked["id"], service="/clock", values={"success": True}, result=True)
     assert other.next(id="c")["values"] == {"success": True, "message": ""}
     other.client.close()
+
+
+@pytest.mark.parametrize(
+    ("kind", "type_name"), [("service", "std_srvs/SetBool"), ("action", "control_msgs/FollowJointTrajectory")]
+)
+def test_a_client_cannot_offer_what_another_client_offers_until_that_one_leaves(
+    bridge: Bridge, party: Party, kind: str, type_name: str
+) -> None:
+    first, second = Party(bridge), Party(bridge)
+    offer = {"op": f"advertise_{kind}", kind: "/same", "type": type_name}
+    first.ask(**offer)
+    # When the bridge answers, it has handled the offer.
+    first.call("rosapi/get_time")
+    # Another name for the same thing is refused, too.
+    second.ask(**{**offer, kind: "same"}, id="refused")
+    told = second.next(op="status")
+    assert (told["id"], told["level"]) == ("refused", "error")
+    assert f"advertise_{kind}: /same is offered already" in told["msg"]
+    second.ask(op=f"unadvertise_{kind}", **{kind: "/same"})
+    assert "/same is not advertised by this client" in second.next(op="status")["msg"]
+    first.ask(**offer)
+    first.client.close()
+    for each in (second, party):
+        each.ask(**offer)
+        each.ask(op=f"unadvertise_{kind}", **{kind: "/same"})
+        each.call("rosapi/get_time")
+        assert [one for one in each.got()[2 * (each is second) :] if one["op"] == "status"] == []
+    second.client.close()

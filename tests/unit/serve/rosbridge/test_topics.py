@@ -18,7 +18,7 @@ from tests.unit.serve.rosbridge.conftest import PATIENCE_S, Party, wait_for, wai
 from rclzenoh.interfaces import serialize
 from throwcollect.ros import DurabilityPolicy, Node, QoSProfile, get_message
 from throwcollect.serve.rosbridge import Bridge, subscriptions
-from throwcollect.serve.rosbridge.subscriptions import RateLimit, SubscriptionRequest
+from throwcollect.serve.rosbridge.subscriptions import RateLimit, SubscribedTopic, SubscriptionRequest
 
 String: Any = get_message("std_msgs/msg/String")
 JointState: Any = get_message("sensor_msgs/msg/JointState")
@@ -182,6 +182,36 @@ def test_a_throttle_of_33_ms_passes_30_of_50_messages_a_second(monkeypatch: pyte
         now = arrives
         pace.offer(sample)
     assert len(sent) == pytest.approx(1800, abs=60)
+
+
+@pytest.mark.parametrize("end", ["close", "lose"])
+def test_messages_that_wait_for_their_time_are_forgotten_when_their_subscription_or_its_session_ends(end: str) -> None:
+    timers: list[Callable[[], None]] = []
+    sent: list[str] = []
+    feed = SimpleNamespace(remove=lambda _: None)
+    client: Any = SimpleNamespace(
+        session=SimpleNamespace(listen=lambda _topic, _type, listener: heard.append(listener) or feed),
+        later=lambda _seconds, action: timers.append(action),
+        send=lambda frame, _size: sent.append(frame),
+    )
+    heard: list[Callable[[Any], None]] = []
+    topic = SubscribedTopic(client, "/words", "std_msgs/msg/String")
+    topic.want(None, SubscriptionRequest(throttle_s=60.0, queue_length=10))
+    topic.open()
+
+    def hear(word: str) -> None:
+        heard[-1](SimpleNamespace(frame=lambda _topic, _compression: word))
+
+    for word in "abc":
+        hear(word)
+    getattr(topic, end)()
+    timers.pop()()
+    assert (sent, timers) == (["a"], [])
+    # In a new session, messages wait as before.
+    topic.open()
+    hear("d")
+    timers.pop()()
+    assert sent == ["a", "d"]
 
 
 def test_a_long_message_comes_in_fragments_of_the_requested_size(party: Party, node: Node) -> None:
