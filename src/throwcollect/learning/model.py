@@ -278,7 +278,7 @@ class Model:
         listed = read_list("points", points, "mappings, one for each throw", (Mapping,))
         rows = []
         for number, point in enumerate(listed):
-            if wrong := sorted(set(point) ^ set(names)):
+            if wrong := sorted(set(point) ^ set(names), key=str):
                 state = "is missing" if wrong[0] in names else "is no key of this model"
                 raise ConfigError(f"throw {number}: {wrong[0]} {state}", expected=f"values of {', '.join(names)}")
             rows.append([as_float(point[name]) for name in names])

@@ -212,6 +212,8 @@ def test_points_with_missing_unknown_or_infinite_values_are_refused(model: Model
         model.predict([{KEYS[1]: 0.0, KEYS[2]: 0.0}])
     with pytest.raises(ConfigError, match="is no key of this model"):
         model.predict([dict.fromkeys(KEYS, 1.0) | {"ball.mass_kg": 1.0}])
+    with pytest.raises(ConfigError, match="throw 0: 3 is no key of this model"):
+        model.predict([dict.fromkeys(KEYS, 1.0) | {3: 1.0, None: 1.0}])
     with pytest.raises(ConfigError, match="is inf"):
         model.predict([dict.fromkeys(KEYS, float("inf"))])
 
