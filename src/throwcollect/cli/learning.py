@@ -18,8 +18,9 @@ from throwcollect.side_by_side import count_cores
 from throwcollect.wording import command, format_count, join_names
 
 if TYPE_CHECKING:
+    from throwcollect.learning.aiming import Aim
     from throwcollect.learning.lists import Row
-    from throwcollect.learning.model import Aim, Model
+    from throwcollect.learning.model import Model
     from throwcollect.learning.score import Errors, Score
 
 _MOST_TOLD = 20
@@ -132,7 +133,7 @@ def aim(
         task = load_config(directory / CONFIG).task
         write_aims(output, aims, names, task)
     if json:
-        print_json([_make_aim_document(aim) for aim in aims])
+        print_json([aim.as_dict() for aim in aims])
     elif output is not None:
         typer.echo(f"{output}: {format_count(len(aims), task.noun)}")
     else:
@@ -334,16 +335,6 @@ def _tell_out_of_reach(model: Model, aims: Sequence[Aim]) -> None:
         tell(f"target {number} of {len(aims)} is out of reach: {explain_reach(model.learned, aim)}")
     if len(far) > _MOST_TOLD:
         tell(f"and {len(far) - _MOST_TOLD} more; {len(far)} of {len(aims)} targets are out of reach")
-
-
-def _make_aim_document(aim: Aim) -> dict[str, object]:
-    return {
-        "target": aim.target.tolist(),
-        "parameters": aim.parameters,
-        "predicted": aim.predicted.tolist(),
-        "reachable": aim.reachable,
-        "nearest": aim.nearest.tolist(),
-    }
 
 
 def _describe_score(score: Score) -> list[str]:

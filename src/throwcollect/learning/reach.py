@@ -6,9 +6,8 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from throwcollect.learning.aiming import REACH, TOLERANCE
+from throwcollect.learning.aiming import REACH, TOLERANCE, Aim
 from throwcollect.learning.learned_map import KeyRole, LearnedMap
-from throwcollect.learning.model import Aim
 from throwcollect.learning.score import tell_length
 
 
