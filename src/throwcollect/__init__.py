@@ -31,7 +31,8 @@ if TYPE_CHECKING:
     )
     from throwcollect.export.export import export as export_dataset
     from throwcollect.extras import MissingExtraError
-    from throwcollect.learning.model import Aim, Model, fit, load_model
+    from throwcollect.learning.aiming import Aim
+    from throwcollect.learning.model import Model, fit, load_model
     from throwcollect.learning.score import Score
     from throwcollect.replay.verification import verify_dataset
     from throwcollect.simulator import Simulator
@@ -69,7 +70,7 @@ __all__ = [
 ]
 
 _PLACES = {
-    "Aim": "learning.model:Aim",
+    "Aim": "learning.aiming:Aim",
     "Config": "config.schema:Config",
     "ConfigError": "errors:ConfigError",
     "ConflictError": "errors:ConflictError",

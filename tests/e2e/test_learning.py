@@ -81,6 +81,9 @@ def test_the_commands_of_the_page_work_in_their_order(tmp_path: Path, monkeypatc
         assert done.returncode == 0, (line, done.stderr)
         said += done.stdout
     assert re.search(r"^miss_m +2 of 2 targets: median ", said, re.MULTILINE)
+    head, *_, row = re.findall(r"^ +median  .*|^learned from \d+ throws .*", said, re.MULTILINE)
+    assert re.split("  +", head.strip()) == ["median", "9 of 10 below", "largest", "throws", "did not succeed"]
+    assert re.fullmatch(r"learned from \d+ throws( +[\d.e-]+ cm){3} +3 +0", row)
     assert Path("models", "real", "model.json").exists()
 
 
@@ -257,7 +260,7 @@ def test_a_missing_target_column_is_an_error_with_both_possible_names(place: Pat
 
 def test_adapt_prints_the_median_miss_with_its_unit(place: Path) -> None:
     said = call_here("adapt", place / "model", place / "data", "-o", place / "told")
-    assert re.search(r"^median miss before: [\d.]+ cm", said.stdout, re.M), said.stdout
+    assert re.search(r"^median miss before: [\d.e-]+ cm", said.stdout, re.M), said.stdout
 
 
 def test_the_python_program_of_the_page_runs(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:

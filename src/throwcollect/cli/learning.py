@@ -18,9 +18,10 @@ from throwcollect.side_by_side import count_cores
 from throwcollect.wording import command, format_count, join_names
 
 if TYPE_CHECKING:
+    from throwcollect.learning.aiming import Aim
     from throwcollect.learning.lists import Row
-    from throwcollect.learning.model import Aim, Model
-    from throwcollect.learning.score import Errors, Score
+    from throwcollect.learning.model import Model
+    from throwcollect.learning.score import Score
 
 _MOST_TOLD = 20
 """Largest number of targets out of reach that are printed; further ones are only counted."""
@@ -61,7 +62,7 @@ def fit(
 ) -> None:
     """Learn from a dataset where throws end, and which parameters lead to a target."""
     from throwcollect.learning.model import fit
-    from throwcollect.learning.score import tell_length
+    from throwcollect.learning.score import format_length
 
     if onnx:
         require("onnx")
@@ -88,7 +89,7 @@ def fit(
         if names:
             typer.echo(f"{what}: {', '.join(names)}")
     folds = trained.folds_error.items()
-    errors = ", ".join(f"degree {degree}: {tell_length(error, model.targets)}" for degree, error in folds)
+    errors = ", ".join(f"degree {degree}: {format_length(error, model.targets)}" for degree, error in folds)
     typer.echo(f"error for throws that it was not fitted to, in simulation, median: {errors}")
     typer.echo(f"model: {output}\naim with it: {command('aim', output, '--at', _write_example(model))}")
 
@@ -132,7 +133,7 @@ def aim(
         task = load_config(directory / CONFIG).task
         write_aims(output, aims, names, task)
     if json:
-        print_json([_make_aim_document(aim) for aim in aims])
+        print_json([aim.as_dict() for aim in aims])
     elif output is not None:
         typer.echo(f"{output}: {format_count(len(aims), task.noun)}")
     else:
@@ -235,7 +236,7 @@ def adapt(
     from throwcollect.learning.adapting import FarThrowError, Method
     from throwcollect.learning.lists import read_table, refuse_large_targets
     from throwcollect.learning.model import load_model
-    from throwcollect.learning.score import tell_length
+    from throwcollect.learning.score import format_length
 
     methods = ("auto", *(each.value for each in Method))
     if method not in methods:
@@ -263,13 +264,11 @@ def adapt(
     typer.echo(f"{format_count(entry.throws, 'throw')}; what differs: {entry.method.value}")
     for estimate in entry.found:
         typer.echo(f"{estimate.name}: {estimate.value:.4g} (standard deviation {estimate.deviation:.2g})")
-    before, after = (
-        tell_length(sorted(misses)[len(misses) // 2], model.targets) if misses else None
-        for misses in (entry.before, entry.after)
-    )
-    typer.echo(
-        f"median miss before: {before}" + ("" if after is None else f"; after, each by a model of the others: {after}")
-    )
+    before, after = entry.medians
+    told = f"median miss before: {format_length(before, model.targets)}"
+    if after is not None:
+        told += f"; after, each by a model of the others: {format_length(after, model.targets)}"
+    typer.echo(told)
 
 
 def _split(names: str | None) -> tuple[str, ...]:
@@ -336,33 +335,13 @@ def _tell_out_of_reach(model: Model, aims: Sequence[Aim]) -> None:
         tell(f"and {len(far) - _MOST_TOLD} more; {len(far)} of {len(aims)} targets are out of reach")
 
 
-def _make_aim_document(aim: Aim) -> dict[str, object]:
-    return {
-        "target": aim.target.tolist(),
-        "parameters": aim.parameters,
-        "predicted": aim.predicted.tolist(),
-        "reachable": aim.reachable,
-        "nearest": aim.nearest.tolist(),
-    }
-
-
 def _describe_score(score: Score) -> list[str]:
-    lines = [
+    from throwcollect.learning.score import SCORE_HEAD
+
+    rows = [("", *SCORE_HEAD), *(row.cells for row in score.list_rows())]
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    return [
         f"throws at {format_count(score.targets, 'target')} for each of {format_count(score.seeds, 'seed')}, medians "
-        "of the seeds, in simulation: median, 9 of 10 below, largest; not landed"
+        "of the seeds, in simulation:",
+        *("  ".join([f"{row[0]:{widths[0]}}", *map(str.rjust, row[1:], widths[1:])]) for row in rows),
     ]
-    lines += [f"  learned from {each.trained_on:5} throws:  {_format_errors(each.errors)}" for each in score.trained]
-    if score.distilled is not None:
-        lines.append(f"  model.onnx of these:        {_format_errors(score.distilled)}")
-    if score.adapted:
-        lines.append("in the other world, by the number of throws there:")
-        lines += [
-            f"  {each.real_throws:3} ({each.method.value}):  {_format_errors(each.errors)}" for each in score.adapted
-        ]
-    return lines
-
-
-def _format_errors(errors: Errors) -> str:
-    from throwcollect.learning.score import tell_misses
-
-    return "  ".join([*(f"{cell:>8}" for cell in tell_misses(errors)), str(errors.missed)])

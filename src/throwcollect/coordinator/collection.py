@@ -360,7 +360,7 @@ class TrialCollection:
     def _note(self, trial: int, result: Result) -> None:
         self._outcomes[result.outcome.value] += 1
         if self._growth is not None:
-            self._growth.tell(trial, result)
+            self._growth.take_result(trial, result)
 
     def _tell_set_aside(self) -> None:
         aside = {name: reason for name in self._names if (reason := self._leases.why_set_aside(name)) is not None}

@@ -85,12 +85,12 @@ class Growth:
 
     def recall(self, trial: int, result: Result) -> None:
         """Take in a result that an earlier collection has left of a trial that is sure to belong to the plan."""
-        self._rounds.tell(trial, result)
+        self._rounds.take_result(trial, result)
 
-    def tell(self, trial: int, result: Result) -> None:
+    def take_result(self, trial: int, result: Result) -> None:
         """Take in the result of a trial that has ended now."""
         self._first_anew = min(self._first_anew, trial)
-        self._rounds.tell(trial, result)
+        self._rounds.take_result(trial, result)
 
     def keep(self, trial: int, result: Result) -> bool:
         """Keep a result that the earlier collection has left, unless its trial is sure to belong to the plan.

@@ -15,6 +15,7 @@ from throwcollect.dataset.provenance import Provenance
 from throwcollect.robots.description import robot_of
 from throwcollect.sweep.arrow_column import count_values, find_range
 from throwcollect.sweep.plan import FIRST_TRIALS
+from throwcollect.units import unit_of_name
 
 _SIZES = ((1_000, "n<1K"), (10_000, "1K<n<10K"), (100_000, "10K<n<100K"), (1_000_000, "100K<n<1M"))
 _MORE = "1M<n<10M"
@@ -125,9 +126,7 @@ def _list_targets(config: Config, throws: pa.Table) -> list[str]:
     if not found:
         return []
     rows = [
-        f"| `{name}` | {each.targets} | {each.measured} | {each.median:.4g} | {each.share90:.4g} | {each.largest:.4g} |"
-        if each.measured
-        else f"| `{name}` | {each.targets} | 0 | | | |"
+        f"| `{name}` | {each.targets} | {each.measured} | {' | '.join(each.format_misses(unit_of_name(name)))} |"
         for name, each in found.items()
     ]
     return [

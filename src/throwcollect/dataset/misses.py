@@ -12,6 +12,7 @@ import pyarrow as pa
 from throwcollect.config.schema import Config
 from throwcollect.config.target_columns import is_target
 from throwcollect.config.values import leaves
+from throwcollect.dataset.miss_quantiles import find_median, find_share90
 from throwcollect.dataset.summary import MissSummary
 from throwcollect.sweep.arrow_column import nan_where_null
 from throwcollect.sweep.points import Targets
@@ -38,8 +39,8 @@ def summarise_misses(config: Config, throws: pa.Table) -> dict[str, MissSummary]
         columns = [number for number, each in enumerate(misses.targets) if each.miss == name]
         aimed = int((~np.isnan(targets.values[:, columns])).any(axis=1).sum())
         values = throws[name].drop_null().to_numpy()
-        median, share90, largest = np.quantile(values, (0.5, 0.9, 1.0)).tolist() if len(values) else (None,) * 3
-        summaries[name] = MissSummary(aimed, len(values), median, share90, largest)
+        largest = float(values.max()) if len(values) else None
+        summaries[name] = MissSummary(aimed, len(values), find_median(values), find_share90(values), largest)
     return summaries
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 from throwcollect.errors import LossError
 from throwcollect.tasks.result import LOST
+from throwcollect.units import format_distance
 from throwcollect.wording import format_count
 
 
@@ -25,6 +26,11 @@ class MissSummary:
     median: float | None
     share90: float | None
     largest: float | None
+
+    def format_misses(self, unit: str) -> tuple[str, str, str]:
+        """Write median, share90 and largest miss for people; `unit` is that of the column."""
+        median, share90, largest = (format_distance(each, unit) for each in (self.median, self.share90, self.largest))
+        return median, share90, largest
 
 
 @dataclass(frozen=True)

@@ -134,7 +134,7 @@ def _draw_rounds(plan: Plan, rows: Mapping[int, Row] | None) -> _Drawing:
         for trial in added:
             row = None if rows is None else rows.get(trial.number)
             if row is not None and row["outcome"] != REFUSED:
-                rounds.tell(trial.number, table.result(row))
+                rounds.take_result(trial.number, table.result(row))
                 lost = trial.number if lost is None and row["outcome"] == LOST else lost
     problem, count = None, sum(map(len, values))
     if not is_doubtful():

@@ -144,10 +144,13 @@ def _find_cells(axes: Sequence[str], throws: pa.Table) -> list[Cell | None]:
     """Find the cell of each row by expressions and widths; None for a row without a finite value on an axis.
 
     Raises:
-        ConfigError: If an axis is no expression with a width, or cannot be evaluated.
+        ConfigError: If there is no axis, or one is no expression with a width, or cannot be evaluated.
     """
     columns = []
-    for text in read_list("cells", axes, "texts EXPRESSION=WIDTH"):
+    texts = read_list("cells", axes, "texts EXPRESSION=WIDTH")
+    if not texts:
+        raise refuse_argument("cells", "the list is empty", expected="at least one axis, such as landing_x_m=0.05")
+    for text in texts:
         name, width = _read_pair(text, "cells", "an expression and the width of cells, such as landing_x_m=0.05")
         if not float(width) > 0:
             raise refuse_argument("cells", f"the width of cells should be above 0, got {text!r}")

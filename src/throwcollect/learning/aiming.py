@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import Enum
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,6 +41,29 @@ class Choice(str, Enum):
     """Those with the smallest predicted torque, as a share of its limit."""
     LEAST_SENSITIVE = "least-sensitive"
     """Those at which errors of the parameters move the end of the trial least."""
+
+
+@dataclass(frozen=True, eq=False)
+class Aim:
+    """How to reach a target.
+
+    Attributes:
+        target: Values of the model's targets, then of the keys that are given with them.
+        parameters: Values by dotted key, as `Simulator.throw` takes them, also of the keys that are given.
+        predicted: Where the trial should end, shape ``(n_targets,)``.
+        reachable: Whether a throw of the dataset and the prediction are near enough to the target.
+        nearest: Where the nearest throw of the dataset ended, shape ``(n_targets,)``.
+    """
+
+    target: Array
+    parameters: dict[str, float]
+    predicted: Array
+    reachable: bool
+    nearest: Array
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the same as a dictionary with lists in place of arrays, for JSON."""
+        return {name: value.tolist() if isinstance(value, np.ndarray) else value for name, value in vars(self).items()}
 
 
 @dataclass(frozen=True, eq=False)

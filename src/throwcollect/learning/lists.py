@@ -13,7 +13,7 @@ from throwcollect.config.target_columns import LARGEST_TARGET
 from throwcollect.config.task_config import TaskConfig
 from throwcollect.errors import ConfigError
 from throwcollect.files import write_file
-from throwcollect.learning.model import Aim
+from throwcollect.learning.aiming import Aim
 from throwcollect.sweep.point_file import explain_wrong_count, read_number
 from throwcollect.wording import join_names
 

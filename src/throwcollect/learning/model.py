@@ -17,7 +17,7 @@ from throwcollect.errors import ConfigError
 from throwcollect.extras import require
 from throwcollect.files import StrPath
 from throwcollect.learning.adapting import Method, adapt, refuse_far_inputs, refuse_far_places
-from throwcollect.learning.aiming import Choice, aim
+from throwcollect.learning.aiming import Aim, Choice, aim
 from throwcollect.learning.arrays import Array
 from throwcollect.learning.distilling import distil
 from throwcollect.learning.fitting import Fit, fit_map
@@ -31,25 +31,6 @@ from throwcollect.wording import format_count
 
 if TYPE_CHECKING:
     from throwcollect.dataset.reader import Dataset
-
-
-@dataclass(frozen=True, eq=False)
-class Aim:
-    """How to reach a target.
-
-    Attributes:
-        target: Values of the model's targets, then of the keys that are given with them.
-        parameters: Values by dotted key, as `Simulator.throw` takes them, also of the keys that are given.
-        predicted: Where the trial should end, shape ``(n_targets,)``.
-        reachable: Whether a throw of the dataset and the prediction are near enough to the target.
-        nearest: Where the nearest throw of the dataset ended, shape ``(n_targets,)``.
-    """
-
-    target: Array
-    parameters: dict[str, float]
-    predicted: Array
-    reachable: bool
-    nearest: Array
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -278,7 +259,7 @@ class Model:
         listed = read_list("points", points, "mappings, one for each throw", (Mapping,))
         rows = []
         for number, point in enumerate(listed):
-            if wrong := sorted(set(point) ^ set(names)):
+            if wrong := sorted(set(point) ^ set(names), key=str):
                 state = "is missing" if wrong[0] in names else "is no key of this model"
                 raise ConfigError(f"throw {number}: {wrong[0]} {state}", expected=f"values of {', '.join(names)}")
             rows.append([as_float(point[name]) for name in names])

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from throwcollect.learning.adapting import Method
 from throwcollect.learning.learned_map import Axis
 from throwcollect.learning.model_file import AdaptationEntry, ModelFile
-from throwcollect.learning.score import Errors, Score, tell_length, tell_misses, tell_scatter
+from throwcollect.learning.score import SCORE_HEAD, Score, ScoreRow, format_length, format_scatter
 from throwcollect.wording import format_count
 
 PROGRAM = """\
@@ -130,8 +132,8 @@ def _describe_adaptation(adaptation: AdaptationEntry, file: ModelFile) -> list[s
         *(f"| `{each.name}` | {each.value:.4g} | {each.deviation:.2g} |" for each in adaptation.found),
         "",
     ]
-    if adaptation.after:
-        before, after = (sorted(each)[len(each) // 2] for each in (adaptation.before, adaptation.after))
+    before, after = adaptation.medians
+    if after is not None:
         lines += [
             f"The throws were off by {_format_length(before, file)} before (median), "
             f"and by {_format_length(after, file)} after, each predicted by a model that was adapted to the others.",
@@ -142,43 +144,36 @@ def _describe_adaptation(adaptation: AdaptationEntry, file: ModelFile) -> list[s
 
 def _describe_score(score: Score, file: ModelFile) -> list[str]:
     targets = format_count(score.targets, "target")
+    rows = score.list_rows()
     lines = [
         "## How it hits",
         "",
         f"Misses of {targets} for each of {format_count(score.seeds, 'seed')} (from {score.seed} on), medians of "
         "the seeds; each draws targets, the throws that were learned from, and those in another world; in simulation:",
         "",
-        "| learned from | median | 9 of 10 below | largest | did not succeed |",
-        "|---|---|---|---|---|",
-        *(f"| {format_count(each.trained_on, 'throw')} | {_describe_errors(each.errors)} |" for each in score.trained),
-        *([f"| `model.onnx` of these | {_describe_errors(score.distilled)} |"] if score.distilled is not None else []),
+        *_tabulate([row for row in rows if not row.elsewhere]),
         "",
     ]
     if score.adapted:
         scatter = (
-            f", with a scatter of {tell_scatter(score.scatter, file.targets)} of what is measured"
+            f", with a scatter of {format_scatter(score.scatter, file.targets)} of what is measured"
             if score.scatter
             else ""
         )
         lines += [
-            f"In another world{scatter}, at those of these targets that can be reached there, "
-            f"{format_count(score.adapted[0].errors.throws, 'throw')} for each row, in simulation:",
+            f"In another world{scatter}, at those of these targets that can be reached there, in simulation:",
             "",
-            "| throws there | differs by | median | 9 of 10 below | largest | did not succeed |",
-            "|---|---|---|---|---|---|",
-            *(
-                f"| {each.real_throws} | {each.method.value} | {_describe_errors(each.errors)} |"
-                for each in score.adapted
-            ),
+            *_tabulate([row for row in rows if row.elsewhere]),
             "",
         ]
     return lines
 
 
-def _describe_errors(errors: Errors) -> str:
-    return " | ".join([*tell_misses(errors), str(errors.missed)])
+def _tabulate(rows: Sequence[ScoreRow]) -> list[str]:
+    lines = [("", *SCORE_HEAD), ("---",) * (len(SCORE_HEAD) + 1), *(row.cells for row in rows)]
+    return [f"| {' | '.join(cells)} |" for cells in lines]
 
 
-def _format_length(value: float, file: ModelFile) -> str:
+def _format_length(value: float | None, file: ModelFile) -> str:
     """A distance between targets, over all of them."""
-    return tell_length(value, file.targets)
+    return format_length(value, file.targets)

@@ -8,6 +8,7 @@ from typing import Literal
 from pydantic import Field, FiniteFloat, ValidationError, model_validator
 
 from throwcollect.dataset.directory import has_files
+from throwcollect.dataset.miss_quantiles import find_median
 from throwcollect.errors import DatasetError
 from throwcollect.files import read_text
 from throwcollect.learning.adapting import ROLES, Method
@@ -54,6 +55,11 @@ class AdaptationEntry(ModelEntry):
     before: list[FiniteFloat]
     after: list[FiniteFloat]
     found: list[AdaptedNumber]
+
+    @property
+    def medians(self) -> tuple[float | None, float | None]:
+        """Medians of `before` and of `after`; None if there are no distances."""
+        return find_median(self.before), find_median(self.after)
 
 
 class TrainedOn(ModelEntry):

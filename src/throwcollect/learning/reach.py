@@ -6,10 +6,9 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from throwcollect.learning.aiming import REACH, TOLERANCE
+from throwcollect.learning.aiming import REACH, TOLERANCE, Aim
 from throwcollect.learning.learned_map import KeyRole, LearnedMap
-from throwcollect.learning.model import Aim
-from throwcollect.learning.score import tell_length
+from throwcollect.learning.score import format_length
 
 
 def explain_reach(learned: LearnedMap, aim: Aim) -> str:
@@ -23,14 +22,14 @@ def explain_reach(learned: LearnedMap, aim: Aim) -> str:
     ]
     if away > REACH:
         reasons.append(
-            f"no throw came within {tell_length(REACH, learned.targets)}, so predictions there are uncertain"
+            f"no throw came within {format_length(REACH, learned.targets)}, so predictions there are uncertain"
         )
     if missed > TOLERANCE:
-        reasons.append(f"the best parameters are predicted to miss it by {tell_length(missed, learned.targets)}")
+        reasons.append(f"the best parameters are predicted to miss it by {format_length(missed, learned.targets)}")
     return (
         f"{_join_numbers(aim.target)}; {'; '.join(reasons)}\n"
         f"  the nearest point that was reached: {_join_numbers(aim.nearest)} "
-        f"({tell_length(away, learned.targets)} away); predicted end: {_join_numbers(aim.predicted)}"
+        f"({format_length(away, learned.targets)} away); predicted end: {_join_numbers(aim.predicted)}"
     )
 
 

@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 from pydantic import Field, FiniteFloat
 
+from throwcollect.dataset.miss_quantiles import find_median, find_share90
 from throwcollect.learning.adapting import Method
 from throwcollect.learning.arrays import Array, ModelEntry
-from throwcollect.units import unit_of_name
+from throwcollect.units import format_distance, unit_of_name
+from throwcollect.wording import format_count
 
-SHOWN_AS = {"m": (100.0, " cm"), "rad": (180.0 / np.pi, "°")}
-"""For a unit of targets: the factor and the unit with which misses are shown to people."""
+SCORE_HEAD = ("median", "9 of 10 below", "largest", "throws", "did not succeed")
+"""Head of the table of a score, beside its labels."""
 
 
 class MissStatistics(ModelEntry):
@@ -22,7 +25,7 @@ class MissStatistics(ModelEntry):
     Attributes:
         unit: The unit.
         median: Median; None if half of the throws did not succeed, as such a throw counts as farther than all others.
-        share90: Nine of ten throws miss by less; None if it is the miss of a throw that did not succeed.
+        share90: Nine of ten throws miss by less; None if that depends on a throw that did not succeed.
         largest: Largest miss; None if a throw did not succeed.
     """
 
@@ -65,7 +68,7 @@ class Errors(MissStatistics):
 
     @classmethod
     def middle(cls, some: Sequence[Errors]) -> Errors:
-        """Sum up the errors of several seeds, at least one: each number is the median of theirs."""
+        """Sum up the errors of several seeds, at least one: the medians of their misses, and all their throws."""
         first, *others = (_take_middle(each) for each in zip(*(each.by_unit for each in some), strict=True))
         throws, missed = sum(each.throws for each in some), sum(each.missed for each in some)
         return cls(throws=throws, missed=missed, **vars(first), others=others)
@@ -77,55 +80,48 @@ def list_units(targets: Sequence[str]) -> list[str]:
     return sorted(units, key=lambda unit: unit != "m")
 
 
-def tell_miss(miss: float | None, unit: str) -> str:
-    """A miss in words: in centimetres, degrees, or its own unit; ``-`` for None."""
-    if miss is None:
-        return "-"
-    factor, shown = SHOWN_AS.get(unit, (1.0, unit))
-    return f"{miss * factor:.2f}{shown}" if unit in SHOWN_AS else f"{miss:.3g} {shown}".rstrip()
-
-
-def tell_misses(errors: Errors) -> tuple[str, str, str]:
-    """Median, share90 and largest in words, each for all units."""
+def format_misses(errors: Errors) -> tuple[str, str, str]:
+    """Write median, share90 and largest for people, each for all units."""
     median, share90, largest = (
-        ", ".join(dict.fromkeys(tell_miss(getattr(each, name), each.unit) for each in errors.by_unit))
+        ", ".join(dict.fromkeys(format_distance(getattr(each, name), each.unit) for each in errors.by_unit))
         for name in ("median", "share90", "largest")
     )
     return median, share90, largest
 
 
-def tell_length(length: float, targets: Sequence[str]) -> str:
-    """A distance over all targets in words, whatever their units."""
+def format_length(length: float | None, targets: Sequence[str]) -> str:
+    """Write a distance over all targets for people, whatever their units."""
     units = list_units(targets)
-    return tell_miss(length, units[0]) if len(units) == 1 else f"{length:.3g} ({' and '.join(units)} together)"
+    if len(units) == 1 or length is None:
+        return format_distance(length, units[0])
+    return f"{length:.3g} ({' and '.join(units)} together)"
 
 
-def tell_scatter(scatter: float, targets: Sequence[str]) -> str:
-    """A standard deviation that every target has, in words."""
-    return " and ".join(tell_miss(scatter, unit) for unit in list_units(targets))
+def format_scatter(scatter: float, targets: Sequence[str]) -> str:
+    """Write a standard deviation that every target has for people."""
+    return " and ".join(format_distance(scatter, unit) for unit in list_units(targets))
 
 
 def _sum_up(away: Array, unit: str) -> MissStatistics:
     distances = np.linalg.norm(away, axis=1)
     # A throw that did not succeed has no distance, and counts as farther away than all others.
-    ordered = np.sort(np.where(np.isfinite(distances), distances, np.inf))
-    # Indices of the lower median, of the smallest distance that 9 of 10 do not exceed, and of the largest distance.
-    places = (len(ordered) - 1) // 2, int(np.ceil(0.9 * len(ordered))) - 1, len(ordered) - 1
-    median, share90, largest = (float(ordered[place]) if np.isfinite(ordered[place]) else None for place in places)
-    return MissStatistics(unit=unit, median=median, share90=share90, largest=largest)
+    misses = np.where(np.isfinite(distances), distances, np.inf)
+    largest = float(misses.max())
+    return MissStatistics(
+        unit=unit,
+        median=find_median(misses),
+        share90=find_share90(misses),
+        largest=largest if np.isfinite(largest) else None,
+    )
 
 
 def _take_middle(some: Sequence[MissStatistics]) -> MissStatistics:
     median, share90, largest = (
-        _find_median([getattr(each, name) for each in some]) for name in ("median", "share90", "largest")
+        # None counts as larger than all numbers.
+        find_median([np.inf if (value := getattr(each, name)) is None else value for each in some])
+        for name in ("median", "share90", "largest")
     )
     return MissStatistics(unit=some[0].unit, median=median, share90=share90, largest=largest)
-
-
-def _find_median(values: Sequence[float | None]) -> float | None:
-    """The median; None counts as larger than all numbers."""
-    median = float(np.median([np.inf if value is None else value for value in values]))
-    return median if np.isfinite(median) else None
 
 
 class Trained(ModelEntry):
@@ -166,6 +162,26 @@ class ThrowAtTarget(ModelEntry):
     place: list[FiniteFloat] | None
 
 
+@dataclass(frozen=True)
+class ScoreRow:
+    """A row of the table of a score.
+
+    Attributes:
+        label: Which model threw.
+        errors: How it hits.
+        elsewhere: Whether it threw in another world.
+    """
+
+    label: str
+    errors: Errors
+    elsewhere: bool = False
+
+    @property
+    def cells(self) -> tuple[str, ...]:
+        """The label, and what `SCORE_HEAD` names."""
+        return (self.label, *format_misses(self.errors), str(self.errors.throws), str(self.errors.missed))
+
+
 class Score(ModelEntry):
     """All results of a model; all numbers are from simulation.
 
@@ -191,6 +207,16 @@ class Score(ModelEntry):
     scatter: FiniteFloat
     adapted: list[Adapted]
     adapted_throws: list[ThrowAtTarget] = Field(repr=False)
+
+    def list_rows(self) -> list[ScoreRow]:
+        """Make the table of all results, for people."""
+        rows = [ScoreRow(f"learned from {each.trained_on:,} throws", each.errors) for each in self.trained]
+        if self.distilled is not None:
+            rows.append(ScoreRow("model.onnx of these", self.distilled))
+        for each in self.adapted:
+            after = f"after {format_count(each.real_throws, 'throw')} ({each.method.value})"
+            rows.append(ScoreRow(f"in the other world {after}", each.errors, elsewhere=True))
+        return rows
 
 
 def pool_scores(scores: Sequence[Score]) -> Score:

@@ -13,10 +13,11 @@ from throwcollect.dataset.reader import Dataset
 from throwcollect.errors import ConfigError
 from throwcollect.learning.model import Model, load_model
 from throwcollect.learning.model_directory import read_score
-from throwcollect.learning.score import SHOWN_AS, Errors, MissStatistics, Score, ThrowAtTarget, tell_length, tell_misses
+from throwcollect.learning.score import SCORE_HEAD, Errors, MissStatistics, Score, ThrowAtTarget, format_length
 from throwcollect.report.contents import Panel, ReportSection, Row, Table
 from throwcollect.report.figures import BLUE, LEGEND_ABOVE
 from throwcollect.report.miss_map import choose_scale, draw_miss_map, title_column, title_misses
+from throwcollect.units import choose_shown_unit
 from throwcollect.wording import command, format_count
 
 _TITLE = "How a model of it hits"
@@ -39,7 +40,7 @@ def show_model(directory: Path, dataset: Dataset) -> ReportSection:
             expected=f"a model of this dataset, digest {dataset.digest[:10]}",
             hint=command("fit", dataset.directory, "-o", "MODEL"),
         )
-    error = tell_length(trained.error, model.targets)
+    error = format_length(trained.error, model.targets)
     text = (
         f"Learned from {trained.throws:,} throws: {', '.join(model.parameters)} to {', '.join(model.targets)}. "
         f"Throws that polynomials were not fitted to are predicted to {error} (median)."
@@ -101,7 +102,7 @@ def _show_errors(
 
 def _draw_errors(numbers: Sequence[int], misses: Sequence[MissStatistics]) -> go.Figure:
     """Draw median and ninth decile of misses of one unit over a number of throws."""
-    factor, unit = SHOWN_AS.get(misses[0].unit, (1.0, misses[0].unit))
+    factor, unit = choose_shown_unit(misses[0].unit)
     figure = go.Figure()
     # The legend has room for a marker, but hardly for a dash: so the markers differ, too.
     for name, symbol, values, look in (
@@ -111,20 +112,10 @@ def _draw_errors(numbers: Sequence[int], misses: Sequence[MissStatistics]) -> go
         scaled = [None if value is None else value * factor for value in values]
         marker, line = {"color": BLUE, "size": 5, "symbol": symbol}, {"color": BLUE, **look}
         figure.add_scatter(x=list(numbers), y=scaled, mode="lines+markers", line=line, marker=marker, name=name)
-    title = f"{_NOUNS.get(misses[0].unit, 'difference')} from the target [{unit.strip()}]"
+    title = f"{_NOUNS.get(misses[0].unit, 'difference')} from the target [{unit}]"
     return figure.update_yaxes(title=title).update_layout(height=420, legend=LEGEND_ABOVE)
 
 
 def _tabulate(score: Score) -> Table:
-    rows = [(f"learned from {each.trained_on:,} throws", *_list_cells(each.errors)) for each in score.trained]
-    if score.distilled is not None:
-        rows.append(("model.onnx of these", *_list_cells(score.distilled)))
-    for each in score.adapted:
-        after = f"after {format_count(each.real_throws, 'throw')} ({each.method.value})"
-        rows.append((f"in the other world {after}", *_list_cells(each.errors)))
-    head = ("", "median", "9 of 10 below", "largest", "throws", "did not succeed")
-    return Table(head=head, rows=tuple(rows), number_columns=(1, 2, 3, 4, 5))
-
-
-def _list_cells(errors: Errors) -> tuple[str, ...]:
-    return (*tell_misses(errors), str(errors.throws), str(errors.missed))
+    rows = tuple(row.cells for row in score.list_rows())
+    return Table(head=("", *SCORE_HEAD), rows=rows, number_columns=(1, 2, 3, 4, 5))

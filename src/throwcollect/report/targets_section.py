@@ -14,12 +14,10 @@ from throwcollect.report.figures import BLUE
 from throwcollect.report.miss_map import choose_scale, draw_miss_map, title_misses
 from throwcollect.report.plotted_points import choose_points, read_numbers
 from throwcollect.sweep.points import Targets
-from throwcollect.units import unit_of_name
+from throwcollect.units import choose_shown_unit, unit_of_name
 from throwcollect.wording import format_count
 
 _TITLE = "How targets are missed"
-_LEAST_TOLD = 0.01
-"""A smaller number is shown with two significant digits, because its first two decimals would be zeros."""
 
 
 def show_targets(dataset: Dataset) -> tuple[ReportSection, ...]:
@@ -30,7 +28,7 @@ def show_targets(dataset: Dataset) -> tuple[ReportSection, ...]:
     misses = summarise_misses(dataset.config, dataset.throws)
     targeted = int((~np.isnan(targets.values)).any(axis=1).sum())
     said = [
-        f"{name}: median {_format(name, each.median)}, 9 of 10 below {_format(name, each.share90)}"
+        "{}: median {}, 9 of 10 below {}".format(name, *each.format_misses(unit_of_name(name))[:2])
         for name, each in misses.items()
         if each.measured
     ]
@@ -64,7 +62,7 @@ def _show_map(dataset: Dataset, targets: Targets) -> Panel:
 
 
 def _draw_share(dataset: Dataset, miss: str) -> go.Figure:
-    scale, unit = _choose_unit(miss)
+    scale, unit = choose_shown_unit(unit_of_name(miss))
     values: NDArray[np.float64] = np.sort(dataset.throws[miss].drop_null().to_numpy()) * scale
     figure = go.Figure()
     chosen = choose_points(len(values))
@@ -87,23 +85,9 @@ def _tabulate(misses: dict[str, MissSummary]) -> Table:
             name,
             f"{each.targets:,}",
             f"{each.measured:,}",
-            *(_format(name, value) for value in (each.median, each.share90, each.largest)),
+            *each.format_misses(unit_of_name(name)),
         )
         for name, each in misses.items()
     )
     head = ("", "with a target", "measured", "median", "9 of 10 below", "largest")
     return Table(head=head, rows=rows, number_columns=(1, 2, 3, 4, 5))
-
-
-def _format(miss: str, value: float | None) -> str:
-    if value is None:
-        return "-"
-    scale, unit = _choose_unit(miss)
-    digits = ".2f" if value == 0 or scale * value >= _LEAST_TOLD else ".2g"
-    return f"{scale * value:{digits}} {unit}"
-
-
-def _choose_unit(miss: str) -> tuple[float, str]:
-    """The factor that makes a distance easy to read, and the unit that it has then."""
-    unit = unit_of_name(miss)
-    return {"m": (100.0, "cm"), "rad": (1000.0, "mrad")}.get(unit, (1.0, unit))

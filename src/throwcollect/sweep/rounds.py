@@ -100,7 +100,7 @@ class Rounds:
         self._waiting += bytes(number not in trials.refused for number in trials.numbers)
         self._succeeded += bytes(len(trials))
 
-    def tell(self, number: int, result: Result) -> None:
+    def take_result(self, number: int, result: Result) -> None:
         """Take in the result of a trial; a second result of the same trial changes nothing."""
         if not self._waiting[number]:
             return

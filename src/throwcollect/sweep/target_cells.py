@@ -17,8 +17,8 @@ NOWHERE = -1
 _TIE = 1e-6
 """Cells whose scores differ by less count as equal."""
 _MOST_DOUBLINGS = 60
-_DOUBT = 4
-"""One doubt counts as this many misses."""
+_GIVEN_BACK = 4
+"""A cell that is given back counts as missed this many times more."""
 
 
 class Cells:
@@ -67,7 +67,7 @@ class Cells:
         return np.column_stack(np.unravel_index(cells, self.shape)).astype(np.float64)
 
 
-class Thinness:
+class CellChooser:
     """Chooses cells to throw at, each time the cell with the lowest score.
 
     The score of a cell is the number of throws that have landed in it or are planned, plus penalties for cells that
@@ -93,7 +93,7 @@ class Thinness:
         randomness: np.random.Generator,
     ) -> None:
         self._missed = missed
-        self._doubted = np.zeros(len(missed), dtype=np.bool_)
+        self._given_back = np.zeros(len(missed), dtype=np.bool_)
         self._score = landed + asked + _penalise(missed) + np.maximum(away - 1, 0) ** 2
         # A throw counts 1, so this small number decides only between equal scores.
         self._score += _TIE * randomness.permutation(len(missed)) / len(missed)
@@ -106,19 +106,19 @@ class Thinness:
             self._score[taken[index]] += 1
         return taken
 
-    def doubt(self, cells: NDArray[np.int64]) -> NDArray[np.bool_]:
-        """Give back chosen cells without a promising throw; from then on each counts as missed `_DOUBT` times more.
+    def give_back(self, cells: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """Give back chosen cells without a promising throw; each then counts as missed `_GIVEN_BACK` times more.
 
         Returns:
             True for cells that are given back. A cell is given back only once: if `take` chooses it again, it stays
             chosen.
         """
-        fresh = ~self._doubted[cells]
+        fresh = ~self._given_back[cells]
         # A cell may be listed more than once, and `-=` would subtract only once.
         np.subtract.at(self._score, cells[fresh], 1)
-        doubted = np.unique(cells[fresh])
-        self._doubted[doubted] = True
-        self._score[doubted] += _penalise(self._missed[doubted] + _DOUBT) - _penalise(self._missed[doubted])
+        returned = np.unique(cells[fresh])
+        self._given_back[returned] = True
+        self._score[returned] += _penalise(self._missed[returned] + _GIVEN_BACK) - _penalise(self._missed[returned])
         return fresh
 
 

@@ -12,7 +12,7 @@ from throwcollect.config.sweep import TargetConfig
 from throwcollect.sweep.inverse import InverseModel
 from throwcollect.sweep.plan import ROUND_TRIALS
 from throwcollect.sweep.samplers import places, spread
-from throwcollect.sweep.target_cells import NOWHERE, Cells, Thinness
+from throwcollect.sweep.target_cells import NOWHERE, CellChooser, Cells
 from throwcollect.tasks.result import Result
 from throwcollect.tasks.throw.throw_result import ThrowOutcome, ThrowResult
 
@@ -77,17 +77,17 @@ class TargetSampler:
         if not self._model.usable:
             self._aims = np.append(self._aims, np.full(ROUND_TRIALS, NOWHERE))
             return otherwise
-        thinness = self._score_cells(randomness)
+        chooser = self._score_cells(randomness)
         aims = np.empty(0, dtype=np.int64)
         unit = np.empty((0, tried.shape[1]))
         # The loop ends, because a cell without a promising throw is given back only once; then its throw is taken.
         while len(aims) < ROUND_TRIALS:
-            cells = thinness.take(ROUND_TRIALS - len(aims))
+            cells = chooser.take(ROUND_TRIALS - len(aims))
             corners = self._cells.corners(cells)[:, np.newaxis]
             places_inside = randomness.random((len(cells), _GOALS, self.dimensions))
             proposed, promising = self._model.propose(corners + places_inside, randomness)
             given_back = np.zeros(len(cells), dtype=np.bool_)
-            given_back[~promising] = thinness.doubt(cells[~promising])
+            given_back[~promising] = chooser.give_back(cells[~promising])
             aims = np.append(aims, cells[~given_back])
             unit = np.append(unit, proposed[~given_back], axis=0)
         self._aims = np.append(self._aims, aims)
@@ -109,10 +109,10 @@ class TargetSampler:
                 self._landed[cell] += 1
                 self._missed[cell] = 0
 
-    def _score_cells(self, randomness: np.random.Generator) -> Thinness:
+    def _score_cells(self, randomness: np.random.Generator) -> CellChooser:
         """Make the current scores of the cells; `randomness` decides between equal scores."""
         cells = self._cells.count
-        return Thinness(
+        return CellChooser(
             landed=self._landed,
             asked=np.bincount(self._aims[self._aims != NOWHERE], minlength=cells),
             missed=self._missed,

@@ -103,7 +103,6 @@ def roll_out(
     weights: NDArray[np.float64],
     tau: float,
     family: DynamicMovementPrimitive,
-    refinement: int = 1,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     """Compute the motion of a DMP that starts at rest, by the classical Runge-Kutta method with exact phase.
 
@@ -117,14 +116,13 @@ def roll_out(
         weights: [rad], shape ``(n_joints, n_basis_functions)``.
         tau: Time constant [s].
         family: Constants of the DMP; its weights are ignored.
-        refinement: Factor on the number of integration steps; tests measure the error of the integration by it.
 
     Returns:
         Positions [rad], velocities [rad/s] and accelerations [rad/s²], each of shape ``(n, n_joints)``.
     """
     spacing = float(times[1] - times[0])
     rate = max(250.0, 5 * family.alpha_z, 8 * family.basis_functions)
-    substeps = refinement * math.ceil(spacing / tau * rate)
+    substeps = math.ceil(spacing / tau * rate)
     # A step of Runge-Kutta takes the forcing term at its beginning, its middle and its end.
     halves = np.arange(2.0 * substeps * (len(times) - 1) + 1) * (spacing / (2 * substeps))
     phase = exp(-family.alpha_x / tau * halves)

@@ -23,7 +23,7 @@ def config(trials: int | None = 150, landed: int | None = None) -> Config:
 
 def tell_ends(growth: Growth, trials: Trials) -> None:
     for trial in trials:
-        growth.tell(trial.number, ThrowResult(ThrowOutcome.RECAUGHT))
+        growth.take_result(trial.number, ThrowResult(ThrowOutcome.RECAUGHT))
 
 
 def test_a_round_is_drawn_and_checked_trial_by_trial_once_it_is_due() -> None:
@@ -106,7 +106,7 @@ def test_rounds_beyond_the_end_of_the_plan_are_reported() -> None:
     assert len(planned) == 192
     growth = Growth(Plan(settings, in_columns(planned)))
     for number in range(64):
-        growth.tell(number, landed)
+        growth.take_result(number, landed)
     assert growth.keep(130, landed)
     assert growth.confirm() is None
     assert growth.take_wrong() == (128, 1)
@@ -118,11 +118,11 @@ def test_no_round_is_drawn_until_all_earlier_rounds_are_confirmed() -> None:
     planned = collect(settings, rounds=4)
     growth = Growth(Plan(settings, in_columns(planned)))
     for trial in planned[1:64]:
-        growth.tell(trial.number, throw(trial))
+        growth.take_result(trial.number, throw(trial))
     assert growth.confirm() is None
     assert growth.step() is None
     assert not growth.over
-    growth.tell(0, throw(planned[0]))
+    growth.take_result(0, throw(planned[0]))
     assert growth.step() is None
     earlier = growth.confirm()
     assert earlier is not None

@@ -79,7 +79,7 @@ def test_a_throw_that_did_not_land_has_no_miss(tmp_path: Path) -> None:
     found = info(tmp_path / "data").misses
     assert found == {"miss_m": MissSummary(3, 0, None, None, None)}
     assert "miss_m    0 of 3 targets\n" in describe(info(tmp_path / "data"))
-    assert "| `miss_m` | 3 | 0 | | | |" in (tmp_path / "data" / "README.md").read_text()
+    assert "| `miss_m` | 3 | 0 | - | - | - |" in (tmp_path / "data" / "README.md").read_text()
 
 
 def test_targets_can_have_a_height_and_a_hit_angle(tmp_path: Path) -> None:
@@ -238,10 +238,9 @@ def test_info_and_the_data_card_summarize_the_misses(targeted: Path) -> None:
     found = info(targeted).misses["miss_m"]
     assert (found.targets, found.measured) == (3, 3)
     assert (found.median, found.largest) == (misses[1], misses[2])
-    assert f"miss_m    3 of 3 targets: median {misses[1]:.3g} m, 9 of 10 below {found.share90:.3g} m\n" in describe(
-        info(targeted)
-    )
-    assert f"| `miss_m` | 3 | 3 | {misses[1]:.4g} |" in (targeted / "README.md").read_text()
+    median, share90 = f"{100 * misses[1]:.2f} cm", f"{100 * found.share90:.2f} cm"
+    assert f"miss_m    3 of 3 targets: median {median}, 9 of 10 below {share90}\n" in describe(info(targeted))
+    assert f"| `miss_m` | 3 | 3 | {median} | {share90} |" in (targeted / "README.md").read_text()
 
 
 def test_a_plan_with_targets_that_the_task_lacks_is_reported(targeted: Path, tmp_path: Path) -> None:

@@ -96,13 +96,14 @@ def test_cells_can_be_defined_by_any_expression(some: Path) -> None:
     axes = ["hypot(landing_x_m, landing_y_m)=0.3", "hit_angle_rad=0.2"]
     found = assign(source(Dataset.open(some)), fractions=HALVES, cells=axes, seed=1)
     rows = Dataset.open(some).throws.to_pylist()
-    for trial, cell in (item for part in found.values() for item in part.items()):
-        row = rows[trial]
-        if row["landing_x_m"] is None:
-            assert cell is None
-        else:
-            distance = math.hypot(row["landing_x_m"], row["landing_y_m"])
-            assert cell == (int(distance // 0.3), int(row["hit_angle_rad"] // 0.2))
+    chosen = {trial: cell for part in found.values() for trial, cell in part.items()}
+    expected = {
+        row["trial"]: (int(math.hypot(row["landing_x_m"], row["landing_y_m"]) // 0.3), int(row["hit_angle_rad"] // 0.2))
+        for row in rows
+        if row["landing_x_m"] is not None
+    }
+    assert len(expected) == 8
+    assert chosen == dict.fromkeys(range(8, 12)) | expected
 
 
 @pytest.mark.parametrize(
@@ -143,6 +144,11 @@ def test_a_split_by_wrong_fractions_is_refused_with_a_reason(
 def test_a_split_by_wrong_cells_is_refused_with_a_reason(some: Path, tmp_path: Path, axis: str, message: str) -> None:
     with pytest.raises(ConfigError, match=f"^cells: {message}"):
         split(some, tmp_path / "parts", fractions=HALVES, cells=[axis])
+
+
+def test_a_split_without_axes_of_cells_is_refused(some: Path, tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match=r"^cells: the list is empty\n  expected: .* landing_x_m=0\.05"):
+        split(some, tmp_path / "parts", fractions=HALVES, cells=[])
 
 
 def test_a_single_text_instead_of_a_list_of_cell_axes_is_refused(some: Path, tmp_path: Path) -> None:

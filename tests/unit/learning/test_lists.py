@@ -10,8 +10,8 @@ import pytest
 
 from throwcollect.config.schema import Config
 from throwcollect.errors import ConfigError, DatasetError
+from throwcollect.learning.aiming import Aim
 from throwcollect.learning.lists import Row, read_table, read_targets, write_aims
-from throwcollect.learning.model import Aim
 
 TARGETS = ("landing_x_m", "landing_y_m")
 HEADER = "landing_x_m,landing_y_m"

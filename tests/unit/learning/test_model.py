@@ -133,8 +133,13 @@ def test_a_score_is_stored_in_the_model_and_shown_in_its_card(model: Model, tmp_
     write_score(tmp_path / "model", score)
     assert read_score(tmp_path / "model") == score
     card = (tmp_path / "model" / "README.md").read_text()
-    assert "| 120 throws | 0.12 cm | - | - | 1 |" in card
-    assert "| `model.onnx` of these | 1.00 cm, 0.57° | -, 1.15° | - | 1 |" in card
+    assert "| learned from 120 throws | 0.12 cm | - | - | 2 | 1 |" in card
+    assert "| model.onnx of these | 1.00 cm, 0.57° | -, 1.15° | - | 2 | 1 |" in card
+    assert "| in the other world after 0 throws (none) | 0.12 cm | - | - | 2 | 1 |" in card
+    # The page of a report shows the same rows.
+    assert [row.cells[0] for row in score.list_rows()] == [
+        line.split(" | ")[0].removeprefix("| ") for line in card.splitlines() if line.endswith(" | 2 | 1 |")
+    ]
     assert "with a scatter of 2.00 cm" in card
 
 
@@ -212,6 +217,8 @@ def test_points_with_missing_unknown_or_infinite_values_are_refused(model: Model
         model.predict([{KEYS[1]: 0.0, KEYS[2]: 0.0}])
     with pytest.raises(ConfigError, match="is no key of this model"):
         model.predict([dict.fromkeys(KEYS, 1.0) | {"ball.mass_kg": 1.0}])
+    with pytest.raises(ConfigError, match="throw 0: 3 is no key of this model"):
+        model.predict([dict.fromkeys(KEYS, 1.0) | {3: 1.0, None: 1.0}])
     with pytest.raises(ConfigError, match="is inf"):
         model.predict([dict.fromkeys(KEYS, float("inf"))])
 

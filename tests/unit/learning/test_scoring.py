@@ -12,9 +12,11 @@ import pytest
 from tests.unit.learning.worlds import KEYS, TARGETS, land, learn
 
 from throwcollect.config.schema import Config
+from throwcollect.dataset.miss_quantiles import find_median, find_share90
 from throwcollect.learning.adapting import Method
 from throwcollect.learning.distilling import distil
-from throwcollect.learning.score import Errors, Score, pool_scores, tell_misses
+from throwcollect.learning.model_file import AdaptationEntry
+from throwcollect.learning.score import Errors, Score, format_misses, pool_scores
 from throwcollect.learning.scoring import draw_targets, score_model, spread_first
 
 SHIFT = np.array([0.1, 0.12])
@@ -128,9 +130,19 @@ def test_targets_are_ordered_so_that_the_first_ones_are_far_apart() -> None:
     assert spread_first(targets).tolist() == targets[[0, 4, 1, 3, 2]].tolist()
 
 
-def test_error_statistics_that_fall_on_a_missed_throw_are_empty() -> None:
+def test_error_statistics_that_depend_on_a_throw_that_did_not_succeed_are_empty() -> None:
     found = Errors.of(np.array([[0.3], [-0.1], [np.nan], [0.2]]), ["landing_x_m"])
-    assert (found.throws, found.missed, found.median, found.share90, found.largest) == (4, 1, 0.2, None, None)
+    assert (found.throws, found.missed, found.median, found.share90, found.largest) == (4, 1, 0.25, None, None)
+    half = Errors.of(np.array([[0.3], [-0.1], [np.nan], [np.nan]]), ["landing_x_m"])
+    assert (half.missed, half.median, half.largest) == (2, None, None)
+
+
+def test_errors_of_a_model_are_summed_up_as_misses_of_a_dataset_are() -> None:
+    misses = [0.1, 0.01, 0.03, 0.02]
+    found = Errors.of(np.array(misses)[:, np.newaxis], ["landing_x_m"])
+    assert (found.median, found.share90) == (find_median(misses), find_share90(misses))
+    entry = AdaptationEntry(method="none", throws=4, scatter=0.0, before=misses, after=[], found=[])
+    assert entry.medians == (found.median, None)
 
 
 def test_errors_in_metres_and_radians_are_summarised_separately() -> None:
@@ -140,8 +152,8 @@ def test_errors_in_metres_and_radians_are_summarised_separately() -> None:
     assert (lengths.unit, lengths.median, lengths.largest) == ("m", pytest.approx(0.05), pytest.approx(0.5))
     assert (angles.unit, angles.median, angles.largest) == ("rad", 0.2, 0.5)
     assert Errors.middle([found, found]) == found.model_copy(update={"throws": 6})
-    assert tell_misses(found) == ("5.00 cm, 11.46°", "50.00 cm, 28.65°", "50.00 cm, 28.65°")
-    assert tell_misses(Errors.of(away[:, :1], ["landing_time_s"]))[2] == "0.5 s"
+    assert format_misses(found) == ("5.00 cm, 11.46°", "41.00 cm, 25.21°", "50.00 cm, 28.65°")
+    assert format_misses(Errors.of(away[:, :1], ["landing_time_s"]))[2] == "0.5 s"
 
 
 def test_a_distilled_map_is_scored_at_the_same_targets() -> None:

@@ -39,11 +39,11 @@ def test_a_plan_begins_with_two_rounds_without_results() -> None:
 def test_a_round_is_due_when_all_rounds_but_the_last_have_ended() -> None:
     rounds, _ = growing()
     for number in range(64, 128):
-        rounds.tell(number, LANDED)
+        rounds.take_result(number, LANDED)
     for number in range(63):
-        rounds.tell(number, LANDED)
+        rounds.take_result(number, LANDED)
         assert not rounds.due
-    rounds.tell(63, LANDED)
+    rounds.take_result(63, LANDED)
     assert rounds.due
 
 
@@ -60,9 +60,9 @@ def test_results_of_the_last_round_do_not_change_the_next_one() -> None:
     for last in (LANDED, FAILED, None):
         rounds, trials = growing()
         for trial in trials[:64]:
-            rounds.tell(trial.number, throw(trial))
+            rounds.take_result(trial.number, throw(trial))
         for trial in trials[64:] if last else ():
-            rounds.tell(trial.number, last)
+            rounds.take_result(trial.number, last)
         points = rounds.draw()
         assert points is not None
         drawn.append(points.values.tolist())
@@ -72,7 +72,7 @@ def test_results_of_the_last_round_do_not_change_the_next_one() -> None:
 def test_a_result_that_is_reported_twice_counts_once() -> None:
     rounds, _ = growing(target=None, landed=65)
     for number in [*range(64), *range(64)]:
-        rounds.tell(number, LANDED)
+        rounds.take_result(number, LANDED)
     assert rounds.due
     assert not rounds.over
 
@@ -81,12 +81,12 @@ def test_no_round_follows_when_enough_landed_without_the_last_round() -> None:
     rounds, _ = growing(trials=None, target=None, landed=64)
     for number in range(128):
         assert not rounds.over
-        rounds.tell(number, LANDED if number != 5 else FAILED)
+        rounds.take_result(number, LANDED if number != 5 else FAILED)
     assert not rounds.over
     rounds, _ = growing(trials=None, target=None, landed=63)
     for number in range(64):
         assert not rounds.over
-        rounds.tell(number, LANDED if number != 5 else FAILED)
+        rounds.take_result(number, LANDED if number != 5 else FAILED)
     assert rounds.over
 
 

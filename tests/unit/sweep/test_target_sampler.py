@@ -14,7 +14,7 @@ from tests.unit.sweep.thrower import DISTANCE, HIT_ANGLE, PARAMETERS, TARGET, co
 
 from throwcollect.config.sweep import TargetConfig
 from throwcollect.sweep.plan import make_plan
-from throwcollect.sweep.target_cells import Cells, Thinness
+from throwcollect.sweep.target_cells import CellChooser, Cells
 from throwcollect.sweep.trials import Trial, Trials
 from throwcollect.tasks.measures import BallState
 from throwcollect.tasks.throw.throw_result import ThrowOutcome, ThrowResult
@@ -160,13 +160,13 @@ def test_the_outermost_bins_include_their_outer_ends() -> None:
     assert CELLS.corners(np.array([0, 31])).tolist() == [[0, 0], [3, 7]]
 
 
-def thinness(**known: list[int]) -> Thinness:
+def make_chooser(**known: list[int]) -> CellChooser:
     each = {name: np.array(known.get(name, [0, 0, 0, 0])) for name in ("landed", "asked", "missed", "away")}
-    return Thinness(**each, randomness=np.random.default_rng(0))
+    return CellChooser(**each, randomness=np.random.default_rng(0))
 
 
 def choose(count: int, **known: list[int]) -> list[int]:
-    return thinness(**known).take(count).tolist()
+    return make_chooser(**known).take(count).tolist()
 
 
 def test_the_thinnest_cells_come_first_and_throws_under_way_count() -> None:
@@ -187,14 +187,14 @@ def test_cells_at_the_edge_of_reach_come_before_cells_beyond() -> None:
     assert sorted(choose(3, away=[1, 5, 0, 1])) == [0, 2, 3]
 
 
-def test_a_cell_that_is_doubted_waits_as_if_missed_four_times_and_is_doubted_once() -> None:
-    cells = thinness(landed=[0, 2, 2, 2])
-    assert cells.take(2).tolist() == [0, 0]
-    assert cells.doubt(np.array([0, 0])).tolist() == [True, True]
-    taken = cells.take(3 * 5 + 4).tolist()
+def test_a_cell_that_is_given_back_waits_as_if_missed_four_times_and_is_given_back_once() -> None:
+    chooser = make_chooser(landed=[0, 2, 2, 2])
+    assert chooser.take(2).tolist() == [0, 0]
+    assert chooser.give_back(np.array([0, 0])).tolist() == [True, True]
+    taken = chooser.take(3 * 5 + 4).tolist()
     assert taken.count(0) == 1
     assert taken.index(0) >= 3 * 5
-    assert cells.doubt(np.array([0, 1])).tolist() == [False, True]
+    assert chooser.give_back(np.array([0, 1])).tolist() == [False, True]
 
 
 def test_rounds_that_run_at_the_same_time_do_not_throw_at_the_same_cells() -> None:

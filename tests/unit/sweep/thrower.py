@@ -74,7 +74,7 @@ def go_on(
     ended = 0
     while True:
         for trial in order(trials[ended : grown.planned]):
-            grown.tell(trial.number, throw(trial))
+            grown.take_result(trial.number, throw(trial))
         ended = grown.planned
         if grown.over or (rounds is not None and ended >= 64 * rounds):
             return trials

@@ -103,8 +103,8 @@ def _describe_misses(name: str, misses: MissSummary) -> str:
     targets = f"{misses.measured} of {format_count(misses.targets, 'target')}"
     if misses.median is None:
         return targets
-    unit = unit_of_name(name)
-    return f"{targets}: median {misses.median:.3g} {unit}, 9 of 10 below {misses.share90:.3g} {unit}"
+    median, share90, _ = misses.format_misses(unit_of_name(name))
+    return f"{targets}: median {median}, 9 of 10 below {share90}"
 
 
 def _describe_landing(landing: Mapping[str, tuple[float, float]] | None) -> str:
