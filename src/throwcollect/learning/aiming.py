@@ -52,7 +52,8 @@ class Aim:
         parameters: Values by dotted key, as `Simulator.throw` takes them, also of the keys that are given.
         predicted: Where the trial should end, shape ``(n_targets,)``.
         reachable: Whether a throw of the dataset and the prediction are near enough to the target.
-        nearest: Where the nearest throw of the dataset ended, shape ``(n_targets,)``.
+        nearest: Where the throw of the dataset that comes nearest to the target ends, shape ``(n_targets,)``: with what
+            is given with the target, and in the world of an adapted model, as predicted.
     """
 
     target: Array

@@ -141,13 +141,16 @@ class Model:
             processes: How many processes simulate.
 
         Raises:
-            ConfigError: If a number is out of its range.
+            ConfigError: If a number is out of its range, or what should simulate is no simulator.
             WorkerError: If a process of a simulator ends.
         """
         for name, number in (("targets", targets), ("seeds", seeds), ("processes", processes)):
             check_whole_number(name, number, least=1)
         check_whole_number("seed", seed, least=0)
         _check_scatter(scatter)
+        for name, given in (("simulator", simulator), ("world", world)):
+            if not isinstance(given, Simulates) and (given is not None or name == "simulator"):
+                raise refuse_argument(name, f"got {show_value(given)}", expected="a throwcollect.Simulator")
         distilled = None if self.file.distilled is None else distil(leave_out_correction(self.learned))
         scores = [
             score_model(
@@ -261,6 +264,8 @@ class Model:
         for number, point in enumerate(listed):
             if wrong := sorted(set(point) ^ set(names), key=str):
                 state = "is missing" if wrong[0] in names else "is no key of this model"
+                if wrong[0] in (axis.key for axis in self.learned.axes_of(KeyRole.LATENT)):
+                    state = "is a property of the world, which the model has learned; leave it out"
                 raise ConfigError(f"throw {number}: {wrong[0]} {state}", expected=f"values of {', '.join(names)}")
             rows.append([as_float(point[name]) for name in names])
         values = np.array(rows, np.float64).reshape(-1, len(names))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 
@@ -26,6 +26,7 @@ _APART = 1000
 """Added to the seed of targets, this gives the seed of throws to adapt by, so that these are no seed's targets."""
 
 
+@runtime_checkable
 class Simulates(Protocol):
     """The part of `Simulator` that scoring needs."""
 

@@ -250,6 +250,20 @@ def test_an_argument_of_a_score_that_is_no_number_is_refused(model: Model, argum
         model.score(None, **{argument: "a"})
 
 
+def test_a_score_by_something_that_does_not_simulate_is_refused(model: Model) -> None:
+    with pytest.raises(ConfigError, match="^simulator: got 'my.yaml'\n  expected: a throwcollect.Simulator"):
+        model.score("my.yaml")
+
+
+def test_predicting_with_a_property_of_the_world_says_that_the_model_has_learned_it(dataset: Dataset) -> None:
+    model = fit(dataset, parameters=KEYS[:2])
+    with pytest.raises(
+        ConfigError, match=f"throw 0: {KEYS[2]} is a property of the world, which the model has learned"
+    ):
+        model.predict([dict.fromkeys(KEYS, 1.0)])
+    assert model.predict([dict.fromkeys(KEYS[:2], 1.0)]).shape == (1, 2)
+
+
 def test_a_value_that_is_no_number_is_shown_in_the_error(model: Model) -> None:
     with pytest.raises(ConfigError, match="got 'a', 1"):
         model.aim([("a", 1)])
