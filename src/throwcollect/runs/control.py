@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from typing import TYPE_CHECKING
 
-from throwcollect.errors import ConfigError, ThrowcollectError, WorkerError
+from throwcollect.errors import ConfigError, ConflictError, ThrowcollectError, WorkerError
 from throwcollect.ros.graph_names import make_own_name
 from throwcollect.ros.router_endpoint import answers
 from throwcollect.runs.records import Records, Run
@@ -109,7 +109,7 @@ def scale(run: Run, simulations: int) -> None:
     """Ask the launcher of a run for another number of simulations.
 
     Raises:
-        ConflictError: If the run has ended, or is a container, which has no simulations.
+        ConflictError: If the run has ended, is still starting, or is a container, which has no simulations.
         ConfigError: If it cannot be scaled, or the launcher refuses that number.
         WorkerError: If the launcher died, or does not answer.
     """
@@ -117,6 +117,8 @@ def scale(run: Run, simulations: int) -> None:
     require_simulations(run)
     if record.runtime and not get_runtime(record.runtime).can_be_scaled:
         raise ConfigError(f"run {run.id}: has one simulation, as all runs of the runtime {record.runtime} have")
+    if record.endpoint is None:
+        raise ConflictError(f"run {run.id}: is still starting", hint="try again in a moment")
     record.middleware.joining.settle()
     from throwcollect.runtimes.node_collection import SIMULATIONS
 

@@ -12,7 +12,7 @@ from typing import Annotated, Any
 
 from fastapi import APIRouter, Query, Response
 from fastapi.responses import PlainTextResponse
-from pydantic import BaseModel, ConfigDict, Field, JsonValue, field_validator
+from pydantic import BaseModel, ConfigDict, Field, JsonValue, StrictInt, field_validator
 
 from throwcollect.files import open_log
 from throwcollect.runs.events import EVENTS, parse
@@ -31,7 +31,7 @@ class InstanceRequest(BaseModel):
     model_config = ConfigDict(extra="forbid")
 
     component: str
-    simulations: int | None = Field(default=None, ge=1, le=256)
+    simulations: StrictInt | None = Field(default=None, ge=1, le=256)
     set: dict[str, JsonValue] = Field(default_factory=dict)
     joins: str | None = None
 
@@ -57,7 +57,7 @@ class Scaling(BaseModel):
 
     model_config = ConfigDict(extra="forbid")
 
-    simulations: int = Field(ge=0, le=256)
+    simulations: StrictInt = Field(ge=0, le=256)
 
 
 def make_component_routes(watch: StateWatch) -> APIRouter:

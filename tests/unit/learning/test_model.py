@@ -251,7 +251,7 @@ def test_an_argument_of_a_score_that_is_no_number_is_refused(model: Model, argum
 
 
 def test_a_score_by_something_that_does_not_simulate_is_refused(model: Model) -> None:
-    with pytest.raises(ConfigError, match="^simulator: got 'my.yaml'\n  expected: a throwcollect.Simulator"):
+    with pytest.raises(ConfigError, match=r"^simulator: got 'my\.yaml'\n  expected: a throwcollect\.Simulator"):
         model.score("my.yaml")
 
 

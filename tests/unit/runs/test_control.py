@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from rclzenoh.session_config import CONFIG_FILE_VARIABLE, OVERRIDE_VARIABLE
-from throwcollect.errors import ConfigError, WorkerError
+from throwcollect.errors import ConfigError, ConflictError, WorkerError
 from throwcollect.ros import Context, Node, SingleThreadedExecutor
 from throwcollect.ros.router import router
 from throwcollect.run_key import RunKey
@@ -85,6 +85,11 @@ def test_scaling_below_zero_or_above_the_largest_number_is_refused(
     assert wanted == []
 
 
+def test_scaling_a_run_that_has_no_router_yet_says_that_it_is_starting() -> None:
+    with pytest.raises(ConflictError, match=r"^run a-0123: is still starting"):
+        scale(living(None), 3)
+
+
 @pytest.mark.parametrize("most", [1])
 def test_scaling_above_the_limit_of_the_launcher_is_refused(endpoint: str, wanted: list[int]) -> None:
     with pytest.raises(ConfigError, match=r"out of range. Min: 0, max: 1, value: 2"):
@@ -99,11 +104,10 @@ def test_scaling_without_a_launcher_is_an_error(endpoint: str, monkeypatch: pyte
         scale(living(endpoint), 3)
 
 
-@pytest.mark.parametrize("nowhere", [None, "tcp/127.0.0.1:1"])
-def test_scaling_without_a_router_is_an_error(nowhere: str | None, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_scaling_without_a_router_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(control, "_ANSWER_S", 0.2)
     with pytest.raises(WorkerError, match="run a-0123: its launcher does not answer"):
-        scale(living(nowhere), 3)
+        scale(living("tcp/127.0.0.1:1"), 3)
 
 
 def test_a_run_in_one_process_cannot_be_scaled() -> None:

@@ -29,6 +29,7 @@ HALF = "should be text that UTF-8 can hold, got half a character ('\\ud800')"
         ({"component": "throws", "simulations": 0}, "simulations", f"{SIMULATIONS}, got 0"),
         ({"component": "throws", "simulations": 257}, "simulations", f"{SIMULATIONS}, got 257"),
         ({"component": "throws", "simulations": "many"}, "simulations", f"{SIMULATIONS}, got 'many'"),
+        ({"component": "throws", "simulations": True}, "simulations", f"{SIMULATIONS}, got true"),
         ({"component": "throws", "simulation": 3}, "simulation", "unknown key; did you mean 'simulations'?"),
         ({"component": "throws", "set": []}, "set", "should be keys, each with anything, got an empty list"),
         ({"component": "throws", "image": "ubuntu"}, "image", UNKNOWN),

@@ -56,7 +56,7 @@ def send_goal(
         try:
             handle = session.answer(sent, alive=client.server_is_ready, who=name)
             if not handle.accepted:
-                echo = command("ros", "topic", "echo", "/rosout", *(("--run", run) if run is not None else ()))
+                echo = command("ros", "topic", "echo", "-f", "/rosout", *(("--run", run) if run is not None else ()))
                 raise ConfigError(f"{name}: the goal was rejected", hint=f"the log of the node says why: {echo}")
             print(f"Goal accepted with ID: {bytes(bytearray(handle.goal_id.uuid)).hex()}\n", flush=True)
             response = session.answer(handle.get_result_async(), alive=client.server_is_ready, who=name)

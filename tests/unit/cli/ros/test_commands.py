@@ -336,7 +336,7 @@ def test_commands_join_a_run_by_its_name_or_directory(
         assert say("node", "list", "--run", named) == (0, "/robot/driver\n", "")
         assert say("env", "--run", named) == (0, line, "")
     rejected = say("action", "send", FOLLOW, FJT.TYPE, "{}", "--run", run.run)
-    assert f"the log of the node says why: throwcollect ros topic echo /rosout --run {run.run}\n" in rejected.err
+    assert f"the log of the node says why: throwcollect ros topic echo -f /rosout --run {run.run}\n" in rejected.err
     run.update(endpoint=None)
     for command in (("node", "list"), ("env",)):
         assert say(*command, "--run", run.run).code == 3
