@@ -28,10 +28,11 @@ from throwcollect.runtimes.nodes import (
     protocol_of,
 )
 from throwcollect.runtimes.ports import format_endpoint, reach_from_here, reserve_port
-from throwcollect.runtimes.runtime import Place, Runtime
+from throwcollect.runtimes.runtime import Place, Runtime, Session
 
 if TYPE_CHECKING:
     from throwcollect.config.schema import Config
+    from throwcollect.dataset.summary import Info
 
 _KILLED_S = 5.0
 """Time that a process has to end after SIGKILL."""
@@ -102,6 +103,13 @@ class LocalNodes(NodeHost):
         self._server = server or _make_server(place.middleware)
         self._owns_server = server is None
         self._processes: dict[str, ForkedNode] = {}
+
+    def collect(self, session: Session) -> Info | None:
+        """See `runtime.Host.collect`."""
+        # This imports ROS, so it has to wait until the backend is chosen.
+        from throwcollect.runtimes.node_collection import NodeCollection
+
+        return NodeCollection(self, session).run_to_the_end()
 
     @property
     def endpoint(self) -> str:

@@ -16,7 +16,7 @@ from throwcollect.own_process import SERIAL_LIBRARIES
 from throwcollect.ros.connection import Connection
 from throwcollect.ros.middleware import Middleware
 from throwcollect.runtimes.node_logs import NodeLogs
-from throwcollect.runtimes.runtime import Place, Session
+from throwcollect.runtimes.runtime import Place
 
 if TYPE_CHECKING:
     # Modules that need only the names of nodes should not wait for these imports.
@@ -140,13 +140,6 @@ class NodeHost(ABC):
         if (endpoint := self.endpoint) is None:
             return None
         return Connection(endpoint, self.place.key, self.config.run.domain_id, self.place.middleware)
-
-    def collect(self, session: Session) -> Info | None:
-        """See `runtime.Host.collect`."""
-        # This imports ROS, so it has to wait until the backend is chosen.
-        from throwcollect.runtimes.node_collection import NodeCollection
-
-        return NodeCollection(self, session).run_to_the_end()
 
     def open(self) -> tuple[str, ...]:
         """Make everything that the nodes need, such as a network.

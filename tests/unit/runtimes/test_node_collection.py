@@ -42,7 +42,8 @@ def test_restarted_nodes_have_the_same_time_to_find_each_other_again(monkeypatch
     session = Mock()
     collection = collection_of(monkeypatch, session)
     supervisor = collection._supervisor
-    supervisor.states.return_value = [NodeState("sim_0", "running", 0, "1", None)]
+    router = NodeState("router", "running", 0, "2", None)
+    supervisor.states.return_value = [router, NodeState("sim_0", "running", 0, "1", None)]
     for now[0] in (0.0, 11.0, 13.0):
         collection._report(BLIND)
     assert "started again" in session.warn.call_args.args[0]
@@ -50,5 +51,12 @@ def test_restarted_nodes_have_the_same_time_to_find_each_other_again(monkeypatch
     for now[0] in (23.0, 34.0):
         collection._report(BLIND)
     now[0] = 36.0
-    with pytest.raises(WorkerError, match="for 12 s, twice"):
+    with pytest.raises(WorkerError, match="for 12 s, twice") as caught:
         collection._report(BLIND)
+    assert "a firewall may keep nodes apart" in str(caught.value)
+    # Whatever kills a router again and again is the reason then.
+    supervisor.states.return_value[0] = replace(router, restarts=3, last_end="ended by SIGABRT")
+    with pytest.raises(WorkerError, match="for 12 s, twice") as caught:
+        collection._report(BLIND)
+    assert "it was started again 3 times, as it was ended by SIGABRT" in str(caught.value)
+    assert "firewall" not in str(caught.value)

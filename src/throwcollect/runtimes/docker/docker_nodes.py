@@ -38,7 +38,7 @@ from throwcollect.runtimes.docker.watch import ContainerState, EngineWatch
 from throwcollect.runtimes.node_logs import NodeLogs
 from throwcollect.runtimes.nodes import ROUTER, NodeExit, NodeHost, NodeSpec, describe_end, protocol_of
 from throwcollect.runtimes.ports import LOOPBACK, format_endpoint
-from throwcollect.runtimes.runtime import Place
+from throwcollect.runtimes.runtime import Place, Session
 from throwcollect.wording import command
 
 LOG_S = 2.0
@@ -96,6 +96,13 @@ class DockerNodes(NodeHost):
             self._clock.attend(self._client)
             self._image_id = check(self._client, self._place, config)
             undo.pop_all()
+
+    def collect(self, session: Session) -> Info | None:
+        """See `runtime.Host.collect`."""
+        # This imports ROS, so it has to wait until the backend is chosen.
+        from throwcollect.runtimes.node_collection import NodeCollection
+
+        return NodeCollection(self, session).run_to_the_end()
 
     def open(self) -> tuple[str, ...]:
         """Make the run's network and volumes if they do not exist, watch its containers, and take over existing ones.
