@@ -164,6 +164,11 @@ def change_bag_file_number_type(directory: Path) -> None:
     path.write_text(before + files + re.sub(r"message_count: (\d+)", r"message_count: \1.0", after, count=1))
 
 
+def nudge_landing(directory: Path) -> None:
+    table = pq.read_table(directory / "throws.parquet")
+    change_table(directory / "throws.parquet", "landing_x_m", 2, table["landing_x_m"][2].as_py() + 1e-8)
+
+
 def add_bag_section(directory: Path) -> None:
     path = directory / "metadata.yaml"
     path.write_text(path.read_text() + "colours: 3\n")
@@ -203,6 +208,7 @@ TABLE_DEFECTS: dict[Callable[[Path], None], tuple[str, str, str]] = {
     change_bag_file_count: ("metadata.yaml", "files", "the files give"),
     change_bag_format: ("metadata.yaml", "throwcollect.format", "is '7'"),
     add_bag_key: ("metadata.yaml", "", "unknown keys: .*colour"),
+    nudge_landing: ("quick_00000.mcap", "trial 2", "throws.parquet has landing_x_m"),
     add_bag_section: ("metadata.yaml", "", "unknown sections: .*colours"),
     change_bag_number_type: ("metadata.yaml", "version", "is 9.0, the files give 9"),
     change_bag_file_number_type: ("metadata.yaml", "files", r"is \[.*\d\.0, .*the files give"),

@@ -24,6 +24,7 @@ from throwcollect.episode.channels import Channels
 from throwcollect.episode.record import Contact, EpisodeHeader, Samples
 from throwcollect.errors import ConfigError
 from throwcollect.robots.description import full_description
+from throwcollect.robots.limits import joint_limits
 from throwcollect.robots.talos import TALOS
 from throwcollect.robots.trajectory import JointTrajectory
 from throwcollect.sweep.digest import trial_digests
@@ -179,6 +180,51 @@ def test_a_forged_episode_is_found(collection: Collection, name: str) -> None:
     found = list(problems(collection, forge))
     assert any(re.search(problem, each) for each in found), [each[:200] for each in found]
     assert all(len(each) < 500 for each in found)
+
+
+def depart(by_rad: float, torque_share: float = 0.0) -> Forgery:
+    """The elbow leaves its trajectory and comes back, with fitting velocities; one torque is a share of its limit."""
+
+    def forge(samples: Samples, header: EpisodeHeader) -> tuple[Samples, EpisodeHeader]:
+        position, velocity, effort = (each.copy() for each in (samples.position, samples.velocity, samples.effort))
+        phase = np.pi * np.linspace(0, 1, len(samples))
+        position[:, ELBOW] += by_rad * np.sin(phase) ** 2
+        velocity[:, ELBOW] += by_rad * np.gradient(np.sin(phase) ** 2) * 250
+        effort[1, ELBOW] = torque_share * joint_limits(TALOS).effort[ELBOW]
+        return replace(samples, position=position, velocity=velocity, effort=effort), header
+
+    return forge
+
+
+def tilt_ball(by_rad: float) -> Forgery:
+    def forge(samples: Samples, header: EpisodeHeader) -> tuple[Samples, EpisodeHeader]:
+        orientation = samples.ball_orientation_xyzw.copy()
+        # A small turn about the vertical axis.
+        orientation[FLIGHT:] += by_rad / 2 * orientation[FLIGHT:][:, [1, 0, 3, 2]] * [-1, 1, 1, -1]
+        return replace(samples, ball_orientation_xyzw=orientation), header
+
+    return forge
+
+
+@pytest.mark.parametrize(
+    ("forge", "found"),
+    [
+        (depart(0.019), None),
+        (depart(0.021), "departs from the trajectory of the trial by 0.021 rad"),
+        (depart(0.021, torque_share=0.99), "departs from the trajectory of the trial by 0.021 rad"),
+        (depart(0.021, torque_share=0.9995), None),
+        (in_samples("velocity", slice(40, 60), ELBOW, lambda was: was + 0.05), None),
+        (in_samples("velocity", slice(40, 60), ELBOW, lambda was: was + 0.1), "moves otherwise than its velocities"),
+        (tilt_ball(5e-10), None),
+        (tilt_ball(2e-9), "orientation departs from ballistic motion"),
+    ],
+)
+def test_forgeries_are_found_from_the_documented_tolerances_on(
+    collection: Collection, forge: Forgery, found: str | None
+) -> None:
+    said = list(problems(collection, forge))
+    assert len(said) == (found is not None)
+    assert found is None or found in said[0]
 
 
 def problems(collection: Collection, forge: Change | None) -> Iterator[str]:
