@@ -120,10 +120,13 @@ def _describe_error(details: ErrorDetails, values: Any, above: Location, expecte
         refused = section.refused.get(name)
         # If a section has a single key, the user means that key, whatever they wrote.
         only = known[0] if len(known) == 1 else ""
-        meant = "" if refused else _find_nearest(name, known) or only
         if name.isdecimal() and value is None:
             # YAML takes what follows a comma for the next key.
             refused = "unknown key; if it is the end of a number, decimals are written with a point, as in 1.5"
+        if location[:-1] == ("sweep",) and "." in name:
+            # The level between is the one that is forgotten most often.
+            refused = "unknown key; keys that vary belong below sweep.parameters"
+        meant = "" if refused else _find_nearest(name, known) or only
         yield KeyProblem(location, refused or unknown_key(name, known), unknown=True, meant=meant)
     elif isinstance(cause, ContradictionError):
         for key, sentence in cause.sentences.items():
