@@ -19,7 +19,7 @@ from throwcollect.config.values import reason_not_sweepable, with_values
 from throwcollect.errors import ConfigError, Problem
 from throwcollect.sweep.parquet_file import encode_table
 from throwcollect.sweep.points import Points, Targets
-from throwcollect.wording import format_count
+from throwcollect.wording import format_count, join_names
 
 _MOST_PROBLEMS = 20
 _UNNAMED_INDEX = re.compile(r"__index_level_\d+__")
@@ -95,6 +95,8 @@ def _read_csv(path: Path, config: Config) -> _Rows:
             reader = csv.reader(file)
             # Empty lines are skipped, before the header as well as below it.
             names = tuple(name.strip() for name in next(filter(None, reader), []))
+            if problem := explain_wrong_separator(names):
+                raise ConfigError([Problem(problem, "", path, reader.line_num)])
             _check_columns(names, path, config, line=reader.line_num)
             for cells in reader:
                 if not cells:
@@ -130,6 +132,13 @@ def _read_row(names: tuple[str, ...], cells: list[str], path: Path, line: int) -
             expected = "a number, or empty for no target" if is_target(name) else "a number"
             problems.append(Problem(f"should be {expected}, got {cell.strip()!r}", name, path, line))
     return row, problems
+
+
+def explain_wrong_separator(header: Sequence[str]) -> str:
+    """Explain that the columns of a CSV file are separated by something else than commas; empty if nothing says so."""
+    separators = {";": "semicolons", "\t": "tabs"}
+    found = [word for separator, word in separators.items() if any(separator in name for name in header)]
+    return f"columns should be separated by commas, got {join_names(found)}" if found else ""
 
 
 def explain_wrong_count(cells: Sequence[str], columns: int) -> str:
