@@ -92,7 +92,7 @@ def _name_run(context: typer.Context) -> str:
 
 
 def _explain_commas(context: typer.Context, message: str) -> str:
-    """Write a line on commas if a number stands alone, and the command has an option that takes several; else nothing."""
+    """Write a line on commas for a number that stands alone, if the command has an option that takes several."""
     option = next((each for each in context.command.params if getattr(each, "metavar", None) == "X,Y"), None)
     if option is None or not _STRAY_NUMBER.search(message):
         return ""

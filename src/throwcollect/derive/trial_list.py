@@ -84,7 +84,7 @@ def _gather_targets(sources: Sequence[Source]) -> Targets | None:
 
 
 def _add_missing_offsets(configs: Sequence[Config]) -> list[Config]:
-    """Add the offset 0 to each configuration for the joints that have an offset in another one: none is the same as 0."""
+    """Add offsets of 0, which is the same as none, for the joints that have an offset in another configuration."""
     joints = dict.fromkeys(joint for config in configs for joint in config.robot.joint_offsets)
     return [
         config.model_copy(

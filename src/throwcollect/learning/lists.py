@@ -66,7 +66,7 @@ def _find_columns(header: list[str], names: Sequence[str], aliases: dict[str, st
     """
     columns = {name: aliases.get(name, name) if name not in header else name for name in names}
     if missing := [name for name in names if columns[name] not in header]:
-        if problem := explain_wrong_separator(header):
+        if problem := explain_wrong_separator(header, {*names, *aliases.values()}.__contains__):
             raise ConfigError(f"{place}: {problem}", expected=f"columns {', '.join(names)}")
         other = "".join(f", or {aliases[name]} for {name}" for name in missing if name in aliases)
         raise ConfigError(f"{place}: no column {join_names(missing)}", expected=f"columns {', '.join(names)}{other}")

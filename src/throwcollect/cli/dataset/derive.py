@@ -85,8 +85,9 @@ def split_dataset(
         whole += " that have an episode,"
     lines = []
     for name, part in found.parts.items():
-        cells = format_count(part.cells, "cell") + (f", {part.uncelled} in no cell" if part.uncelled else "")
-        lines.append(f"{output / name}: {part.dataset.trials} of {whole} in {cells}")
+        elsewhere = f", {part.uncelled} in no cell" if part.uncelled else ""
+        places = format_count(part.cells, "cell") + elsewhere
+        lines.append(f"{output / name}: {part.dataset.trials} of {whole} in {places}")
         lines.append(f"  digest  {part.dataset.digest}")
     print_result(found.as_dict(), "\n".join([*lines, *_list_left_out(found.without_episode)]), json=json)
 

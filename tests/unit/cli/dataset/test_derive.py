@@ -79,7 +79,9 @@ def test_the_command_sample_takes_the_same_trials_for_the_same_seed_and_others_f
 def test_the_command_split_says_what_each_part_has_and_passes_the_seed_on(source: Path, tmp_path: Path) -> None:
     arguments = ("--fractions", "a=0.5,b=0.5", "--cells", "trial=2", "--seed", "1")
     text = run("split", source, tmp_path / "parts", *arguments)
-    told = re.findall(rf"^{tmp_path}/parts/([ab]): (\d) of 5 trials that have an episode, in (\d) cells?$", text, flags=re.MULTILINE)
+    told = re.findall(
+        rf"^{tmp_path}/parts/([ab]): (\d) of 5 trials that have an episode, in (\d) cells?$", text, flags=re.MULTILINE
+    )
     assert text.endswith("left out, as they have no episode: 1 lost, 1 refused\n")
     assert sum(int(trials) for _, trials, _ in told) == 5
     found = json.loads(run("split", source, tmp_path / "again", *arguments, "--json"))
