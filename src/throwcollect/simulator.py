@@ -5,12 +5,20 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from threading import RLock
 from types import TracebackType
 
 import numpy as np
 from numpy.typing import NDArray
 
-from throwcollect.arguments import as_float, check_list, check_mapping, check_whole_number, show_value
+from throwcollect.arguments import (
+    as_float,
+    check_list,
+    check_mapping,
+    check_whole_number,
+    refuse_argument,
+    show_value,
+)
 from throwcollect.config.loader import load
 from throwcollect.config.schema import Config
 from throwcollect.config.sweep import MOST_TRIALS
@@ -47,11 +55,12 @@ class Simulator:
     under the same number. The first throw takes about a second, because the robot is loaded, and each further throw
     less than a tenth of that.
 
-    Use it as a context manager, or `close` it, because a process can have only a few physics engines at a time.
+    Use it as a context manager, or `close` it, because a process can have only a few physics engines at a time. Several
+    threads may use one simulator: while it throws for one of them, the others wait.
 
     Args:
-        config: YAML file of a configuration; its sweep is not looked at.
-        overrides: ``key=value`` pairs that win over the file, as ``--set`` takes them.
+        config: YAML file of a configuration, or a `Config`, as `load_config` gives it; its sweep is not looked at.
+        overrides: ``key=value`` pairs that win over the file, as ``--set`` takes them; none beside a `Config`.
 
     Attributes:
         config: The resolved configuration.
@@ -61,12 +70,25 @@ class Simulator:
         WorkerError: If the physics engine does not start.
     """
 
-    def __init__(self, config: StrPath, *, overrides: Sequence[str] = ()) -> None:
-        self._start(load(config, overrides), os.fspath(config))
+    def __init__(self, config: StrPath | Config, *, overrides: Sequence[str] = ()) -> None:
+        if isinstance(config, Config):
+            if overrides:
+                raise refuse_argument(
+                    "overrides", "win over a file, got a Config", hint="load_config(FILE, overrides) applies them"
+                )
+            self._start(config, config.name)
+        elif isinstance(config, str | os.PathLike):
+            self._start(load(config, overrides), os.fspath(config))
+        else:
+            raise refuse_argument(
+                "config", f"got {show_value(config)}", expected="a YAML file, or a Config as load_config gives it"
+            )
 
     def _start(self, config: Config, source: str) -> None:
-        """Make the robot and the physics engine of a configuration, which was read from the file `source`."""
+        """Make the robot and the physics engine of a configuration; `source` names it in messages, such as its file."""
         self._source = source
+        # A throw changes the robot's model and the world. A handler of a signal may close during a throw of its thread.
+        self._lock = RLock()
         self.config: Config = config
         self._check = feasibility_check(self.config)
         self._replayer = Replayer(self.config)
@@ -81,7 +103,8 @@ class Simulator:
 
     def close(self) -> None:
         """Free the physics engine; nothing can be simulated afterwards. Closing it once more does nothing."""
-        self._replayer.close()
+        with self._lock:
+            self._replayer.close()
 
     def throw(self, values: Point | None = None, *, trial: int = 0, target: Point | None = None) -> Throw:
         """Simulate one throw.
@@ -134,7 +157,8 @@ class Simulator:
         wrong = {key: reason for key in values if (reason := reason_not_sweepable(self.config, key)) is not None}
         if wrong:
             raise ConfigError([Problem(reason, key=key) for key, reason in wrong.items()])
-        return refusal(with_values(self.config, values), self._check)
+        with self._lock:
+            return refusal(with_values(self.config, values), self._check)
 
     def throw_many(self, points: Iterable[Point], *, processes: int = 1) -> Iterator[Throw]:
         """Simulate many throws, which are the trials 0, 1, 2 and so on.
@@ -191,7 +215,10 @@ class Simulator:
             raise ConflictError("this simulator is closed", hint="make another Simulator")
 
     def _throw(self, trial: Trial) -> Throw:
-        episode = self._replayer.run(trial)
+        with self._lock:
+            # Another thread may have closed it since the throw was asked for.
+            self._require_open()
+            episode = self._replayer.run(trial)
         keys = tuple(trial.values)
         table = ThrowsTable(keys, self.config, tuple(trial.target))
         row = table.row(trial, judge_episode(with_values(self.config, trial.values), episode), None)

@@ -4,12 +4,13 @@ import re
 import subprocess
 import sys
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from throwcollect import Simulator
+from throwcollect import Simulator, load_config
 from throwcollect.errors import ConfigError, ConflictError, PlanError
 
 ROOT = Path(__file__).parents[2]
@@ -180,6 +181,31 @@ def test_find_refusal_and_throw_many_check_their_arguments(simulator: Simulator)
         simulator.find_refusal([1])
     with pytest.raises(ConfigError, match=r"^processes: got 1\.5\n  expected: a whole number, 1 or more"):
         next(simulator.throw_many([{}], processes=1.5))
+
+
+def test_a_simulator_of_a_config_throws_as_that_of_its_file(simulator: Simulator) -> None:
+    config = load_config(ROOT / "configs" / "quickstart.yaml")
+    with Simulator(config) as other:
+        assert other.throw(POINT).row == simulator.throw(POINT).row
+    with pytest.raises(ConfigError, match=r"^overrides: win over a file, got a Config\n  try: load_config"):
+        Simulator(config, overrides=["seed=1"])
+
+
+def test_a_simulator_of_neither_file_nor_config_is_refused() -> None:
+    with pytest.raises(ConfigError, match=r"^config: got {'task': 1}\n  expected: a YAML file, or a Config"):
+        Simulator({"task": 1})
+
+
+def test_a_simulator_throws_for_several_threads_one_after_the_other(simulator: Simulator) -> None:
+    points = [{"task.duration_s": duration_s} for duration_s in (1.0, 1.1, 1.2)] * 4
+    alone = [simulator.throw(point).row for point in points[:3]] * 4
+
+    def throw(point: dict[str, float]) -> dict[str, object]:
+        assert "moves at" in str(simulator.find_refusal(REFUSED))
+        return simulator.throw(point).row
+
+    with ThreadPoolExecutor(4) as threads:
+        assert list(threads.map(throw, points)) == alone
 
 
 def test_a_missing_configuration_is_an_error_that_names_it(tmp_path: Path) -> None:

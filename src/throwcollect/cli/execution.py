@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+import re
 import signal
 import sys
 import traceback
@@ -23,6 +24,8 @@ from throwcollect.wording import is_text, printable
 
 _WRONG_PATHS = (errno.ENAMETOOLONG, errno.ELOOP, errno.EACCES, errno.ENOTDIR)
 """System errors that a path from the user may cause, and that are no errors of this program."""
+_STRAY_NUMBER = re.compile(r"(option: -|\(-?)[.\d][\d. -]*\)?$")
+"""End of typer's messages on a number that belongs to no option or argument."""
 _OPTIONS = {"rate_hz": "--rate"}
 """Options by the arguments that they set, where the two have different names."""
 
@@ -88,6 +91,14 @@ def _name_run(context: typer.Context) -> str:
     return f"{context.command_path} --run RUN, or " if has_run and not has_arguments else ""
 
 
+def _explain_commas(context: typer.Context, message: str) -> str:
+    """Write a line on commas for a number that stands alone, if the command has an option that takes several."""
+    option = next((each for each in context.command.params if getattr(each, "metavar", None) == "X,Y"), None)
+    if option is None or not _STRAY_NUMBER.search(message):
+        return ""
+    return f"  expected: commas between the numbers, such as {option.opts[0]} 1.4,-0.2\n"
+
+
 def _describe(error: Exception) -> tuple[str, int]:
     """Find the message and the exit code of an error."""
     if isinstance(error, ConfigError):
@@ -98,8 +109,9 @@ def _describe(error: Exception) -> tuple[str, int]:
         message = error.format_message()
         context: typer.Context | None = getattr(error, "ctx", None)
         usage = f"{_name_run(context)}{context.command_path} --help" if context else "throwcollect --help"
+        expected = _explain_commas(context, message) if context else ""
         # The message is empty if there was no argument: typer has printed the help then.
-        return (f"{message}\n  try: {usage}" if message else ""), error.exit_code
+        return (f"{message}\n{expected}  try: {usage}" if message else ""), error.exit_code
     if isinstance(error, OSError) and error.errno in _WRONG_PATHS and error.filename is not None:
         return f"{error.filename}: {error.strerror}", ConfigError.exit_code
     where = "  try: THROWCOLLECT_DEBUG=1 shows where; please report it"

@@ -27,6 +27,7 @@ _TAG = "tag:yaml.org,2002:"
 _MOST_BYTES = 5_000_000
 _MOST_BITS = 1023
 """Most binary digits of a whole number; every such number can be a float."""
+_NO_MERGING = "merge keys (<<) are not supported; write the keys out, or put an alias in place of the whole value"
 _SWEPT = ("sweep", "parameters")
 _SWEPT_FIELDS = ("min", "max", "scale", "count", "values")
 
@@ -160,10 +161,13 @@ class Document:
         except ValueError as error:
             return self._leave_out(node, location, str(error))
 
-    def _make_mapping(self, node: MappingNode, location: Location, inside: tuple[Node, ...]) -> dict[str, Any]:
+    def _make_mapping(self, node: MappingNode, location: Location, inside: tuple[Node, ...]) -> Any:
         values: dict[str, Any] = {}
         for key_node, value_node in node.value:
             name = key_node.value
+            if key_node.tag == _TAG + "merge":
+                # Without what it should bring, other keys would be reported as missing, too.
+                return self._leave_out(key_node, location, _NO_MERGING)
             if not isinstance(name, str):
                 self._note(key_node, location, "a key should be a word")
             elif name in values:

@@ -65,6 +65,11 @@ def unknown_key(name: str, known: list[str]) -> str:
     return "unknown key; " + (f"known keys here: {', '.join(known)}" if known else "no keys are expected here")
 
 
+def unknown_joint(name: str, robot: str, joints: Sequence[str]) -> str:
+    """Make the sentence for a name that is no joint of a robot, by the robot's joints."""
+    return _refuse_joint(name, robot, _find_nearest(name, joints))
+
+
 def quote(value: Any) -> str:
     """Show a value in a message as its author would recognise it."""
     if isinstance(value, str):
@@ -115,17 +120,20 @@ def _describe_error(details: ErrorDetails, values: Any, above: Location, expecte
         refused = section.refused.get(name)
         # If a section has a single key, the user means that key, whatever they wrote.
         only = known[0] if len(known) == 1 else ""
-        meant = "" if refused else _find_nearest(name, known) or only
         if name.isdecimal() and value is None:
             # YAML takes what follows a comma for the next key.
             refused = "unknown key; if it is the end of a number, decimals are written with a point, as in 1.5"
+        if location[:-1] == ("sweep",) and "." in name:
+            # The level between is the one that is forgotten most often.
+            refused = "unknown key; keys that vary belong below sweep.parameters"
+        meant = "" if refused else _find_nearest(name, known) or only
         yield KeyProblem(location, refused or unknown_key(name, known), unknown=True, meant=meant)
     elif isinstance(cause, ContradictionError):
         for key, sentence in cause.sentences.items():
             yield KeyProblem((*location, *_split(key)), sentence)
     elif isinstance(cause, UnknownJointError):
         meant = _find_nearest(cause.name, cause.joints)
-        sentence = f"{cause.robot} has no joint {quote(cause.name)}{_did_you_mean(meant)}"
+        sentence = _refuse_joint(cause.name, cause.robot, meant)
         yield KeyProblem(location, sentence, unknown=is_key, meant=meant)
     elif cause is not None:
         yield KeyProblem(location, str(cause), unknown=is_key)
@@ -142,6 +150,10 @@ def _describe_error(details: ErrorDetails, values: Any, above: Location, expecte
             no_match = "; none is chosen automatically, as the same file would give other throws on another machine"
         sentence = _write_expectation(str(shape), value, shape.choices, no_match=no_match)
         yield KeyProblem(location, sentence + _explain_radians(kind, shape, value))
+
+
+def _refuse_joint(name: str, robot: str, meant: str) -> str:
+    return f"{robot} has no joint {quote(name)}{_did_you_mean(meant)}"
 
 
 def _write_expectation(words: str, value: Any, choices: list[str], *, no_match: str = "") -> str:

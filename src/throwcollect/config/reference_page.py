@@ -140,13 +140,19 @@ def _list_targets() -> str:
 
 def _list_sweepable() -> str:
     config = Config()
+    # By default, no joint has an offset.
+    robot = config.robot.model_copy(update={"joint_offsets": dict.fromkeys(config.task.end, 0.0)})
+    config = config.model_copy(update={"robot": robot})
     weights = {joint: [0.0] * 2 for joint in config.task.end}
     primitive = DynamicMovementPrimitive(family="dmp", basis_functions=2, weights=weights)
     learned: Section = config.task.model_copy(update={"trajectory": primitive})
     keys = [*sweepable_keys(config), *sweepable_keys(config.model_copy(update={"task": learned}))]
     joints = "|".join(all_joints())
     general = dict.fromkeys(re.sub(rf"({joints})(\.\d+)?", _generalise, key) for key in keys)
-    where = "A joint must be in `task.end`, and a weight in `task.trajectory.weights`."
+    where = (
+        "A joint must be in `task.end`, one with an offset in `robot.joint_offsets`, too, and a weight in "
+        "`task.trajectory.weights`."
+    )
     return ", ".join(f"`{key}`" for key in general) + f".\n{where}"
 
 

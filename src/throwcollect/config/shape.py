@@ -57,6 +57,11 @@ class ValueShape:
         """The words that are allowed; empty if any text is."""
         return [word for shape in self.alternatives for word in _list_words(shape.node)]
 
+    @property
+    def maps_joints(self) -> bool:
+        """Whether it is a mapping from names of joints."""
+        return "propertyNames" in self.node
+
     def child(self, part: str | int) -> ValueShape:
         """Find the shape of the value under a key or an index; it allows anything if there should be no value."""
         for shape in self.alternatives:
@@ -128,7 +133,7 @@ def _describe(shape: ValueShape) -> str:
             return "{" + ", ".join(f"{key}: …" for key in required) + "}"
         if "properties" in node:
             return "keys and values"
-        names = "joint names" if "propertyNames" in node else "keys"
+        names = "joint names" if shape.maps_joints else "keys"
         return f"{names}, each with {shape.child('')}"
     if kind == "null":
         return "null"

@@ -10,11 +10,12 @@ from typing import Any, TypeVar
 from pydantic import ValidationError
 
 from throwcollect.config.key import Effect, Key, key_of_field, overlay
-from throwcollect.config.problems import Location, findings, join_key, unknown_key
+from throwcollect.config.problems import Location, findings, join_key, unknown_joint, unknown_key
 from throwcollect.config.schema import Config
 from throwcollect.config.section import Section, list_sections
-from throwcollect.config.shape import index_or_key
+from throwcollect.config.shape import index_or_key, shape_of
 from throwcollect.errors import ConfigError, Problem
+from throwcollect.members import load_member
 
 AnySection = TypeVar("AnySection", bound=Section)
 
@@ -94,7 +95,9 @@ def reason_not_sweepable(config: Config, key: str) -> str | None:
     and the recording is set up only once, so their other keys may not.
     """
     leaf = next((leaf for leaf in leaves(config) if leaf.name == key), None)
-    return unknown_key(key, sweepable_keys(config)) if leaf is None else _find_obstacle(config, leaf)
+    if leaf is not None:
+        return _find_obstacle(config, leaf)
+    return _explain_absent_joint(config, key) or unknown_key(key, sweepable_keys(config))
 
 
 def _find_obstacle(config: Config, leaf: Leaf) -> str | None:
@@ -106,8 +109,46 @@ def _find_obstacle(config: Config, leaf: Leaf) -> str | None:
         return "cannot be swept, as it is not a number"
     joint = leaf.name.removeprefix("task.start.")
     if joint != leaf.name and joint not in config.task.end:
-        return f"cannot vary from trial to trial, as task.end does not name {joint}"
+        return _explain_unnamed(joint, "task.end")
     return None
+
+
+def _explain_absent_joint(config: Config, key: str) -> str | None:
+    """Say why a sweep may not vary a value of a joint that the configuration does not name in that place.
+
+    Returns:
+        The reason; None if the key does not lead to a mapping from joints, so that the key itself is wrong.
+    """
+    holder: Any = config
+    annotation = Key()
+    parts = key.split(".")
+    depth = 0
+    while depth < len(parts) and parts[depth] in (inner := _list_values(holder)):
+        if isinstance(holder, Section):
+            annotation = overlay(annotation, type(holder), parts[depth])
+        holder = inner[parts[depth]]
+        depth += 1
+    if depth == len(parts) or not isinstance(holder, dict) or not shape_of(parts[:depth]).maps_joints:
+        return None
+    if not annotation.swept:
+        return "cannot vary from trial to trial"
+    robot, joint = load_member("robots", config.robot.name), parts[depth]
+    if joint not in robot.joints:
+        return unknown_joint(joint, robot.title, robot.joints)
+    if joint not in config.task.end:
+        return _explain_unnamed(joint, "task.end")
+    # Only a value that is a single number can be added without knowing more of the motion.
+    advice = "; give it a value there first, such as 0.0" if depth == len(parts) - 1 else ""
+    return _explain_unnamed(joint, join_key(tuple(parts[:depth]))) + advice
+
+
+def _list_values(holder: Any) -> dict[str, Any]:
+    """Map the names in a section or a mapping to their values; empty for anything else."""
+    return holder.__dict__ if isinstance(holder, Section) else holder if isinstance(holder, dict) else {}
+
+
+def _explain_unnamed(joint: str, mapping: str) -> str:
+    return f"cannot vary from trial to trial, as {mapping} does not name {joint}"
 
 
 def _find_operator_keys(section: type[Section]) -> Iterator[str]:

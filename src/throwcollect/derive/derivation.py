@@ -9,9 +9,11 @@ from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import closing
 from dataclasses import asdict, dataclass
+from itertools import chain, islice
 from pathlib import Path
 from typing import Any
 
+from throwcollect.config.schema import Config
 from throwcollect.dataset.creation import create
 from throwcollect.dataset.damage import locating_damage
 from throwcollect.dataset.directory import CARD, SOURCES
@@ -29,7 +31,9 @@ from throwcollect.episode.restamp import Restamper
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.files import new_directory, write_file
 from throwcollect.robots.description import full_description
+from throwcollect.sweep.digest import trial_digests
 from throwcollect.sweep.plan import Plan, make_trials
+from throwcollect.sweep.points import Points
 
 _ROWS_AT_ONCE = 256
 _MOST_THREADS = 4
@@ -45,12 +49,14 @@ class Derived:
         offered: Number of trials of its sources.
         without_episode: Number of trials that were asked for but have no episode, by outcome; they are left out.
         digest: Its digest.
+        repeated: Number of trials that more than one of its sources has, so that the dataset has them several times.
     """
 
     trials: int
     offered: int
     without_episode: Mapping[str, int]
     digest: str
+    repeated: int
 
     def as_dict(self) -> dict[str, Any]:
         """Return the same as a dictionary, for JSON."""
@@ -103,7 +109,18 @@ def _write(sources: Sequence[Source], directory: Path, name: str | None) -> Deri
         offered=sum(len(each.dataset.throws) for each in sources),
         without_episode=dict(sorted(without.items())),
         digest=info(directory).digest,
+        repeated=_count_repeated(sources, config, points),
     )
+
+
+def _count_repeated(sources: Sequence[Source], config: Config, points: Points) -> int:
+    """Count the trials that more than one source has; the points are those of all sources, one after the other."""
+    if len(sources) == 1:
+        return 0
+    # All seeds are taken as 0, as they follow from the numbers of trials, which differ between datasets.
+    digests = iter(trial_digests(config, points, [0] * len(points.values)))
+    held = [{digest.tobytes() for digest in islice(digests, len(source.trials))} for source in sources]
+    return sum(count > 1 for count in Counter(chain.from_iterable(held)).values())
 
 
 def _restamp_episodes(sources: Sequence[Source], restamper: Restamper) -> Iterator[tuple[Episode, Row]]:

@@ -11,7 +11,6 @@ from throwcollect.config.loader import value_as_yaml
 from throwcollect.config.schema import Config, SweepConfig
 from throwcollect.config.values import leaves, reason_not_sweepable
 from throwcollect.dataset.directory import TRIALS
-from throwcollect.dataset.reader import Dataset
 from throwcollect.derive.source import Source
 from throwcollect.errors import ConfigError, Problem
 from throwcollect.sweep.points import Points, Targets
@@ -25,14 +24,15 @@ def list_of_trials(sources: Sequence[Source]) -> tuple[Config, Points]:
 
     Returns:
         The configuration of the first source, which takes its points from a file; and the points. The sweep varies the
-        keys that any source sweeps, and those that the sources have fixed at different values.
+        keys that any source sweeps, and those that the sources have fixed at different values; for this, the
+        configuration has the offsets of all joints for which any source has one.
 
     Raises:
         ConfigError: If the sources differ in keys that cannot be swept; it shows all of them.
     """
-    first, *others = [source.dataset for source in sources]
+    configs = _add_missing_offsets([source.dataset.config for source in sources])
     keys = list(dict.fromkeys(key for source in sources for key in source.dataset.plan.keys))
-    fixed = [_collect_fixed_values(dataset) for dataset in (first, *others)]
+    fixed = [_collect_fixed_values(config) for config in configs]
     problems = []
     for key in dict.fromkeys(key for values in fixed for key in values):
         values = [each.get(key, _ABSENT) for each in fixed]
@@ -41,7 +41,7 @@ def list_of_trials(sources: Sequence[Source]) -> tuple[Config, Points]:
         elif key in keys or all(value == values[0] for value in values):
             continue
         else:
-            obstacle = reason_not_sweepable(first.config, key)
+            obstacle = reason_not_sweepable(configs[0], key)
         if obstacle is None:
             keys.append(key)
         else:
@@ -56,7 +56,7 @@ def list_of_trials(sources: Sequence[Source]) -> tuple[Config, Points]:
     ]
     points = Points(tuple(keys), np.array(rows, np.float64), _gather_targets(sources))
     sweep = SweepConfig(sampler="list", file=TRIALS)
-    config = first.config.without_run().model_copy(update={"sweep": sweep, "trials": None, "until": None})
+    config = configs[0].without_run().model_copy(update={"sweep": sweep, "trials": None, "until": None})
     return config, points
 
 
@@ -83,8 +83,23 @@ def _gather_targets(sources: Sequence[Source]) -> Targets | None:
     return Targets(names, np.array([[trial.target.get(name, np.nan) for name in names] for trial in trials]))
 
 
-def _collect_fixed_values(dataset: Dataset) -> dict[str, Any]:
-    return {leaf.name: leaf.value for leaf in leaves(dataset.config) if leaf.key.determines_samples}
+def _add_missing_offsets(configs: Sequence[Config]) -> list[Config]:
+    """Add offsets of 0, which is the same as none, for the joints that have an offset in another configuration."""
+    joints = dict.fromkeys(joint for config in configs for joint in config.robot.joint_offsets)
+    return [
+        config.model_copy(
+            update={
+                "robot": config.robot.model_copy(
+                    update={"joint_offsets": {**dict.fromkeys(joints, 0.0), **config.robot.joint_offsets}}
+                )
+            }
+        )
+        for config in configs
+    ]
+
+
+def _collect_fixed_values(config: Config) -> dict[str, Any]:
+    return {leaf.name: leaf.value for leaf in leaves(config) if leaf.key.determines_samples}
 
 
 def _list_differences(sources: Sequence[Source], values: Sequence[Any]) -> str:

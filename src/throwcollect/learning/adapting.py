@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
 
@@ -12,6 +13,7 @@ from throwcollect.learning.arrays import Array
 from throwcollect.learning.learned_map import Correction, KeyRole, LearnedMap
 from throwcollect.reproducible_math import matmul, solve
 from throwcollect.units import unit_of_name
+from throwcollect.wording import join_names
 
 _OFFSET = 0.1
 """Standard deviation that is expected of the offset [m or rad] before any throw."""
@@ -170,15 +172,23 @@ def refuse_far_places(learned: LearnedMap, places: Array) -> None:
     low, high = learned.outputs.min(axis=0), learned.outputs.max(axis=0)
     away = np.linalg.norm(np.maximum(0.0, np.maximum(low - places, places - high)), axis=1)
     ranges = ", ".join(f"{least:.3g} to {most:.3g}" for least, most in zip(low.tolist(), high.tolist(), strict=True))
-    units = dict.fromkeys(filter(None, map(unit_of_name, learned.targets)))
     for number in np.flatnonzero(away > max(_LEAST_WIDTH, float(np.linalg.norm(high - low)))).tolist():
         ends = zip(learned.targets, places[number].tolist(), strict=True)
         raise FarThrowError(
             number,
             ", ".join(f"{target} is {end:g}" for target, end in ends),
             expected=f"about {ranges}, where the throws ended that the model was learned from",
-            hint=f"check the unit: {' and '.join(_NOT_MIXED_UP.get(unit, unit) for unit in units)}" if units else None,
+            hint=_suggest_checks(learned.targets),
         )
+
+
+def _suggest_checks(targets: Sequence[str]) -> str | None:
+    """Say which mistakes move the ends of throws far away; None if none is likely."""
+    units = dict.fromkeys(filter(None, map(unit_of_name, targets)))
+    checks = [f"check the unit: {' and '.join(_NOT_MIXED_UP.get(unit, unit) for unit in units)}"] if units else []
+    if len(targets) > 1:
+        checks.append(f"check that {join_names(targets)} are not swapped")
+    return "; ".join(checks) or None
 
 
 def leave_as_it_is(learned: LearnedMap, distances: Array) -> Adaptation:

@@ -14,7 +14,7 @@ from throwcollect.config.task_config import TaskConfig
 from throwcollect.errors import ConfigError
 from throwcollect.files import write_file
 from throwcollect.learning.aiming import Aim
-from throwcollect.sweep.point_file import explain_wrong_count, read_number
+from throwcollect.sweep.point_file import explain_wrong_count, explain_wrong_separator, read_number
 from throwcollect.wording import join_names
 
 
@@ -66,6 +66,8 @@ def _find_columns(header: list[str], names: Sequence[str], aliases: dict[str, st
     """
     columns = {name: aliases.get(name, name) if name not in header else name for name in names}
     if missing := [name for name in names if columns[name] not in header]:
+        if problem := explain_wrong_separator(header, {*names, *aliases.values()}.__contains__):
+            raise ConfigError(f"{place}: {problem}", expected=f"columns {', '.join(names)}")
         other = "".join(f", or {aliases[name]} for {name}" for name in missing if name in aliases)
         raise ConfigError(f"{place}: no column {join_names(missing)}", expected=f"columns {', '.join(names)}{other}")
     if twice := [column for column in columns.values() if header.count(column) > 1]:

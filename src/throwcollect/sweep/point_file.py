@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import math
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -95,6 +95,8 @@ def _read_csv(path: Path, config: Config) -> _Rows:
             reader = csv.reader(file)
             # Empty lines are skipped, before the header as well as below it.
             names = tuple(name.strip() for name in next(filter(None, reader), []))
+            if problem := explain_wrong_separator(names, lambda name: _is_column(name, config)):
+                raise ConfigError([Problem(problem, "", path, reader.line_num)])
             _check_columns(names, path, config, line=reader.line_num)
             for cells in reader:
                 if not cells:
@@ -130,6 +132,23 @@ def _read_row(names: tuple[str, ...], cells: list[str], path: Path, line: int) -
             expected = "a number, or empty for no target" if is_target(name) else "a number"
             problems.append(Problem(f"should be {expected}, got {cell.strip()!r}", name, path, line))
     return row, problems
+
+
+def explain_wrong_separator(header: Sequence[str], is_column: Callable[[str], bool]) -> str:
+    """Explain that the columns of a CSV file are separated by something else than commas.
+
+    Args:
+        header: Names of the columns, as they are read with commas.
+        is_column: Says whether the file may have a column of a name.
+
+    Returns:
+        The sentence; empty if no other separator gives the name of a column, as in a file that is no list at all.
+    """
+    for separator, word in ((";", "semicolons"), ("\t", "tabs")):
+        parts = [part.strip(' "') for name in header if separator in name for part in name.split(separator)]
+        if any(map(is_column, parts)):
+            return f"columns should be separated by commas, got {word}"
+    return ""
 
 
 def explain_wrong_count(cells: Sequence[str], columns: int) -> str:
@@ -188,6 +207,10 @@ def _read_parquet(path: Path, config: Config) -> _Rows:
     values = np.array([column[good] for column in columns.values()], dtype=np.float64)
     points = _make_points(tuple(columns), values.reshape(len(columns), np.count_nonzero(good)).T, config)
     return _Rows(points, np.flatnonzero(good) + 1, problems)
+
+
+def _is_column(name: str, config: Config) -> bool:
+    return is_target(name) or reason_not_sweepable(config, name) is None
 
 
 def _check_columns(names: tuple[str, ...], path: Path, config: Config, *, line: int | None) -> None:

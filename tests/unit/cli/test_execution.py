@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import sys
+
 import pytest
 
 from throwcollect.arguments import refuse_argument
 from throwcollect.cli.execution import execute
+from throwcollect.cli.main import assemble_command
 from throwcollect.errors import ConfigError, NotFoundError, Problem
 
 
@@ -34,3 +37,23 @@ def test_an_error_about_a_configuration_key_names_the_key_unchanged(capsys: pyte
     both = NotFoundError([Problem("is not there", "task.end"), Problem("is not there", "seed", argument=True)])
     assert describe(both, capsys) == "throwcollect: task.end: is not there\n--seed: is not there\n"
     assert describe(ConfigError("no target"), capsys) == "throwcollect: no target\n"
+
+
+@pytest.mark.parametrize("numbers", [["1.4", "-0.2"], ["1.4", "0.2"], ["1.4", "-.2"], ["1.4", "0.2", "0.1"]])
+def test_numbers_of_a_target_without_a_comma_are_told_how_they_are_written(
+    numbers: list[str], capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sys, "argv", ["throwcollect", "aim", "model", "--at", *numbers])
+    with pytest.raises(SystemExit):
+        execute(assemble_command("aim"))
+    said = capsys.readouterr().err
+    assert "\n  expected: commas between the numbers, such as --at 1.4,-0.2\n  try: throwcollect aim --help\n" in said
+
+
+def test_a_wrong_option_of_a_command_with_targets_is_not_taken_for_a_number(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sys, "argv", ["throwcollect", "aim", "model", "--foo"])
+    with pytest.raises(SystemExit):
+        execute(assemble_command("aim"))
+    assert "commas" not in capsys.readouterr().err

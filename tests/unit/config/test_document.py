@@ -52,6 +52,14 @@ def test_an_alias_has_the_value_of_its_anchor(read):
     assert read("a: &range {min: 1}\nb: *range\n").values == {"a": {"min": 1}, "b": {"min": 1}}
 
 
+def test_a_merge_key_at_the_top_of_a_file_or_in_an_override_is_refused(read):
+    with pytest.raises(ConfigError, match=r"run\.yaml:2: merge keys \(<<\) are not supported; write the keys out"):
+        read("a: &a {b: 1}\n<<: *a\n")
+    document = read("a: 1\n")
+    document.override("ball={<<: {mass_kg: 1}}")
+    assert [key for key, _, _ in facts(document)] == ["ball"]
+
+
 def test_an_anchor_inside_itself_is_a_problem(read):
     assert facts(read("a: &a\n  b: *a\n")) == [("a.b", 1, "an alias cannot be inside its own anchor")]
 

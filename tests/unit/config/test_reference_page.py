@@ -26,3 +26,9 @@ def test_rows_of_the_reference_tables_have_equally_many_cells():
         bars = line.count("|") if line.startswith("|") else 0
         assert not table or bars in (0, table)
         table = bars
+
+
+def test_keys_that_may_be_swept_include_the_offset_of_a_joint():
+    swept = page().partition("### Keys that may be swept")[2].partition("##")[0]
+    assert "`robot.joint_offsets.<joint>`" in swept
+    assert "in `robot.joint_offsets`" in swept

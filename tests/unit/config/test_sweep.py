@@ -85,6 +85,20 @@ def test_a_sampler_refuses_missing_and_unneeded_keys(problems_of, sweep, message
     assert problems_of(f"trials: 1\nsweep: {sweep}") == [f"run.yaml:2: {message}"]
 
 
+def test_a_swept_key_outside_of_parameters_is_told_where_it_belongs(problems_of):
+    assert problems_of("sweep:\n  sampler: grid\n  task.duration_s: {values: [1]}") == [
+        "run.yaml:3: sweep.task.duration_s: unknown key; keys that vary belong below sweep.parameters"
+    ]
+
+
+def test_a_merge_key_in_a_sweep_is_the_only_problem(problems_of):
+    text = "name: a\ntrials: 1\nsweep:\n  parameters:\n    task.duration_s: &range {min: 1, max: 1.2}\n"
+    assert problems_of(text + "    task.trajectory.gamma: {<<: *range, max: 1.3}") == [
+        "run.yaml:6: sweep.parameters.task.trajectory.gamma: merge keys (<<) are not supported; "
+        "write the keys out, or put an alias in place of the whole value"
+    ]
+
+
 def test_a_sampler_that_draws_needs_a_number_of_trials(problems_of):
     assert problems_of("sweep: {parameters: {ball.mass_kg: {min: 1, max: 2}}}") == [
         "run.yaml: trials: missing; the sampler sobol should know how many trials to draw, or (until) how many "

@@ -98,6 +98,27 @@ def test_keys_that_may_vary_between_trials_can_be_swept(key):
             "task.start.arm_right_3_joint",
             "cannot vary from trial to trial, as task.end does not name arm_right_3_joint",
         ),
+        ("task.end.arm_right_6_joint", "cannot vary from trial to trial, as task.end does not name arm_right_6_joint"),
+        ("task.start.head_1_joint", "cannot vary from trial to trial, as task.end does not name head_1_joint"),
+        ("task.end.arm_rigth_4_joint", "Talos has no joint 'arm_rigth_4_joint'; did you mean 'arm_right_4_joint'?"),
+        (
+            "robot.joint_offsets.arm_right_4_joint",
+            "cannot vary from trial to trial, as robot.joint_offsets does not name arm_right_4_joint; "
+            "give it a value there first, such as 0.0",
+        ),
+        (
+            "robot.joint_offsets.arm_right_6_joint",
+            "cannot vary from trial to trial, as task.end does not name arm_right_6_joint",
+        ),
+        (
+            "robot.joint_offsets.arm_rigth_4_joint",
+            "Talos has no joint 'arm_rigth_4_joint'; did you mean 'arm_right_4_joint'?",
+        ),
+        ("robot.posture.head_1_joint", "cannot vary from trial to trial"),
+        (
+            "task.trajectory.weights.torso_1_joint.0",
+            "cannot vary from trial to trial, as task.trajectory.weights does not name torso_1_joint",
+        ),
         (
             "task.trajectory.basis_functions",
             "cannot be swept, as it is a whole number; the values of a sweep have decimals",

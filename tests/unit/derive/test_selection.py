@@ -108,6 +108,19 @@ def test_a_merged_dataset_sweeps_the_keys_that_any_source_sweeps_or_that_differ(
     assert [number for _, number in sources(tmp_path / "light")] == [7, 8]
 
 
+def test_merging_takes_an_absent_offset_of_a_joint_as_zero(
+    collected: Path, make_collection: type[Collection], tmp_path: Path
+) -> None:
+    elbow = "arm_right_4_joint"
+    make_collection({"trials": 2, "robot": {"joint_offsets": {elbow: 0.05}}}).collect(tmp_path / "other")
+    for name, order in (("behind", [collected, tmp_path / "other"]), ("before", [tmp_path / "other", collected])):
+        merge(order, tmp_path / name)
+        assert verify(tmp_path / name) == []
+        assert load(tmp_path / name / "config.yaml").robot.joint_offsets.keys() == {elbow}
+    offsets = [trial.values[f"robot.joint_offsets.{elbow}"] for trial in Dataset.open(tmp_path / "behind").plan.trials]
+    assert offsets == [0.0] * 7 + [0.05] * 2
+
+
 def test_datasets_with_different_physics_cannot_be_merged(
     collected: Path, make_collection: type[Collection], tmp_path: Path
 ) -> None:

@@ -51,6 +51,8 @@ def test_a_list_may_have_its_columns_in_any_order_among_others(table: Path) -> N
         (f"{HEADER}\n1,0\n1,63,-0,29\n", f":3: should have 2 values, got 4; {POINTS}"),
         (f"{HEADER}\n1.63,-0.29,0.3\n", ":2: should have 2 values, got 3"),
         (f"{HEADER},note\n1.63,-0.29\n", ":2: should have 3 values, got 2"),
+        (f"{HEADER.replace(',', ';')}\n1;0\n", ":1: columns should be separated by commas, got semicolons"),
+        ("# Two numbers; in m.\n1,0\n", ":1: no column landing_x_m and landing_y_m"),
         (f"{HEADER},landing_x_m\n1,0,2\n", ":1: landing_x_m: the column is here twice"),
         (f"\n{HEADER}\n1,\n", ":3: landing_y_m: ''"),
     ],

@@ -305,7 +305,9 @@ def test_adapting_refuses_places_in_another_unit(model: Model, factor: float) ->
     assert re.fullmatch(
         r"about 0\.\d+ to 1\.\d+, -0\.\d+ to 0\.\d+, where the throws ended .*", caught.value.expected or ""
     )
-    assert caught.value.hint == "check the unit: m, not cm or mm"
+    assert caught.value.hint == (
+        "check the unit: m, not cm or mm; check that landing_x_m and landing_y_m are not swapped"
+    )
 
 
 @pytest.mark.parametrize(

@@ -177,6 +177,12 @@ def test_a_file_that_is_no_table_is_a_problem(tmp_path):
 TARGETED = "task.duration_s,target_y_m,target_x_m\n"
 
 
+@pytest.mark.parametrize(("separator", "name"), [(";", "semicolons"), ("\t", "tabs")])
+def test_columns_that_are_separated_by_something_else_than_commas_are_one_problem(csv, separator, name):
+    path = csv(separator.join(["task.duration_s", "ball.mass_kg"]) + "\n" + separator.join(["1,1", "0,04"]) + "\n")
+    assert problems(path) == [f"list.csv:1: columns should be separated by commas, got {name}"]
+
+
 def test_columns_of_targets_are_no_keys_and_may_be_empty_in_a_row(csv):
     points = read_points(csv(TARGETED + "1.0,-0.2,1.4\n1.1,,\n1.2, ,\n"), Config())
     assert points.keys == ("task.duration_s",)

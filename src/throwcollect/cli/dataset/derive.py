@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from throwcollect.cli.options import DatasetArgument, JsonOption, OutputArgument
-from throwcollect.cli.printing import format_number, print_result
+from throwcollect.cli.printing import format_number, print_result, tell
 from throwcollect.wording import format_count
 
 if TYPE_CHECKING:
@@ -30,7 +30,11 @@ def merge_datasets(
     """Put the trials of several datasets one after the other."""
     from throwcollect.derive.selection import merge
 
-    _show(output, merge(directories, output), json=json)
+    found = merge(directories, output)
+    if found.repeated:
+        twice = format_count(found.repeated, "trial")
+        tell(f"warning: in more than one of the datasets, and so more than once in the new one: {twice}")
+    _show(output, found, json=json)
 
 
 def filter_dataset(
@@ -75,10 +79,15 @@ def split_dataset(
     from throwcollect.derive.split import SQUARES, split
 
     found = split(directory, output, fractions=fractions, cells=cells or SQUARES, seed=seed)
+    # Each trial with an episode is in one part, so shares are shares of these.
+    whole = format_count(sum(part.dataset.trials for part in found.parts.values()), "trial")
+    if found.without_episode:
+        whole += " that have an episode,"
     lines = []
     for name, part in found.parts.items():
         elsewhere = f", {part.uncelled} in no cell" if part.uncelled else ""
-        lines.append(f"{output / name}: {_count_trials(part.dataset)} in {format_count(part.cells, 'cell')}{elsewhere}")
+        places = format_count(part.cells, "cell") + elsewhere
+        lines.append(f"{output / name}: {part.dataset.trials} of {whole} in {places}")
         lines.append(f"  digest  {part.dataset.digest}")
     print_result(found.as_dict(), "\n".join([*lines, *_list_left_out(found.without_episode)]), json=json)
 
@@ -92,13 +101,10 @@ def show_statistics(directory: DatasetArgument, json: JsonOption = False) -> Non
 
 
 def _show(output: Path, derived: Derived, *, json: bool) -> None:
-    lines = [f"{output}: {_count_trials(derived)}", f"  digest  {derived.digest}"]
+    counts = f"{derived.trials} of {format_count(derived.offered, 'trial')}"
+    lines = [f"{output}: {counts}", f"  digest  {derived.digest}"]
     text = "\n".join([*lines, *_list_left_out(derived.without_episode)])
     print_result({"directory": str(output), **derived.as_dict()}, text, json=json)
-
-
-def _count_trials(derived: Derived) -> str:
-    return f"{derived.trials} of {format_count(derived.offered, 'trial')}"
 
 
 def _list_left_out(without_episode: Mapping[str, int]) -> list[str]:

@@ -13,6 +13,8 @@ from throwcollect.dataset.reader import Dataset
 from throwcollect.derive.source import source as find_source
 from throwcollect.derive.split import assign
 
+REPEATED = "warning: in more than one of the datasets, and so more than once in the new one"
+
 
 def run(*arguments: str | Path) -> str:
     done = CliRunner().invoke(dataset_app, list(map(str, arguments)), catch_exceptions=False)
@@ -41,14 +43,26 @@ def test_commands_say_how_many_trials_without_an_episode_were_left_out(source: P
         r"left out, as they have no episode: 1 lost, 1 refused\n",
         text,
     )
-    found = json.loads(run("merge", source, tmp_path / "a", tmp_path / "b", "--json"))
+    merged = CliRunner().invoke(dataset_app, ["merge", str(source), str(tmp_path / "a"), str(tmp_path / "b"), "--json"])
+    found = json.loads(merged.stdout)
     assert found.pop("digest")
     assert found == {
         "directory": str(tmp_path / "b"),
         "trials": 9,
         "offered": 11,
         "without_episode": {"lost": 1, "refused": 1},
+        "repeated": 4,
     }
+    assert merged.stderr == f"{REPEATED}: 4 trials\n"
+
+
+def test_the_command_merge_warns_only_of_trials_that_several_datasets_have(source: Path, tmp_path: Path) -> None:
+    for name, condition in (("even", "trial % 2 == 0"), ("odd", "trial % 2 == 1"), ("late", "trial > 3")):
+        run("filter", source, tmp_path / name, "--where", condition)
+    assert "warning" not in run("merge", tmp_path / "even", tmp_path / "odd", tmp_path / "whole")
+    twice = run("merge", tmp_path / "late", tmp_path / "odd", tmp_path / "late", tmp_path / "twice")
+    # Of the trials 4 to 6, one was lost.
+    assert f"{REPEATED}: 2 trials\n" in twice
 
 
 def test_the_command_sample_takes_the_same_trials_for_the_same_seed_and_others_for_another(
@@ -65,7 +79,9 @@ def test_the_command_sample_takes_the_same_trials_for_the_same_seed_and_others_f
 def test_the_command_split_says_what_each_part_has_and_passes_the_seed_on(source: Path, tmp_path: Path) -> None:
     arguments = ("--fractions", "a=0.5,b=0.5", "--cells", "trial=2", "--seed", "1")
     text = run("split", source, tmp_path / "parts", *arguments)
-    told = re.findall(rf"^{tmp_path}/parts/([ab]): (\d) of 7 trials in (\d) cells?$", text, flags=re.MULTILINE)
+    told = re.findall(
+        rf"^{tmp_path}/parts/([ab]): (\d) of 5 trials that have an episode, in (\d) cells?$", text, flags=re.MULTILINE
+    )
     assert text.endswith("left out, as they have no episode: 1 lost, 1 refused\n")
     assert sum(int(trials) for _, trials, _ in told) == 5
     found = json.loads(run("split", source, tmp_path / "again", *arguments, "--json"))
