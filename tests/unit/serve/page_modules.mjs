@@ -14,7 +14,7 @@ const { coarsen } = await load("coarse.js");
 const { placeApart } = await load("places.js");
 const { coverPlace } = await load("target.js");
 const { describeModel } = await load("model_map.js");
-const { describe, tabulate } = await load("model_words.js");
+const { describe, median, tabulate } = await load("model_words.js");
 const { Rosbridge } = await load("rosbridge.js");
 const { BoxGeometry, SphereGeometry } = await load("vendor/three/build/three.module.js");
 
@@ -171,6 +171,12 @@ test("errors of a score become rows, first those in the own world, then those in
   const rows = tabulate({ trained: [{ trained_on: 30, errors }], adapted: [{ real_throws: 0, method: "none", errors }, { real_throws: 1, method: "offset", errors }] });
   assert.deepEqual(rows.map(([text]) => text), ["learned from 30 throws", "other world, not adapted", "other world, 1 throw there (offset)"]);
   assert.deepEqual(rows[0].slice(1), ["1.00\u00a0cm", "2.00\u00a0cm", "–"]);
+  const [, second] = tabulate({ trained: [{ trained_on: 30, errors }], distilled: errors, adapted: [] });
+  assert.deepEqual(second, ["model.onnx of these", "1.00\u00a0cm", "2.00\u00a0cm", "–"]);
+});
+
+test("the median is the mean of the middle two where there is no middle one", () => {
+  assert.deepEqual([[], [3], [4, 1], [9, 1, 5, 2], [3, 1, 2]].map(median), [null, 3, 2.5, 3.5, 2]);
 });
 
 test("misses are shown in the unit of their targets", () => {

@@ -63,23 +63,25 @@ export function describe({ learned_from: name, throws, error, parameters, target
 }
 
 /** Rows of the table of errors: the model that threw, the median, what nine of ten stay below, and the largest. */
-export function tabulate({ trained, adapted }) {
+export function tabulate({ trained, distilled, adapted }) {
   // A line may be broken only between two units.
   const tell = (errors, name) => [...new Set(byUnit(errors).map((each) => tellMiss(each[name], each.unit).replaceAll(" ", "\u00a0")))].join(", ");
   const row = (text, errors) => [text, ...["median", "share90", "largest"].map((name) => tell(errors, name))];
   return [
     ...trained.map(({ trained_on: count, errors }) => row(`learned from ${count} throws`, errors)),
+    ...(distilled ? [row("model.onnx of these", distilled)] : []),
     ...adapted.map(({ real_throws: count, method, errors }) => row(`other world, ${count ? `${count} ${count === 1 ? "throw" : "throws"} there (${method})` : "not adapted"}`, errors)),
   ];
 }
 
 /**
  * @param {number[]} values
- * @returns {number | null} the one in the middle; null if there are none
+ * @returns {number | null} the one in the middle, or the mean of the two there; null if there are none
  */
 export function median(values) {
+  if (!values.length) return null;
   const sorted = [...values].sort((a, b) => a - b);
-  return sorted[(sorted.length - 1) >> 1] ?? null;
+  return (sorted[(sorted.length - 1) >> 1] + sorted[sorted.length >> 1]) / 2;
 }
 
 function short(value) {
