@@ -8,13 +8,11 @@ from collections.abc import Collection, Iterator
 import numpy as np
 
 from throwcollect.dataset.recorded_trial import ABORTED, CANCELED, EXECUTING, SUCCEEDED, RecordedTrial, shorten
+from throwcollect.episode.record import REST_S, REST_SPEED_MPS
 from throwcollect.robots.description import robot_of
 from throwcollect.units import NS_PER_S
 
 _END_REASONS = ("landed", "rest", "timeout")
-_REST_S = 0.5
-_REST_SPEED = 0.01
-"""The simulation ends a trial as `rest` when the ball has been slower than this [m/s] for so long [s]."""
 _LEAST_ERROR_CODE = -5
 """Lowest error code of control_msgs/action/FollowJointTrajectory; 0 is success."""
 _ROUNDING = 1e-9
@@ -103,15 +101,15 @@ def _find_end_problems(trial: RecordedTrial) -> Iterator[str]:
 def _explain_unrest(trial: RecordedTrial) -> str | None:
     """Say why a trial cannot have ended as `rest`; None if it can have."""
     physics_hz = trial.config.sim.physics_hz
-    since = trial.last_step - _REST_S * physics_hz
+    since = trial.last_step - REST_S * physics_hz
     resting = np.arange(0, trial.last_step + 1, trial.stride) > since
     speed = float(np.linalg.norm(trial.samples.ball_linear_velocity[resting], axis=1).max())
-    if speed > _REST_SPEED + _ROUNDING:
-        return f"the ball moved at {speed:.3g} m/s in the last {_REST_S} s"
+    if speed > REST_SPEED_MPS + _ROUNDING:
+        return f"the ball moved at {speed:.3g} m/s in the last {REST_S} s"
     if not trial.find_pressed(trial.header.contacts)[resting].all():
-        return f"nothing held the ball in the last {_REST_S} s"
+        return f"nothing held the ball in the last {REST_S} s"
     moves_s = trial.motion_s + trial.config.sim.command_delay_s
     # A goal that was given up ends the motion at another time.
     if not trial.has_failed_goal and since / physics_hz < moves_s - 1 / physics_hz:
-        return f"the arm moved until {moves_s:.3f} s, less than {_REST_S} s before"
+        return f"the arm moved until {moves_s:.3f} s, less than {REST_S} s before"
     return None

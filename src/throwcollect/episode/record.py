@@ -100,6 +100,9 @@ class GoalOutcome:
 
 EndReason = Literal["landed", "rest", "timeout"]
 """Reasons for the end of a trial: the ball has crossed the landing plane; ball and arm rest; its time is over."""
+REST_S = 0.5
+REST_SPEED_MPS = 0.01
+"""A ball rests that has been slower than this for so long."""
 
 
 @dataclass(frozen=True)

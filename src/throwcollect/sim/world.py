@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from throwcollect.config.schema import Config
 from throwcollect.engine_packages import require_engine
 from throwcollect.engines.engine import BALL_NUMBERS, BodyState, Engine, Observer, Sample, State, Steps, ball_of
-from throwcollect.episode.record import Contact, EndReason, Samples
+from throwcollect.episode.record import REST_S, REST_SPEED_MPS, Contact, EndReason, Samples
 from throwcollect.members import load_member
 from throwcollect.robots.description import (
     Description,
@@ -28,9 +28,6 @@ from throwcollect.sim.scene import drag_of, physics_of, scene_of
 from throwcollect.sim.spawned import SpawnedBodies
 from throwcollect.tools.tool import tool_of
 from throwcollect.units import NS_PER_S
-
-_REST_S = 0.5
-_REST_SPEED = 0.01
 
 
 class World(Observer):
@@ -295,8 +292,8 @@ class World(Observer):
         self._sampled_target = target
         self._has_moved |= not stands_still
         lies = stands_still and self._touching and self._has_moved
-        if not (lies and math.hypot(*now[BALL_LINEAR_VELOCITY]) < _REST_SPEED):
+        if not (lies and math.hypot(*now[BALL_LINEAR_VELOCITY]) < REST_SPEED_MPS):
             self._resting_since = self.steps
-        elif self.steps - self._resting_since >= _REST_S * self._hz:
+        elif self.steps - self._resting_since >= REST_S * self._hz:
             return "rest"
         return "timeout" if self.steps >= self._last_step else None
