@@ -12,7 +12,7 @@ from throwcollect.ros.msg import JointTrajectory, JointTrajectoryControllerState
 from throwcollect.ros.srv import QueryTrajectoryState
 from throwcollect.sim.controller_action import ControllerAction
 from throwcollect.sim.controller_messages import nanoseconds, read_trajectory, state_message
-from throwcollect.sim.controller_parameters import ParameterFace
+from throwcollect.sim.controller_parameters import ControllerParameterServer
 from throwcollect.sim.own_time import make_own_time
 from throwcollect.sim.simulation import Simulation
 
@@ -27,7 +27,7 @@ class ControllerNode(Node):
 
     Attributes:
         controller: Name of the controller in the simulation.
-        face: The controller's parameters.
+        parameter_server: Offers the parameters of the controller.
         action: The action by which clients give the controller goals.
     """
 
@@ -40,7 +40,7 @@ class ControllerNode(Node):
         self._limb = limb
         self._log = _LogHandler(self)
         limb.controller.logger.addHandler(self._log)
-        self.face = ParameterFace(self, limb, simulation.trial)
+        self.parameter_server = ControllerParameterServer(self, limb, simulation.trial)
         self.action = ControllerAction(
             self, simulation, controller, aborts_refused=simulation.config.controllers.refused_goals == "abort"
         )

@@ -26,8 +26,8 @@ _LEAST_RATE_HZ = 0.1
 """Least `action_monitor_rate`; all other numbers must only not be negative."""
 
 
-class ParameterFace:
-    """Declares the parameters of a limb's controller on its node, and hands changes on.
+class ControllerParameterServer:
+    """Offers the parameters of a limb's controller on its node, and hands changes on.
 
     Changes hold for the next goal. The gains of ros2_controllers are left out, because controllers that command
     positions have none. While the simulation's trial is leased, all changes are refused.

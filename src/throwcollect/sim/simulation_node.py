@@ -113,7 +113,7 @@ class SimulationNode(Node):
         self._episodes = self.create_publisher(UInt8MultiArray, _EPISODE, _WHOLE)
 
     @property
-    def companions(self) -> tuple[Node, ...]:
+    def other_nodes(self) -> tuple[Node, ...]:
         """The other nodes of the simulation: one for each controller, and the controller manager."""
         return (*self._controllers.values(), self._manager)
 
@@ -137,7 +137,7 @@ class SimulationNode(Node):
         """Publish what has happened since the last call: time, samples, feedback, results, the episode."""
         simulation = self._simulation
         now = Time(nanoseconds=simulation.now_ns)
-        for node in (self, *self.companions):
+        for node in (self, *self.other_nodes):
             node.get_clock().set_ros_time_override(now)
         for name, result in simulation.pop_results():
             self._controllers[name].action.finish(result)
@@ -349,7 +349,7 @@ class SimulationNode(Node):
     def _restore_parameters(self) -> None:
         """Undo what clients have changed of the parameters; of the real-time factor, only slow motion is undone."""
         for controller in self._controllers.values():
-            controller.face.restore()
+            controller.parameter_server.restore()
         configured = {NUMBER: NO_TRIAL, CONTROLLERS: _NO_CONTROLLERS, **self._physics}
         stray = {key: value for key, value in configured.items() if self._get_value(key) != value}
         if self._hangs(self._get_value(_FACTOR)):

@@ -71,7 +71,7 @@ def run(config: Path, *, name: str, namespace: str | None = None) -> None:
     except ros.NameValidationException as error:
         raise ConfigError(str(error)) from error
     executor = ros.SingleThreadedExecutor()
-    nodes = (node, *node.companions)
+    nodes = (node, *node.other_nodes)
     for served in nodes:
         executor.add_node(served)
     stopped = 0
