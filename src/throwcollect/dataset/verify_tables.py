@@ -7,11 +7,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
+import pyarrow as pa
 
 from throwcollect.config.loader import load
 from throwcollect.config.schema import Config
+from throwcollect.config.shape import unit_of_key
 from throwcollect.dataset.directory import CONFIG, PLAN, THROWS, TRIALS, config_path, shard_of
 from throwcollect.dataset.findings import Finding
+from throwcollect.dataset.recorded_trial import shorten
 from throwcollect.dataset.throws_table import REFUSED, Row, RowsByTrial, read_throws_table
 from throwcollect.errors import ConfigError, DatasetError, ForeignPlanError
 from throwcollect.sweep.digest import trial_digests
@@ -77,10 +80,19 @@ def check_tables(directory: Path) -> Tables:
         except DatasetError as error:
             tables.findings.append(Finding.of(THROWS, error))
         else:
+            tables.findings += _find_unit_problems(throws.schema)
             tables.findings += _find_row_problems(tables.plan, throws["trial"].to_pylist())
             tables.rows = RowsByTrial(throws)
             tables.findings += _find_plan_problems(tables.plan, tables.rows, tables.doubtful)
     return tables
+
+
+def _find_unit_problems(schema: pa.Schema) -> Iterator[Finding]:
+    """Find units of columns that are not theirs; exports take them over, while descriptions are for people alone."""
+    for column in schema:
+        stated, unit = (column.metadata or {}).get(b"unit"), unit_of_key(column.name)
+        if stated not in (None, unit.encode()):
+            yield Finding(THROWS, column.name, f"has the unit {shorten(stated)}, should be {unit!r}")
 
 
 def read_list(directory: Path, plan: Plan) -> Points:

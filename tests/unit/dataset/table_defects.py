@@ -164,6 +164,14 @@ def change_bag_file_number_type(directory: Path) -> None:
     path.write_text(before + files + re.sub(r"message_count: (\d+)", r"message_count: \1.0", after, count=1))
 
 
+def change_unit(directory: Path) -> None:
+    table = pq.read_table(directory / "throws.parquet")
+    index = table.schema.get_field_index("task.duration_s")
+    field = table.schema.field(index)
+    other = field.with_metadata({**field.metadata, b"unit": b"ms"})
+    pq.write_table(table.set_column(index, other, table.column(index)), directory / "throws.parquet")
+
+
 def nudge_landing(directory: Path) -> None:
     table = pq.read_table(directory / "throws.parquet")
     change_table(directory / "throws.parquet", "landing_x_m", 2, table["landing_x_m"][2].as_py() + 1e-8)
@@ -208,6 +216,7 @@ TABLE_DEFECTS: dict[Callable[[Path], None], tuple[str, str, str]] = {
     change_bag_file_count: ("metadata.yaml", "files", "the files give"),
     change_bag_format: ("metadata.yaml", "throwcollect.format", "is '7'"),
     add_bag_key: ("metadata.yaml", "", "unknown keys: .*colour"),
+    change_unit: ("throws.parquet", "task.duration_s", "has the unit b'ms', should be 's'"),
     nudge_landing: ("quick_00000.mcap", "trial 2", "throws.parquet has landing_x_m"),
     add_bag_section: ("metadata.yaml", "", "unknown sections: .*colours"),
     change_bag_number_type: ("metadata.yaml", "version", "is 9.0, the files give 9"),
