@@ -36,7 +36,7 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def middle(place: Path) -> str:
     """A target amid the throws, as --at takes it."""
     said = call_here("aim", place / "model", "--at", "0,0").stderr
-    found = re.search(r"reached: (\S+)", said)
+    found = re.search(r"nearest throw ends at (\S+)", said)
     assert found is not None
     return found[1]
 
@@ -211,10 +211,10 @@ def test_throws_of_another_robot_are_refused(place: Path) -> None:
     assert "the task throw of the robot talos\n  expected: throw of arm, as the model has it" in said.stderr
 
 
-def test_a_target_out_of_reach_is_reported_with_the_nearest_point(place: Path) -> None:
+def test_a_target_out_of_reach_is_reported_with_the_nearest_throw(place: Path) -> None:
     said = call_here("aim", place / "model", "--at", "9,0")
     assert said.returncode == 1
-    told = r"out of reach: 9\.000,0\.000; no throw .*\n  .* that was reached: \d\.\d+,-?\d\.\d+ \(7\d\d\.\d+ cm away\)"
+    told = r"out of reach: 9\.000,0\.000; no throw .*\n  the nearest throw ends at \d\.\d+,-?\d\.\d+ \(7\d\d\.\d+ cm"
     assert re.search(told, said.stderr), said.stderr
 
 

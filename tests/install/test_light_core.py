@@ -150,13 +150,16 @@ def test_no_package_of_the_extras_is_installed(environment: Path) -> None:
 def test_datasets_are_read_exported_and_derived_as_with_all_extras(
     environment: Path, forker: Forker, dataset: Path, tmp_path: Path
 ) -> None:
+    first, second = tmp_path / "first", tmp_path / "second"
+    filter_dataset(dataset, first, where="trial < 3")
+    filter_dataset(dataset, second, where="trial >= 3")
     for arguments in (
         ("dataset", "info", dataset),
         ("dataset", "digest", dataset),
         ("dataset", "export", dataset, tmp_path / "parquet", "--to", "parquet"),
         ("dataset", "export", dataset, tmp_path / "lerobot", "--to", "lerobot"),
         ("dataset", "export", dataset, tmp_path / "npz", "--to", "npz", "--rate", "50"),
-        ("dataset", "merge", dataset, dataset, tmp_path / "merged"),
+        ("dataset", "merge", first, second, tmp_path / "merged"),
         ("config", QUICKSTART),
     ):
         said = forker.run(*arguments)
@@ -166,9 +169,8 @@ def test_datasets_are_read_exported_and_derived_as_with_all_extras(
     assert json.loads(told)["samples"] == compute_statistics(dataset).samples
     said = run(environment, "throwcollect", "dataset", "filter", dataset, tmp_path / "few", "--where", "trial < 3")
     assert said.returncode == 0, said.stderr
-    filter_dataset(dataset, tmp_path / "as few", where="trial < 3")
-    names = sorted(path.name for path in (tmp_path / "as few").iterdir() if path.name not in OF_THE_MOMENT)
-    assert filecmp.cmpfiles(tmp_path / "few", tmp_path / "as few", names, shallow=False) == (names, [], [])
+    names = sorted(path.name for path in first.iterdir() if path.name not in OF_THE_MOMENT)
+    assert filecmp.cmpfiles(tmp_path / "few", first, names, shallow=False) == (names, [], [])
 
 
 def test_verify_names_the_checks_that_need_an_extra(environment: Path, dataset: Path) -> None:
