@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from throwcollect.learning.model import Model
     from throwcollect.learning.score import Score
 
-_MOST_TOLD = 20
+_MOST_PRINTED = 20
 """Largest number of targets out of reach that are printed; further ones are only counted."""
 
 ModelArgument = Annotated[Path, typer.Argument(metavar="MODEL", help="Directory of the model.", readable=False)]
@@ -139,7 +139,7 @@ def aim(
     else:
         for aim in aims:
             typer.echo(" ".join(f"--set {key}={value!r}" for key, value in aim.parameters.items()))
-    _tell_out_of_reach(model, aims)
+    _print_out_of_reach(model, aims)
     if not all(aim.reachable for aim in aims):
         raise typer.Exit(1)
 
@@ -324,15 +324,15 @@ def _read_dataset(directory: Path, keys: Sequence[str], model: Model) -> list[Ro
     ]
 
 
-def _tell_out_of_reach(model: Model, aims: Sequence[Aim]) -> None:
-    """Print which targets are out of reach, and why; only count those beyond the first `_MOST_TOLD`."""
+def _print_out_of_reach(model: Model, aims: Sequence[Aim]) -> None:
+    """Print which targets are out of reach, and why; only count those beyond the first `_MOST_PRINTED`."""
     from throwcollect.learning.reach import explain_reach
 
     far = [(number, aim) for number, aim in enumerate(aims, start=1) if not aim.reachable]
-    for number, aim in far[:_MOST_TOLD]:
+    for number, aim in far[:_MOST_PRINTED]:
         tell(f"target {number} of {len(aims)} is out of reach: {explain_reach(model.learned, aim)}")
-    if len(far) > _MOST_TOLD:
-        tell(f"and {len(far) - _MOST_TOLD} more; {len(far)} of {len(aims)} targets are out of reach")
+    if len(far) > _MOST_PRINTED:
+        tell(f"and {len(far) - _MOST_PRINTED} more; {len(far)} of {len(aims)} targets are out of reach")
 
 
 def _describe_score(score: Score) -> list[str]:

@@ -90,7 +90,7 @@ class TrialCollection:
         count = 0
         told = time.monotonic()
 
-        def tell(trial: int, result: Result) -> None:
+        def count_episode(trial: int, result: Result) -> None:
             nonlocal count, told
             # Episodes come file by file, so this is the number in all files that were read so far.
             if count and time.monotonic() >= told + _TELL_EVERY_S:
@@ -100,7 +100,7 @@ class TrialCollection:
             collection.recall(trial, result)
 
         try:
-            if collection.writer.recover(tell, processes=processes):
+            if collection.writer.recover(count_episode, processes=processes):
                 say(f"keeps {format_count(count, 'episode')} of an earlier collection")
             collection._cut_plan(say)
         except BaseException:
@@ -209,7 +209,7 @@ class TrialCollection:
             return False
         self._lookahead.end(simulation)
         self._leases.complete(simulation, trial)
-        self._tell_set_aside()
+        self._warn_of_set_aside()
         self._backlog.append((episode, result))
         return True
 
@@ -362,7 +362,7 @@ class TrialCollection:
         if self._growth is not None:
             self._growth.take_result(trial, result)
 
-    def _tell_set_aside(self) -> None:
+    def _warn_of_set_aside(self) -> None:
         aside = {name: reason for name in self._names if (reason := self._leases.why_set_aside(name)) is not None}
         for simulation in aside.keys() - self._set_aside.keys():
             self.warn(f"{simulation}: gets no more trials, because {aside[simulation]}")

@@ -111,7 +111,7 @@ def _list_ranges(config: Config, throws: pa.Table) -> list[str]:
     return [
         "## What varies",
         "",
-        *_tell_drawing(config),
+        *_describe_drawing(config),
         "",
         "| key | unit | lowest | highest |",
         "|---|---|---|---|",
@@ -141,7 +141,7 @@ def _list_targets(config: Config, throws: pa.Table) -> list[str]:
     ]
 
 
-def _tell_drawing(config: Config) -> list[str]:
+def _describe_drawing(config: Config) -> list[str]:
     """Tell how the values were drawn, one sentence a line."""
     lines = [f"Drawn by the sampler `{config.sweep.sampler}` with seed {config.seed}."]
     if config.sweep.target is not None:

@@ -87,8 +87,8 @@ class RecordedTrial:
 
     def name_contact(self, contact: Contact) -> str:
         """Name a contact in words; a long name of its body is cut."""
-        return f"the contact with {shorten(contact.body)} at {self.tell_time(contact.start_ns)}"
+        return f"the contact with {shorten(contact.body)} at {self.format_time(contact.start_ns)}"
 
-    def tell_time(self, instant_ns: int) -> str:
+    def format_time(self, instant_ns: int) -> str:
         """Write an instant as the time since the start of the trial."""
         return f"{(instant_ns - self.header.start_ns) / NS_PER_S:.3f} s"

@@ -166,10 +166,10 @@ def _checking_shards(
         doing="checks recordings",
         fork=True,
     ) as reports:
-        yield _tell(zip(names, reports, strict=True), len(names), say if many else lambda _: None)
+        yield _report_progress(zip(names, reports, strict=True), len(names), say if many else lambda _: None)
 
 
-def _tell(
+def _report_progress(
     reports: Iterator[tuple[str, ShardReport]], count: int, say: Callable[[str], object]
 ) -> Iterator[tuple[str, ShardReport]]:
     """Pass the reports on, and say how many there are every few seconds."""

@@ -83,7 +83,7 @@ def _find_end_problems(trial: RecordedTrial) -> Iterator[str]:
     held = trial.find_pressed([contact for contact in header.contacts if contact.body == config.tool.name])
     crossings = np.flatnonzero((height[1:] < 0) & (height[:-1] >= 0) & ~held[1:]) + 1
     if len(crossings) and crossings[0] < last:
-        crossed = trial.tell_time(int(samples.stamps_ns[crossings[0]]))
+        crossed = trial.format_time(int(samples.stamps_ns[crossings[0]]))
         yield f"the ball crossed the landing plane at {crossed}, and the trial went on"
     elif len(crossings) and header.end_reason != "landed":
         yield f"ended as {header.end_reason}, although the ball crossed the landing plane"

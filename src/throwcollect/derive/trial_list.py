@@ -48,7 +48,7 @@ def list_of_trials(sources: Sequence[Source]) -> tuple[Config, Points]:
             problems.append(Problem(f"{_list_differences(sources, values)}; {obstacle}", key))
     if problems:
         expected = "datasets that differ only in what a sweep may vary"
-        raise ConfigError(problems, expected=expected, hint=_tell_how_to_compare(sources))
+        raise ConfigError(problems, expected=expected, hint=_explain_how_to_compare(sources))
     rows = [
         [source.dataset.plan.trial(number).values.get(key, values[key]) for key in keys]
         for source, values in zip(sources, fixed, strict=True)
@@ -60,7 +60,7 @@ def list_of_trials(sources: Sequence[Source]) -> tuple[Config, Points]:
     return config, points
 
 
-def _tell_how_to_compare(sources: Sequence[Source]) -> str | None:
+def _explain_how_to_compare(sources: Sequence[Source]) -> str | None:
     """Name the command that compares two engines; None if all datasets are of one."""
     first, *others = [source.dataset for source in sources]
     engine = next(

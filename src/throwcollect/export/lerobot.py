@@ -101,7 +101,7 @@ dataset = LeRobotDataset("me/throws", root=".")
             "| `observation.state` | rad, rad/s | positions (`.pos`), velocities (`.vel`) of moving joints, measured |",
             "| `observation.effort` | N m | torques of their motors |",
             "| `observation.environment_state` | m, m/s | position and velocity of the ball's centre, in world"
-            f"{_tell_goal(source)} |",
+            f"{_describe_goal(source)} |",
             "| `action` | rad | their commanded positions, on the trajectory that controllers were sent |",
             f"| `next.reward` | 1 | 1 in the last frame of a throw that {success}, 0 in all others |",
             f"| `next.success` | | true in the last frame of a throw that {success} |",
@@ -271,7 +271,7 @@ def _say_task(source: ExportSource, target: Mapping[str, float]) -> str:
     return f"{said} to {', '.join(goal)}." if goal else f"{said}."
 
 
-def _tell_goal(source: ExportSource) -> str:
+def _describe_goal(source: ExportSource) -> str:
     """Name the targets that follow the ball in the state of the environment, as the end of a sentence."""
     goal = [f"{each.word} [{unit_of(each.name)}]" for each in source.targets]
     return f"; then where it should end: {', '.join(goal)}, also in the text of the task" if goal else ""

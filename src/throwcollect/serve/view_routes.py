@@ -78,7 +78,7 @@ def make_view_routes(instances: Instances) -> APIRouter:
         return FileResponse(find_mesh_by_content(sha256), headers=headers)
 
     @router.websocket("/instances/{instance}/shown")
-    async def tell_throws(socket: WebSocket, instance: str) -> None:
+    async def stream_throws(socket: WebSocket, instance: str) -> None:
         try:
             run = await asyncio.to_thread(instances.get, instance)
         except ThrowcollectError as error:

@@ -65,14 +65,14 @@ class ControllerAction:
             goal.result.set_result(result)
 
     @property
-    def heard(self) -> bool:
+    def has_subscribers(self) -> bool:
         """Whether feedback has subscribers."""
         return self._node.count_subscribers(self._feedback_topic) > 0
 
     @property
     def watched(self) -> bool:
         """Whether a goal has been taken and feedback has subscribers."""
-        return bool(self._goals) and self.heard
+        return bool(self._goals) and self.has_subscribers
 
     @property
     def owes_feedback(self) -> bool:

@@ -50,9 +50,9 @@ class ControllerNode(Node):
         self._states = self.create_publisher(JointTrajectoryControllerState, "~/controller_state", _STATES)
 
     @property
-    def heard(self) -> bool:
+    def has_subscribers(self) -> bool:
         """Whether the controller's state or its feedback has subscribers."""
-        return self.wants_states or self.action.heard
+        return self.wants_states or self.action.has_subscribers
 
     @property
     def watched(self) -> bool:

@@ -73,7 +73,7 @@ class LimbController:
         return self._controller
 
     @property
-    def moves(self) -> bool:
+    def is_driven(self) -> bool:
         """Whether the commands may still change, so that the limb must be driven."""
         return self._start_ns is None and not self._controller.at_rest
 

@@ -247,7 +247,7 @@ class Simulation:
         # A trial ends when its rules say so; a motion by hand, when all joints have come to rest.
         if self._in_trial and self.world.end_reason is not None:
             self._running = False
-        elif not self._in_trial and not any(limb.moves for limb in self.limbs.values()):
+        elif not self._in_trial and not any(limb.is_driven for limb in self.limbs.values()):
             # The ball may still be on its way then, so the clock runs on until it has landed or rests.
             self._running = self.world.end_reason is None
         if factor:
@@ -357,7 +357,7 @@ class Simulation:
 
     def _step_some(self, most: int) -> int:
         """Take at most `most` steps, so that a controller looks at the measured state when it has to."""
-        moving = [limb for limb in self.limbs.values() if limb.moves]
+        moving = [limb for limb in self.limbs.values() if limb.is_driven]
         free = most
         if self._keeps_states:
             # Every controller looks at each sample; between samples there is nothing to keep.

@@ -212,7 +212,7 @@ class SimulationNode(Node):
             return
         self._noticed_changes = changes
         self._listened = [(topic, publisher) for topic, publisher in self._live if publisher.get_subscription_count()]
-        self._subscribed = [controller for controller in self._controllers.values() if controller.heard]
+        self._subscribed = [controller for controller in self._controllers.values() if controller.has_subscribers]
         self._simulation.watch(controller.controller for controller in self._subscribed if controller.wants_states)
 
     def _publish_latched(self, channels: Channels) -> None:

@@ -161,7 +161,7 @@ class BulletEngine(Engine):
             pressing = {(point[2], point[4]) for point in points if point[9] > 0} if points else nothing
             if pressing != last_pressing:
                 self._pressing = last_pressing = pressing
-                self._tell_touch(number, observer)
+                self._report_touch(number, observer)
             if number == due:
                 due += stride
                 if observer.on_sample(number, self._sample()):
@@ -185,7 +185,7 @@ class BulletEngine(Engine):
         """Find the boxes around the links of the robot, along the axes of the world."""
         return boxes(self._client, self._scenery.robot)
 
-    def _tell_touch(self, step: int, observer: Observer) -> None:
+    def _report_touch(self, step: int, observer: Observer) -> None:
         """Tell the observer which bodies press on the ball now, unless only other surfaces of the same bodies do."""
         touching = frozenset(self._names[surface] for surface in self._pressing or ())
         if touching != self._touching:

@@ -210,7 +210,7 @@ class MujocoEngine(Engine):
             now = greater(pressing, nothing, presses).tobytes() if contacts else untouched
             if now != last_presses:
                 last_presses = now
-                self._tell_touch(number, now, observer)
+                self._report_touch(number, now, observer)
             if number == due:
                 due += stride
                 if observer.on_sample(number, self._sample()):
@@ -249,7 +249,7 @@ class MujocoEngine(Engine):
         mujoco.mj_kinematics(self._model, self._data)
         return boxes(self._model, self._data, bodies)
 
-    def _tell_touch(self, step: int, presses: bytes, observer: Observer) -> None:
+    def _report_touch(self, step: int, presses: bytes, observer: Observer) -> None:
         """Tell the observer which bodies press on the ball now, if others did before.
 
         `presses` has one byte for each surface, 1 if it presses.

@@ -35,12 +35,12 @@ class Goal(Errand):
         self._client = client
         self.id: RequestId = request.id
         self._given = request.text("action")
-        super().__init__(absolute_name(self._given), self._tell_failure)
+        super().__init__(absolute_name(self._given), self._send_failure)
         self.form = Form()
         self.handle: Any = None
         self.is_cancelled = False
 
-    def tell_feedback(self, message: Any) -> None:
+    def send_feedback(self, message: Any) -> None:
         """Send feedback to the client; feedback after the result is dropped."""
         if self.is_open:
             self._answer("action_feedback", plain_values(message.feedback, self.form.compression))
@@ -49,7 +49,7 @@ class Goal(Errand):
         """Send the result to the client."""
         self._answer("action_result", plain_values(result, self.form.compression), status=status, result=True)
 
-    def _tell_failure(self, why: str) -> None:
+    def _send_failure(self, why: str) -> None:
         self._answer("action_result", why, status=_UNKNOWN, result=False)
 
     def _answer(self, op: str, values: Any, **more: object) -> None:
@@ -71,7 +71,7 @@ class Goals(Errands[Goal]):
             ConfigError: If nobody offers the action, or the goal is malformed.
         """
         goal.form = request.form()
-        on_feedback = goal.tell_feedback if request.flag("feedback") else None
+        on_feedback = goal.send_feedback if request.flag("feedback") else None
         type_name = request.text("action_type")
         action_type = find_interface("action", type_name)
         if goal.name not in dict(ros.get_action_names_and_types(self._client.session.node)):

@@ -52,7 +52,7 @@ class Rosapi:
             "message_details": lambda call: {"typedefs": describe_message(call.fields.text("type"))},
             "service_request_details": lambda call: _describe_service(call, "Request"),
             "service_response_details": lambda call: _describe_service(call, "Response"),
-            "get_time": self._tell_time,
+            "get_time": self._get_time,
             "get_ros_version": lambda _: {"version": 2, "distro": "jazzy"},
         }
         parameters = Parameters(client, questions)
@@ -164,7 +164,7 @@ class Rosapi:
             "services": [each for each, _ in _list_visible(self._node.get_service_names_and_types_by_node(*owner))],
         }
 
-    def _tell_time(self, _call: Call) -> Values:
+    def _get_time(self, _call: Call) -> Values:
         seconds, nanoseconds = divmod(self._node.get_clock().now().nanoseconds, NS_PER_S)
         return {"time": {"sec": seconds, "nanosec": nanoseconds}}
 
