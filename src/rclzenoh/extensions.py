@@ -10,7 +10,7 @@ from rclzenoh.node import Node
 
 
 def graph_changes(node: Node) -> int:
-    """Return a number that differs from the last one if the ROS graph has changed since then."""
+    """Return a number that differs from the last one if anything that was asked about the ROS graph has changed."""
     return node.context.graph.changes
 
 

@@ -1,20 +1,24 @@
 """The ROS graph: all nodes and endpoints of a domain, which announce themselves by liveliness tokens.
 
-Tokens are parsed when somebody asks about the graph, in the asking thread. Asking again while nothing changed costs a
-dictionary lookup.
+A context follows only what somebody has asked about. Otherwise, every context would be sent every token, which are
+191 of each simulation: the router of 32 simulations would have 200,000 to pass on before the first trial.
+
+Tokens are parsed when somebody asks about the graph, in the asking thread. Asking about a name again while nothing
+changed costs two dictionary lookups.
 """
 
 from __future__ import annotations
 
 import threading
 import time
-from collections import Counter, deque
+from collections import deque
 from collections.abc import Callable, Iterable, Iterator
+from typing import Any
 
 import zenoh
 
 from rclzenoh.duration import deadline_after
-from rclzenoh.keys import PREFIX, EntityKind, Token, parse_token
+from rclzenoh.keys import PREFIX, EntityKind, Token, parse_token, token_keys
 
 _MOST_UNREAD = 10_000
 """With this many unread changes, they are read even if nobody asks about the graph."""
@@ -23,23 +27,39 @@ _HISTORY_TIMEOUT_S = 10.0
 
 
 class Graph:
-    """Nodes and endpoints that are known in one domain."""
+    """Nodes and endpoints of one domain; of each kind, they are known from the first question about it on."""
 
     def __init__(self, session: zenoh.Session, domain: int) -> None:
+        self._session = session
+        self._domain = domain
+        # This is not the lock of `_changed`, which threads of Zenoh need while another thread waits for tokens.
+        self._asking = threading.Lock()
+        self._followed: dict[tuple[EntityKind, str | None], Any] = {}
         # A thread may take the lock of a Condition twice, as `_on_change` does when it reads changes.
         self._changed = threading.Condition()
         self._unread: deque[tuple[bool, str]] = deque()
-        self._tokens: dict[str, Token] = {}
-        self._counts: Counter[tuple[EntityKind, str, str]] = Counter()
+        # By kind and name, and then by key expression.
+        self._tokens: dict[tuple[EntityKind, str], dict[str, Token]] = {}
         self.changes = 0
-        """Number of changes so far; as long as it stays the same, the graph does, too."""
-        key = f"{PREFIX}/{domain}/**"
-        handler = zenoh.handlers.Callback(self._on_change, indirect=False)
-        self._subscriber = session.liveliness().declare_subscriber(key, handler, history=True)
-        # Nobody answers this query, but the router ends it only after it has sent the history that the subscriber asked
-        # for, so the graph is complete afterwards. A liveliness query would not do: with a subscriber to the same
-        # tokens, it does not end (Zenoh 1.10).
-        list(session.get(f"{PREFIX}/{domain}/{session.zid()}", timeout=_HISTORY_TIMEOUT_S))
+        """Number of changes so far; as long as it stays the same, what is known of the graph does, too."""
+
+    def _follow(self, kind: EntityKind, name: str | None = None) -> None:
+        """Know all tokens of a kind, or of a kind and a name, from now on, and wait for those that exist already."""
+        if (kind, None) in self._followed or (kind, name) in self._followed:
+            return
+        with self._asking:
+            # Another thread may have asked meanwhile.
+            if (kind, name) in self._followed:
+                return
+            key = token_keys(self._domain, kind, name)
+            handler = zenoh.handlers.Callback(self._on_change, indirect=False)
+            subscriber = self._session.liveliness().declare_subscriber(key, handler, history=True)
+            # Nobody answers this query, but the router ends it only after it has sent the history that the subscriber
+            # asked for, so the tokens are complete afterwards. A liveliness query would not do: with a subscriber to
+            # the same tokens, it does not end (Zenoh 1.10).
+            asked = f"{PREFIX}/{self._domain}/{self._session.zid()}"
+            list(self._session.get(asked, timeout=_HISTORY_TIMEOUT_S))
+            self._followed[kind, name] = subscriber
 
     def _on_change(self, sample: zenoh.Sample) -> None:
         with self._changed:
@@ -56,26 +76,33 @@ class Graph:
                 token = parse_token(key)
                 if token is None:
                     continue
-                # After a lost connection to the router, tokens that are known already are announced again.
-                if appeared and key not in self._tokens:
-                    self._tokens[key] = token
-                    self._counts[token.kind, token.name, token.type] += 1
-                elif not appeared and self._tokens.pop(key, None) is not None:
-                    self._counts[token.kind, token.name, token.type] -= 1
+                # A token may be announced more than once: after a lost connection to the router, or because two
+                # subscribers follow it, that of its kind and that of its name.
+                place = token.kind, token.name
+                if appeared:
+                    self._tokens.setdefault(place, {})[key] = token
+                elif place in self._tokens:
+                    self._tokens[place].pop(key, None)
+                    if not self._tokens[place]:
+                        del self._tokens[place]
 
-    def tokens(self, *kinds: EntityKind) -> Iterator[Token]:
-        """All nodes and endpoints of some kinds."""
+    def tokens(self, *kinds: EntityKind, name: str | None = None) -> Iterator[Token]:
+        """All nodes and endpoints of some kinds, and of one name if it is given."""
+        for kind in kinds:
+            self._follow(kind, name)
         self._read()
-        # The values are copied, because threads of Zenoh may change the dictionary while a caller iterates over them.
-        return (token for token in list(self._tokens.values()) if token.kind in kinds)
+        # What is iterated over is copied, because threads of Zenoh may change it meanwhile.
+        if name is None:
+            found = [same_name for (kind, _), same_name in list(self._tokens.items()) if kind in kinds]
+        else:
+            found = [self._tokens.get((kind, name), {}) for kind in kinds]
+        return (token for same_name in found for token in list(same_name.values()))
 
     def count(self, kind: EntityKind, name: str, dds_type: str | None = None) -> int:
         """Endpoints of one kind, name and, if given, DDS type."""
-        if self._unread:
-            self._read()
-        if dds_type is not None:
-            return self._counts.get((kind, name, dds_type), 0)
-        return sum(token.name == name for token in self.tokens(kind))
+        # All names of the kind are followed, because who counts does so for many names, again and again.
+        self._follow(kind)
+        return sum(dds_type in (None, token.type) for token in self.tokens(kind, name=name))
 
     def names_and_types(self, *kinds: EntityKind, node: tuple[str, str] | None = None) -> list[tuple[str, list[str]]]:
         """Names and ROS types of endpoints, sorted, of all nodes or of one, given by its namespace and name."""

@@ -80,6 +80,12 @@ class Token:
         return ros_type(self.type)
 
 
+def token_keys(domain: int, kind: EntityKind, name: str | None = None) -> str:
+    """Key expression of all tokens of a kind, or of those with one absolute name of a topic or service."""
+    some = f"{PREFIX}/{domain}/*/*/*/{kind.value}"
+    return f"{some}/**" if name is None else f"{some}/*/*/*/{name.replace('/', '%')}/**"
+
+
 def parse_token(key: str) -> Token | None:
     """Token from its key expression; None if that is malformed, as anybody may declare one.
 

@@ -59,5 +59,5 @@ class NodeGraph(NodeBase):
 
     def _list_endpoints_info(self, kind: EntityKind, topic_name: str) -> list[TopicEndpointInfo]:
         name = self.resolve_topic_name(topic_name)
-        infos = (endpoint_info(token) for token in self.context.graph.tokens(kind) if token.name == name)
+        infos = (endpoint_info(token) for token in self.context.graph.tokens(kind, name=name))
         return [info for info in infos if info is not None]

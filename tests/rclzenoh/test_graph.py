@@ -22,6 +22,44 @@ def test_the_graph_is_complete_when_a_node_begins(rig):
     assert len([name for name, _ in rig.node("observer").get_node_names_and_namespaces()]) == len(tokens) + 1
 
 
+def test_endpoints_from_before_the_first_question_are_known_at_once(rig):
+    asker, other = rig.node("asker"), rig.node("other")
+    for node in (asker, other):
+        node.create_publisher(String, "/t", 10)
+    list(other.context.session.get("nobody/has/this"))
+    assert asker.count_publishers("/t") == 2
+    assert sorted(info.node_name for info in asker.get_publishers_info_by_topic("/t")) == ["asker", "other"]
+
+
+def test_a_context_is_sent_only_what_it_has_asked_about(rig):
+    counting, describing, other = rig.node("counting"), rig.node("describing"), rig.node("other")
+    assert counting.count_subscribers("/t") == 0
+    assert describing.get_publishers_info_by_topic("/t") == []
+    before = [node.context.graph.changes for node in (counting, describing)]
+    other.create_service(Trigger, "/s", lambda _request, response: response)
+    other.create_subscription(String, "/t", lambda _: None, 10)
+    other.create_publisher(String, "/u", 10)
+    other.create_publisher(String, "/t", 10)
+    # Tokens arrive in the order in which they were declared, so all that were sent have arrived then.
+    assert rig.spin(lambda: counting.count_subscribers("/t") == len(describing.get_publishers_info_by_topic("/t")) == 1)
+    after = [node.context.graph.changes for node in (counting, describing)]
+    assert after == [changes + 1 for changes in before]
+
+
+def test_an_endpoint_that_is_announced_twice_counts_once(rig):
+    asker, other = rig.node("asker"), rig.node("other")
+    # Both questions are answered from now on, one by the tokens of the topic, and the other by those of all topics.
+    assert asker.get_publishers_info_by_topic("/t") == []
+    assert asker.count_publishers("/t") == 0
+    before = asker.context.graph.changes
+    publisher = other.create_publisher(String, "/t", 10)
+    assert rig.spin(lambda: asker.context.graph.changes == before + 2)
+    assert len(asker.get_publishers_info_by_topic("/t")) == asker.count_publishers("/t") == 1
+    other.destroy_publisher(publisher)
+    assert rig.spin(lambda: asker.context.graph.changes == before + 4)
+    assert len(asker.get_publishers_info_by_topic("/t")) == asker.count_publishers("/t") == 0
+
+
 def test_tokens_of_a_node_are_unique_and_carry_its_session(rig):
     node = rig.node("a")
     domain = node.context.get_domain_id()

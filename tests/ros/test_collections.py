@@ -181,7 +181,7 @@ def test_a_coordinator_that_sees_no_simulation_ends_the_run_with_an_error(
     code, _, err = running.finish()
     assert code == WorkerError.exit_code == 3
     assert "the coordinator does not see the simulations; all of them are started again" in err
-    assert "simulations have been ready for 12 s, twice, but the coordinator does not see them" in err
+    assert "simulations have been ready for 12.5 s, twice, but the coordinator does not see them" in err
     assert "they use rmw_" in err
     assert "a firewall may keep nodes apart" in err
 

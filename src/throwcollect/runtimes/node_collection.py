@@ -47,7 +47,9 @@ _POLL_S = 0.1
 _LAST_POLL_S = 0.005
 """The time between polls once all known trials have ended: the coordinator ends soon, and the user waits for that."""
 _MEET_S = 12.0
-"""Nodes that are ready usually see each other within a second; after this time, something is wrong."""
+_MEET_EACH_S = 0.5
+"""Two simulations that are ready are seen within a second, but many that start at once share cores and a router. After
+the first time, and the second one for each simulation, something is wrong."""
 
 
 def roster(host: NodeHost, simulations: int) -> list[NodeSpec]:
@@ -169,7 +171,8 @@ class NodeCollection:
             self._apart_since = math.inf
             return
         self._apart_since = min(self._apart_since, time.monotonic())
-        if time.monotonic() - self._apart_since <= _MEET_S:
+        patience_s = _MEET_S + _MEET_EACH_S * self._simulations
+        if time.monotonic() - self._apart_since <= patience_s:
             return
         if not self._started_again:
             self._started_again = True
@@ -181,7 +184,7 @@ class NodeCollection:
             (router,) = (state for state in states if state.name == ROUTER)
             died = f"; it was started again {format_count(router.restarts, 'time')}, as it was {router.last_end}"
             raise WorkerError(
-                f"simulations have been ready for {_MEET_S:g} s, twice, but the coordinator does not see them",
+                f"simulations have been ready for {patience_s:g} s, twice, but the coordinator does not see them",
                 evidence=f"they use {self._host.place.middleware.rmw}, and the router at {self._host.endpoint}"
                 + (died if router.restarts else ""),
                 hint="throwcollect logs router shows what it said; it may lack memory"

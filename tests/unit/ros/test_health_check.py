@@ -48,6 +48,11 @@ def test_a_health_check_of_a_working_node_passes(rig, spinning, name, namespace)
 def test_a_health_check_leaves_no_trace_in_the_graph_and_in_the_logs(rig, spinning, capfd):
     node = rig.node("sim_3", namespace="/sim_3")
     spinning()
+    # From now on, every node, topic, service and client that appears is a change.
+    node.get_node_names_and_namespaces()
+    node.get_topic_names_and_types()
+    node.get_service_names_and_types()
+    node.get_client_names_and_types_by_node("sim_3", "/sim_3")
     changes = node.context.graph.changes
     check("sim_3")
     assert node.context.graph.changes == changes
