@@ -48,8 +48,8 @@ _LAST_POLL_S = 0.005
 """The time between polls once all known trials have ended: the coordinator ends soon, and the user waits for that."""
 _MEET_S = 12.0
 _MEET_EACH_S = 0.5
-"""Two simulations that are ready are seen within a second, but many that start at once share cores and a router. After
-the first time, and the second one for each simulation, something is wrong."""
+"""Simulations that are ready are usually seen within a second, but many that start at once share cores and a router.
+Something is wrong after the first of these times plus the second one for each simulation."""
 
 
 def roster(host: NodeHost, simulations: int) -> list[NodeSpec]:
