@@ -14,13 +14,13 @@ from throwcollect.runtimes.runtime import NodeState
 BLIND = Progress(total=4, ended=0, outcomes={}, simulations=0, throws_per_s=0.0, hung=[])
 
 
-def collection_of(monkeypatch: pytest.MonkeyPatch, session: Mock) -> NodeCollection:
+def collection_of(monkeypatch: pytest.MonkeyPatch, session: Mock, simulations: int = 1) -> NodeCollection:
     """A collection without nodes."""
     supervisor = Mock(states=Mock(return_value=[]))
     monkeypatch.setattr(node_collection, "Supervisor", Mock(return_value=supervisor))
     monkeypatch.setattr(node_collection, "RunListener", Mock())
     monkeypatch.setattr(node_collection, "roster", Mock())
-    place = SimpleNamespace(simulations=1, collects=True, middleware=SimpleNamespace(rmw="rmw_fastrtps_cpp"))
+    place = SimpleNamespace(simulations=simulations, collects=True, middleware=SimpleNamespace(rmw="rmw_fastrtps_cpp"))
     host = SimpleNamespace(place=place, config=Config(), endpoint=None, connection=None)
     return NodeCollection(host, session)
 
@@ -36,27 +36,31 @@ def test_the_launcher_waits_less_for_messages_once_all_trials_have_ended(
         assert spin.call_args.args[1] <= longest_s
 
 
-def test_restarted_nodes_have_the_same_time_to_find_each_other_again(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize(("simulations", "patience_s"), [(1, 12.5), (64, 44)])
+def test_restarted_nodes_have_the_same_time_to_find_each_other_again(
+    monkeypatch: pytest.MonkeyPatch, simulations: int, patience_s: float
+) -> None:
     now = [0.0]
     monkeypatch.setattr(node_collection, "time", SimpleNamespace(monotonic=lambda: now[0]))
     session = Mock()
-    collection = collection_of(monkeypatch, session)
+    collection = collection_of(monkeypatch, session, simulations)
     supervisor = collection._supervisor
     router = NodeState("router", "running", 0, "2", None)
     supervisor.states.return_value = [router, NodeState("sim_0", "running", 0, "1", None)]
-    for now[0] in (0.0, 11.0, 13.0):
+    for now[0] in (0.0, patience_s - 0.1, patience_s + 0.1):
+        session.warn.assert_not_called()
         collection._report(BLIND)
     assert "started again" in session.warn.call_args.args[0]
     # The coordinator was restarted too, so the next report comes late, when simulations are ready already.
-    for now[0] in (23.0, 34.0):
+    for now[0] in (2 * patience_s, 3 * patience_s - 0.1):
         collection._report(BLIND)
-    now[0] = 36.0
-    with pytest.raises(WorkerError, match="for 12 s, twice") as caught:
+    now[0] = 3 * patience_s + 0.1
+    with pytest.raises(WorkerError, match=f"for {patience_s} s, twice") as caught:
         collection._report(BLIND)
     assert "a firewall may keep nodes apart" in str(caught.value)
     # Whatever kills a router again and again is the reason then.
     supervisor.states.return_value[0] = replace(router, restarts=3, last_end="ended by SIGABRT")
-    with pytest.raises(WorkerError, match="for 12 s, twice") as caught:
+    with pytest.raises(WorkerError, match=f"for {patience_s} s, twice") as caught:
         collection._report(BLIND)
     assert "it was started again 3 times, as it was ended by SIGABRT" in str(caught.value)
     assert "firewall" not in str(caught.value)
