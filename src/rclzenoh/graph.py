@@ -1,7 +1,7 @@
 """The ROS graph: all nodes and endpoints of a domain, which announce themselves by liveliness tokens.
 
-A context follows only what somebody has asked about. Otherwise, every context would be sent every token, which are
-191 of each simulation: the router of 32 simulations would have 200,000 to pass on before the first trial.
+A context is sent only the tokens of what it has asked about. If each were sent all tokens, their number would grow with
+the square of the nodes, and the router of a large run would be busy for a minute before anything else happens.
 
 Tokens are parsed when somebody asks about the graph, in the asking thread. Asking about a name again while nothing
 changed costs two dictionary lookups.
@@ -22,12 +22,14 @@ from rclzenoh.keys import PREFIX, EntityKind, Token, parse_token, token_keys
 
 _MOST_UNREAD = 10_000
 """With this many unread changes, they are read even if nobody asks about the graph."""
+_MOST_NAMES = 16
+"""A context that asks about more names of one kind than this is sent all tokens of that kind."""
 _POLL_S = 0.1
 _HISTORY_TIMEOUT_S = 10.0
 
 
 class Graph:
-    """Nodes and endpoints of one domain; of each kind, they are known from the first question about it on."""
+    """Nodes and endpoints of one domain. The graph learns of each kind when somebody first asks about it."""
 
     def __init__(self, session: zenoh.Session, domain: int) -> None:
         self._session = session
@@ -44,10 +46,13 @@ class Graph:
         """Number of changes so far; as long as it stays the same, what is known of the graph does, too."""
 
     def _follow(self, kind: EntityKind, name: str | None = None) -> None:
-        """Know all tokens of a kind, or of a kind and a name, from now on, and wait for those that exist already."""
+        """Subscribe to the tokens of a kind, or of one name of it, and wait until those that exist are known."""
         if (kind, None) in self._followed or (kind, name) in self._followed:
             return
         with self._asking:
+            # Whoever asks about ever new names, such as a client of rosapi, must not leave a subscriber for each.
+            if sum(followed is kind for followed, _ in self._followed) >= _MOST_NAMES:
+                name = None
             # Another thread may have asked meanwhile.
             if (kind, name) in self._followed:
                 return

@@ -46,6 +46,16 @@ def test_a_context_is_sent_only_what_it_has_asked_about(rig):
     assert after == [changes + 1 for changes in before]
 
 
+def test_a_context_that_asks_about_many_topics_is_sent_all(rig):
+    asker, other = rig.node("asker"), rig.node("other")
+    other.create_publisher(String, "/t99", 10)
+    list(other.context.session.get("nobody/has/this"))
+    assert sum(len(asker.get_publishers_info_by_topic(f"/t{i}")) for i in range(100)) == 1
+    before = asker.context.graph.changes
+    other.create_publisher(String, "/u", 10)
+    assert rig.spin(lambda: asker.context.graph.changes == before + 1)
+
+
 def test_an_endpoint_that_is_announced_twice_counts_once(rig):
     asker, other = rig.node("asker"), rig.node("other")
     # Both questions are answered from now on, one by the tokens of the topic, and the other by those of all topics.
