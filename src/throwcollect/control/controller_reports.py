@@ -13,8 +13,9 @@ from throwcollect.control.goal import TrajectoryPoint
 
 
 class GoalStatus(IntEnum):
-    """How a goal ended (action_msgs/msg/GoalStatus)."""
+    """Where a goal is (action_msgs/msg/GoalStatus)."""
 
+    EXECUTING = 2
     SUCCEEDED = 4
     CANCELED = 5
     ABORTED = 6

@@ -11,12 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from throwcollect.config.schema import Config
+from throwcollect.control import GoalStatus
 from throwcollect.episode.record import Contact, EpisodeHeader, Samples
 from throwcollect.robots.trajectory import JointTrajectory
 from throwcollect.units import NS_PER_S
 
-EXECUTING, SUCCEEDED, CANCELED, ABORTED = 2, 4, 5, 6
-"""Numbers of action_msgs/msg/GoalStatus."""
 _short = reprlib.Repr()
 _short.maxstring = 60
 shorten = _short.repr
@@ -60,7 +59,7 @@ class RecordedTrial:
     @cached_property
     def has_failed_goal(self) -> bool:
         """Whether a goal was canceled or aborted; then the joints need not have followed their trajectory."""
-        return any(goal.status in (CANCELED, ABORTED) for goal in self.header.goals)
+        return any(goal.status in (GoalStatus.CANCELED, GoalStatus.ABORTED) for goal in self.header.goals)
 
     def step_at(self, instant_ns: int) -> int | None:
         """Find the step that ends at an instant [ns]; None if no step of the trial does."""

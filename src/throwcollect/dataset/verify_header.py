@@ -7,7 +7,8 @@ from collections.abc import Collection, Iterator
 
 import numpy as np
 
-from throwcollect.dataset.recorded_trial import ABORTED, CANCELED, EXECUTING, SUCCEEDED, RecordedTrial, shorten
+from throwcollect.control import GoalStatus
+from throwcollect.dataset.recorded_trial import RecordedTrial, shorten
 from throwcollect.episode.record import REST_S, REST_SPEED_MPS
 from throwcollect.robots.description import robot_of
 from throwcollect.units import NS_PER_S
@@ -61,13 +62,13 @@ def _find_goal_problems(trial: RecordedTrial) -> Iterator[str]:
     duration_s = float(trial.samples.stamps_ns[-1] - trial.samples.stamps_ns[0]) / NS_PER_S
     for goal in header.goals:
         what = f"the goal of {shorten(goal.controller)}"
-        if goal.status not in (EXECUTING, SUCCEEDED, CANCELED, ABORTED):
+        if goal.status not in list(GoalStatus):
             yield f"{what} has the unknown status {goal.status}"
         if not _LEAST_ERROR_CODE <= goal.error_code <= 0:
             yield f"{what} has the unknown error code {goal.error_code}"
-        if goal.status in (EXECUTING, SUCCEEDED) and goal.error_code:
+        if goal.status in (GoalStatus.EXECUTING, GoalStatus.SUCCEEDED) and goal.error_code:
             yield f"{what} has status {goal.status} and an error code all the same"
-        if goal.status == SUCCEEDED and duration_s < trial.motion_s - _ROUNDING:
+        if goal.status == GoalStatus.SUCCEEDED and duration_s < trial.motion_s - _ROUNDING:
             yield f"{what} succeeded, but the trial ended at {duration_s:.3f} s, before its trajectory"
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from throwcollect.config.schema import Config
+from throwcollect.control import GoalStatus
 from throwcollect.episode.record import EpisodeHeader, Samples
 from throwcollect.robots.description import robot_of
 from throwcollect.robots.limits import joint_limits, shares_of
@@ -20,8 +21,6 @@ from throwcollect.units import NS_PER_S
 
 _SLACK = 1e-3
 _AT_LIMIT = 1 - _SLACK
-# The numbers are constants of action_msgs/msg/GoalStatus.
-_FAILED_GOALS = {5: "canceled", 6: "aborted"}
 
 
 def measure_joints(
@@ -64,9 +63,9 @@ def measure_joints(
 def explain_failed_goal(header: EpisodeHeader) -> str | None:
     """Say which controller did not carry out its trajectory, and why; None if all controllers did."""
     for goal in header.goals:
-        if goal.status in _FAILED_GOALS:
+        if goal.status in (GoalStatus.CANCELED, GoalStatus.ABORTED):
             detail = f": {goal.error_string}" if goal.error_string else f" with error code {goal.error_code}"
-            return f"{goal.controller} {_FAILED_GOALS[goal.status]} its goal{detail}"
+            return f"{goal.controller} {GoalStatus(goal.status).name.lower()} its goal{detail}"
     return None
 
 

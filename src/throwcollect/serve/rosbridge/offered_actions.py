@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from throwcollect import ros
+from throwcollect.control import GoalStatus
 from throwcollect.errors import ConfigError
 from throwcollect.ros.graph_names import absolute_name, find_interface
 from throwcollect.ros.message_values import fill
@@ -14,8 +15,6 @@ from throwcollect.serve.rosbridge.codec import plain_values
 from throwcollect.serve.rosbridge.peer import Peer
 from throwcollect.serve.rosbridge.request import BridgeRequest, Form
 
-_SUCCEEDED, _CANCELED, _ABORTED = 4, 5, 6
-"""Of action_msgs/msg/GoalStatus."""
 FAREWELL_S = 0.2
 """Time in which nodes get the last results of an action, before it is withdrawn."""
 _numbers = itertools.count(1)
@@ -52,7 +51,7 @@ class OfferedAction:
             server.destroy()
             return
         for number in list(self._goals):
-            self._finish(number, self._type.Result(), _ABORTED)
+            self._finish(number, self._type.Result(), GoalStatus.ABORTED)
         # The action is withdrawn a bit later, so that nodes that wait for a result get it first.
         self._client.later(FAREWELL_S, server.destroy)
 
@@ -83,7 +82,8 @@ class OfferedAction:
         values, result = request.any("values"), self._type.Result()
         if isinstance(values, Mapping) or has_succeeded:
             fill(result, {} if values is None else values)
-        self._finish(number, result, request.natural_or("status", _SUCCEEDED) if has_succeeded else _ABORTED)
+        status = request.natural_or("status", GoalStatus.SUCCEEDED) if has_succeeded else GoalStatus.ABORTED
+        self._finish(number, result, status)
 
     def take_status(self, request: BridgeRequest) -> None:
         """Take note of the state of a goal; if it has ended, finish it with an empty result, as the client sends none.
@@ -92,7 +92,7 @@ class OfferedAction:
             ConfigError: If there is no such goal.
         """
         number, status = self._find(request), request.natural_or("status", 0)
-        if status in (_SUCCEEDED, _CANCELED, _ABORTED):
+        if status in (GoalStatus.SUCCEEDED, GoalStatus.CANCELED, GoalStatus.ABORTED):
             self._finish(number, self._type.Result(), status)
 
     def _find(self, request: BridgeRequest) -> str:
@@ -102,10 +102,10 @@ class OfferedAction:
 
     def _finish(self, number: str, result: Any, status: int) -> None:
         handle, future = self._goals.pop(number)
-        if status == _SUCCEEDED:
+        if status == GoalStatus.SUCCEEDED:
             handle.succeed()
         # In ROS, a goal can be cancelled only after a request to cancel it; otherwise, this aborts it.
-        elif status == _CANCELED and handle.is_cancel_requested:
+        elif status == GoalStatus.CANCELED and handle.is_cancel_requested:
             handle.canceled()
         else:
             handle.abort()
