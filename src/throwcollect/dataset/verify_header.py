@@ -13,7 +13,6 @@ from throwcollect.episode.record import REST_S, REST_SPEED_MPS
 from throwcollect.robots.description import robot_of
 from throwcollect.units import NS_PER_S
 
-_END_REASONS = ("landed", "rest", "timeout")
 _LEAST_ERROR_CODE = -5
 """Lowest error code of control_msgs/action/FollowJointTrajectory; 0 is success."""
 _ROUNDING = 1e-9
@@ -26,10 +25,7 @@ def find_header_problems(trial: RecordedTrial, bodies: Collection[str] | None) -
     """
     yield from _find_contact_problems(trial, bodies)
     yield from _find_goal_problems(trial)
-    if trial.header.end_reason not in _END_REASONS:
-        yield f"ended as {shorten(trial.header.end_reason)}, not as {', '.join(_END_REASONS)}"
-    else:
-        yield from _find_end_problems(trial)
+    yield from _find_end_problems(trial)
 
 
 def _find_contact_problems(trial: RecordedTrial, bodies: Collection[str] | None) -> Iterator[str]:

@@ -117,7 +117,6 @@ FORGERIES: dict[str, tuple[Forgery, str]] = {
     "effort that is no number": (in_samples("effort", 7, 3, lambda _: np.nan), "effort holds .* sample 7"),
     "infinite position": (in_samples("position", 9, 3, lambda _: np.inf), "position holds .* not finite"),
     "infinite ball": (in_samples("ball_position", 9, 1, lambda _: -np.inf), "ball_position holds"),
-    "unknown end": (in_header(end_reason=lambda _: "crashed"), "ended as 'crashed', not as landed"),
     "cut end": (cut("landed"), "do not enclose a crossing"),
     "cut as timeout": (cut("timeout"), "ended as timeout after"),
     "cut as rest in flight": (cut("rest"), "ended as rest, but the ball moved at"),
