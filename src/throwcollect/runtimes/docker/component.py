@@ -27,7 +27,7 @@ from throwcollect.runtimes.docker.container_options import (
     container_options,
 )
 from throwcollect.runtimes.docker.docker_engine import ENGINE_ERRORS, connect, find_other_machine
-from throwcollect.runtimes.docker.docker_nodes import LOG_S, end_in_words
+from throwcollect.runtimes.docker.docker_nodes import end_in_words
 from throwcollect.runtimes.docker.engine_clock import EngineClock
 from throwcollect.runtimes.docker.node_container import NodeContainer
 from throwcollect.runtimes.docker.watch import EngineWatch
@@ -165,7 +165,7 @@ class ComponentContainer:
                 # The container may be gone already.
                 with suppress(*ENGINE_ERRORS):
                     self._client.api.stop(handle, timeout=_GRACE_S)
-                    self._container.wait_log(LOG_S)
+                    self._container.wait_log()
                     self._client.api.remove_container(handle, v=True, force=True)
             with suppress(*ENGINE_ERRORS):
                 # The filter is a regular expression, and names begin with a slash in the engine.
@@ -237,7 +237,7 @@ class ComponentContainer:
             raise WorkerError(f"the container of {self._spec.image} cannot be started: {container.failure}")
         state = self._watch.state(container.handle) if self._watch is not None else None
         if state is not None and state.ended:
-            container.wait_log(LOG_S)
+            container.wait_log()
             # The end of the joined run may have made the container fail; the record of that run shows it a bit later.
             deadline = time.monotonic() + _OVER_S
             while state.code != 0 and self._joining and not self._is_left_behind and time.monotonic() < deadline:

@@ -32,7 +32,7 @@ from throwcollect.runtimes.docker.container_options import (
 from throwcollect.runtimes.docker.docker_engine import ENGINE_ERRORS, connect, engine_errors
 from throwcollect.runtimes.docker.engine_clock import EngineClock
 from throwcollect.runtimes.docker.held_runs import remove
-from throwcollect.runtimes.docker.node_container import NodeContainer
+from throwcollect.runtimes.docker.node_container import LOG_S, NodeContainer
 from throwcollect.runtimes.docker.volume import dataset_info, place_directory, place_key
 from throwcollect.runtimes.docker.watch import ContainerState, EngineWatch
 from throwcollect.runtimes.node_logs import NodeLogs
@@ -40,9 +40,6 @@ from throwcollect.runtimes.nodes import ROUTER, NodeExit, NodeHost, NodeSpec, de
 from throwcollect.runtimes.ports import LOOPBACK, format_endpoint
 from throwcollect.runtimes.runtime import Place, Session
 from throwcollect.wording import command
-
-LOG_S = 2.0
-"""Time in which the last lines that a node printed arrive in its file."""
 
 _BEGIN_S = 30.0
 """Time to wait for the start of a container; only the end of a run waits longer."""
@@ -331,7 +328,7 @@ class DockerNodes(NodeHost):
             return
         with suppress(*ENGINE_ERRORS):
             self._client.api.stop(node.handle, timeout=grace_s)
-            node.wait_log(LOG_S)
+            node.wait_log()
             self._client.api.remove_container(node.handle, v=True, force=True)
 
 

@@ -20,6 +20,8 @@ from throwcollect.runtimes.docker.engine_clock import EngineClock
 _AT_ONCE = threading.BoundedSemaphore(8)
 """Starting more containers at the same time was measured to gain nothing."""
 
+LOG_S = 2.0
+"""Time in which the last lines that a node printed arrive in its file."""
 _RETRY_S = 1.0
 _LIVELY = ("running", "paused", "restarting")
 
@@ -80,10 +82,10 @@ class NodeContainer:
         """If the container is still being started, remove it as soon as it runs, because nobody needs it any more."""
         self._unwanted.set()
 
-    def wait_log(self, timeout_s: float) -> None:
-        """Wait for `log_complete`, at most this time [s]."""
+    def wait_log(self) -> None:
+        """Wait for `log_complete`, at most the time in which the last lines arrive."""
         if self._thread is not None:
-            self._thread.join(timeout_s)
+            self._thread.join(LOG_S)
 
     def close(self) -> None:
         """Stop copying output at the next error of the engine or the end of a stream."""
