@@ -95,7 +95,7 @@ def simulate(directory: DatasetArgument, trials: list[int]) -> None:
     from throwcollect.sweep.plan import Plan
 
     plan = Plan.read(directory / PLAN, load(directory / CONFIG))
-    known = range(plan.trials.first, plan.trials.first + len(plan.trials))
+    known = plan.trials.numbers
     if unknown := [trial for trial in trials if trial not in known]:
         raise NotFoundError(f"{directory / PLAN}: no trial {unknown[0]}", expected=f"{known[0]} to {known[-1]}")
     replayer = Replayer(plan.config)
