@@ -19,7 +19,6 @@ from bench import collection, containers, intake, raw, reading, soak
 from bench.other_version import OtherVersion
 from throwcollect.config.loader import load
 from throwcollect.engine_packages import PACKAGES
-from throwcollect.sweep.plan import make_plan
 
 CONFIG = Path(__file__).parents[1] / "configs" / "quickstart.yaml"
 RESULT = Path("build/bench.json")
@@ -44,7 +43,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory(prefix="throwcollect-bench-") as scratch:
         before = OtherVersion(arguments.before, Path(scratch) / "before") if arguments.before else None
         for (engine, keys), simulations in itertools.product(overrides.items(), sorted({1, cores, _MANY})):
-            plan = make_plan(load(CONFIG, keys))
+            plan = collection.draw_unchecked_plan(load(CONFIG, keys))
             rounds = []
             for index in range(arguments.rounds):
                 place = Path(scratch) / f"{engine}-{simulations}-{index}"
@@ -63,7 +62,7 @@ def main() -> None:
         if containers.image_mb() is None:
             print("\nno containers: no engine answers, or it does not have the image (throwcollect image build)")
         else:
-            few = make_plan(load(CONFIG, [f"trials={10 * containers.MANY}"]))
+            few = collection.draw_unchecked_plan(load(CONFIG, [f"trials={10 * containers.MANY}"]))
             report["containers"] = containers.measure(plan, few, arguments.rounds, Path(scratch))
             _print_containers(report["containers"])
         looks = soak.measure()

@@ -16,7 +16,6 @@ from typing import Any
 from bench import collection
 from throwcollect.config.loader import load
 from throwcollect.ros.middleware import VARIABLE
-from throwcollect.sweep.plan import make_plan
 
 CONFIG = Path(__file__).parents[1] / "configs" / "quickstart.yaml"
 BACKENDS = ("embedded", "rclpy")
@@ -31,7 +30,7 @@ def main() -> None:
     parser.add_argument("--one", type=int, metavar="N", help="measure one collection with N simulations")
     arguments = parser.parse_args()
     if arguments.one is not None:
-        plan = make_plan(load(CONFIG, [f"trials={arguments.trials}"]))
+        plan = collection.draw_unchecked_plan(load(CONFIG, [f"trials={arguments.trials}"]))
         with tempfile.TemporaryDirectory(prefix="throwcollect-bench-") as scratch:
             print(json.dumps(asdict(collection.measure(plan, arguments.one, Path(scratch) / "data"))))
         return

@@ -11,6 +11,7 @@ from pathlib import Path
 import psutil
 from docker.client import DockerClient
 
+from throwcollect.config.schema import Config
 from throwcollect.coordinator.progress import Progress
 from throwcollect.dataset.creation import create
 from throwcollect.ros.middleware import Middleware
@@ -22,7 +23,7 @@ from throwcollect.runtimes.nodes import NodeHost
 from throwcollect.runtimes.run_listener import RunListener
 from throwcollect.runtimes.runtime import Place
 from throwcollect.runtimes.supervisor import Supervisor
-from throwcollect.sweep.plan import Plan
+from throwcollect.sweep.plan import Plan, draw_first_points, make_trials
 
 ROLES = ("sim", "router", "coordinator")
 _POLL_S = 0.01
@@ -55,6 +56,11 @@ class _Mark:
     ended: int
     cpu_s: dict[str, float]
     kernel_s: dict[str, float]
+
+
+def draw_unchecked_plan(config: Config) -> Plan:
+    """Draw the trials of a sweep, none of which is refused."""
+    return Plan(config, make_trials(config, draw_first_points(config, directory=Path())))
 
 
 def _until(supervisor: Supervisor, listener: RunListener, reports: list[Progress], ended: int) -> float:

@@ -21,6 +21,7 @@ from typing import TypeVar
 
 import pyarrow as pa
 
+from bench.collection import draw_unchecked_plan
 from throwcollect.cluster.submit import submit
 from throwcollect.config.loader import load
 from throwcollect.config.schema import Config
@@ -32,7 +33,7 @@ from throwcollect.dataset.manifest import entry_of, manifest_text, read_manifest
 from throwcollect.dataset.slice_directory import slice_directory
 from throwcollect.runs.preparation import prepare
 from throwcollect.sweep.parquet_file import encode_table, read_parquet
-from throwcollect.sweep.plan import Plan, make_plan
+from throwcollect.sweep.plan import Plan
 from throwcollect.sweep.slice import Slice
 
 CONFIG = Path(__file__).parents[1] / "configs" / "quickstart.yaml"
@@ -82,7 +83,7 @@ def _measure(trials: int, one: Path, scratch: Path) -> None:
     """Print the times for one size, as a row of the table."""
     config: Config = load(CONFIG, [*_SETTINGS, f"trials={trials}"])
     tasks = trials // PER_SHARD
-    planned, plan = _measure_time(lambda: make_plan(config))
+    planned, plan = _measure_time(lambda: draw_unchecked_plan(config))
     frozen, _ = _measure_time(lambda: create(scratch / "data", plan))
     changes = [*_SETTINGS, f"trials={trials}"]
     submitted, _ = _measure_time(

@@ -17,10 +17,13 @@ from dataclasses import asdict
 from pathlib import Path
 from bench import collection
 from throwcollect.config.loader import load
-from throwcollect.sweep.plan import make_plan
+try:
+    from bench.collection import draw_unchecked_plan
+except ImportError:  # in commits whose benchmarks have no such function
+    from throwcollect.sweep.plan import make_plan as draw_unchecked_plan
 
 config, overrides, simulations, directory = json.loads(sys.argv[1])
-plan = make_plan(load(Path(config), overrides))
+plan = draw_unchecked_plan(load(Path(config), overrides))
 print(json.dumps(asdict(collection.measure(plan, simulations, Path(directory)))))
 """
 

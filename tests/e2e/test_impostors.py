@@ -11,6 +11,7 @@ import pytest
 
 from tests.commands import Command, start_command
 from tests.e2e.collection import FAST, call, write_config
+from tests.unit.sweep.own_plan import make_plan
 from throwcollect import ros
 from throwcollect.config.loader import load
 from throwcollect.dataset.reader import Dataset
@@ -19,7 +20,6 @@ from throwcollect.replay.replayer import Replayer
 from throwcollect.ros import SetParametersResult, get_message
 from throwcollect.ros.router import router
 from throwcollect.run_key import Signer
-from throwcollect.sweep.plan import make_plan
 
 TRIALS = 40
 UInt8MultiArray: Any = get_message("std_msgs/msg/UInt8MultiArray")

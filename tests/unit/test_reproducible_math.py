@@ -12,13 +12,13 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from tests import processors
+from tests.unit.sweep.own_plan import make_plan
 from tests.unit.sweep.thrower import collect, configuration
 
 from throwcollect.config.loader import load
 from throwcollect.episode.frames import MovingFrame
 from throwcollect.reproducible_math import add_up, cos, exp, log, matmul, power, sin, solve
 from throwcollect.robots.quintic_curve import sample_quintic
-from throwcollect.sweep.plan import make_plan
 from throwcollect.tasks.task import task_of
 
 ROOT = Path(__file__).parents[2]

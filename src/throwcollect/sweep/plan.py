@@ -181,23 +181,6 @@ class Plan:
         return plan if slice is None else plan.slice_of(slice)
 
 
-def make_plan(config: Config, *, check: Check | None = None, directory: Path | None = None) -> Plan:
-    """Draw all trials of a sweep in this process; for a plan that grows, its first two rounds (see `rounds`).
-
-    Benchmarks and tests make their plans with this function; `coordinator.prepare.draw_plan` makes large plans in
-    several processes.
-
-    Raises:
-        PlanError: If the sweep has no point, or every trial is refused.
-        ConfigError: If the file of the sampler `list` cannot be used.
-    """
-    trials = make_trials(config, draw_first_points(config, directory=directory or Path()))
-    if check is not None:
-        trials = trials.refuse([refusal(with_values(config, trial.values), check) for trial in trials])
-    check_some_left(trials)
-    return Plan(config, trials)
-
-
 def draw_first_points(config: Config, *, directory: Path) -> Points:
     """Draw the points of all trials that are known before anything runs; for a plan that grows, its first two rounds.
 

@@ -3,12 +3,13 @@
 from collections.abc import Iterator
 
 import pytest
+from tests.unit.sweep.own_plan import make_plan
 
 from throwcollect.config.schema import Config
 from throwcollect.coordinator.acceptance import Acceptance
 from throwcollect.episode.episode_message import Delivery
 from throwcollect.replay.replayer import Replayer
-from throwcollect.sweep.plan import Plan, make_plan
+from throwcollect.sweep.plan import Plan
 
 CONFIG = Config.model_validate(
     {"trials": 2, "sweep": {"sampler": "uniform", "parameters": {"ball.mass_kg": {"min": 0.03, "max": 0.06}}}}

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from tests.unit.sweep.own_plan import make_plan
 
 from throwcollect.config.schema import Config
 from throwcollect.coordinator.collection import TrialCollection
@@ -15,7 +16,7 @@ from throwcollect.dataset.provenance import read_provenance
 from throwcollect.episode.episode_message import Delivery
 from throwcollect.errors import LossError
 from throwcollect.replay.replayer import Replayer
-from throwcollect.sweep.plan import Plan, make_plan
+from throwcollect.sweep.plan import Plan
 
 PLAN: Plan = make_plan(
     Config.model_validate(

@@ -5,12 +5,13 @@ from pathlib import Path
 
 import pytest
 from tests.unit.sweep.columns import in_columns
+from tests.unit.sweep.own_plan import make_plan
 from tests.unit.sweep.thrower import collect, configuration, throw
 
 from throwcollect.config.schema import Config
 from throwcollect.coordinator.growth import Growth
 from throwcollect.coordinator.prepare import draw_plan, more_trials
-from throwcollect.sweep.plan import Plan, make_plan
+from throwcollect.sweep.plan import Plan
 from throwcollect.sweep.trials import Trial, Trials
 from throwcollect.tasks.throw.throw_result import ThrowOutcome, ThrowResult
 

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from tests.unit.sweep.own_plan import make_plan
 
 from throwcollect import ros
 from throwcollect.config.loader import load
@@ -16,7 +17,6 @@ from throwcollect.dataset.creation import create
 from throwcollect.dataset.writer import DatasetWriter
 from throwcollect.ros import get_message
 from throwcollect.ros.router import router
-from throwcollect.sweep.plan import make_plan
 
 UInt8MultiArray: Any = get_message("std_msgs/msg/UInt8MultiArray")
 YAML = """\

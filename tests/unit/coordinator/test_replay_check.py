@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from tests.unit.sweep.own_plan import make_plan
 
 from throwcollect.config.schema import Config
 from throwcollect.coordinator import replay_check
@@ -15,7 +16,7 @@ from throwcollect.coordinator.replay_check import ReplayCheck
 from throwcollect.dataset.creation import create
 from throwcollect.errors import DatasetError, WorkerError
 from throwcollect.replay.replayer import Replayer
-from throwcollect.sweep.plan import Plan, make_plan
+from throwcollect.sweep.plan import Plan
 from throwcollect.trial.choice import choose_trials
 
 PLAN: Plan = make_plan(

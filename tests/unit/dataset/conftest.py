@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from tests.unit.sweep.own_plan import make_plan
 
 from throwcollect.config.schema import Config
 from throwcollect.dataset.writer import DatasetWriter
@@ -22,7 +23,7 @@ from throwcollect.episode.recorded_chunk import RecordedChunk
 from throwcollect.robots.description import full_description, start_posture
 from throwcollect.robots.quintic_curve import sample_quintic
 from throwcollect.robots.talos import TALOS
-from throwcollect.sweep.plan import Plan, make_plan
+from throwcollect.sweep.plan import Plan
 from throwcollect.tasks.free_flight import ballistic_positions
 from throwcollect.tasks.task import task_of
 from throwcollect.tasks.throw.throw_result import ThrowResult

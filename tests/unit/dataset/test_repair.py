@@ -11,6 +11,7 @@ from typing import Any
 import pyarrow.parquet as pq
 import pytest
 from tests.unit.dataset.damage import flip
+from tests.unit.sweep.own_plan import make_plan
 
 from throwcollect.config.schema import Config
 from throwcollect.dataset.mcap_reader import open_mcap
@@ -19,7 +20,7 @@ from throwcollect.dataset.scan import scan_whole
 from throwcollect.dataset.verify import verify
 from throwcollect.dataset.writer import DatasetWriter
 from throwcollect.errors import ConfigError, DatasetError
-from throwcollect.sweep.plan import Plan, make_plan
+from throwcollect.sweep.plan import Plan
 
 SHARD = "quick_00001.mcap"
 MAY_DIFFER = {"README.md", "provenance.json"}

@@ -7,6 +7,7 @@ import pyarrow.parquet as pq
 import pytest
 from tests.unit.dataset.conftest import Collection
 from tests.unit.dataset.mutations import fit_manifest
+from tests.unit.sweep.own_plan import make_plan
 
 from throwcollect.config.loader import load
 from throwcollect.dataset.inspect import digest
@@ -15,7 +16,6 @@ from throwcollect.dataset.verify import verify
 from throwcollect.derive.selection import filter_trials, merge, sample
 from throwcollect.episode.record import EpisodeHeader, Samples
 from throwcollect.errors import ConfigError, DatasetError
-from throwcollect.sweep.plan import make_plan
 
 
 def sources(directory: Path) -> list[tuple[str, int]]:

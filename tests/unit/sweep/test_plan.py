@@ -7,11 +7,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from tests.unit.sweep.columns import in_columns
+from tests.unit.sweep.own_plan import make_plan
 
 from throwcollect.config.run import RunConfig
 from throwcollect.config.schema import Config, Range, SweepConfig, Values
 from throwcollect.errors import ConfigError, DatasetError, PlanError
-from throwcollect.sweep.plan import Plan, make_plan
+from throwcollect.sweep.plan import Plan
 from throwcollect.sweep.trials import Trial
 
 PARAMETERS = {"ball.mass_kg": Range(min=0.01, max=1, scale="log"), "task.duration_s": Range(min=1, max=3)}

@@ -8,10 +8,11 @@ import os
 from pathlib import Path
 
 import pytest
+from tests.unit.sweep.own_plan import make_plan
 from tests.unit.sweep.thrower import configuration
 
 from throwcollect.errors import DatasetError
-from throwcollect.sweep.plan import Plan, make_plan
+from throwcollect.sweep.plan import Plan
 from throwcollect.sweep.round_file import append_round
 
 CONFIG = configuration(trials=7, target=None)

@@ -5,10 +5,11 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from tests.unit.sweep.own_plan import make_plan
 from tests.unit.sweep.thrower import collect, configuration, go_on, throw
 
 from throwcollect.errors import PlanError
-from throwcollect.sweep.plan import make_plan, make_trials
+from throwcollect.sweep.plan import make_trials
 from throwcollect.sweep.rounds import Rounds
 from throwcollect.sweep.samplers import draw_points
 from throwcollect.sweep.trials import Trial

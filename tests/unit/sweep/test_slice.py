@@ -8,10 +8,11 @@ from pathlib import Path
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
+from tests.unit.sweep.own_plan import make_plan
 
 from throwcollect.config.schema import Config
 from throwcollect.errors import ConfigError, DatasetError
-from throwcollect.sweep.plan import Plan, make_plan
+from throwcollect.sweep.plan import Plan
 from throwcollect.sweep.slice import Slice
 
 SWEPT = {

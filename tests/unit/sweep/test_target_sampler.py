@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
+from tests.unit.sweep.own_plan import make_plan
 from tests.unit.sweep.thrower import DISTANCE, HIT_ANGLE, PARAMETERS, TARGET, collect, configuration, throw
 
 from throwcollect.config.sweep import TargetConfig
-from throwcollect.sweep.plan import make_plan
 from throwcollect.sweep.target_cells import CellChooser, Cells
 from throwcollect.sweep.trials import Trial, Trials
 from throwcollect.tasks.measures import BallState

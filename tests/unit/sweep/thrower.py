@@ -7,9 +7,10 @@ from collections.abc import Callable, Iterable
 from typing import Any
 
 from tests.unit.sweep.columns import in_columns
+from tests.unit.sweep.own_plan import make_plan
 
 from throwcollect.config.schema import Config
-from throwcollect.sweep.plan import make_plan, make_trials
+from throwcollect.sweep.plan import make_trials
 from throwcollect.sweep.rounds import Rounds
 from throwcollect.sweep.trials import Trial
 from throwcollect.tasks.measures import BallState

@@ -8,12 +8,12 @@ import sys
 from pathlib import Path
 
 import pytest
+from tests.unit.sweep.own_plan import make_plan
 
 from throwcollect.cli.show import init
 from throwcollect.config.default_path import DEFAULT_CONFIG
 from throwcollect.config.loader import load
 from throwcollect.errors import ConfigError
-from throwcollect.sweep.plan import make_plan
 from throwcollect.tasks.starter import make_starter, samplers
 
 PLUGINS = Path(__file__).parents[2] / "plugins"

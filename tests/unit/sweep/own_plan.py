@@ -1,0 +1,18 @@
+"""Plans whose trials are drawn in this process, and refused by any check or by none."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from throwcollect.config.schema import Config
+from throwcollect.config.values import with_values
+from throwcollect.sweep.plan import Check, Plan, check_some_left, draw_first_points, make_trials, refusal
+
+
+def make_plan(config: Config, *, check: Check | None = None, directory: Path | None = None) -> Plan:
+    """Draw all trials of a sweep; for a plan that grows, its first two rounds. `draw_plan` asks the robot, too."""
+    trials = make_trials(config, draw_first_points(config, directory=directory or Path()))
+    if check is not None:
+        trials = trials.refuse([refusal(with_values(config, trial.values), check) for trial in trials])
+    check_some_left(trials)
+    return Plan(config, trials)
