@@ -51,7 +51,8 @@ class EpisodePlace:
     digest: str
 
 
-def _make_field(name: str, kind: pa.DataType, description: str) -> pa.Field:
+def make_field(name: str, kind: pa.DataType, description: str) -> pa.Field:
+    """Make a column of a table, with its description for people."""
     return pa.field(name, kind, metadata={"description": description})
 
 
@@ -118,17 +119,17 @@ class ThrowsTable:
         self.later = frozenset(each.name for each in self._columns.columns if each.later)
         self.schema = pa.schema(
             [
-                _make_field("trial", pa.int64(), "Number of the trial."),
+                make_field("trial", pa.int64(), "Number of the trial."),
                 *map(_describe_swept, parameters),
-                *(_make_field(each.name, pa.float64(), each.description) for each in self._misses.targets),
-                _make_field("outcome", pa.string(), f"{', '.join(each.value for each in task.outcomes)} or {REFUSED}."),
-                _make_field("reason", pa.string(), task.reasons),
-                *(_make_field(each.name, _KINDS[each.kind], each.description) for each in self._columns.columns),
-                *(_make_field(name, pa.float64(), text) for name, text in self._misses.descriptions.items()),
-                _make_field("shard", pa.string(), "MCAP file that holds the episode; null when there is none."),
-                _make_field("chunk_offset", pa.int64(), "Where the episode's chunk begins in that file [bytes]."),
-                _make_field("samples", pa.int64(), "Number of samples of the episode."),
-                _make_field("digest", pa.string(), "SHA-256 of the episode: of its header and its message records."),
+                *(make_field(each.name, pa.float64(), each.description) for each in self._misses.targets),
+                make_field("outcome", pa.string(), f"{', '.join(each.value for each in task.outcomes)} or {REFUSED}."),
+                make_field("reason", pa.string(), task.reasons),
+                *(make_field(each.name, _KINDS[each.kind], each.description) for each in self._columns.columns),
+                *(make_field(name, pa.float64(), text) for name, text in self._misses.descriptions.items()),
+                make_field("shard", pa.string(), "MCAP file that holds the episode; null when there is none."),
+                make_field("chunk_offset", pa.int64(), "Where the episode's chunk begins in that file [bytes]."),
+                make_field("samples", pa.int64(), "Number of samples of the episode."),
+                make_field("digest", pa.string(), "SHA-256 of the episode: of its header and its message records."),
             ]
         )
         _check_task(task, self.schema.names)

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import pyarrow as pa
 
+from throwcollect.dataset.throws_table import make_field
 from throwcollect.derive.source import Source
 from throwcollect.sweep.parquet_file import encode_table
 
@@ -50,18 +51,14 @@ def sources_section(sources: Sequence[Source]) -> str:
     return "\n".join([*lines, ""])
 
 
-def _make_field(name: str, kind: pa.DataType, description: str) -> pa.Field:
-    return pa.field(name, kind, metadata={"description": description})
-
-
 _SOURCES = pa.schema(
     [
-        _make_field("trial", pa.int64(), "Number of the trial here."),
-        _make_field("source_name", pa.string(), "Name of the dataset that the trial comes from."),
-        _make_field("source_directory", pa.string(), "Directory of that dataset, as it was given."),
-        _make_field("source_digest", pa.string(), "Digest of that dataset."),
-        _make_field("source_trial", pa.int64(), "Number of the trial there."),
-        _make_field("source_trial_digest", pa.string(), "Digest of the trial in the plan there."),
-        _make_field("source_episode_digest", pa.string(), "Digest of the episode there."),
+        make_field("trial", pa.int64(), "Number of the trial here."),
+        make_field("source_name", pa.string(), "Name of the dataset that the trial comes from."),
+        make_field("source_directory", pa.string(), "Directory of that dataset, as it was given."),
+        make_field("source_digest", pa.string(), "Digest of that dataset."),
+        make_field("source_trial", pa.int64(), "Number of the trial there."),
+        make_field("source_trial_digest", pa.string(), "Digest of the trial in the plan there."),
+        make_field("source_episode_digest", pa.string(), "Digest of the episode there."),
     ]
 )
