@@ -21,7 +21,8 @@ from throwcollect.robots.limits import joint_limits
 from throwcollect.robots.robot import Robot, read_xml
 from throwcollect.tools.tool import Tool, tool_of
 
-_PACKAGE = "package://"
+PACKAGE = "package://"
+"""Beginning of the URLs of meshes in a description, which the name of a package follows."""
 _written: dict[tuple[Robot, str], str] = {}
 """The latest full descriptions, by robot and configuration of the tool. They are kept, because everything that looks at
 a dataset needs the same description, and writing it takes 20 ms."""
@@ -256,7 +257,7 @@ def _collect_shapes(
             geometry = ElementTree.SubElement(shape, "geometry")
             geometry.extend(copy.deepcopy(list(original.iterfind("geometry/*"))))
             for mesh in geometry.iter("mesh"):
-                relative = mesh.get("filename", "").removeprefix(_PACKAGE)
+                relative = mesh.get("filename", "").removeprefix(PACKAGE)
                 mesh.set("filename", str(robot.share() / relative))
             shapes.append(shape)
     return shapes

@@ -12,7 +12,7 @@ from throwcollect.config.schema import BallConfig, Config
 from throwcollect.episode.frames import read_origin
 from throwcollect.episode.topics import BALL
 from throwcollect.errors import DatasetError
-from throwcollect.robots.description import full_description, robot_of
+from throwcollect.robots.description import PACKAGE, full_description, robot_of
 from throwcollect.tools.tool import tool_of
 
 Rgba = tuple[float, float, float, float]
@@ -22,7 +22,6 @@ BALL_RGBA: Rgba = (1.0, 0.45, 0.0, 1.0)
 
 _TOOL_RGBA: Rgba = (0.55, 0.35, 0.2, 1.0)
 _DEFAULT_RGBA: Rgba = (1.0, 1.0, 1.0, 1.0)
-_PACKAGE = "package://"
 
 
 @dataclass(frozen=True)
@@ -156,7 +155,7 @@ def _read_shape(link: str, visual: ElementTree.Element, colors: dict[str, Rgba])
     mesh = ""
     if geometry.tag == "mesh":
         size = _read_numbers(geometry.get("scale", "1 1 1"))
-        mesh = geometry.attrib["filename"].removeprefix(_PACKAGE)
+        mesh = geometry.attrib["filename"].removeprefix(PACKAGE)
     elif geometry.tag == "box":
         size = _read_numbers(geometry.attrib["size"])
     elif geometry.tag == "sphere":

@@ -5,13 +5,13 @@ from __future__ import annotations
 import base64
 
 from throwcollect.errors import ConfigError
+from throwcollect.robots.description import PACKAGE
 from throwcollect.serve.robot_files import find_mesh
 from throwcollect.serve.rosbridge.service_calls import Call
 
 GET_FILE = "file_server/get_file"
 """Name of the service, without a slash at its beginning."""
 
-_PACKAGE = "package://"
 _LARGEST = 64 * 2**20
 
 
@@ -22,9 +22,9 @@ def give_file(call: Call) -> None:
         ConfigError: If no robot has such a mesh, or the file is too large or cannot be read.
     """
     url = call.fields.text("name")
-    name, _, rest = url.removeprefix(_PACKAGE).partition("/")
-    if not url.startswith(_PACKAGE):
-        raise ConfigError(f"{url}: not a file of a robot's description", expected=f"{_PACKAGE}NAME/PATH")
+    name, _, rest = url.removeprefix(PACKAGE).partition("/")
+    if not url.startswith(PACKAGE):
+        raise ConfigError(f"{url}: not a file of a robot's description", expected=f"{PACKAGE}NAME/PATH")
     path = find_mesh(name, rest)
     try:
         if path.stat().st_size > _LARGEST:
