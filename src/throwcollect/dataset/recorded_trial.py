@@ -48,8 +48,7 @@ class RecordedTrial:
     @cached_property
     def times_s(self) -> NDArray[np.float64]:
         """Times of the samples since the start of the trial [s], shape ``(n_samples,)``."""
-        times: NDArray[np.float64] = (self.samples.stamps_ns - self.header.start_ns) / NS_PER_S
-        return times
+        return self.samples.seconds_since(self.header.start_ns)
 
     @cached_property
     def motion_s(self) -> float:
@@ -90,4 +89,4 @@ class RecordedTrial:
 
     def format_time(self, instant_ns: int) -> str:
         """Write an instant as the time since the start of the trial."""
-        return f"{(instant_ns - self.header.start_ns) / NS_PER_S:.3f} s"
+        return f"{self.header.seconds_at(instant_ns):.3f} s"

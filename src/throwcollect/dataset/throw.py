@@ -28,7 +28,6 @@ from throwcollect.dataset.trajectory_columns import (
 from throwcollect.episode.trajectory_rows import STAMPS
 from throwcollect.errors import DatasetError
 from throwcollect.extras import lazily
-from throwcollect.units import NS_PER_S
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -230,8 +229,8 @@ class Events:
         return tuple(
             ContactInterval(
                 contact.body,
-                (contact.start_ns - header.start_ns) / NS_PER_S,
-                None if contact.end_ns is None else (contact.end_ns - header.start_ns) / NS_PER_S,
+                header.seconds_at(contact.start_ns),
+                None if contact.end_ns is None else header.seconds_at(contact.end_ns),
             )
             for contact in header.contacts
         )

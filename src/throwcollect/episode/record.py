@@ -10,6 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from throwcollect.units import NS_PER_S
+
 Instant = Annotated[int, Field(ge=0, le=2**62)]
 """Simulated time [ns]; no clock shows later ones."""
 _Name = Annotated[str, Field(max_length=256)]
@@ -45,6 +47,11 @@ class Samples:
 
     def __getitem__(self, rows: slice) -> Samples:
         return Samples(**{name: column[rows] for name, column in vars(self).items()})
+
+    def seconds_since(self, instant_ns: int) -> NDArray[np.float64]:
+        """Times of the samples, counted from an instant [s], shape ``(n_samples,)``."""
+        times: NDArray[np.float64] = (self.stamps_ns - instant_ns) / NS_PER_S
+        return times
 
 
 @dataclass(frozen=True)
@@ -124,6 +131,10 @@ class EpisodeHeader:
     contacts: tuple[Contact, ...]
     goals: tuple[GoalOutcome, ...]
     samples: Annotated[int, Field(ge=1, le=2**32)]
+
+    def seconds_at(self, instant_ns: int) -> float:
+        """Time from the first sample to an instant [s]."""
+        return (instant_ns - self.start_ns) / NS_PER_S
 
 
 def find_infinite_columns(samples: Samples) -> Iterator[str]:

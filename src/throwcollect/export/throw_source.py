@@ -21,7 +21,6 @@ from throwcollect.export.signals import Signal, list_signals, unit_of
 from throwcollect.robots.quintic_curve import sample_quintic
 from throwcollect.robots.trajectory import JointTrajectory
 from throwcollect.tasks.task import trajectory_of
-from throwcollect.units import NS_PER_S
 
 _PLACES = ("shard", "chunk_offset")
 """Columns that say where a recording lies in the dataset, which means nothing in an export."""
@@ -162,7 +161,7 @@ def _list_targets(dataset: Dataset) -> tuple[TargetColumn, ...]:
 
 
 def _compute_signals(samples: Samples, trajectory: JointTrajectory, start_ns: int) -> dict[str, NDArray[np.float64]]:
-    time_s = (samples.stamps_ns - start_ns) / NS_PER_S
+    time_s = samples.seconds_since(start_ns)
     position, velocity, acceleration = sample_quintic(trajectory, time_s)
     return {
         "time_s": time_s,

@@ -17,7 +17,6 @@ from throwcollect.robots.quintic_curve import sample_positions
 from throwcollect.robots.trajectory import JointTrajectory
 from throwcollect.tasks.measures import Peak
 from throwcollect.tasks.result import AnyResult, Result
-from throwcollect.units import NS_PER_S
 
 _SLACK = 1e-3
 _AT_LIMIT = 1 - _SLACK
@@ -44,7 +43,7 @@ def measure_joints(
     # One row per joint, so that arithmetic runs along memory.
     measured = samples.position.T[moving]
     positions = shares_of(np.abs(measured - middle[:, np.newaxis]).max(axis=1), limits.upper[moving] - middle)
-    desired = sample_positions(trajectory, (samples.stamps_ns - start_ns) / NS_PER_S).T
+    desired = sample_positions(trajectory, samples.seconds_since(start_ns)).T
     errors = np.abs(measured - desired).max(axis=1)
     saturated = 0.0
     # In most trials, no torque reaches its limit, and the samples need not be searched.

@@ -19,7 +19,7 @@ from throwcollect.episode.record import Samples
 from throwcollect.errors import ConfigError
 from throwcollect.extras import lazily, require
 from throwcollect.files import write_file
-from throwcollect.units import NS_PER_S
+from throwcollect.robots.description import PACKAGE
 from throwcollect.view.camera import Camera, camera_on
 from throwcollect.view.drawn_robot import BALL_RGBA, draw_robot_of
 from throwcollect.view.shown_throws import choose_rows
@@ -91,8 +91,8 @@ def render(directory: Path, output: Path, *, trial: int | None = None, slow: flo
 def _draw_all(config: Config, joints: tuple[str, ...], samples: Samples, row: dict[str, Any], slow: float) -> list[Any]:
     """Draw the pictures of a throw, one every `_FRAME_MS`, and its last sample."""
     robot = draw_robot_of(config)
-    urdf = robot.urdf.replace("package://", f"{robot.share}/")
-    times_s = (samples.stamps_ns - samples.stamps_ns[0]) / NS_PER_S
+    urdf = robot.urdf.replace(PACKAGE, f"{robot.share}/")
+    times_s = samples.seconds_since(samples.stamps_ns[0])
     shown = [*np.searchsorted(times_s, np.arange(0, times_s[-1], _FRAME_MS / 1000 / slow)), len(samples) - 1]
     released_s = row.get("release_time_s")
     released = len(samples) if released_s is None else int(np.searchsorted(times_s, released_s))

@@ -18,7 +18,6 @@ from throwcollect.robots.quintic_curve import sample_positions
 from throwcollect.tasks.task import trajectory_of
 from throwcollect.tasks.throw.flight import flight_residual, release_of
 from throwcollect.tasks.throw.throw_config import throw_section
-from throwcollect.units import NS_PER_S
 
 MOST_RESIDUALS = 2000
 """Most episodes whose flight is computed again, which takes some 15 s; `verify` computes the flights of all."""
@@ -147,7 +146,7 @@ def read_motion(dataset: Dataset, trial: int) -> JointMotion:
     header, samples = _read(dataset, trial)
     config = dataset.plan.config_of(dataset.plan.trial(trial))
     trajectory = trajectory_of(config)
-    times = (samples.stamps_ns - header.start_ns) / NS_PER_S
+    times = samples.seconds_since(header.start_ns)
     columns = [dataset.joints.index(joint) for joint in trajectory.joints]
     release_ns = _find_release(header, config)
     return JointMotion(
@@ -156,7 +155,7 @@ def read_motion(dataset: Dataset, trial: int) -> JointMotion:
         times_s=times,
         commanded=sample_positions(trajectory, times),
         measured=samples.position[:, columns],
-        release_s=None if release_ns is None else (release_ns - header.start_ns) / NS_PER_S,
+        release_s=None if release_ns is None else header.seconds_at(release_ns),
     )
 
 

@@ -19,7 +19,6 @@ from throwcollect.tasks.throw.flight import (
 )
 from throwcollect.tasks.throw.throw_config import throw_section
 from throwcollect.tasks.throw.throw_result import ThrowOutcome, ThrowResult
-from throwcollect.units import NS_PER_S
 
 
 class ThrowTask(Task[ThrowResult]):
@@ -57,7 +56,7 @@ class ThrowTask(Task[ThrowResult]):
         if release_ns is not None and release_ns <= samples.stamps_ns[-1]:
             flight = flight_after(samples, start_ns=header.start_ns, release_ns=release_ns)
             if impacts := [contact.start_ns for contact in header.contacts if contact.body == "ground"]:
-                flight = without_impact(flight, (min(impacts) - header.start_ns) / NS_PER_S, config=config)
+                flight = without_impact(flight, header.seconds_at(min(impacts)), config=config)
             result = self._measure_flight(result, flight)
             touched = self._list_touches(header, release_ns, result.landing.time_s if result.landing else math.inf)
             result = replace(
@@ -80,7 +79,7 @@ class ThrowTask(Task[ThrowResult]):
             return Failure(ThrowOutcome.DROPPED, reason)
         if touched:
             first = touched[0]
-            time_s = (first.start_ns - header.start_ns) / NS_PER_S
+            time_s = header.seconds_at(first.start_ns)
             if first.body == tool:
                 return Failure(ThrowOutcome.RECAUGHT, f"the {tool} touched the ball again at {time_s:.3f} s")
             return Failure(ThrowOutcome.SELF_HIT, f"the ball touched {first.body} at {time_s:.3f} s")
@@ -93,7 +92,7 @@ class ThrowTask(Task[ThrowResult]):
         """List the contacts with the robot between release and landing; contacts with the tool must have begun then."""
 
         def counts(contact: Contact) -> bool:
-            if contact.body == "ground" or (contact.start_ns - header.start_ns) / NS_PER_S >= end_s:
+            if contact.body == "ground" or header.seconds_at(contact.start_ns) >= end_s:
                 return False
             if contact.body == self.config.tool.name:
                 return contact.start_ns >= release_ns
