@@ -159,14 +159,8 @@ class ComponentContainer:
         self._container.renounce()
         while not self._clock.given_up and self._watch is not None and not self._container.wait_begun(_POLL_S):
             pass
-        handle = self._container.handle
         try:
-            if handle is not None:
-                # The container may be gone already.
-                with suppress(*ENGINE_ERRORS):
-                    self._client.api.stop(handle, timeout=_GRACE_S)
-                    self._container.wait_log()
-                    self._client.api.remove_container(handle, v=True, force=True)
+            self._container.end(_GRACE_S)
             with suppress(*ENGINE_ERRORS):
                 # The filter is a regular expression, and names begin with a slash in the engine.
                 name = f"^/{self._place.container(CONTAINER)}$"

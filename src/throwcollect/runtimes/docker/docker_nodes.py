@@ -324,12 +324,7 @@ class DockerNodes(NodeHost):
     def _end(self, node: NodeContainer, grace_s: int) -> None:
         if not node.wait_begun(_BEGIN_S):
             node.renounce()
-        if node.handle is None:
-            return
-        with suppress(*ENGINE_ERRORS):
-            self._client.api.stop(node.handle, timeout=grace_s)
-            node.wait_log()
-            self._client.api.remove_container(node.handle, v=True, force=True)
+        node.end(grace_s)
 
 
 def end_in_words(state: ContainerState, memory: str | None) -> str:

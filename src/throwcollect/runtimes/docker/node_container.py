@@ -87,6 +87,15 @@ class NodeContainer:
         if self._thread is not None:
             self._thread.join(LOG_S)
 
+    def end(self, grace_s: int) -> None:
+        """End the container, after this time [s] by force, and remove it; it may be gone, or never have begun."""
+        if self.handle is None:
+            return
+        with suppress(*ENGINE_ERRORS):
+            self._client.api.stop(self.handle, timeout=grace_s)
+            self.wait_log()
+            self._client.api.remove_container(self.handle, v=True, force=True)
+
     def close(self) -> None:
         """Stop copying output at the next error of the engine or the end of a stream."""
         self._closed.set()
