@@ -228,6 +228,4 @@ def _show_throughput(throughput: Throughput | None, info: Info) -> ReportSection
 def _show_provenance(facts: dict[str, str], config: str) -> ReportSection:
     text = Markup("<code>throwcollect dataset verify</code> checks the recordings against the digest of the dataset.")
     table = Table(tuple((name, _CODE.format(value)) for name, value in facts.items()))
-    return ReportSection(
-        "provenance", "Provenance", "Where it comes from", text, (table, Listing("config.yaml", config))
-    )
+    return ReportSection("provenance", "Provenance", "Where it comes from", text, (table, Listing(CONFIG, config)))

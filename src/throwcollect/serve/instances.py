@@ -28,7 +28,7 @@ from throwcollect.runs.records import Records, Run
 from throwcollect.runs.run_record import Origin, RunRecord
 from throwcollect.runs.run_selection import require_living, require_simulations
 from throwcollect.runs.state_directory import state_directory
-from throwcollect.serve.catalogue import NAME, Catalogue, Component
+from throwcollect.serve.catalogue import ENTRY, NAME, Catalogue, Component
 from throwcollect.serve.live import name_node
 from throwcollect.serve.resumption import check_resumption
 from throwcollect.serve.robot_files import description_of
@@ -61,7 +61,7 @@ class Instances:
             ConflictError: If its record cannot be read.
         """
         # Ids become names of files, so they must not hold a slash, for example.
-        if not re.fullmatch(r"(?!\.)[A-Za-z0-9_.-]{1,80}", instance):
+        if not re.fullmatch(ENTRY, instance):
             raise NotFoundError(f"no run {instance!r}", expected="at most 80 of letters, digits, -, _ and .")
         try:
             return Records().get(instance)

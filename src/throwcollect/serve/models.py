@@ -17,8 +17,8 @@ from throwcollect.learning.model import Model, load_model
 from throwcollect.learning.model_directory import POINTS, read_score
 from throwcollect.learning.model_file import MODEL, AdaptationEntry
 from throwcollect.learning.score import Score
+from throwcollect.serve.catalogue import ENTRY
 
-_NAME = r"(?!\.)[A-Za-z0-9_.-]{1,80}"
 _MOST_MODELS = 200
 _MOST_POINTS = 2000
 
@@ -77,7 +77,7 @@ class Models:
             names = sorted(os.listdir(self.directory))
         except OSError:
             return []
-        found = (each for each in names if re.fullmatch(_NAME, each) and (self.directory / each / MODEL).is_file())
+        found = (each for each in names if re.fullmatch(ENTRY, each) and (self.directory / each / MODEL).is_file())
         return list(islice(found, _MOST_MODELS))
 
     def view(self, name: str) -> ModelView:
@@ -122,7 +122,7 @@ class Models:
 
     def _load(self, name: str) -> Model:
         # Names of models become names of directories.
-        if not re.fullmatch(_NAME, name) or not (self.directory / name / MODEL).is_file():
+        if not re.fullmatch(ENTRY, name) or not (self.directory / name / MODEL).is_file():
             raise NotFoundError(
                 f"no model {name!r}", hint=f"throwcollect fit makes models; they belong in {self.directory}"
             )
