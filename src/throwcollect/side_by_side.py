@@ -15,7 +15,7 @@ from typing import Any, TypeVar
 from throwcollect.errors import WorkerError
 from throwcollect.interruption import die_with_parent
 
-THROWS_A_START = 20
+_THROWS_A_START = 20
 """Number of throws that a process simulates in about the time that it takes to start."""
 
 _SAFE_PATH = "PYTHONSAFEPATH"
@@ -32,6 +32,11 @@ def count_cores() -> int:
     return len(os.sched_getaffinity(0))
 
 
+def limit_processes(processes: int, throws: int) -> int:
+    """Limit the number of processes that simulate throws, as a start takes as long as some throws; it is at least 1."""
+    return min(processes, max(1, throws // _THROWS_A_START))
+
+
 def work_side_by_side(
     pieces: Sequence[_Piece],
     begin: Callable[..., Callable[[_Piece], _Found]],
@@ -39,13 +44,10 @@ def work_side_by_side(
     *,
     processes: int,
     doing: str,
-    worth: int = 1,
     fork: bool = False,
 ) -> Iterator[_Found]:
     """Do pieces of work as `working_side_by_side` does, from the request for the first result to the last result."""
-    with working_side_by_side(
-        pieces, begin, arguments, processes=processes, doing=doing, worth=worth, fork=fork
-    ) as found:
+    with working_side_by_side(pieces, begin, arguments, processes=processes, doing=doing, fork=fork) as found:
         yield from found
 
 
@@ -57,7 +59,6 @@ def working_side_by_side(
     *,
     processes: int,
     doing: str,
-    worth: int = 1,
     fork: bool = False,
 ) -> Iterator[Iterator[_Found]]:
     """Do pieces of work in several processes, which import the calling program, as `multiprocessing` does.
@@ -71,7 +72,6 @@ def working_side_by_side(
         arguments: Arguments of `begin`.
         processes: Largest number of processes; with 1, this process does the work itself.
         doing: Verb and object for messages, such as ``checks trials``.
-        worth: How many pieces take as long as the start of a process; a process is started only for at least as many.
         fork: Whether to fork the processes off this one, with everything that it has imported and read, if it has only
             one Python thread. The pieces must not use libraries with threads of their own.
 
@@ -87,7 +87,7 @@ def working_side_by_side(
     from concurrent.futures import ProcessPoolExecutor
     from concurrent.futures.process import BrokenProcessPool
 
-    processes = min(processes, len(pieces) // worth)
+    processes = min(processes, len(pieces))
     if processes <= 1:
         yield _do_here(pieces, begin, arguments)
         return

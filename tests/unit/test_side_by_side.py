@@ -15,7 +15,7 @@ import pytest
 from tests.unit.work_side_by_side import SlowlySent, begin, begin_badly, begin_death, begin_nap
 
 from throwcollect.errors import ConfigError, WorkerError
-from throwcollect.side_by_side import work_side_by_side, working_side_by_side
+from throwcollect.side_by_side import limit_processes, work_side_by_side, working_side_by_side
 
 ASLEEP = """
 import time
@@ -112,12 +112,9 @@ def test_processes_start_before_results_are_read_and_end_with_the_block() -> Non
     assert multiprocessing.active_children() == []
 
 
-def test_a_process_is_begun_only_for_enough_pieces() -> None:
-    assert {pid for _, pid in work_side_by_side(range(39), begin, (3,), processes=2, doing="counts", worth=20)} == {
-        os.getpid()
-    }
-    found = work_side_by_side(range(40), begin, (3,), processes=2, doing="counts", worth=20)
-    assert os.getpid() not in {pid for _, pid in found}
+def test_a_further_process_is_begun_only_for_enough_throws() -> None:
+    assert [limit_processes(3, throws) for throws in (0, 39, 40, 59, 60, 1000)] == [1, 1, 2, 2, 3, 3]
+    assert {pid for _, pid in work_side_by_side(range(40), begin, (3,), processes=1, doing="counts")} == {os.getpid()}
 
 
 def test_processes_are_forked_off_one_without_other_threads_of_python() -> None:

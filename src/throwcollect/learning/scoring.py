@@ -16,7 +16,7 @@ from throwcollect.learning.distilling import DistilledMap
 from throwcollect.learning.fitting import count_needed_throws, fit_throws, number_cells
 from throwcollect.learning.learned_map import KeyRole, LearnedMap, no_correction
 from throwcollect.learning.score import Adapted, Errors, Score, ThrowAtTarget, Trained
-from throwcollect.side_by_side import THROWS_A_START
+from throwcollect.side_by_side import limit_processes
 
 SIZES = (30, 100, 300, 1000, 3000, 10_000)
 """Numbers of throws from which models are learned, to show how many throws a model needs."""
@@ -244,7 +244,7 @@ def _throw(learned: LearnedMap, lists: Sequence[Array], given: Array, world: Sim
     points = [dict(zip(keys, row, strict=True)) for row in values.tolist()]
     thrown = [number for number, point in enumerate(points) if world.find_refusal(point) is None]
     places = np.full((len(points), len(learned.targets)), np.nan)
-    processes = min(processes, max(1, len(thrown) // THROWS_A_START))
+    processes = limit_processes(processes, len(thrown))
     throws = world.throw_many([points[number] for number in thrown], processes=processes)
     for number, throw in zip(thrown, throws, strict=True):
         if throw.outcome == world.config.task.success:

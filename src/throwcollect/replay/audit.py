@@ -12,7 +12,7 @@ from throwcollect.engine_packages import require_engine
 from throwcollect.errors import DatasetError
 from throwcollect.extras import require
 from throwcollect.replay.comparison import Comparison, compare
-from throwcollect.side_by_side import THROWS_A_START, count_cores, work_side_by_side
+from throwcollect.side_by_side import count_cores, limit_processes, work_side_by_side
 from throwcollect.trial.choice import choose_trials
 
 _Found = TypeVar("_Found")
@@ -51,7 +51,8 @@ def simulate_side_by_side(
         WorkerError: If the physics engine does not start.
     """
     require_simulating(engine)
-    return work_side_by_side(trials, begin, arguments, processes=count_cores(), doing="simulates", worth=THROWS_A_START)
+    processes = limit_processes(count_cores(), len(trials))
+    return work_side_by_side(trials, begin, arguments, processes=processes, doing="simulates")
 
 
 def require_simulating(engine: str) -> None:
