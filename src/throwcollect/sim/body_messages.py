@@ -5,6 +5,7 @@ from __future__ import annotations
 from throwcollect.engines.engine import BodyState
 from throwcollect.ros.msg import EntityState, Pose, Twist
 from throwcollect.sim.entities import WORLD_FRAME
+from throwcollect.units import NS_PER_S
 
 
 def body_state(pose: Pose, twist: Twist | None = None) -> BodyState:
@@ -22,7 +23,7 @@ def entity_state(state: BodyState, now_ns: int) -> EntityState:
     """Make a simulation_interfaces/msg/EntityState of a body at a time; accelerations are not measured."""
     message = EntityState()
     message.header.frame_id = WORLD_FRAME
-    message.header.stamp.sec, message.header.stamp.nanosec = divmod(now_ns, 10**9)
+    message.header.stamp.sec, message.header.stamp.nanosec = divmod(now_ns, NS_PER_S)
     position, orientation = message.pose.position, message.pose.orientation
     position.x, position.y, position.z = state.position
     orientation.x, orientation.y, orientation.z, orientation.w = state.orientation_xyzw

@@ -8,15 +8,15 @@ from throwcollect.control import ControllerState, JointTolerance, Trajectory, Tr
 from throwcollect.ros.action import FollowJointTrajectory
 from throwcollect.ros.msg import Duration, JointTrajectory, JointTrajectoryControllerState, JointTrajectoryPoint, Time
 from throwcollect.ros.msg import JointTolerance as JointToleranceMessage
+from throwcollect.units import NS_PER_S
 
-_NS = 10**9
-_LONGEST_NS = 2**31 * _NS - 1
+_LONGEST_NS = 2**31 * NS_PER_S - 1
 """Largest time that a message can hold [ns]: its seconds have 32 bits, one of them for the sign."""
 
 
 def nanoseconds(time: Time | Duration) -> int:
     """Convert a builtin_interfaces Time or Duration to nanoseconds."""
-    return int(time.sec) * _NS + int(time.nanosec)
+    return int(time.sec) * NS_PER_S + int(time.nanosec)
 
 
 def read_trajectory(message: JointTrajectory) -> Trajectory:
@@ -60,7 +60,7 @@ def state_message(state: ControllerState) -> JointTrajectoryControllerState:
         output=_point_message(state.output),
         speed_scaling_factor=float(state.speed_scaling_factor),
     )
-    message.header.stamp.sec, message.header.stamp.nanosec = divmod(state.stamp_ns, _NS)
+    message.header.stamp.sec, message.header.stamp.nanosec = divmod(state.stamp_ns, NS_PER_S)
     return message
 
 
@@ -72,7 +72,7 @@ def feedback_message(state: ControllerState) -> FollowJointTrajectory.Feedback:
         actual=_point_message(state.actual),
         error=_point_message(state.error),
     )
-    message.header.stamp.sec, message.header.stamp.nanosec = divmod(state.stamp_ns, _NS)
+    message.header.stamp.sec, message.header.stamp.nanosec = divmod(state.stamp_ns, NS_PER_S)
     return message
 
 
@@ -91,5 +91,5 @@ def _point_message(point: TrajectoryPoint) -> JointTrajectoryPoint:
     )
     # A trajectory with a stamp of decades ago can have been going on for longer than a message can hold.
     passed_ns = min(point.time_from_start_ns, _LONGEST_NS)
-    message.time_from_start.sec, message.time_from_start.nanosec = divmod(passed_ns, _NS)
+    message.time_from_start.sec, message.time_from_start.nanosec = divmod(passed_ns, NS_PER_S)
     return message

@@ -8,6 +8,8 @@ from __future__ import annotations
 import math
 import time
 
+from throwcollect.units import NS_PER_S
+
 _SHORTEST_S = 0.004
 """Real time of the shortest stretch; it is well above the millisecond of work between two stretches."""
 _LONGEST_S = 0.05
@@ -72,5 +74,5 @@ class Pace:
         if factor != self._factor or since_ns != self._until_ns or began_s > self._due_s + _LATE_S:
             self._due_s = began_s
         self._factor, self._until_ns = factor, until_ns
-        self._due_s += (until_ns - since_ns) / 1e9 / factor
+        self._due_s += (until_ns - since_ns) / NS_PER_S / factor
         time.sleep(max(0.0, self._due_s - time.monotonic()))

@@ -6,14 +6,12 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from throwcollect.config.schema import Config
-from throwcollect.control import ErrorCode, GoalResult, TrajectoryRefusal
+from throwcollect.control import ErrorCode, GoalResult, GoalStatus, TrajectoryRefusal
 from throwcollect.episode.record import GoalOutcome
 from throwcollect.errors import RequestError
 
 NO_TRIAL = -1
 """Number of the trial while none is set up."""
-_EXECUTING = 2
-"""action_msgs/msg/GoalStatus.STATUS_EXECUTING."""
 
 
 @dataclass(frozen=True)
@@ -83,7 +81,7 @@ class PresentTrial:
 
     def note_goal(self, controller: str) -> None:
         """Note that a controller has accepted a goal."""
-        self._goals[controller] = GoalOutcome(controller, _EXECUTING, 0, "")
+        self._goals[controller] = GoalOutcome(controller, GoalStatus.EXECUTING, 0, "")
 
     def note_result(self, controller: str, result: GoalResult) -> None:
         """Note that the goal of a controller has ended."""

@@ -23,6 +23,7 @@ from throwcollect.sim.limb_controller import LimbController
 from throwcollect.sim.pace import Pace, long_stretch_steps, longest_steps, stretch_steps
 from throwcollect.sim.present_trial import PresentTrial, TrialSetup
 from throwcollect.sim.world import World
+from throwcollect.units import NS_PER_S
 
 _STRETCH_S = 0.5
 """Simulated time between two looks at messages in a trial or in many steps: about 20 ms of real time."""
@@ -84,7 +85,7 @@ class Simulation:
         self.world = World(config)
         self.entities = Entities(self.world, config.robot.name)
         self._steps: StepRequest | None = None
-        self._period_ns = period_ns = round(10**9 / config.sim.physics_hz)
+        self._period_ns = period_ns = round(NS_PER_S / config.sim.physics_hz)
         self._stride = config.sim.physics_hz // config.record.rate_hz
         robot = robot_of(config)
         self.limbs = {

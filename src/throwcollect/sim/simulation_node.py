@@ -41,6 +41,7 @@ from throwcollect.sim.simulation_control import SimulationControl
 from throwcollect.sim.stepping import Stepping
 from throwcollect.sim.trial_runner import TrialRunner
 from throwcollect.trial.lease import LEASES, Lease, leases_from_json
+from throwcollect.units import NS_PER_S
 
 _CLOCK = "rosgraph_msgs/msg/Clock"
 Clock: Any = get_message(_CLOCK)
@@ -200,7 +201,7 @@ class SimulationNode(Node):
             return
         self._published_ns = simulation.now_ns
         message = Clock()
-        message.clock.sec, message.clock.nanosec = divmod(simulation.now_ns, 10**9)
+        message.clock.sec, message.clock.nanosec = divmod(simulation.now_ns, NS_PER_S)
         for topic, publisher in self._listened:
             if topic.type_name == _CLOCK:
                 publisher.publish(message)
