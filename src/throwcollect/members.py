@@ -101,9 +101,9 @@ def load_member(family: str, name: str) -> Any:
         ImportError: If the member is our own, and a package that it needs cannot be imported.
     """
     entry = _find_members()[family][name]
-    if name in _OWN[family]:
+    if is_own(family, name):
         return entry.load()
-    what, namesakes = _describe(family, name), _find_namesakes(family, name)
+    what, namesakes = describe_member(family, name), _find_namesakes(family, name)
     if len({each.value for each in namesakes}) > 1:
         raise ConfigError(f"{what}: only one package may use a name", hint="uninstall all of these packages but one")
     found = _import(entry.value, what)
@@ -113,6 +113,9 @@ def load_member(family: str, name: str) -> Any:
         return _check_class(found, kind, where)
     if not isinstance(found, kind):
         raise ConfigError(f"{where} should be a {kind.__module__}.{kind.__name__}, is {found!r}")
+    # Exporters have no name of their own.
+    if getattr(found, "name", name) != name:
+        raise ConfigError(f"{where} should have the name of its entry point, {name!r}, has {found.name!r}")
     return found
 
 
@@ -127,6 +130,27 @@ def load_object(path: str, kind: type | None = None) -> Any:
         return getattr(import_module(module), name)
     found = _import(path, path)
     return found if kind is None else _check_class(found, kind, path)
+
+
+def is_own(family: str, name: str) -> bool:
+    """Whether a member comes with throwcollect, and not from another package."""
+    return name in _OWN[family]
+
+
+def load_part(family: str, name: str, path: str, kind: type | None = None) -> Any:
+    """Import the object ``module:name`` that a member names; see `load_object`.
+
+    Raises:
+        ConfigError: If the member comes from another package, and the object cannot be imported or is not of this kind;
+            the message names that package.
+    """
+    if is_own(family, name):
+        return load_object(path, kind)
+    what = describe_member(family, name)
+    if not isinstance(path, str):
+        raise ConfigError(f"{what} should name its object as 'module:name', names {path!r}")
+    found = _import(path, f"{what}: {path}")
+    return found if kind is None else _check_class(found, kind, f"{what}: {path}")
 
 
 @contextmanager
@@ -145,7 +169,7 @@ def explain_failure(family: str, name: str, doing: str, *, passing: tuple[type[E
     Raises:
         MemberError: If the block raises another error, which was not raised on purpose.
     """
-    if name in _OWN[family]:
+    if is_own(family, name):
         yield
         return
     try:
@@ -153,13 +177,14 @@ def explain_failure(family: str, name: str, doing: str, *, passing: tuple[type[E
             yield
     except ThrowcollectError:
         raise
-    except Exception as error:
+    # `SystemExit` would end the process without a word, or as often as a simulation is started again.
+    except (Exception, SystemExit) as error:
         if isinstance(error, passing):
             raise
         if os.environ.get(_DEBUG):
             # In a simulation, only the message of the error gets on, as the reason for which a trial is refused.
             traceback.print_exc()
-        what = _describe(family, name)
+        what = describe_member(family, name)
         raise MemberError(f"{what} cannot {doing}: {type(error).__name__}: {error}", hint=_WAY_OUT) from error
 
 
@@ -196,7 +221,7 @@ def _check_class(found: Any, kind: type, where: str) -> Any:
     return found
 
 
-def _describe(family: str, name: str) -> str:
+def describe_member(family: str, name: str) -> str:
     """Name a member of another package and that package, as the beginning of a message."""
     owners = sorted(map(_name_owner, _find_namesakes(family, name)))
     return f"the {family.removesuffix('s')} {name} of {' and '.join(owners)}"

@@ -13,7 +13,7 @@ from throwcollect import members
 from throwcollect.engines.ballistic.ballistic_engine import BallisticEngine
 from throwcollect.engines.bullet.bullet_engine import BulletEngine
 from throwcollect.errors import ConfigError, DatasetError, MemberError
-from throwcollect.members import explain_failure, load_member, names_of
+from throwcollect.members import explain_failure, load_member, load_part, names_of
 
 BALLISTIC = "throwcollect.engines.ballistic.ballistic_engine:BallisticEngine"
 ARM = """\
@@ -111,6 +111,8 @@ def test_an_unknown_robot_is_an_error_without_complaints_about_joints(tmp_path: 
 BROKEN = """
 from throwcollect.config.task_config import TaskConfig
 from throwcollect.engines.engine import Engine
+from throwcollect.export.exporter import Exporter
+from throwcollect.robots.robot import Robot
 
 NUMBER = 3
 
@@ -119,6 +121,14 @@ class Stopped(Engine):
 
 class Aimless(TaskConfig):
     implementation = "nothing:Nothing"
+
+def exporter(**values):
+    return Exporter(**{"describe": print, "write": print} | values)
+
+def robot(**values):
+    joints = {"arm": ("elbow",)}
+    texts = dict(name="mine", title="mine", urdf="a", srdf="a", rest="a", hand="a")
+    return Robot(**texts | {"controllers": joints, "share": print} | values)
 """
 
 
@@ -149,6 +159,56 @@ def test_a_broken_member_is_an_error_that_names_its_package(
     assert said in str(caught.value)
     monkeypatch.undo()
     members._find_members.cache_clear()
+
+
+@pytest.mark.parametrize(
+    ("family", "made", "said"),
+    [
+        ("exporters", "exporter(write=3)", "cannot be loaded: TypeError: write should be a function, is 3"),
+        ("exporters", "exporter(packages='h5py')", "TypeError: packages should be a tuple of texts, is 'h5py'"),
+        ("robots", "robot(controllers=['arm'])", "TypeError: controllers should have a tuple of joints for each name"),
+        ("robots", "robot(controllers={})", "TypeError: controllers should have a tuple of joints for each name"),
+        ("robots", "robot(controllers={'arm': 'elbow'})", "TypeError: controllers should have a tuple of joints"),
+        ("robots", "robot(controllers={'my arm': ('a',)})", "names of letters, digits and underscores, has 'my arm'"),
+        ("robots", "robot(controllers={'a': ('b', 'b')})", "each joint should be in one controller; b is there twice"),
+        ("robots", "robot(share='/tmp')", "TypeError: share should be a function that returns a directory, is '/tmp'"),
+        ("robots", "robot(hand=None)", "cannot be loaded: TypeError: hand should be a text, is None"),
+        ("robots", "robot(holding='hand')", "TypeError: holding should be a tuple of texts, is 'hand'"),
+        ("robots", "robot(name='other')", "should have the name of its entry point, 'mine', has 'other'"),
+    ],
+)
+def test_a_value_of_a_wrong_kind_is_an_error_that_says_what_would_be_right(
+    family: str, made: str, said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "broken.py").write_text(f"{BROKEN}\nMADE = {made}\n")
+    install(tmp_path, "somebodys", family, "broken:MADE")
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.delitem(sys.modules, "broken", raising=False)
+    for cached in (members._find_members, load_member):
+        cached.cache_clear()
+    with pytest.raises(ConfigError) as caught:
+        load_member(family, "mine")
+    assert str(caught.value).startswith(f"the {family[:-1]} mine of somebodys 1.0")
+    assert said in str(caught.value)
+    monkeypatch.undo()
+    members._find_members.cache_clear()
+
+
+def test_a_part_of_a_member_that_cannot_be_imported_is_an_error_that_names_the_package(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    install(tmp_path, "somebodys", "tasks", "some:Task")
+    monkeypatch.syspath_prepend(tmp_path)
+    with pytest.raises(ConfigError, match=r"the task mine of somebodys 1\.0: not_there:Task cannot be loaded: Module"):
+        load_part("tasks", "mine", "not_there:Task")
+
+
+def test_a_member_that_ends_the_process_is_an_error() -> None:
+    with (
+        pytest.raises(MemberError, match="cannot judge trial 3: SystemExit: 5"),
+        explain_failure("tasks", "mine", "judge trial 3"),
+    ):
+        sys.exit(5)
 
 
 def test_two_packages_with_a_member_of_one_name_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

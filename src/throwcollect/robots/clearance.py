@@ -152,7 +152,7 @@ def _read_shapes(robot: Robot) -> pinocchio.GeometryModel:
     loader = pinocchio.coal.MeshLoader(pinocchio.coal.BV_OBB)
     try:
         geometry = pinocchio.buildGeomFromUrdf(
-            model, str(robot.urdf_path), kind, package_dirs=[str(robot.share())], mesh_loader=loader
+            model, str(robot.urdf_path), kind, package_dirs=[str(robot.directory)], mesh_loader=loader
         )
     except (ValueError, RuntimeError) as error:
         raise ConfigError(f"{robot.urdf_path}: its meshes cannot be read: {error}") from error

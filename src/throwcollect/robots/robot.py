@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import math
+import re
 import xml.etree.ElementTree as ElementTree
+from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -10,6 +13,10 @@ from pathlib import Path
 from types import MappingProxyType
 
 from throwcollect.errors import ConfigError
+from throwcollect.members import explain_failure, names_of
+
+_NAME = r"[A-Za-z_][A-Za-z0-9_]*"
+"""Controllers are nodes and topics of ROS, so their names are as ROS allows them."""
 
 
 # Robots are keys of caches. With `eq`, a robot would be hashed by its fields, but mappings among them have no hash.
@@ -59,6 +66,31 @@ class Robot:
     goal_time_s: float = 0.0
     stopped_velocity_radps: float = 0.01
 
+    def __post_init__(self) -> None:
+        """Refuse values of wrong kinds where they are given, because later they would fail in any place.
+
+        Raises:
+            TypeError: If a value is of a wrong kind.
+            ValueError: If a name is wrong, or a joint is in two controllers.
+        """
+        for name in ("name", "title", "urdf", "srdf", "rest", "hand", "kind", "open_hand"):
+            if not isinstance(value := getattr(self, name), str):
+                raise TypeError(f"{name} should be a text, is {value!r}")
+        for name in ("holding", "rigid"):
+            if not _is_texts(value := getattr(self, name)):
+                raise TypeError(f"{name} should be a tuple of texts, is {value!r}")
+        if not callable(self.share):
+            raise TypeError(f"share should be a function that returns a directory, is {self.share!r}")
+        controllers = self.controllers
+        if not (isinstance(controllers, Mapping) and controllers and all(map(_is_texts, controllers.values()))):
+            raise TypeError(
+                f"controllers should have a tuple of joints for each name, and at least one; {controllers!r}"
+            )
+        if wrong := [name for name in controllers if not re.fullmatch(_NAME, str(name), re.ASCII)]:
+            raise ValueError(f"controllers should have names of letters, digits and underscores, has {wrong[0]!r}")
+        if twice := [joint for joint, count in Counter(self.joints).items() if count > 1]:
+            raise ValueError(f"each joint should be in one controller; {', '.join(twice)} is there twice")
+
     @cached_property
     def joints(self) -> tuple[str, ...]:
         """All joints that are commanded, in the order of every joint state and joint array."""
@@ -85,13 +117,29 @@ class Robot:
         return self.ros1_names.get(controller, controller) if naming == "ros1" else controller
 
     @property
+    def directory(self) -> Path:
+        """Directory that `share` returns.
+
+        Raises:
+            ConfigError: If the description is not installed.
+            MemberError: If the robot comes from another package, and its function fails.
+        """
+        if self.name not in names_of("robots"):
+            return self.share()
+        with explain_failure("robots", self.name, "find its files"):
+            found: object = self.share()
+            if not isinstance(found, Path):
+                raise TypeError(f"share should return a pathlib.Path, returned {found!r}")
+            return found
+
+    @property
     def urdf_path(self) -> Path:
         """Path of the URDF.
 
         Raises:
             ConfigError: If the description is not installed.
         """
-        return self.share() / self.urdf
+        return self.directory / self.urdf
 
     @property
     def srdf_path(self) -> Path:
@@ -100,7 +148,7 @@ class Robot:
         Raises:
             ConfigError: If the description is not installed.
         """
-        return self.share() / self.srdf
+        return self.directory / self.srdf
 
     @cached_property
     def rest_posture(self) -> Mapping[str, float]:
@@ -115,9 +163,16 @@ class Robot:
             raise ConfigError(f"{path}: no group_state {self.rest}")
         angles = {joint.get("name"): joint.get("value", "0") for joint in state.iter("joint")}
         try:
-            return MappingProxyType({name: float(angles.get(name, "0")) for name in self.joints})
+            posture = {name: float(angles.get(name, "0")) for name in self.joints}
         except ValueError as error:
             raise ConfigError(f"{path}: group_state {self.rest} is not readable: {error}") from error
+        if wrong := [name for name, angle in posture.items() if not math.isfinite(angle)]:
+            raise ConfigError(f"{path}: group_state {self.rest}: the angle of {wrong[0]} is not finite")
+        return MappingProxyType(posture)
+
+
+def _is_texts(value: object) -> bool:
+    return isinstance(value, tuple | list) and all(isinstance(each, str) for each in value)
 
 
 def read_xml(path: Path) -> ElementTree.Element:

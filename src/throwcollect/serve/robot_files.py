@@ -170,7 +170,7 @@ def _find_packages() -> Mapping[str, Path]:
         ConfigError: If the description of a robot cannot be read.
     """
     return {
-        package: robot.share() / package for text, robot in _read_descriptions() for package, _ in _MESH.findall(text)
+        package: robot.directory / package for text, robot in _read_descriptions() for package, _ in _MESH.findall(text)
     }
 
 
