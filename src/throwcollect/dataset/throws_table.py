@@ -13,9 +13,11 @@ import pyarrow as pa
 
 from throwcollect.config.schema import Config
 from throwcollect.config.shape import unit_of_key
+from throwcollect.config.target_columns import TARGET_PREFIX, is_target
 from throwcollect.dataset.directory import THROWS, list_shards
 from throwcollect.dataset.misses import Misses
 from throwcollect.errors import ConfigError, DatasetError
+from throwcollect.members import explain_failure
 from throwcollect.sweep.arrow_column import count_values, find_range, make_table, read_validity
 from throwcollect.sweep.parquet_file import read_parquet
 from throwcollect.sweep.plan import Plan
@@ -83,7 +85,8 @@ def _check_task(task: Task[Any], columns: Sequence[str]) -> None:
     """Make sure that a task, which may be of another package, can have its results in a table of these columns.
 
     Raises:
-        ConfigError: If it lacks an outcome that it needs, or two columns have the same name.
+        ConfigError: If it lacks an outcome that it needs, two columns have the same name, or a column of its results
+            has the name of a target.
     """
     name, outcomes = task.config.task.name, {each.value for each in task.outcomes}
     needed = (task.config.task.success, LIMIT_VIOLATED, TRACKING_FAILED, LOST)
@@ -93,6 +96,13 @@ def _check_task(task: Task[Any], columns: Sequence[str]) -> None:
         raise ConfigError(
             f"task.name: results of the task {name} have columns of the same name as others of the table: "
             f"{', '.join(twice)}",
+            hint="rename the fields of its results",
+        )
+    # Whoever reads the table takes columns of these names for targets that the trials were given.
+    if targets := [each.name for each in task.columns.columns if is_target(each.name)]:
+        raise ConfigError(
+            f"task.name: results of the task {name} have columns that begin with {TARGET_PREFIX}, as only targets of "
+            f"trials may: {', '.join(targets)}",
             hint="rename the fields of its results",
         )
 
@@ -108,6 +118,7 @@ class ThrowsTable:
 
     Raises:
         ConfigError: If the task lacks an outcome that it needs, or a column of its results has the name of another.
+        MemberError: If the task comes from another package, and fails to declare its results.
     """
 
     def __init__(self, parameters: Sequence[str], config: Config, targets: Sequence[str] = ()) -> None:
@@ -115,7 +126,8 @@ class ThrowsTable:
         self._misses = Misses(config, targets)
         task = task_of(config)
         self._outcomes = task.outcomes
-        self._columns = task.columns
+        with explain_failure("tasks", config.task.name, "declare its results"):
+            self._columns = task.columns
         self.later = frozenset(each.name for each in self._columns.columns if each.later)
         self.schema = pa.schema(
             [

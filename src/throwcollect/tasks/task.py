@@ -10,13 +10,14 @@ from typing import Any, ClassVar, Generic
 from throwcollect.config.motion import MinimumJerk
 from throwcollect.config.schema import Config
 from throwcollect.episode.record import EpisodeHeader, Samples
-from throwcollect.members import explain_failure, load_object
+from throwcollect.members import explain_failure, is_own, load_part
 from throwcollect.robots.description import robot_of
 from throwcollect.robots.trajectory import JointTrajectory
 from throwcollect.tasks.dmp import dmp_trajectory
 from throwcollect.tasks.joint_measures import explain_failed_goal, explain_violation, measure_joints
 from throwcollect.tasks.minimum_jerk import minimum_jerk_trajectory
 from throwcollect.tasks.result import LIMIT_VIOLATED, LOST, TRACKING_FAILED, AnyResult, Outcome, ResultColumns
+from throwcollect.tasks.returned import check_assessment, check_declared, check_trajectory, check_values
 
 
 @dataclass(frozen=True)
@@ -98,7 +99,11 @@ class Task(ABC, Generic[AnyResult]):
         if not (measured and math.isfinite(samples.ball_position.sum() + samples.ball_linear_velocity.sum())):
             reason = "the samples hold numbers that are not finite"
             return self.results(self.outcomes(TRACKING_FAILED), reason=reason)
-        result, failure = self.assess(measured, samples, header)
+        assessed = self.assess(measured, samples, header)
+        if not is_own("tasks", self.config.task.name):
+            check_assessment(assessed, self.results, self.outcomes, Failure)
+            check_values(self.columns.write(assessed[0]), self.columns.columns)
+        result, failure = assessed
         if refusal := explain_failed_goal(header):
             failure = Failure(self.outcomes(TRACKING_FAILED), refusal)
         elif failure is None and (violation := explain_violation(result)):
@@ -124,8 +129,18 @@ class Task(ABC, Generic[AnyResult]):
 
 
 def task_of(config: Config) -> Task[Any]:
-    """Make the task that a configuration describes."""
-    task: Task[Any] = load_object(config.task.implementation, Task)(config)
+    """Make the task that a configuration describes.
+
+    Raises:
+        ConfigError: If the task comes from another package, and cannot be imported.
+        MemberError: If the task comes from another package and fails, or declares something wrong.
+    """
+    name = config.task.name
+    kind = load_part("tasks", name, config.task.implementation, Task)
+    with explain_failure("tasks", name, "be made"):
+        task: Task[Any] = kind(config)
+        if not is_own("tasks", name):
+            check_declared(getattr(task, "outcomes", None), getattr(task, "results", None))
     return task
 
 
@@ -137,4 +152,7 @@ def trajectory_of(config: Config) -> JointTrajectory:
         MemberError: If the task comes from another package and fails.
     """
     with explain_failure("tasks", config.task.name, "plan its motion"):
-        return task_of(config).trajectory()
+        trajectory = task_of(config).trajectory()
+        if not is_own("tasks", config.task.name):
+            check_trajectory(trajectory, [joint for joint in robot_of(config).joints if joint in config.task.end])
+    return trajectory

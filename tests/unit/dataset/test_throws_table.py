@@ -69,6 +69,13 @@ def test_a_task_with_a_result_named_like_another_column_is_refused(
         ThrowsTable((), Config())
 
 
+def test_a_task_with_a_result_named_like_a_target_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    column = ("target_height_m", float, measured(Number("A number.")))
+    monkeypatch.setattr(ThrowTask, "results", make_dataclass("Results", [column], bases=(ThrowResult,), frozen=True))
+    with pytest.raises(ConfigError, match=r"columns that begin with target_, as only .* may: target_height_m"):
+        ThrowsTable((), Config())
+
+
 def test_a_task_that_lacks_a_required_outcome_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(ThrowTask, "outcomes", Outcome("Few", {"LOST": "lost", "LIMIT_VIOLATED": "limit_violated"}))
     with pytest.raises(ConfigError, match="outcomes of the task throw lack landed, tracking_failed"):
