@@ -7,13 +7,14 @@ import xml.etree.ElementTree as ElementTree
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
+from pathlib import Path
 from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
 
 from throwcollect.config.schema import Config
-from throwcollect.errors import ConfigError
+from throwcollect.errors import ConfigError, MemberError
 from throwcollect.extras import MissingExtraError, is_installed
 from throwcollect.members import load_member
 from throwcollect.pinocchio_library import pinocchio
@@ -23,6 +24,19 @@ from throwcollect.tools.tool import Tool, tool_of
 
 PACKAGE = "package://"
 """Beginning of the URLs of meshes in a description, which the name of a package follows."""
+_NUMBERS: Mapping[str, Mapping[str, int]] = MappingProxyType(
+    {
+        "origin": {"xyz": 3, "rpy": 3},
+        "axis": {"xyz": 3},
+        "mass": {"value": 1},
+        "inertia": dict.fromkeys(("ixx", "ixy", "ixz", "iyy", "iyz", "izz"), 1),
+        "box": {"size": 3},
+        "mesh": {"scale": 3},
+        "sphere": {"radius": 1},
+        "cylinder": {"radius": 1, "length": 1},
+    }
+)
+"""Attributes of elements of a URDF, with how many numbers each has; `joint_limits` reads those of `<limit>`."""
 _written: dict[tuple[Robot, str], str] = {}
 """The latest full descriptions, by robot and configuration of the tool. They are kept, because everything that looks at
 a dataset needs the same description, and writing it takes 20 ms."""
@@ -53,8 +67,8 @@ def robot_of(config: Config) -> Robot:
 def is_available(config: Config) -> bool:
     """Say whether the robot's files, and the library that computes with them, are installed."""
     try:
-        robot_of(config).share()
-    except (ConfigError, MissingExtraError):
+        _ = robot_of(config).directory
+    except (ConfigError, MemberError, MissingExtraError):
         return False
     return is_installed("pinocchio")
 
@@ -154,6 +168,7 @@ def physics_description(config: Config) -> Description:
         ConfigError: If the robot's files cannot be read.
     """
     robot, tool = robot_of(config), tool_of(config.tool)
+    _check_name_of_tool(robot, tool)
     locked = find_locked_joints(config)
     source, whole = _read_whole(robot)
     model = lock_joints(whole, locked)
@@ -178,11 +193,45 @@ def physics_description(config: Config) -> Description:
     return Description(urdf=_write_text(description), moving=moving, locked=locked)
 
 
+def _check_name_of_tool(robot: Robot, tool: Tool) -> None:
+    """Make sure that a contact with the tool is not taken for one with the ground or a part of the robot.
+
+    Raises:
+        ConfigError: If one of these has the name of the tool or of its link.
+    """
+    if taken := {tool.name, tool.link} & {"ground", *_list_links(robot)}:
+        raise ConfigError(
+            f"tool.name: the tool is recorded as {tool.name}, with the link {tool.link}; the ground or a link of "
+            f"{robot.title} has the name {', '.join(sorted(taken))}, too",
+            hint="give the tool another `Tool.name`",
+        )
+
+
+def _check_numbers(path: Path, description: ElementTree.Element) -> None:
+    """Make sure that numbers of links and joints can be read, because Pinocchio takes 0 for a mass that cannot.
+
+    Raises:
+        ConfigError: If a number cannot be read or is not finite, or a mass is below 0.
+    """
+    for element in (each for kind in ("link", "joint") for part in description.iter(kind) for each in part.iter()):
+        for key, count in _NUMBERS.get(element.tag, {}).items():
+            if (text := element.get(key)) is None:
+                continue
+            try:
+                numbers = [float(each) for each in text.split()]
+            except ValueError:
+                numbers = []
+            if len(numbers) != count or not np.isfinite(numbers).all() or (element.tag == "mass" and numbers[0] < 0):
+                numeral = "a finite number" if count == 1 else f"{count} finite numbers"
+                wanted = "a mass of at least 0" if element.tag == "mass" else numeral
+                raise ConfigError(f"{path}: {key} of <{element.tag}> should be {wanted}, is {text!r}")
+
+
 def _read_description(robot: Robot) -> ElementTree.Element:
     """Read the links and joints of the robot's URDF, without the collision shapes of the hand that holds the tool.
 
     Raises:
-        ConfigError: If it cannot be read, or has no link of the hand's name.
+        ConfigError: If it or a number in it cannot be read, or it has no link of the hand's name.
     """
     path = robot.urdf_path
     source = read_xml(path)
@@ -195,6 +244,7 @@ def _read_description(robot: Robot) -> ElementTree.Element:
                 link.remove(shape)
     if description.find(f"link[@name='{robot.hand}']") is None:
         raise ConfigError(f"{path}: link {robot.hand} is missing")
+    _check_numbers(path, description)
     links, joints = ({element.get("name", "") for element in description.findall(kind)} for kind in ("link", "joint"))
     if shared := links & joints:
         # Pinocchio has a frame for the joint and one for the link, and cannot tell which one is meant.
@@ -258,7 +308,7 @@ def _collect_shapes(
             geometry.extend(copy.deepcopy(list(original.iterfind("geometry/*"))))
             for mesh in geometry.iter("mesh"):
                 relative = mesh.get("filename", "").removeprefix(PACKAGE)
-                mesh.set("filename", str(robot.share() / relative))
+                mesh.set("filename", str(robot.directory / relative))
             shapes.append(shape)
     return shapes
 

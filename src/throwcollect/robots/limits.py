@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cache
 
@@ -55,6 +56,13 @@ def joint_limits(robot: Robot) -> JointLimits:
             rows.append([*numbers, float(damping)])
         except (KeyError, ValueError) as error:
             raise ConfigError(f"{path}: joint {name}: limit is not readable: {error}") from error
+        lower, upper, velocity, effort, *_ = rows[-1]
+        # Written so that a number that is not one is refused, too.
+        if not (-math.inf < lower <= upper < math.inf and velocity >= 0 and effort >= 0):
+            found = ", ".join(f"{key} {limit.get(key)}" for key in ("lower", "upper", "velocity", "effort"))
+            raise ConfigError(
+                f"{path}: joint {name}: lower should be at most upper, and velocity and effort not below 0: {found}"
+            )
     table = np.array(rows)
     # The result is cached, so all callers have the same arrays, and none may write to them.
     table.flags.writeable = False
