@@ -13,21 +13,21 @@ from throwcollect.dataset.journal import read_journal
 from throwcollect.dataset.provenance import read_provenance
 from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.summary import Info
+from throwcollect.errors import MemberError
 from throwcollect.files import read_text
-from throwcollect.members import load_object
+from throwcollect.members import describe_member
 from throwcollect.report import figures
 from throwcollect.report.amounts import format_duration, format_share, format_size
-from throwcollect.report.contents import Listing, Panel, ReportSection, Row, Table, TaskReport, Tile
+from throwcollect.report.contents import Listing, Panel, ReportSection, Row, Table, Tile
 from throwcollect.report.failures import FailureGroup, group_failures
 from throwcollect.report.joint_peaks import KINDS, JointPeaks, summarise_peaks
 from throwcollect.report.model_section import show_model
 from throwcollect.report.outcomes import LANDED, Outcomes, in_words
 from throwcollect.report.swept_keys import SweptKey, read_parameters
 from throwcollect.report.targets_section import show_targets
+from throwcollect.report.task_part import find_repeated, report_task
 from throwcollect.report.throughput import Throughput, measure_throughput
-from throwcollect.robots.description import robot_of
 from throwcollect.sweep.digest import config_digest
-from throwcollect.tasks.task import task_of
 
 _MOST_FAILURES = 40
 _MOST_CONFIG_BYTES = 10_000_000
@@ -59,14 +59,29 @@ def report_dataset(dataset: Dataset, *, model: Path | None = None) -> Report:
     Raises:
         ConfigError: If the model was learned from another dataset.
         DatasetError: If a table or an episode is damaged, or the model.
+        MemberError: If the task comes from another package, and its part of the report fails.
     """
     throws, info = dataset.throws, summary(dataset)
     outcomes = Outcomes.of(throws["outcome"].to_pylist(), success=dataset.config.task.success)
     parameters = read_parameters(dataset.config, throws, outcomes)
     reasons = zip(*(throws[name].to_pylist() for name in ("trial", "outcome", "reason")), strict=True)
     facts = _list_facts(dataset, info)
-    task, noun = _report_task(dataset, outcomes), dataset.config.task.noun
+    task, noun = report_task(dataset, outcomes), dataset.config.task.noun
     finished = f", finished on {facts['finished'][:10]}" if "finished" in facts else ""
+    sections = (
+        *task.results,
+        *show_targets(dataset),
+        *(() if model is None else (show_model(model, dataset),)),
+        _show_parameters(parameters, outcomes),
+        _show_outcomes(outcomes, parameters, group_failures(reasons), noun),
+        _show_limits({kind: summarise_peaks(throws, kind) for kind in KINDS}, noun),
+        *task.episodes,
+        _show_throughput(measure_throughput(read_journal(dataset.directory / JOURNAL)), info),
+        _show_provenance(facts, read_text(dataset.directory / CONFIG, most_bytes=_MOST_CONFIG_BYTES)),
+    )
+    if repeated := find_repeated(sections):
+        member = describe_member("tasks", dataset.config.task.name)
+        raise MemberError(f"{member} cannot report its trials: two sections of the report have the key {repeated!r}")
     return Report(
         name=info.name,
         lead=f"{info.trials:,} {task.subject}{finished}.",
@@ -76,17 +91,7 @@ def report_dataset(dataset: Dataset, *, model: Path | None = None) -> Report:
             Tile(format_size(info.size_bytes), "on disk"),
         ),
         outcomes=outcomes,
-        sections=(
-            *task.results,
-            *show_targets(dataset),
-            *(() if model is None else (show_model(model, dataset),)),
-            _show_parameters(parameters, outcomes),
-            _show_outcomes(outcomes, parameters, group_failures(reasons), noun),
-            _show_limits({kind: summarise_peaks(throws, kind) for kind in KINDS}, noun),
-            *task.episodes,
-            _show_throughput(measure_throughput(read_journal(dataset.directory / JOURNAL)), info),
-            _show_provenance(facts, read_text(dataset.directory / CONFIG, most_bytes=_MOST_CONFIG_BYTES)),
-        ),
+        sections=sections,
         noun=noun,
     )
 
@@ -101,20 +106,6 @@ def _list_facts(dataset: Dataset, info: Info) -> dict[str, str]:
         "sampler": f"{dataset.config.sweep.sampler}, seed {dataset.config.seed}",
         **(collected.facts() if collected else {"collected": f"unknown: it has no readable {PROVENANCE}"}),
     }
-
-
-def _report_task(dataset: Dataset, outcomes: Outcomes) -> TaskReport:
-    """Make the part of the task; for a task without one, numbers of trials and of those that succeeded."""
-    if path := task_of(dataset.config).report:
-        added: TaskReport = load_object(path)(dataset, outcomes)
-        return added
-    trials = len(outcomes.codes)
-    tiles = (
-        Tile(f"{trials:,}", "trials planned"),
-        Tile(format_share(outcomes.succeeded, trials), in_words(outcomes.success)),
-    )
-    by = robot_of(dataset.config).introduction
-    return TaskReport(f"simulated {dataset.config.task.subject} by {by}", tiles, results=(), episodes=())
 
 
 def _show_parameters(parameters: tuple[SweptKey, ...], outcomes: Outcomes) -> ReportSection:
