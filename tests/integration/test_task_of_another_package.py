@@ -51,6 +51,39 @@ from reach.reach_task import ReachTask
 
 found, ReachTask.{method} = {{}}, ReachTask.kept
 """
+REPORT = """
+import sys, types
+from reach.reach_task import ReachTask
+import plotly.graph_objects as go
+from throwcollect.report.contents import Panel, ReportSection, TaskReport, Tile
+
+def sections(dataset, outcomes):
+    {does}
+
+found, ReachTask.report = {{}}, "reach.panel:sections"
+sys.modules["reach.panel"] = module = types.ModuleType("reach.panel")
+module.sections = sections
+"""
+UNREPORT = """
+import sys
+from reach.reach_task import ReachTask
+
+found, ReachTask.report = {}, ""
+del sys.modules["reach.panel"]
+"""
+SECTION = 'return TaskReport("motions", (), (ReportSection({key}, "a", "b", "c", {blocks}),), ())'
+FIGURE = '((Panel("p", "t", {figure}),),)'
+WRONG_REPORTS = {
+    "raise ValueError('boom')": "cannot report its trials: ValueError: boom",
+    "return None": "cannot report its trials: TypeError: its function should return a TaskReport, returned None",
+    "return TaskReport('motions', 'tiles', (), ())": "tiles should be a tuple of Tile, is 'tiles'",
+    SECTION.format(key='"mine"', blocks="(3,)"): "the section mine: a block should be a tuple of Panel",
+    SECTION.format(key='"mine"', blocks=FIGURE.format(figure="3")): "the panel p should be a plotly.graph_objects.Fig",
+    SECTION.format(
+        key='"mine"', blocks=FIGURE.format(figure="go.Figure(go.Scatter(y=[1.0, float('nan')]))")
+    ): "the figure of the panel p has numbers that are not finite; use None for a gap",
+    SECTION.format(key='"parameters"', blocks="()"): "two sections of the report have the key 'parameters'",
+}
 
 
 @pytest.fixture(scope="module")
@@ -165,6 +198,33 @@ def test_formats_and_keys_for_throws_alone_are_refused_with_the_reason(
     assert f"{path}:6: sweep.target: should be left out, as the task reach throws no ball" in said
 
 
+def test_a_dataset_of_a_task_that_is_not_installed_is_refused_in_one_sentence(reached: Path) -> None:
+    done = call_here("dataset", "info", reached)  # in this process, which does not find the package
+    assert done.returncode == 2
+    line = (reached / "config.yaml").read_text().splitlines().index("  name: reach") + 1
+    assert done.stderr.strip() == (
+        f"throwcollect: {reached / 'config.yaml'}:{line}: task.name: should be 'throw', got 'reach'; "
+        "no package that is installed brings it"
+    )
+
+
+def test_a_task_whose_part_of_the_report_fails_is_named(
+    process: ProcessPoolExecutor, few: Path, tmp_path: Path
+) -> None:
+    for number, (does, said) in enumerate(WRONG_REPORTS.items()):
+        process.submit(run_program, REPORT.format(does=does)).result()
+        try:
+            output = tmp_path / f"{number}.html"
+            done = process.submit(call_here, "dataset", "report", few / "data", "--output", output).result()
+            assert done.returncode in (1, 2)
+            assert "the task reach of reach 1.0" in done.stderr
+            assert said in done.stderr
+            assert "internal error" not in done.stderr
+            assert not output.exists()
+        finally:
+            process.submit(run_program, UNREPORT).result()
+
+
 def test_a_configuration_without_a_task_name_is_for_throws(throwcollect: Command, tmp_path: Path) -> None:
     path = tmp_path / "throws.yaml"
     path.write_text("task: {duration_s: 1.1}\nuntil: {landed: 3}\n")
@@ -182,7 +242,7 @@ def test_an_unknown_task_is_refused_with_the_reason(refusal: Command, tmp_path: 
 
 
 @pytest.mark.parametrize(
-    ("method", "does", "commands", "said"),
+    ("method", "does", "codes", "said"),
     [
         (
             "assess",
@@ -203,6 +263,31 @@ def test_an_unknown_task_is_refused_with_the_reason(refusal: Command, tmp_path: 
             "cannot judge trial {trial}: ",
         ),
         (
+            "assess",
+            "from dataclasses import replace; return "
+            "replace(_[1], end_error_rad=dict.fromkeys(_[0].config.task.end, float('nan'))), None",
+            {"up {config} --runtime inprocess --output {new}": 3, "dataset verify {data}": 1},
+            "cannot judge trial {trial}: ValueError: torso_1_joint_end_error_rad should be a finite number",
+        ),
+        (
+            "assess",
+            "raise SystemExit(3)",
+            {"dataset verify {data}": 1},
+            "cannot judge trial {trial}: SystemExit: 3",
+        ),
+        (
+            "trajectory",
+            "return None",
+            {"plan {config}": 1},
+            "cannot plan its motion: TypeError: trajectory should return a JointTrajectory, returned None",
+        ),
+        (
+            "__init__",
+            "1 / 0",
+            {"plan {config}": 1, "dataset verify {data}": 1},
+            "cannot be made: ZeroDivisionError: division by zero",
+        ),
+        (
             "trajectory",
             "1 / 0",
             {"plan {config}": 1, "dataset verify {data}": 1, "dataset export {data} {new} --to npz": 1},
@@ -213,7 +298,7 @@ def test_an_unknown_task_is_refused_with_the_reason(refusal: Command, tmp_path: 
 def test_an_error_in_the_task_gives_one_sentence_that_names_it(
     method: str,
     does: str,
-    commands: dict[str, int],
+    codes: dict[str, int],
     said: str,
     process: ProcessPoolExecutor,
     throwcollect: Command,
@@ -223,7 +308,7 @@ def test_an_error_in_the_task_gives_one_sentence_that_names_it(
     config, data = few / "reach.yaml", Path(shutil.copytree(few / "data", tmp_path / "data"))
     process.submit(run_program, FAIL.format(method=method, does=does)).result()
     try:
-        for number, (command, code) in enumerate(commands.items()):
+        for number, (command, code) in enumerate(codes.items()):
             words = command.format(config=config, data=data, new=tmp_path / f"new_{number}").split()
             done = process.submit(call_here, *words).result()
             sentence = f"the task reach of reach 1.0 {said.format(trial=1 if 'replay' in words else 0)}"

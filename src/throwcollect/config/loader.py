@@ -7,6 +7,7 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from copy import deepcopy
+from difflib import get_close_matches
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -123,6 +124,7 @@ def _check(values: dict[str, Any]) -> tuple[Config | None, list[KeyProblem], int
     # Wrong values are removed from this copy below; the caller still needs the values as the user wrote them.
     values = deepcopy(values)
     robot = _find_robot(values)
+    misnamed = _find_misnamed(values)
     found: list[KeyProblem] = []
     replaced: set[Location] = set()
     config = None
@@ -140,17 +142,35 @@ def _check(values: dict[str, Any]) -> tuple[Config | None, list[KeyProblem], int
         removed = {place for place in places if _remove(values, place)}
         # A misspelt key now has its default under the right name, or is missing there.
         replaced |= places | {(*finding.location[:-1], finding.meant) for finding in fresh if finding.meant}
-        # Without a known robot, each joint would be reported.
-        if not removed or robot is None:
+        # Without a known robot, each joint would be reported; without a known task or tool, each of its keys.
+        if not removed or robot is None or misnamed:
             break
+    found = [each for each in found if each.location[0] not in misnamed or each.location[1:] == ("name",)]
     return config, sorted(found, key=lambda finding: not finding.unknown), more
 
 
 def _find_robot(values: dict[str, Any]) -> str | None:
     """Find the name of the robot whose joints the values may name; None if there is no such robot."""
-    section = values.get("robot")
-    name = section.get("name") if isinstance(section, dict) else None
+    name = _read_name(values, "robot")
     return Config().robot.name if name is None else name if name in names_of("robots") else None
+
+
+def _find_misnamed(values: dict[str, Any]) -> set[str]:
+    """Find the sections whose keys cannot be known, as no installed package has the task or tool that they name."""
+    misnamed = set()
+    for section in ("task", "tool"):
+        name, known = _read_name(values, section), names_of(f"{section}s")
+        if isinstance(name, str) and name not in known:
+            misnamed.add(section)
+            # The section `until` is the task's, too. If the name is only misspelt, both may be wrong.
+            if section == "task" and not get_close_matches(name, known):
+                misnamed.add("until")
+    return misnamed
+
+
+def _read_name(values: dict[str, Any], section: str) -> Any:
+    holder = values.get(section)
+    return holder.get("name") if isinstance(holder, dict) else None
 
 
 def _is_about(finding: KeyProblem, location: Location) -> bool:

@@ -28,6 +28,7 @@ Location = tuple[str | int, ...]
 _ENGINE: Location = ("sim", "engine")
 _MEMBERS: tuple[Location, ...] = (("robot", "name"), ("tool", "name"), _ENGINE, ("task", "name"))
 """Keys that name a member of a family, which another package may bring."""
+_NOT_INSTALLED = "; no package that is installed brings it"
 
 
 @dataclass(frozen=True)
@@ -143,9 +144,10 @@ def _describe_error(details: ErrorDetails, values: Any, above: Location, expecte
         tag = "family" if "family" in value else "name"
         choices = [word for each in shape.alternatives for word in each.child(tag).choices]
         words = " or ".join(f"'{each}'" for each in choices)
-        yield KeyProblem((*location, tag), _write_expectation(words, value[tag], choices))
+        no_match = _NOT_INSTALLED if (*location, tag) in _MEMBERS else ""
+        yield KeyProblem((*location, tag), _write_expectation(words, value[tag], choices, no_match=no_match))
     else:
-        no_match = "; no package that is installed brings it" if location in _MEMBERS else ""
+        no_match = _NOT_INSTALLED if location in _MEMBERS else ""
         if location == _ENGINE and value == "auto":
             no_match = "; none is chosen automatically, as the same file would give other throws on another machine"
         sentence = _write_expectation(str(shape), value, shape.choices, no_match=no_match)
