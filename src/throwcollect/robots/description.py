@@ -168,7 +168,7 @@ def physics_description(config: Config) -> Description:
         ConfigError: If the robot's files cannot be read.
     """
     robot, tool = robot_of(config), tool_of(config.tool)
-    _check_name_of_tool(robot, tool)
+    check_name_of_tool(robot, tool)
     locked = find_locked_joints(config)
     source, whole = _read_whole(robot)
     model = lock_joints(whole, locked)
@@ -193,7 +193,7 @@ def physics_description(config: Config) -> Description:
     return Description(urdf=_write_text(description), moving=moving, locked=locked)
 
 
-def _check_name_of_tool(robot: Robot, tool: Tool) -> None:
+def check_name_of_tool(robot: Robot, tool: Tool) -> None:
     """Make sure that a contact with the tool is not taken for one with the ground or a part of the robot.
 
     Raises:

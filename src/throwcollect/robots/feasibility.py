@@ -11,7 +11,14 @@ from numpy.typing import NDArray
 from throwcollect.config.schema import Config
 from throwcollect.pinocchio_library import pinocchio
 from throwcollect.robots.clearance import MARGIN_M, Clearance
-from throwcollect.robots.description import find_locked_joints, joint_model, joint_offsets, robot_of, start_posture
+from throwcollect.robots.description import (
+    check_name_of_tool,
+    find_locked_joints,
+    joint_model,
+    joint_offsets,
+    robot_of,
+    start_posture,
+)
 from throwcollect.robots.dynamics import Dynamics, Motion
 from throwcollect.robots.limits import joint_limits, shares_of
 from throwcollect.robots.quintic_curve import sample_quintic
@@ -54,6 +61,7 @@ class Feasibility:
         self._locked: Mapping[str, float] = {}
         self._free_dynamics = self._dynamics
         self._tool_config, self._tool = config.tool, tool_of(config.tool)
+        check_name_of_tool(self._robot, self._tool)
         self._clearance = Clearance(self._robot, self._model, self._tool)
 
     def check(self, config: Config, trajectory: JointTrajectory) -> str | None:
