@@ -28,8 +28,8 @@ def report_task(dataset: Dataset, outcomes: Outcomes) -> TaskReport:
         report = load_part("tasks", name, path)
         with explain_failure("tasks", name, "report its trials"):
             added: TaskReport = report(dataset, outcomes)
-            if not is_own("tasks", name) and (wrong := next(_find_mistakes(added), None)) is not None:
-                raise TypeError(wrong)
+            if not is_own("tasks", name):
+                _check_part(added)
         return added
     trials = len(outcomes.codes)
     tiles = (
@@ -44,6 +44,16 @@ def find_repeated(sections: tuple[ReportSection, ...]) -> str | None:
     """Find a name that two sections have, so that links to them would lead to the first; None if there is none."""
     names = [section.key for section in sections]
     return next((name for name in names if names.count(name) > 1), None)
+
+
+def _check_part(added: object) -> None:
+    """Make sure that a page can be made of what the function of a task returned.
+
+    Raises:
+        TypeError: If anything in it is wrong.
+    """
+    if (wrong := next(_find_mistakes(added), None)) is not None:
+        raise TypeError(wrong)
 
 
 def _find_mistakes(added: object) -> Iterator[str]:

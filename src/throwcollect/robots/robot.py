@@ -127,10 +127,7 @@ class Robot:
         if self.name not in names_of("robots"):
             return self.share()
         with explain_failure("robots", self.name, "find its files"):
-            found: object = self.share()
-            if not isinstance(found, Path):
-                raise TypeError(f"share should return a pathlib.Path, returned {found!r}")
-            return found
+            return _check_directory(self.share())
 
     @property
     def urdf_path(self) -> Path:
@@ -169,6 +166,17 @@ class Robot:
         if wrong := [name for name, angle in posture.items() if not math.isfinite(angle)]:
             raise ConfigError(f"{path}: group_state {self.rest}: the angle of {wrong[0]} is not finite")
         return MappingProxyType(posture)
+
+
+def _check_directory(found: object) -> Path:
+    """Make sure that a robot's `share` returned a path, and return it.
+
+    Raises:
+        TypeError: If it returned anything else.
+    """
+    if not isinstance(found, Path):
+        raise TypeError(f"share should return a pathlib.Path, returned {found!r}")
+    return found
 
 
 def _is_texts(value: object) -> bool:

@@ -14,6 +14,8 @@ from throwcollect.tasks.result_columns import Column
 
 _LARGEST_COUNT = 2**63
 """Tables hold whole numbers of 64 bits, so no count may be as large as this."""
+_TYPES: Mapping[str, tuple[type, ...]] = {"number": (int, float), "count": (int,), "text": (str,)}
+_WORDS = {"number": "a number", "count": "a whole number", "text": "a text"}
 
 
 def check_declared(outcomes: object, results: object) -> None:
@@ -84,13 +86,11 @@ def check_values(values: Mapping[str, Any], columns: Sequence[Column]) -> None:
         name, value = column.name, values[column.name]
         if value is None:
             continue
-        kinds: Mapping[str, tuple[type, ...]] = {"number": (int, float), "count": (int,), "text": (str,)}
-        if isinstance(value, bool) or not isinstance(value, kinds[column.kind]):
-            words = {"number": "a number", "count": "a whole number", "text": "a text"}[column.kind]
-            raise TypeError(f"{name} should be {words} of Python or None, is {_describe(value)}")
-        if column.kind == "count" and not -_LARGEST_COUNT <= value < _LARGEST_COUNT:
+        if isinstance(value, bool) or not isinstance(value, _TYPES[column.kind]):
+            raise TypeError(f"{name} should be {_WORDS[column.kind]} of Python or None, is {_describe(value)}")
+        if isinstance(value, int) and column.kind == "count" and not -_LARGEST_COUNT <= value < _LARGEST_COUNT:
             raise ValueError(f"{name} should be a whole number of 64 bits, is {value}")
-        if column.kind == "number" and not math.isfinite(value):
+        if isinstance(value, int | float) and column.kind == "number" and not math.isfinite(value):
             raise ValueError(f"{name} should be a finite number, or None if there is nothing to measure; is {value}")
 
 

@@ -166,10 +166,7 @@ class GuardedTool(Tool):
             MemberError: If the tool raises an error, or the answer is not what is wanted.
         """
         with explain_failure("tools", self._member, doing):
-            found = ask()
-            if not check(found):
-                raise TypeError(f"{name} should be {wanted}, is {found!r}")
-        return found
+            return _check_answer(ask(), name, wanted, check)
 
 
 def tool_of(section: ToolConfig) -> Tool:
@@ -186,6 +183,17 @@ def tool_of(section: ToolConfig) -> Tool:
     if is_own("tools", name):
         return tool
     return GuardedTool(tool, name)
+
+
+def _check_answer(found: _Found, name: str, wanted: str, check: Callable[[object], bool]) -> _Found:
+    """Make sure that an answer is what is wanted, and return it.
+
+    Raises:
+        TypeError: If it is not.
+    """
+    if not check(found):
+        raise TypeError(f"{name} should be {wanted}, is {found!r}")
+    return found
 
 
 def _is_name(value: object) -> bool:
