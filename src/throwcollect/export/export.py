@@ -55,6 +55,7 @@ def export(directory: StrPath, output: StrPath, *, to: str, rate_hz: int | None 
     with new_directory(output) as beside:
         with explain_failure("exporters", to, f"write {output}", passing=(OSError,)):
             chosen.write(source, beside)
+            _check_written(beside)
             card = render_card(source, chosen.describe(source))
         shutil.copyfile(directory / CONFIG, beside / CONFIG)
         (beside / CARD).write_text(card, encoding="utf-8")
@@ -69,3 +70,16 @@ def export(directory: StrPath, output: StrPath, *, to: str, rate_hz: int | None 
         size_bytes=size,
         digest=source.dataset.digest,
     )
+
+
+def _check_written(directory: Path) -> None:
+    """Make sure that a format has written files, and none in the place of the data card or the configuration.
+
+    Raises:
+        ValueError: If it has not.
+    """
+    names = {path.name for path in directory.iterdir()} if directory.is_dir() else set()
+    if not names:
+        raise ValueError("write should leave files in the directory, which is empty")
+    if taken := names & {CARD, CONFIG}:
+        raise ValueError(f"write should leave out {', '.join(sorted(taken))}, which every export has")
