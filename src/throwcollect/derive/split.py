@@ -150,6 +150,13 @@ def _find_cells(axes: Sequence[str], throws: pa.Table) -> list[Cell | None]:
     texts = read_list("cells", axes, "texts EXPRESSION=WIDTH")
     if not texts:
         raise refuse_argument("cells", "the list is empty", expected="at least one axis, such as landing_x_m=0.05")
+    if tuple(texts) == SQUARES and "landing_x_m" not in throws.column_names:
+        # Whoever left out the axes has not written this column.
+        raise refuse_argument(
+            "cells",
+            "missing, as trials of this task do not land",
+            expected="an expression on columns of the table and the width of cells, for each axis",
+        )
     for text in texts:
         name, width = _read_pair(text, "cells", "an expression and the width of cells, such as landing_x_m=0.05")
         if not float(width) > 0:

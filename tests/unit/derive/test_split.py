@@ -3,6 +3,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 from tests.unit.dataset.conftest import Collection
@@ -12,7 +13,7 @@ from throwcollect.dataset.verify import verify
 from throwcollect.dataset.writer import DatasetWriter
 from throwcollect.derive.selection import merge
 from throwcollect.derive.source import source
-from throwcollect.derive.split import assign, split
+from throwcollect.derive.split import SQUARES, _find_cells, assign, split
 from throwcollect.episode.record import Contact, EpisodeHeader, Samples
 from throwcollect.errors import ConfigError
 
@@ -189,3 +190,8 @@ def test_a_split_by_a_wrong_mapping_of_shares_is_refused_with_a_reason(
 ) -> None:
     with pytest.raises(ConfigError, match=f"^fractions: {message}"):
         split(some, tmp_path / "parts", fractions=fractions)
+
+
+def test_a_dataset_whose_trials_do_not_land_asks_for_axes() -> None:
+    with pytest.raises(ConfigError, match="cells: missing, as trials of this task do not land"):
+        _find_cells(SQUARES, pa.table({"travel_m": [0.5]}))
