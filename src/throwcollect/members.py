@@ -21,8 +21,9 @@ from functools import cache
 from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points
 from types import MappingProxyType
-from typing import Any
+from typing import Any, ClassVar, get_args, get_origin, get_type_hints
 
+from throwcollect.declared_types import check_type
 from throwcollect.errors import ConfigError, MemberError, ThrowcollectError
 from throwcollect.extras import explain_missing
 
@@ -103,33 +104,19 @@ def load_member(family: str, name: str) -> Any:
     entry = _find_members()[family][name]
     if is_own(family, name):
         return entry.load()
-    what, namesakes = describe_member(family, name), _find_namesakes(family, name)
+    what, namesakes = _describe(family, name), _find_namesakes(family, name)
     if len({each.value for each in namesakes}) > 1:
         raise ConfigError(f"{what}: only one package may use a name", hint="uninstall all of these packages but one")
-    found = _import(entry.value, what)
-    kind = load_object(_KINDS[family])
-    where = f"{what}: {entry.value}"
-    if family not in _VALUES:
-        return _check_class(found, kind, where)
-    if not isinstance(found, kind):
-        raise ConfigError(f"{where} should be a {kind.__module__}.{kind.__name__}, is {found!r}")
-    # Exporters have no name of their own.
-    if getattr(found, "name", name) != name:
-        raise ConfigError(f"{where} should have the name of its entry point, {name!r}, has {found.name!r}")
+    found, kind, where = _import(entry.value, what), _load(_KINDS[family]), f"{what}: {entry.value}"
+    if family in _VALUES:
+        _check(where, found, kind)
+    else:
+        _check_class(where, found, kind)
+    # A section of a configuration has its name as the default of a key; engines, runtimes and exporters have none.
+    key = getattr(found, "model_fields", {}).get("name")
+    if (given := getattr(found, "name", name) if key is None else key.default) != name:
+        raise ConfigError(f"{where} should have the name of its entry point, {name!r}, has {given!r}")
     return found
-
-
-def load_object(path: str, kind: type | None = None) -> Any:
-    """Import the object ``module:name``; if a kind is given, the object has to be a complete class derived from it.
-
-    Raises:
-        ConfigError: If the object comes from another package, and cannot be imported or is not of this kind.
-    """
-    module, _, name = path.partition(":")
-    if module.partition(".")[0] == __package__:
-        return getattr(import_module(module), name)
-    found = _import(path, path)
-    return found if kind is None else _check_class(found, kind, path)
 
 
 def is_own(family: str, name: str) -> bool:
@@ -138,19 +125,18 @@ def is_own(family: str, name: str) -> bool:
 
 
 def load_part(family: str, name: str, path: str, kind: type | None = None) -> Any:
-    """Import the object ``module:name`` that a member names; see `load_object`.
+    """Import the object ``module:name`` that a member names; of a given kind, it has to be a complete class.
 
     Raises:
-        ConfigError: If the member comes from another package, and the object cannot be imported or is not of this kind;
-            the message names that package.
+        ConfigError: If the member comes from another package, and the object cannot be imported or is not of this kind.
     """
     if is_own(family, name):
-        return load_object(path, kind)
-    what = describe_member(family, name)
-    if not isinstance(path, str):
-        raise ConfigError(f"{what} should name its object as 'module:name', names {path!r}")
-    found = _import(path, f"{what}: {path}")
-    return found if kind is None else _check_class(found, kind, f"{what}: {path}")
+        return _load(path)
+    where = f"{_describe(family, name)}: {path}"
+    found = _import(path, where)
+    if kind is not None:
+        _check_class(where, found, kind)
+    return found
 
 
 @contextmanager
@@ -184,8 +170,14 @@ def explain_failure(family: str, name: str, doing: str, *, passing: tuple[type[E
         if os.environ.get(_DEBUG):
             # In a simulation, only the message of the error gets on, as the reason for which a trial is refused.
             traceback.print_exc()
-        what = describe_member(family, name)
+        what = _describe(family, name)
         raise MemberError(f"{what} cannot {doing}: {type(error).__name__}: {error}", hint=_WAY_OUT) from error
+
+
+def _load(path: str) -> Any:
+    """Import an object ``module:name`` of our own."""
+    module, _, name = path.partition(":")
+    return getattr(import_module(module), name)
 
 
 def _import(path: str, what: str) -> Any:
@@ -204,7 +196,19 @@ def _import(path: str, what: str) -> Any:
         raise ConfigError(f"{what} cannot be loaded: {type(error).__name__}: {error}", hint=_WAY_OUT) from error
 
 
-def _check_class(found: Any, kind: type, where: str) -> Any:
+def _check(where: str, value: object, declared: Any) -> None:
+    """Make sure that a value of another package is of the type that is declared for it, and all that it contains.
+
+    Raises:
+        ConfigError: If it is not.
+    """
+    try:
+        check_type(where, value, declared)
+    except TypeError as error:
+        raise ConfigError(str(error), hint=_WAY_OUT) from error
+
+
+def _check_class(where: str, found: Any, kind: type) -> None:
     """Make sure that an object of another package is a class derived from a kind, and lacks nothing.
 
     Raises:
@@ -213,15 +217,16 @@ def _check_class(found: Any, kind: type, where: str) -> Any:
     if not (isinstance(found, type) and issubclass(found, kind)):
         raise ConfigError(f"{where} should be a class derived from {kind.__module__}.{kind.__name__}, is {found!r}")
     # A class variable that is declared without a value has to be set by each derived class.
-    declared = [vars(each).get("__annotations__", {}) for each in kind.__mro__]
-    variables = {name for annotations in declared for name, text in annotations.items() if "ClassVar" in str(text)}
+    hints = get_type_hints(kind, include_extras=True).items()
+    variables = {name: get_args(hint)[0] for name, hint in hints if get_origin(hint) is ClassVar}
     lacking = {name for name in variables if not hasattr(found, name)}
     if lacking := lacking | getattr(found, "__abstractmethods__", frozenset()):
         raise ConfigError(f"{where} lacks {', '.join(sorted(lacking))}")
-    return found
+    for name, declared in variables.items():
+        _check(f"{where}.{name}", getattr(found, name), declared)
 
 
-def describe_member(family: str, name: str) -> str:
+def _describe(family: str, name: str) -> str:
     """Name a member of another package and that package, as the beginning of a message."""
     owners = sorted(map(_name_owner, _find_namesakes(family, name)))
     return f"the {family.removesuffix('s')} {name} of {' and '.join(owners)}"

@@ -75,14 +75,13 @@ SECTION = 'return TaskReport("motions", (), (ReportSection({key}, "a", "b", "c",
 FIGURE = '((Panel("p", "t", {figure}),),)'
 WRONG_REPORTS = {
     "raise ValueError('boom')": "cannot report its trials: ValueError: boom",
-    "return None": "cannot report its trials: TypeError: its function should return a TaskReport, returned None",
-    "return TaskReport('motions', 'tiles', (), ())": "tiles should be a tuple of Tile, is 'tiles'",
-    SECTION.format(key='"mine"', blocks="(3,)"): "the section mine: a block should be a tuple of Panel",
-    SECTION.format(key='"mine"', blocks=FIGURE.format(figure="3")): "the panel p should be a plotly.graph_objects.Fig",
+    "return None": "TypeError: what its function returns: should be an instance of TaskReport, is None",
+    "return TaskReport('motions', 'tiles', (), ())": "returns.tiles: should be a valid tuple, is 'tiles'",
+    SECTION.format(key='"mine"', blocks="(3,)"): "what its function returns.results.0.blocks.0.",
+    SECTION.format(key='"mine"', blocks=FIGURE.format(figure="3")): "figure: should be an instance of Figure, is 3",
     SECTION.format(
         key='"mine"', blocks=FIGURE.format(figure="go.Figure(go.Scatter(y=[1.0, float('nan')]))")
-    ): "the figure of the panel p has numbers that are not finite; use None for a gap",
-    SECTION.format(key='"parameters"', blocks="()"): "two sections of the report have the key 'parameters'",
+    ): "ValueError: Out of range float values are not JSON compliant",
 }
 
 
@@ -267,7 +266,7 @@ def test_an_unknown_task_is_refused_with_the_reason(refusal: Command, tmp_path: 
             "from dataclasses import replace; return "
             "replace(_[1], end_error_rad=dict.fromkeys(_[0].config.task.end, float('nan'))), None",
             {"up {config} --runtime inprocess --output {new}": 3, "dataset verify {data}": 1},
-            "cannot judge trial {trial}: ValueError: torso_1_joint_end_error_rad should be a finite number",
+            "cannot judge trial {trial}: TypeError: its result.end_error_rad.torso_1_joint: should be a finite number",
         ),
         (
             "assess",
@@ -279,7 +278,13 @@ def test_an_unknown_task_is_refused_with_the_reason(refusal: Command, tmp_path: 
             "trajectory",
             "return None",
             {"plan {config}": 1},
-            "cannot plan its motion: TypeError: trajectory should return a JointTrajectory, returned None",
+            "cannot plan its motion: TypeError: what trajectory returns: should be an instance of JointTraj",
+        ),
+        (
+            "trajectory",
+            "from dataclasses import replace; motion = _[0].kept(); return replace(motion, times=motion.times + 1.0)",
+            {"plan {config}": 1},
+            "cannot plan its motion: ValueError: the trajectory should begin at time 0, and have the joints ",
         ),
         (
             "__init__",

@@ -49,7 +49,7 @@ def test_a_ball_stays_in_a_tilted_spoon_while_the_way_out_climbs(turned, section
     for angle in np.arange(0.0, 1.5, 0.02):
         start = {**START, turned: START[turned] + angle}
         config = Config.model_validate({**sections, "task": {"start": start}, "sim": {"settle_s": 0.0}})
-        slope = tool_of(config.tool).way_out(config.ball.radius_m, up_in_spoon(config))
+        slope = tool_of(config).way_out(config.ball.radius_m, up_in_spoon(config))
         # One angle just before the ball is lost is tested, and one just after.
         side = "stays" if slope > 0 else "leaves"
         if side in seen or not (0.01 < slope < 0.04 or -0.08 < slope < -0.03):

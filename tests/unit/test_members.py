@@ -109,7 +109,11 @@ def test_an_unknown_robot_is_an_error_without_complaints_about_joints(tmp_path: 
 
 
 BROKEN = """
+from typing import ClassVar
+from throwcollect.config.target_columns import TargetColumn
 from throwcollect.config.task_config import TaskConfig
+from throwcollect.config.tool_config import ToolConfig
+from throwcollect.config.until import UntilConfig
 from throwcollect.engines.engine import Engine
 from throwcollect.export.exporter import Exporter
 from throwcollect.robots.robot import Robot
@@ -129,17 +133,50 @@ def robot(**values):
     joints = {"arm": ("elbow",)}
     texts = dict(name="mine", title="mine", urdf="a", srdf="a", rest="a", hand="a")
     return Robot(**texts | {"controllers": joints, "share": print} | values)
+
+def target(name):
+    return TargetColumn(name, of="end_m", miss="miss_m", word="end", description="The end [m].")
+
+class Until(UntilConfig):
+    waved: int
+
+def section(base=ToolConfig, **values):
+    values = {"implementation": "wave:Wave", "name": "mine"} | values
+    notes = {"name": "str"} | {key: "ClassVar" for key in values if key != "name"}
+    return type("Section", (base,), values | {"__module__": __name__, "__annotations__": notes})
+
+def task(**values):
+    return section(TaskConfig, **{"until": Until} | values)
 """
+
+
+def find_what_is_said(text: str, family: str, value: str, directory: Path, monkeypatch: pytest.MonkeyPatch) -> str:
+    """Install the module ``broken`` with a member of the name ``mine``, and load the member."""
+    (directory / "broken.py").write_text(text)
+    install(directory, "somebodys", family, value)
+    monkeypatch.syspath_prepend(directory)
+    monkeypatch.delitem(sys.modules, "broken", raising=False)
+    for cached in (members._find_members, load_member):
+        cached.cache_clear()
+    with pytest.raises(ConfigError) as caught:
+        load_member(family, "mine")
+    monkeypatch.undo()
+    members._find_members.cache_clear()
+    return str(caught.value)
 
 
 @pytest.mark.parametrize(
     ("family", "value", "said"),
     [
-        ("robots", "broken:ARM", "cannot be loaded: AttributeError: module 'broken' has no attribute 'ARM'"),
-        ("robots", "not_there:ARM", "cannot be loaded: ModuleNotFoundError: No module named 'not_there'"),
-        ("robots", "broken:NUMBER", ": broken:NUMBER should be a throwcollect.robots.robot.Robot, is 3"),
-        ("exporters", "broken:NUMBER", ": broken:NUMBER should be a throwcollect.export.exporter.Exporter, is 3"),
-        ("engines", "broken:NUMBER", "should be a class derived from throwcollect.engines.engine.Engine, is 3"),
+        ("robots", "broken:ARM", " cannot be loaded: AttributeError: module 'broken' has no attribute 'ARM'"),
+        ("robots", "not_there:ARM", " cannot be loaded: ModuleNotFoundError: No module named 'not_there'"),
+        ("robots", "broken:NUMBER", ": broken:NUMBER: should be an instance of Robot, is 3"),
+        ("exporters", "broken:NUMBER", ": broken:NUMBER: should be an instance of Exporter, is 3"),
+        (
+            "engines",
+            "broken:NUMBER",
+            ": broken:NUMBER should be a class derived from throwcollect.engines.engine.Engin",
+        ),
         ("engines", "broken:Stopped", ": broken:Stopped lacks ball_boxes, configure, is_as_loaded, load, place_ball"),
         ("tasks", "broken:Aimless", ": broken:Aimless lacks until"),
     ],
@@ -147,51 +184,53 @@ def robot(**values):
 def test_a_broken_member_is_an_error_that_names_its_package(
     family: str, value: str, said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    (tmp_path / "broken.py").write_text(BROKEN)
-    install(tmp_path, "somebodys", family, value)
-    monkeypatch.syspath_prepend(tmp_path)
-    monkeypatch.delitem(sys.modules, "broken", raising=False)
-    for cached in (members._find_members, load_member):
-        cached.cache_clear()
-    with pytest.raises(ConfigError) as caught:
-        load_member(family, "mine")
-    assert str(caught.value).startswith(f"the {family[:-1]} mine of somebodys 1.0")
-    assert said in str(caught.value)
-    monkeypatch.undo()
-    members._find_members.cache_clear()
+    found = find_what_is_said(BROKEN, family, value, tmp_path, monkeypatch)
+    assert found.startswith(f"the {family[:-1]} mine of somebodys 1.0{said}")
 
 
 @pytest.mark.parametrize(
     ("family", "made", "said"),
     [
-        ("exporters", "exporter(write=3)", "cannot be loaded: TypeError: write should be a function, is 3"),
-        ("exporters", "exporter(packages='h5py')", "TypeError: packages should be a tuple of texts, is 'h5py'"),
-        ("robots", "robot(controllers=['arm'])", "TypeError: controllers should have a tuple of joints for each name"),
-        ("robots", "robot(controllers={})", "TypeError: controllers should have a tuple of joints for each name"),
-        ("robots", "robot(controllers={'arm': 'elbow'})", "TypeError: controllers should have a tuple of joints"),
-        ("robots", "robot(controllers={'my arm': ('a',)})", "names of letters, digits and underscores, has 'my arm'"),
-        ("robots", "robot(controllers={'a': ('b', 'b')})", "each joint should be in one controller; b is there twice"),
-        ("robots", "robot(share='/tmp')", "TypeError: share should be a function that returns a directory, is '/tmp'"),
-        ("robots", "robot(hand=None)", "cannot be loaded: TypeError: hand should be a text, is None"),
-        ("robots", "robot(holding='hand')", "TypeError: holding should be a tuple of texts, is 'hand'"),
-        ("robots", "robot(name='other')", "should have the name of its entry point, 'mine', has 'other'"),
+        ("exporters", "exporter(write=3)", ".write: should be callable, is 3"),
+        ("exporters", "exporter(packages='h5py')", ".packages: should be a valid tuple, is 'h5py'"),
+        ("robots", "robot(controllers=['arm'])", ".controllers: should be a valid dictionary, is ['arm']"),
+        (
+            "robots",
+            "robot(controllers={})",
+            ".controllers: Dictionary should have at least 1 item after validation, not 0",
+        ),
+        ("robots", "robot(controllers={'arm': 'elbow'})", ".controllers.arm: should be a valid tuple, is 'elbow'"),
+        (
+            "robots",
+            "robot(controllers={'my arm': ('a',)})",
+            ".controllers.my arm.[key]: String should match pattern '^[",
+        ),
+        ("robots", "robot(controllers={'a': ('b', 'b')})", ".controllers: should name each joint once, not b twice"),
+        ("robots", "robot(share='/tmp')", ".share: should be callable, is '/tmp'"),
+        ("robots", "robot(hand=None)", ".hand: should be a valid string, is None"),
+        ("robots", "robot(name='other')", " should have the name of its entry point, 'mine', has 'other'"),
+        ("tools", "section(name='other')", " should have the name of its entry point, 'mine', has 'other'"),
+        ("tools", "section(implementation=3)", ".implementation: should be a valid string, is 3"),
+        ("tasks", "task(until=dict)", ".until: should be a subclass of UntilConfig, is <class 'dict'>"),
+        ("tasks", "task(targets='end_m')", ".targets: should be a valid tuple, is 'end_m'"),
+        (
+            "tasks",
+            "task(target_columns=('end_m',))",
+            ".target_columns.0: should be an instance of TargetColumn, is 'end_",
+        ),
+        (
+            "tasks",
+            "task(target_columns=(target('end_m'),))",
+            ".target_columns.0.name: String should match pattern '^targ",
+        ),
+        ("tasks", "task(name='other')", " should have the name of its entry point, 'mine', has 'other'"),
     ],
 )
-def test_a_value_of_a_wrong_kind_is_an_error_that_says_what_would_be_right(
+def test_a_value_of_a_wrong_type_is_an_error_that_says_what_would_be_right(
     family: str, made: str, said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    (tmp_path / "broken.py").write_text(f"{BROKEN}\nMADE = {made}\n")
-    install(tmp_path, "somebodys", family, "broken:MADE")
-    monkeypatch.syspath_prepend(tmp_path)
-    monkeypatch.delitem(sys.modules, "broken", raising=False)
-    for cached in (members._find_members, load_member):
-        cached.cache_clear()
-    with pytest.raises(ConfigError) as caught:
-        load_member(family, "mine")
-    assert str(caught.value).startswith(f"the {family[:-1]} mine of somebodys 1.0")
-    assert said in str(caught.value)
-    monkeypatch.undo()
-    members._find_members.cache_clear()
+    found = find_what_is_said(f"{BROKEN}\nMADE = {made}\n", family, "broken:MADE", tmp_path, monkeypatch)
+    assert found.startswith(f"the {family[:-1]} mine of somebodys 1.0: broken:MADE{said}")
 
 
 def test_a_part_of_a_member_that_cannot_be_imported_is_an_error_that_names_the_package(

@@ -17,7 +17,6 @@ from throwcollect.config.containers import ContainersConfig
 from throwcollect.config.controllers import ControllersConfig
 from throwcollect.config.key import Effect, Key
 from throwcollect.config.kinds import Angle, Joint, Name
-from throwcollect.config.member_sections import load_section
 from throwcollect.config.motion import DynamicMovementPrimitive, MinimumJerk
 from throwcollect.config.run import RunConfig
 from throwcollect.config.section import Section, any_of
@@ -42,7 +41,7 @@ __all__ = [
 
 def _make_section_type(family: str) -> Any:
     """Make the type of a key that holds the section of any member of a family; its key `name` says which."""
-    sections = {name: load_section(family, name) for name in names_of(family)}
+    sections = {name: load_member(family, name) for name in names_of(family)}
     default = next(iter(sections))
     return any_of(sections, lambda value: value.get("name", default) if isinstance(value, dict) else None)
 
@@ -51,7 +50,7 @@ def _make_until_type() -> Any:
     """Make the type of the key `until`, which holds the section `until` of a task; its only key says which."""
     sections: dict[str, type[UntilConfig]] = {}
     for name in names_of("tasks"):
-        until = load_section("tasks", name).until
+        until = load_member("tasks", name).until
         # Tasks may have the same success. The first task's section is taken, so that packages cannot replace our own.
         sections.setdefault(until.outcome(), until)
     # The first section reports unknown keys.

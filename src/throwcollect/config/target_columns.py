@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
+
+from pydantic import Field
 
 TARGET_PREFIX = "target_"
 """Prefix of the columns of targets. No other columns have it: keys have dots, and results have other names."""
@@ -24,7 +27,7 @@ class TargetColumn:
         required: Whether a target has to have it.
     """
 
-    name: str
+    name: Annotated[str, Field(pattern=f"^{TARGET_PREFIX}")]
     of: str
     miss: str
     word: str

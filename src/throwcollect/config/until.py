@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Any
 
 from pydantic import Field
 
@@ -14,6 +14,17 @@ Wanted = Annotated[int, Field(ge=1, le=1_000_000)]
 
 class UntilConfig(Section):
     """Base of the sections `until`: each has one key, the outcome that is counted, which holds a `Wanted`."""
+
+    @classmethod
+    def __pydantic_init_subclass__(cls, **_: Any) -> None:
+        """Refuse a section that has no key, or several.
+
+        Raises:
+            TypeError: If it has.
+        """
+        if len(cls.model_fields) != 1:
+            keys = ", ".join(cls.model_fields) or "none"
+            raise TypeError(f"{cls.__qualname__} should have one key, the outcome that is counted; it has {keys}")
 
     @classmethod
     def outcome(cls) -> str:

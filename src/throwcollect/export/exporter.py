@@ -25,15 +25,3 @@ class Exporter:
     describe: Callable[[ExportSource], Layout]
     write: Callable[[ExportSource, Path], None]
     packages: tuple[str, ...] = ()
-
-    def __post_init__(self) -> None:
-        """Refuse values of wrong kinds.
-
-        Raises:
-            TypeError: If a value is of a wrong kind.
-        """
-        for name in ("describe", "write"):
-            if not callable(value := getattr(self, name)):
-                raise TypeError(f"{name} should be a function, is {value!r}")
-        if isinstance(self.packages, str) or not all(isinstance(each, str) for each in self.packages):
-            raise TypeError(f"packages should be a tuple of texts, is {self.packages!r}")

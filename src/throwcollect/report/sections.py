@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,21 +14,22 @@ from throwcollect.dataset.journal import read_journal
 from throwcollect.dataset.provenance import read_provenance
 from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.summary import Info
-from throwcollect.errors import MemberError
+from throwcollect.declared_types import check_type
 from throwcollect.files import read_text
-from throwcollect.members import describe_member
+from throwcollect.members import explain_failure, is_own, load_part
 from throwcollect.report import figures
 from throwcollect.report.amounts import format_duration, format_share, format_size
-from throwcollect.report.contents import Listing, Panel, ReportSection, Row, Table, Tile
+from throwcollect.report.contents import Listing, Panel, ReportSection, Row, Table, TaskReport, Tile
 from throwcollect.report.failures import FailureGroup, group_failures
 from throwcollect.report.joint_peaks import KINDS, JointPeaks, summarise_peaks
 from throwcollect.report.model_section import show_model
 from throwcollect.report.outcomes import LANDED, Outcomes, in_words
 from throwcollect.report.swept_keys import SweptKey, read_parameters
 from throwcollect.report.targets_section import show_targets
-from throwcollect.report.task_part import find_repeated, report_task
 from throwcollect.report.throughput import Throughput, measure_throughput
+from throwcollect.robots.description import robot_of
 from throwcollect.sweep.digest import config_digest
+from throwcollect.tasks.task import task_of
 
 _MOST_FAILURES = 40
 _MOST_CONFIG_BYTES = 10_000_000
@@ -66,22 +68,8 @@ def report_dataset(dataset: Dataset, *, model: Path | None = None) -> Report:
     parameters = read_parameters(dataset.config, throws, outcomes)
     reasons = zip(*(throws[name].to_pylist() for name in ("trial", "outcome", "reason")), strict=True)
     facts = _list_facts(dataset, info)
-    task, noun = report_task(dataset, outcomes), dataset.config.task.noun
+    task, noun = _report_task(dataset, outcomes), dataset.config.task.noun
     finished = f", finished on {facts['finished'][:10]}" if "finished" in facts else ""
-    sections = (
-        *task.results,
-        *show_targets(dataset),
-        *(() if model is None else (show_model(model, dataset),)),
-        _show_parameters(parameters, outcomes),
-        _show_outcomes(outcomes, parameters, group_failures(reasons), noun),
-        _show_limits({kind: summarise_peaks(throws, kind) for kind in KINDS}, noun),
-        *task.episodes,
-        _show_throughput(measure_throughput(read_journal(dataset.directory / JOURNAL)), info),
-        _show_provenance(facts, read_text(dataset.directory / CONFIG, most_bytes=_MOST_CONFIG_BYTES)),
-    )
-    if repeated := find_repeated(sections):
-        member = describe_member("tasks", dataset.config.task.name)
-        raise MemberError(f"{member} cannot report its trials: two sections of the report have the key {repeated!r}")
     return Report(
         name=info.name,
         lead=f"{info.trials:,} {task.subject}{finished}.",
@@ -91,7 +79,17 @@ def report_dataset(dataset: Dataset, *, model: Path | None = None) -> Report:
             Tile(format_size(info.size_bytes), "on disk"),
         ),
         outcomes=outcomes,
-        sections=sections,
+        sections=(
+            *task.results,
+            *show_targets(dataset),
+            *(() if model is None else (show_model(model, dataset),)),
+            _show_parameters(parameters, outcomes),
+            _show_outcomes(outcomes, parameters, group_failures(reasons), noun),
+            _show_limits({kind: summarise_peaks(throws, kind) for kind in KINDS}, noun),
+            *task.episodes,
+            _show_throughput(measure_throughput(read_journal(dataset.directory / JOURNAL)), info),
+            _show_provenance(facts, read_text(dataset.directory / CONFIG, most_bytes=_MOST_CONFIG_BYTES)),
+        ),
         noun=noun,
     )
 
@@ -106,6 +104,33 @@ def _list_facts(dataset: Dataset, info: Info) -> dict[str, str]:
         "sampler": f"{dataset.config.sweep.sampler}, seed {dataset.config.seed}",
         **(collected.facts() if collected else {"collected": f"unknown: it has no readable {PROVENANCE}"}),
     }
+
+
+def _report_task(dataset: Dataset, outcomes: Outcomes) -> TaskReport:
+    """Make the part of the task; for a task without one, numbers of trials and of those that succeeded.
+
+    Raises:
+        ConfigError: If the task comes from another package, and its function cannot be imported.
+        MemberError: If the task comes from another package, and its function fails or returns something wrong.
+    """
+    name = dataset.config.task.name
+    if path := task_of(dataset.config).report:
+        report = load_part("tasks", name, path)
+        with explain_failure("tasks", name, "report its trials"):
+            added: TaskReport = report(dataset, outcomes)
+            if not is_own("tasks", name):
+                check_type("what its function returns", added, TaskReport)
+                for panel in (each for section in (*added.results, *added.episodes) for each in section.panels):
+                    # The page cannot have a number that is not finite; a gap is None.
+                    json.dumps(panel.figure.to_dict(), allow_nan=False, default=list)
+        return added
+    trials = len(outcomes.codes)
+    tiles = (
+        Tile(f"{trials:,}", "trials planned"),
+        Tile(format_share(outcomes.succeeded, trials), in_words(outcomes.success)),
+    )
+    by = robot_of(dataset.config).introduction
+    return TaskReport(f"simulated {dataset.config.task.subject} by {by}", tiles, results=(), episodes=())
 
 
 def _show_parameters(parameters: tuple[SweptKey, ...], outcomes: Outcomes) -> ReportSection:

@@ -119,7 +119,7 @@ def full_description(config: Config) -> str:
     if (text := _written.get(key)) is None:
         if len(_written) >= _MOST_WRITTEN:
             _written.clear()
-        text = _written[key] = _write_full(robot, tool_of(config.tool))
+        text = _written[key] = _write_full(robot, tool_of(config))
     return text
 
 
@@ -136,7 +136,7 @@ def touchable_bodies(config: Config) -> frozenset[str]:
     Raises:
         ConfigError: If the robot's files cannot be read.
     """
-    return frozenset({tool_of(config.tool).name, "ground", *_list_links(robot_of(config))})
+    return frozenset({tool_of(config).name, "ground", *_list_links(robot_of(config))})
 
 
 @lru_cache(maxsize=4)
@@ -167,7 +167,7 @@ def physics_description(config: Config) -> Description:
     Raises:
         ConfigError: If the robot's files cannot be read.
     """
-    robot, tool = robot_of(config), tool_of(config.tool)
+    robot, tool = robot_of(config), tool_of(config)
     check_name_of_tool(robot, tool)
     locked = find_locked_joints(config)
     source, whole = _read_whole(robot)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 import xml.etree.ElementTree as ElementTree
 from collections import Counter
 from collections.abc import Callable, Mapping
@@ -11,12 +10,30 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
+from typing import Annotated
 
+from pydantic import AfterValidator, Field
+
+from throwcollect.declared_types import check_type
 from throwcollect.errors import ConfigError
-from throwcollect.members import explain_failure, names_of
+from throwcollect.members import explain_failure
 
-_NAME = r"[A-Za-z_][A-Za-z0-9_]*"
-"""Controllers are nodes and topics of ROS, so their names are as ROS allows them."""
+
+def _refuse_repeated(controllers: Mapping[str, tuple[str, ...]]) -> Mapping[str, tuple[str, ...]]:
+    """Make sure that no joint has two controllers.
+
+    Raises:
+        ValueError: If a joint is there twice.
+    """
+    counts = Counter(joint for joints in controllers.values() for joint in joints)
+    if repeated := [joint for joint, count in counts.items() if count > 1]:
+        raise ValueError(f"should name each joint once, not {repeated[0]} twice")
+    return controllers
+
+
+ControllerName = Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$")]
+"""Controllers are nodes of ROS, so their names are such as ROS allows for nodes."""
+Controllers = Annotated[Mapping[ControllerName, tuple[str, ...]], Field(min_length=1), AfterValidator(_refuse_repeated)]
 
 
 # Robots are keys of caches. With `eq`, a robot would be hashed by its fields, but mappings among them have no hash.
@@ -51,7 +68,7 @@ class Robot:
 
     name: str
     title: str
-    controllers: Mapping[str, tuple[str, ...]]
+    controllers: Controllers
     share: Callable[[], Path]
     urdf: str
     srdf: str
@@ -65,31 +82,6 @@ class Robot:
     goal_tolerance_rad: float = 0.0
     goal_time_s: float = 0.0
     stopped_velocity_radps: float = 0.01
-
-    def __post_init__(self) -> None:
-        """Refuse values of wrong kinds where they are given, because later they would fail in any place.
-
-        Raises:
-            TypeError: If a value is of a wrong kind.
-            ValueError: If a name is wrong, or a joint is in two controllers.
-        """
-        for name in ("name", "title", "urdf", "srdf", "rest", "hand", "kind", "open_hand"):
-            if not isinstance(value := getattr(self, name), str):
-                raise TypeError(f"{name} should be a text, is {value!r}")
-        for name in ("holding", "rigid"):
-            if not _is_texts(value := getattr(self, name)):
-                raise TypeError(f"{name} should be a tuple of texts, is {value!r}")
-        if not callable(self.share):
-            raise TypeError(f"share should be a function that returns a directory, is {self.share!r}")
-        controllers = self.controllers
-        if not (isinstance(controllers, Mapping) and controllers and all(map(_is_texts, controllers.values()))):
-            raise TypeError(
-                f"controllers should have a tuple of joints for each name, and at least one; {controllers!r}"
-            )
-        if wrong := [name for name in controllers if not re.fullmatch(_NAME, str(name), re.ASCII)]:
-            raise ValueError(f"controllers should have names of letters, digits and underscores, has {wrong[0]!r}")
-        if twice := [joint for joint, count in Counter(self.joints).items() if count > 1]:
-            raise ValueError(f"each joint should be in one controller; {', '.join(twice)} is there twice")
 
     @cached_property
     def joints(self) -> tuple[str, ...]:
@@ -124,10 +116,9 @@ class Robot:
             ConfigError: If the description is not installed.
             MemberError: If the robot comes from another package, and its function fails.
         """
-        if self.name not in names_of("robots"):
-            return self.share()
         with explain_failure("robots", self.name, "find its files"):
-            return _check_directory(self.share())
+            check_type("the directory that its function share returns", directory := self.share(), Path)
+        return directory
 
     @property
     def urdf_path(self) -> Path:
@@ -166,21 +157,6 @@ class Robot:
         if wrong := [name for name, angle in posture.items() if not math.isfinite(angle)]:
             raise ConfigError(f"{path}: group_state {self.rest}: the angle of {wrong[0]} is not finite")
         return MappingProxyType(posture)
-
-
-def _check_directory(found: object) -> Path:
-    """Make sure that a robot's `share` returned a path, and return it.
-
-    Raises:
-        TypeError: If it returned anything else.
-    """
-    if not isinstance(found, Path):
-        raise TypeError(f"share should return a pathlib.Path, returned {found!r}")
-    return found
-
-
-def _is_texts(value: object) -> bool:
-    return isinstance(value, tuple | list) and all(isinstance(each, str) for each in value)
 
 
 def read_xml(path: Path) -> ElementTree.Element:

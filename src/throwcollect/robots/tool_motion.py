@@ -22,7 +22,7 @@ class ToolMotion:
     """
 
     def __init__(self, config: Config) -> None:
-        tool = tool_of(config.tool)
+        tool = tool_of(config)
         self._seat = tool.mount * pinocchio.SE3(np.eye(3), np.array(tool.ball_seat(config.ball.radius_m)))
         self._model = _model_of(robot_of(config))
         self._offsets = joint_offsets(config)

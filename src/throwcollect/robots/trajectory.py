@@ -28,6 +28,24 @@ class JointTrajectory:
     velocities: NDArray[np.float64]
     accelerations: NDArray[np.float64]
 
+    def __post_init__(self) -> None:
+        """Refuse numbers that are no motion.
+
+        Raises:
+            ValueError: If there is no point, an array has another shape or a number that is not finite, or times do not
+                increase.
+        """
+        points, of_joints = len(self.times), (len(self.times), len(self.joints))
+        shapes = {"times": (points,), "positions": of_joints, "velocities": of_joints, "accelerations": of_joints}
+        for name, shape in shapes.items():
+            values = getattr(self, name)
+            if np.shape(values) != shape:
+                raise ValueError(f"{name} of a trajectory should have the shape {shape}, have {np.shape(values)}")
+            if not np.isfinite(values).all():
+                raise ValueError(f"{name} of a trajectory hold numbers that are not finite")
+        if not points or (np.diff(self.times) <= 0).any():
+            raise ValueError("times of a trajectory should increase")
+
     @cached_property
     def digest(self) -> str:
         """SHA-256 over names, times and all numbers, in hexadecimal: equal trajectories give equal digests."""

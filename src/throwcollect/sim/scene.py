@@ -16,7 +16,7 @@ _OPENING = (1.0, 0.0, 0.0)
 
 def scene_of(config: Config, description: Description) -> Scene:
     """Describe the world of a trial, with the robot of a description."""
-    tool = tool_of(config.tool)
+    tool = tool_of(config)
     return Scene(
         urdf=description.urdf,
         moving=description.moving,

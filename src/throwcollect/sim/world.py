@@ -249,7 +249,7 @@ class World(Observer):
             offsets = dict(zip(self._joints, joint_offsets(trial).tolist(), strict=True))
             self._offsets = np.array([offsets[joint] for joint in self.moving])
             self._start = [posture[joint] + offsets[joint] for joint in self.moving]
-            tool = tool_of(trial.tool)
+            tool = tool_of(trial)
             self._tool = tool.name
             seat = tool.ball_seat(trial.ball.radius_m)
             self.engine.configure(physics_of(trial, self.moving))

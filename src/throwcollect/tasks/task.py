@@ -9,6 +9,7 @@ from typing import Any, ClassVar, Generic
 
 from throwcollect.config.motion import MinimumJerk
 from throwcollect.config.schema import Config
+from throwcollect.declared_types import check_type
 from throwcollect.episode.record import EpisodeHeader, Samples
 from throwcollect.members import explain_failure, is_own, load_part
 from throwcollect.robots.description import robot_of
@@ -16,8 +17,7 @@ from throwcollect.robots.trajectory import JointTrajectory
 from throwcollect.tasks.dmp import dmp_trajectory
 from throwcollect.tasks.joint_measures import explain_failed_goal, explain_violation, measure_joints
 from throwcollect.tasks.minimum_jerk import minimum_jerk_trajectory
-from throwcollect.tasks.result import LIMIT_VIOLATED, LOST, TRACKING_FAILED, AnyResult, Outcome, ResultColumns
-from throwcollect.tasks.returned import check_assessment, check_declared, check_trajectory, check_values
+from throwcollect.tasks.result import LIMIT_VIOLATED, LOST, TRACKING_FAILED, AnyResult, Outcome, Result, ResultColumns
 
 
 @dataclass(frozen=True)
@@ -99,11 +99,11 @@ class Task(ABC, Generic[AnyResult]):
         if not (measured and math.isfinite(samples.ball_position.sum() + samples.ball_linear_velocity.sum())):
             reason = "the samples hold numbers that are not finite"
             return self.results(self.outcomes(TRACKING_FAILED), reason=reason)
-        assessed = self.assess(measured, samples, header)
+        result, failure = assessed = self.assess(measured, samples, header)
         if not is_own("tasks", self.config.task.name):
-            check_assessment(assessed, self.results, self.outcomes, Failure)
-            check_values(self.columns.write(assessed[0]), self.columns.columns)
-        result, failure = assessed
+            check_type("what assess returns", assessed, tuple[Result, Failure | None])
+            check_type("its result", result, self.results)
+            check_type("its outcome", (failure or result).outcome, self.outcomes)
         if refusal := explain_failed_goal(header):
             failure = Failure(self.outcomes(TRACKING_FAILED), refusal)
         elif failure is None and (violation := explain_violation(result)):
@@ -140,7 +140,7 @@ def task_of(config: Config) -> Task[Any]:
     with explain_failure("tasks", name, "be made"):
         task: Task[Any] = kind(config)
         if not is_own("tasks", name):
-            check_declared(getattr(task, "outcomes", None), getattr(task, "results", None))
+            check_type("results", getattr(task, "results", None), type[Result])
     return task
 
 
@@ -154,5 +154,18 @@ def trajectory_of(config: Config) -> JointTrajectory:
     with explain_failure("tasks", config.task.name, "plan its motion"):
         trajectory = task_of(config).trajectory()
         if not is_own("tasks", config.task.name):
-            check_trajectory(trajectory, [joint for joint in robot_of(config).joints if joint in config.task.end])
+            moved = tuple(joint for joint in robot_of(config).joints if joint in config.task.end)
+            _check_trajectory(trajectory, moved)
     return trajectory
+
+
+def _check_trajectory(trajectory: JointTrajectory, joints: tuple[str, ...]) -> None:
+    """Make sure that a task of another package has planned a motion of these joints from the start of the trial on.
+
+    Raises:
+        TypeError: If it is no trajectory.
+        ValueError: If it is one of other joints, or begins at another time.
+    """
+    check_type("what trajectory returns", trajectory, JointTrajectory)
+    if trajectory.joints != joints or trajectory.times[0] != 0:
+        raise ValueError(f"the trajectory should begin at time 0, and have the joints {', '.join(joints)}")

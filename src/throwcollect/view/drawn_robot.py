@@ -92,7 +92,7 @@ def draw_robot_of(config: Config) -> DrawnRobot:
         ConfigError: If the robot's files cannot be read.
         DatasetError: If its description cannot be drawn.
     """
-    return read_drawn_robot(full_description(config), tool_of(config.tool).link, robot_of(config).directory)
+    return read_drawn_robot(full_description(config), tool_of(config).link, robot_of(config).directory)
 
 
 def read_drawn_robot(description: str, tool: str, share: Path) -> DrawnRobot:

@@ -105,7 +105,7 @@ class ViewRecording:
         if looks == self._looks:
             return
         string, transforms_type = get_message("std_msgs/msg/String"), get_message("tf2_msgs/msg/TFMessage")
-        robot, tool = draw_robot_of(config), tool_of(config.tool).link
+        robot, tool = draw_robot_of(config), tool_of(config).link
         self._put("/robot_description", start, string(data=robot.urdf))
         self._put("/view/ball/robot_description", start, string(data=ball_urdf(config.ball)))
         fixed = [

@@ -49,7 +49,7 @@ def reason(feasibility):
 
 
 def efforts_of(config, motion):
-    return Dynamics(TALOS, joint_model(TALOS), {}).efforts(config, tool_of(config.tool), motion)
+    return Dynamics(TALOS, joint_model(TALOS), {}).efforts(config, tool_of(config), motion)
 
 
 def shares(config):
@@ -147,7 +147,7 @@ def test_the_static_torque_is_the_weight_times_its_lever():
         q[model.idx_qs[model.getJointId("arm_right_4_joint")]] += turn
         pinocchio.framesForwardKinematics(model, data, q)
         gripper = data.oMf[model.getFrameId("gripper_right_base_link")]
-        tool = tool_of(heavy.tool)
+        tool = tool_of(heavy)
         return gripper.act(tool.mount).act(np.array(tool.ball_seat(heavy.ball.radius_m)))[2]
 
     lever = (height(1e-5) - height(-1e-5)) / 2e-5
@@ -225,7 +225,7 @@ def test_a_posture_in_which_held_links_overlap_is_refused(reason):
 def test_the_clearance_check_agrees_with_the_distances_of_all_pairs():
     """Every pair's distance, one by one, is the reference for the pruned check."""
     model = pinocchio.buildModelFromUrdf(str(TALOS.urdf_path))
-    clearance = Clearance(TALOS, model, tool_of(Config().tool))
+    clearance = Clearance(TALOS, model, tool_of(Config()))
     geometry = clearance.geometry
     data, shapes = model.createData(), geometry.createData()
     draw, limits = np.random.default_rng(1), joint_limits(TALOS)
@@ -258,7 +258,7 @@ class Unknowing:
 def test_skipping_postures_near_clear_ones_misses_no_approach():
     """6,000 postures, many of which collide: the result is that of a check of all links in every posture."""
     model = joint_model(TALOS)
-    quick, thorough = (Clearance(TALOS, model, tool_of(Config().tool)) for _ in range(2))
+    quick, thorough = (Clearance(TALOS, model, tool_of(Config())) for _ in range(2))
     thorough._clear = [Unknowing()]
     draw, limits = np.random.default_rng(5), joint_limits(TALOS)
     rest = np.array([{**TALOS.rest_posture, **TASK.start}[joint] for joint in JOINTS])
@@ -278,7 +278,7 @@ def test_skipping_postures_near_clear_ones_misses_no_approach():
 
 def test_the_meshes_of_a_robot_are_read_once_for_all_tools(monkeypatch: pytest.MonkeyPatch) -> None:
     model = joint_model(TALOS)
-    tools = tool_of(Config().tool), tool_of(Config(tool={"handle_length_m": 0.05}).tool)
+    tools = tool_of(Config()), tool_of(Config(tool={"handle_length_m": 0.05}))
     before = Clearance(TALOS, model, tools[0])
     monkeypatch.setattr(pinocchio, "buildGeomFromUrdf", lambda *_, **__: pytest.fail("the meshes are read again"))
     other, again = Clearance(TALOS, model, tools[1]), Clearance(TALOS, model, tools[0])

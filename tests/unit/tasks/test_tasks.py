@@ -9,7 +9,7 @@ import pytest
 from throwcollect.config.schema import Config
 from throwcollect.config.target_columns import is_target
 from throwcollect.config.task_config import TaskConfig
-from throwcollect.members import load_member, load_object, names_of
+from throwcollect.members import load_member, load_part, names_of
 from throwcollect.tasks.first_motion import find_first_motion
 from throwcollect.tasks.result import LIMIT_VIOLATED, LOST, TRACKING_FAILED, Result
 from throwcollect.tasks.task import Task, task_of
@@ -91,4 +91,4 @@ def test_the_motion_ends_where_the_configuration_says(section: type[TaskConfig])
 def test_the_report_part_of_a_task_can_be_loaded(section: type[TaskConfig]) -> None:
     pytest.importorskip("plotly")
     if path := make_task(section).report:
-        assert callable(load_object(path))
+        assert callable(load_part("tasks", section.model_fields["name"].default, path))

@@ -37,7 +37,7 @@ def find_early_loss(samples: Samples, header: EpisodeHeader, *, config: Config) 
     held = [contact.start_ns for contact in header.contacts if contact.body == config.tool.name]
     if held and min(held) > header.start_ns:
         seat = ToolMotion(config).place(samples.position[0])
-        if math.dist(samples.ball_position[0], seat) > tool_of(config.tool).rim_radius_m:
+        if math.dist(samples.ball_position[0], seat) > tool_of(config).rim_radius_m:
             held = []
     if held:
         return None
@@ -56,9 +56,9 @@ def explain_drop(samples: Samples, header: EpisodeHeader, release: BallState, *,
     """
     speed = math.hypot(*release.velocity)
     direction = [part / (speed or 1.0) for part in release.velocity]
-    least = _LEAST_SHARE * math.sqrt(2 * config.scene.gravity_mps2 * tool_of(config.tool).depth_m)
+    least = _LEAST_SHARE * math.sqrt(2 * config.scene.gravity_mps2 * tool_of(config).depth_m)
     release_ns = header.start_ns + round(release.time_s * NS_PER_S)
-    since_ns = release_ns - (tool_of(config.tool).rim_radius_m / speed * NS_PER_S if speed else math.inf)
+    since_ns = release_ns - (tool_of(config).rim_radius_m / speed * NS_PER_S if speed else math.inf)
     last = min(int(np.searchsorted(samples.stamps_ns, release_ns)), len(samples) - 1)
     tool = ToolMotion(config)
     fastest = -math.inf

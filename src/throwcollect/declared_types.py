@@ -1,0 +1,44 @@
+"""Checks values that other packages make against the types that our own code declares for them."""
+
+from __future__ import annotations
+
+import reprlib
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from pydantic import TypeAdapter
+
+
+def check_type(name: str, value: object, declared: Any) -> None:
+    """Make sure that a value is of the type that is declared for it, and so is all that it contains.
+
+    Fields of dataclasses and items of containers are checked, too. Nothing is converted, and a float has to be finite.
+
+    Args:
+        name: Name of the value in messages; empty if the names of its fields are enough.
+        value: The value.
+        declared: The type.
+
+    Raises:
+        TypeError: If anything is of another type; the message says where, and what would be right.
+    """
+    # Most processes use no other package, and need not spend the time of this import.
+    from pydantic import ValidationError
+
+    try:
+        _make_adapter(declared).validate_python((value,))
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        place = ".".join(map(str, (*([name] if name else ()), *first["loc"][1:])))
+        should = first["msg"].removeprefix("Value error, ").removeprefix("Input ")
+        raise TypeError(f"{place}: {should}, is {reprlib.repr(first['input'])}") from error
+
+
+@lru_cache
+def _make_adapter(declared: Any) -> TypeAdapter[Any]:
+    from pydantic import ConfigDict, TypeAdapter
+
+    config = ConfigDict(strict=True, arbitrary_types_allowed=True, allow_inf_nan=False, revalidate_instances="always")
+    # Dataclasses take the configuration only from what they are in.
+    return TypeAdapter(tuple[declared], config=config)

@@ -1,0 +1,31 @@
+"""A trajectory has a motion for each of its joints, whoever made it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from throwcollect.robots.trajectory import JointTrajectory
+
+ZEROS = np.zeros((3, 2))
+RIGHT = JointTrajectory(("hip", "knee"), np.arange(3.0), ZEROS, ZEROS, ZEROS)
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"positions": ZEROS[1:]}, r"positions of a trajectory should have the shape \(3, 2\), have \(2, 2\)"),
+        ({"joints": ("hip",)}, r"positions of a trajectory should have the shape \(3, 1\), have \(3, 2\)"),
+        ({"accelerations": ZEROS * np.nan}, "accelerations of a trajectory hold numbers that are not finite"),
+        ({"times": np.array([0.0, 1.0, 1.0])}, "times of a trajectory should increase"),
+    ],
+)
+def test_numbers_that_are_no_motion_are_refused(change: dict[str, object], said: str) -> None:
+    with pytest.raises(ValueError, match=said):
+        replace(RIGHT, **change)
+
+
+def test_a_trajectory_has_at_least_one_point() -> None:
+    none = np.zeros((0, 2))
+    with pytest.raises(ValueError, match="should increase"):
+        JointTrajectory(("hip", "knee"), np.zeros(0), none, none, none)
