@@ -42,6 +42,8 @@ class Graph:
         self._unread: deque[tuple[bool, str]] = deque()
         # By kind and name, and then by key expression.
         self._tokens: dict[tuple[EntityKind, str], dict[str, Token]] = {}
+        # By namespace and name of the node, and then by key expression.
+        self._of_nodes: dict[tuple[str, str], dict[str, Token]] = {}
         self.changes = 0
         """Number of changes so far; as long as it stays the same, what is known of the graph does, too."""
 
@@ -83,25 +85,24 @@ class Graph:
                     continue
                 # A token may be announced more than once: after a lost connection to the router, or because two
                 # subscribers follow it, that of its kind and that of its name.
-                place = token.kind, token.name
-                if appeared:
-                    self._tokens.setdefault(place, {})[key] = token
-                elif place in self._tokens:
-                    self._tokens[place].pop(key, None)
-                    if not self._tokens[place]:
-                        del self._tokens[place]
+                _note(self._tokens, (token.kind, token.name), key, token if appeared else None)
+                _note(self._of_nodes, (token.namespace, token.node), key, token if appeared else None)
 
-    def tokens(self, *kinds: EntityKind, name: str | None = None) -> Iterator[Token]:
-        """All nodes and endpoints of some kinds, and of one name if it is given."""
+    def tokens(
+        self, *kinds: EntityKind, name: str | None = None, node: tuple[str, str] | None = None
+    ) -> Iterator[Token]:
+        """All nodes and endpoints of some kinds, or those of one name, or of one node by its namespace and name."""
         for kind in kinds:
             self._follow(kind, name)
         self._read()
         # What is iterated over is copied, because threads of Zenoh may change it meanwhile.
-        if name is None:
-            found = [same_name for (kind, _), same_name in list(self._tokens.items()) if kind in kinds]
-        else:
+        if node is not None:
+            found = [self._of_nodes.get(node, {})]
+        elif name is not None:
             found = [self._tokens.get((kind, name), {}) for kind in kinds]
-        return (token for same_name in found for token in list(same_name.values()))
+        else:
+            found = [same_name for (kind, _), same_name in list(self._tokens.items()) if kind in kinds]
+        return (token for same_place in found for token in list(same_place.values()) if token.kind in kinds)
 
     def count(self, kind: EntityKind, name: str, dds_type: str | None = None) -> int:
         """Endpoints of one kind, name and, if given, DDS type."""
@@ -111,11 +112,7 @@ class Graph:
 
     def names_and_types(self, *kinds: EntityKind, node: tuple[str, str] | None = None) -> list[tuple[str, list[str]]]:
         """Names and ROS types of endpoints, sorted, of all nodes or of one, given by its namespace and name."""
-        return group_types(
-            (token.name, token.ros_type)
-            for token in self.tokens(*kinds)
-            if node is None or (token.namespace, token.node) == node
-        )
+        return group_types((token.name, token.ros_type) for token in self.tokens(*kinds, node=node))
 
     def wait_for(self, condition: Callable[[], bool], timeout_s: float | None, alive: Callable[[], bool]) -> bool:
         """Wait until a condition is true of the graph; return whether it is.
@@ -137,6 +134,16 @@ class Graph:
                 if not self._unread:
                     self._changed.wait(min(left, _POLL_S))
         return True
+
+
+def _note(tokens: dict[Any, dict[str, Token]], place: tuple[Any, str], key: str, token: Token | None) -> None:
+    """Note that a token has appeared, or is gone, in a table of tokens by place."""
+    if token is not None:
+        tokens.setdefault(place, {})[key] = token
+    elif place in tokens:
+        tokens[place].pop(key, None)
+        if not tokens[place]:
+            del tokens[place]
 
 
 def group_types(pairs: Iterable[tuple[str, str]]) -> list[tuple[str, list[str]]]:

@@ -56,6 +56,24 @@ def test_a_context_that_asks_about_many_topics_is_sent_all(rig):
     assert rig.spin(lambda: asker.context.graph.changes == before + 1)
 
 
+def test_endpoints_of_a_node_are_its_own_and_go_with_it(rig):
+    asker, first, second = rig.node("asker"), rig.node("first"), rig.node("second")
+    for node in (first, second):
+        node.create_publisher(String, "/t", 10)
+    kept = first.create_publisher(Int32, "/u", 10)
+    first.create_subscription(String, "/s", lambda _: None, 10)
+
+    def list_topics(node):
+        found = asker.get_publisher_names_and_types_by_node(node, "/")
+        return [(name, types) for name, types in found if name in ("/s", "/t", "/u")]
+
+    of_both = ("/t", ["std_msgs/msg/String"])
+    assert rig.spin(lambda: list_topics("first") == [of_both, ("/u", ["std_msgs/msg/Int32"])])
+    assert rig.spin(lambda: list_topics("second") == [of_both])
+    first.destroy_publisher(kept)
+    assert rig.spin(lambda: list_topics("first") == [of_both])
+
+
 def test_an_endpoint_that_is_announced_twice_counts_once(rig):
     asker, other = rig.node("asker"), rig.node("other")
     # Both questions are answered from now on, one by the tokens of the topic, and the other by those of all topics.
