@@ -17,8 +17,7 @@ from throwcollect.errors import ConfigError
 from throwcollect.members import explain_failure, is_own, load_part
 from throwcollect.pinocchio_library import pinocchio
 
-Length = Annotated[float, Field(gt=0)]
-"""[m]"""
+Positive = Annotated[float, Field(gt=0)]
 
 
 @dataclass(frozen=True)
@@ -30,7 +29,7 @@ class Box:
         placement: Pose of the box in the tool's frame; the frame of the box lies at its centre, along its edges.
     """
 
-    size: tuple[Length, Length, Length]
+    size: tuple[Positive, Positive, Positive]
     placement: pinocchio.SE3
 
 
@@ -65,12 +64,12 @@ class Tool(ABC):
 
     @property
     @abstractmethod
-    def rim_radius_m(self) -> Length:
+    def rim_radius_m(self) -> Positive:
         """Radius of the opening through which the ball leaves [m]."""
 
     @property
     @abstractmethod
-    def depth_m(self) -> Length:
+    def depth_m(self) -> Positive:
         """Depth of the cup below the opening [m]."""
 
     @abstractmethod
@@ -123,7 +122,7 @@ def _check(tool: Tool, radius: float) -> None:
     for name, described in vars(Tool).items():
         if isinstance(described, property):
             check_type(name, getattr(tool, name), get_type_hints(described.fget, include_extras=True)["return"])
-    check_type("inertia.mass", tool.inertia.mass, Annotated[float, Field(gt=0)])
+    check_type("inertia.mass", tool.inertia.mass, Positive)
     # A tool refuses balls that it cannot hold; whoever asks for the seat reports that.
     with suppress(ConfigError):
         check_type("ball_seat", tool.ball_seat(radius), tuple[float, float, float])
