@@ -31,7 +31,7 @@ from throwcollect.errors import ConfigError, DatasetError, ForeignPlanError
 from throwcollect.extras import lazily
 from throwcollect.files import StrPath, is_there
 from throwcollect.robots.description import robot_of
-from throwcollect.sweep.arrow_column import find_range
+from throwcollect.sweep.arrow_column import find_range, find_trial
 from throwcollect.sweep.plan import Plan
 from throwcollect.wording import command, format_count
 
@@ -257,7 +257,7 @@ class Dataset(Sequence[Throw]):
         Raises:
             DatasetError: If the trial is not among the throws, has no episode, or it is not where the table says.
         """
-        position = int(self.throws["trial"].index(trial).as_py())
+        position = find_trial(self.throws["trial"], trial)
         if position < 0:
             raise DatasetError(f"no trial {trial}", path=self.directory, expected=f"0 to {len(self.plan.trials) - 1}")
         return self[position].episode.read()

@@ -110,6 +110,15 @@ def find_rows(column: pa.ChunkedArray, value: object) -> NDArray[np.bool_]:
     return np.fromiter((each == value for piece in pieces for each in piece), np.bool_, len(column))
 
 
+def find_trial(trials: pa.ChunkedArray, trial: int) -> int:
+    """Find the row of a trial in a column of their numbers; -1 if it has none."""
+    # Where there are all trials, it is the row of that number. A search for each of a million would take longer than
+    # reading their episodes.
+    if 0 <= trial < len(trials) and trials[trial].as_py() == trial:
+        return trial
+    return int(trials.index(trial).as_py())
+
+
 def count_values(column: pa.ChunkedArray) -> Counter[Any]:
     """Count how often each value of a column occurs; null is None."""
     counts: Counter[Any] = Counter()

@@ -6,6 +6,7 @@ import re
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -64,6 +65,35 @@ def test_a_position_beyond_the_last_throw_is_an_error(loaded: Dataset) -> None:
     for index in (7, -8):
         with pytest.raises(IndexError, match=f"no throw {index} of 7"):
             loaded[index]
+
+
+class Unsearchable:
+    """A column in which nothing can be searched for."""
+
+    def __init__(self, column: pa.ChunkedArray) -> None:
+        self._column = column
+
+    def __len__(self) -> int:
+        return len(self._column)
+
+    def __getitem__(self, row: int) -> Any:
+        return self._column[row]
+
+    def to_pylist(self) -> list[Any]:
+        values: list[Any] = self._column.to_pylist()
+        return values
+
+
+def test_the_episode_of_a_trial_is_found_without_a_search_through_all_rows(loaded: Dataset) -> None:
+    table: Any = {name: Unsearchable(loaded.throws[name]) for name in loaded.throws.column_names}
+    assert replace(loaded, throws=table).episode(5).digest == loaded.episode(5).digest
+
+
+def test_the_episode_of_a_trial_is_found_in_a_selection_in_any_order(loaded: Dataset) -> None:
+    chosen = loaded.select([5, 1, 0])
+    assert [chosen.episode(trial).digest for trial in (0, 1, 5)] == [loaded.episode(k).digest for k in (0, 1, 5)]
+    with pytest.raises(DatasetError, match="no trial 2"):
+        chosen.episode(2)
 
 
 def test_a_trial_without_an_episode_has_a_row_and_says_why_it_has_no_samples(with_gaps: Dataset) -> None:
