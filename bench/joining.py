@@ -52,6 +52,9 @@ def _collect_one(directory: Path) -> None:
 def _make_slices(directory: Path, plan: Plan, one: Path) -> None:
     config = plan.config
     rows = read_parquet(one / THROWS)
+    # Trials that were refused have no episode, but the plan, which is not checked here, refuses none.
+    rows = rows.filter(rows["shard"].is_valid())
+    rows = rows.take([number % len(rows) for number in range(PER_SHARD)])
     recording = one / shard_name(config.name, 0)
     entry = next(each for each in read_manifest(one) if each.path == recording.name)
     for slice in Slice.all_of(len(plan.trials) // PER_SHARD):
