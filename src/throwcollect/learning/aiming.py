@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from throwcollect.learning.arrays import Array
-from throwcollect.learning.learned_map import KeyRole, LearnedMap
+from throwcollect.learning.learned_map import KeyRole, LearnedMap, find_nearest
 from throwcollect.reproducible_math import matmul, solve
 
 REACH = 0.05
@@ -23,6 +25,8 @@ _MANY_STARTS = 48
 """The same number for choices other than the nearest: these need more candidates to choose from."""
 _TOGETHER = 32
 """Number of targets to aim at together: NumPy needs nearly the same time for short arrays, so one by one is slower."""
+_CONTEXTS = 8
+"""Number of contexts for which it is remembered where all throws of the dataset would have ended."""
 _STEPS = 25
 _SMALL_STEP = 1e-9
 """The search ends after a scaled step that is smaller than this."""
@@ -99,19 +103,35 @@ def aim(learned: LearnedMap, targets: Array, context: Array, choice: Choice = Ch
     if not len(targets):
         places = np.empty_like(targets)
         return Aims(np.empty((0, len(learned.axes_of(KeyRole.PARAMETER)))), places, places, np.empty(0, np.bool_))
+
+    # Most often, all targets have the same context, and carrying over a large dataset takes longer than all else.
+    @lru_cache(maxsize=_CONTEXTS)
+    def carry_over(scaled: tuple[float, ...]) -> Array:
+        return learned.carry_over(np.array(scaled, np.float64))
+
     blocks = [slice(first, first + _TOGETHER) for first in range(0, len(targets), _TOGETHER)]
-    found = [_aim_at_once(learned, targets[block], context[block], choice) for block in blocks]
+    found = [
+        _aim_at_once(
+            learned, targets[block], context[block], choice, [*map(carry_over, map(tuple, context[block].tolist()))]
+        )
+        for block in blocks
+    ]
     parameters, predicted, nearest = (np.concatenate(column) for column in zip(*found, strict=True))
     away, missed = (np.linalg.norm(places - targets, axis=1) for places in (nearest, predicted))
     return Aims(parameters, predicted, nearest, (away <= REACH) & (missed <= TOLERANCE))
 
 
-def _aim_at_once(learned: LearnedMap, targets: Array, context: Array, choice: Choice) -> tuple[Array, Array, Array]:
-    """Find parameters for a few targets, with predicted places and with the places where the nearest throws ended."""
+def _aim_at_once(
+    learned: LearnedMap, targets: Array, context: Array, choice: Choice, landings: Sequence[Array]
+) -> tuple[Array, Array, Array]:
+    """Find parameters for a few targets, with predicted places and with the places where the nearest throws ended.
+
+    The landings say where all throws would have ended with the context of each target, each ``(n_throws, n_targets)``.
+    """
     numbers = np.arange(len(targets))
-    landings = _carry_over(learned, context)
-    squares = ((landings - targets[:, np.newaxis]) ** 2).sum(axis=2)
-    starts = np.argsort(squares, axis=1, kind="stable")[:, : _STARTS if choice is Choice.NEAREST else _MANY_STARTS]
+    count = _STARTS if choice is Choice.NEAREST else _MANY_STARTS
+    pairs = zip(landings, targets, strict=True)
+    starts = np.stack([find_nearest(((places - target) ** 2).sum(axis=1), count) for places, target in pairs])
     begun = np.clip(learned.inputs[starts][..., learned.columns_of(KeyRole.PARAMETER)], -1.0, 1.0)
     given = np.repeat(context[:, np.newaxis], starts.shape[1], axis=1)
     # While a candidate moves, it keeps the residual of the throw at which it begins, so only the polynomial has to be
@@ -124,15 +144,8 @@ def _aim_at_once(learned: LearnedMap, targets: Array, context: Array, choice: Ch
     costs = _weigh(learned, choice, inputs, _list_rows(parameters - begun)).reshape(starts.shape)
     # The last key is the first criterion: the miss, where all small misses count as equal; the cost is the second one.
     best = np.lexsort((costs, np.maximum(missed, _CLOSE)), axis=1)[:, 0]
-    return parameters[numbers, best], predicted[numbers, best], landings[numbers, starts[:, 0]]
-
-
-def _carry_over(learned: LearnedMap, context: Array) -> Array:
-    """Where all throws would have ended with the context of each target, shape ``(n, n_throws, n_targets)``."""
-    # Most often, all targets have the same context.
-    different, which = np.unique(context, axis=0, return_inverse=True)
-    # In NumPy 2.0, the inverse has a second axis.
-    return np.stack([learned.carry_over(each) for each in different])[which.reshape(-1)]
+    nearest = np.stack([places[first] for places, first in zip(landings, starts[:, 0], strict=True)])
+    return parameters[numbers, best], predicted[numbers, best], nearest
 
 
 def _list_rows(values: Array) -> Array:

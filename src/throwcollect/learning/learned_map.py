@@ -7,6 +7,7 @@ from enum import Enum
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import FiniteFloat
 
 from throwcollect.learning.arrays import Array, Vector
@@ -182,16 +183,21 @@ class LearnedMap:
         predicted = np.empty((len(inputs), len(self.targets)))
         for row, place in enumerate(inputs):
             squares = ((self.inputs - place) ** 2).sum(axis=1)
-            # Sorting all throws would take longer, so this first finds those that are at least as near as the last of
-            # the nearest ones.
-            last = min(_NEIGHBOURS, len(squares)) - 1
-            few = np.flatnonzero(squares <= np.partition(squares, last)[last])
-            # Throws at the same distance are taken in the order of trials, on every machine.
-            near = few[np.argsort(squares[few], kind="stable")][:_NEIGHBOURS]
+            near = find_nearest(squares, _NEIGHBOURS)
             # The small number keeps the weight finite if the point is the same as that of a throw.
             weights = 1.0 / (squares[near] + 1e-12)
             predicted[row] = (weights[:, np.newaxis] * self.residuals[near]).sum(axis=0) / weights.sum()
         return predicted
+
+
+def find_nearest(squares: Vector, count: int) -> NDArray[np.intp]:
+    """Find the throws with the smallest squares of distances, shape ``(n_throws,)``, the nearest first."""
+    # Sorting all throws would take longer, so this first finds those that are at least as near as the last of the
+    # nearest ones.
+    last = min(count, len(squares)) - 1
+    few = np.flatnonzero(squares <= np.partition(squares, last)[last])
+    # Throws at the same distance are taken in the order of trials, on every machine.
+    return few[np.argsort(squares[few], kind="stable")][:count]
 
 
 def no_correction(axes: tuple[Axis, ...], targets: tuple[str, ...]) -> Correction:

@@ -14,7 +14,7 @@ from throwcollect.learning.aiming import aim
 from throwcollect.learning.arrays import Array
 from throwcollect.learning.distilling import DistilledMap
 from throwcollect.learning.fitting import count_needed_throws, fit_throws, number_cells
-from throwcollect.learning.learned_map import KeyRole, LearnedMap, no_correction
+from throwcollect.learning.learned_map import KeyRole, LearnedMap, find_nearest, no_correction
 from throwcollect.learning.score import Adapted, Errors, Score, ThrowAtTarget, Trained
 from throwcollect.side_by_side import limit_processes
 
@@ -184,7 +184,7 @@ def draw_targets(landings: Array, count: int, seed: int) -> Array:
     for number in range(count):
         inside = np.flatnonzero(members == randomness.integers(members.max() + 1))
         chosen = landings[inside[randomness.integers(len(inside))]]
-        near = np.argsort(((landings - chosen) ** 2).sum(axis=1), kind="stable")[: landings.shape[1] + 1]
+        near = find_nearest(((landings - chosen) ** 2).sum(axis=1), landings.shape[1] + 1)
         # The gaps between sorted random numbers are weights with the sum 1, and all such weights are equally probable.
         shares = np.diff(np.sort(randomness.random(len(near) - 1)), prepend=0.0, append=1.0)
         targets[number] = (shares[:, np.newaxis] * landings[near]).sum(axis=0)

@@ -5,7 +5,7 @@ import pytest
 from tests.unit.learning.worlds import HIGH, KEYS, LOW, draw, effort, land, learn, learn_with_drag
 
 from throwcollect.learning.aiming import Choice, aim
-from throwcollect.learning.learned_map import Correction, KeyRole, Kind, LearnedMap
+from throwcollect.learning.learned_map import Correction, KeyRole, Kind, LearnedMap, find_nearest
 
 
 def throw(learned: LearnedMap, targets: np.ndarray, choice: Choice = Choice.NEAREST):
@@ -52,6 +52,28 @@ def test_every_target_is_aimed_at_in_its_own_context(targets: np.ndarray) -> Non
     drag = learned.unscale(KeyRole.CONTEXT, context)[:, 0]
     off = np.linalg.norm(land(learned.unscale(KeyRole.PARAMETER, together.parameters), drag) - targets, axis=1)
     assert np.median(off) < 0.005
+
+
+@pytest.mark.parametrize(("heights", "looks"), [((0.5,), 1), ((0.5, -0.5), 2)])
+def test_the_dataset_is_carried_over_once_for_each_of_a_few_contexts(
+    heights: tuple[float, ...], looks: int, targets: np.ndarray, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    learned = learn_with_drag(role=KeyRole.CONTEXT)
+    looked = []
+    carry_over = LearnedMap.carry_over
+    monkeypatch.setattr(
+        LearnedMap, "carry_over", lambda self, context: looked.append(context) or carry_over(self, context)
+    )
+    many = np.concatenate([targets, targets])
+    aim(learned, many, np.resize(heights, len(many))[:, np.newaxis])
+    assert len(looked) == looks
+
+
+@pytest.mark.parametrize("count", [1, 8, 48, 500, 900])
+def test_the_nearest_throws_are_those_that_sorting_all_of_them_finds(count: int) -> None:
+    # Rounded, so that many throws are at the same distance.
+    squares = np.round(np.random.default_rng(0).random(500), 2)
+    np.testing.assert_array_equal(find_nearest(squares, count), np.argsort(squares, kind="stable")[:count])
 
 
 def test_aimed_parameters_stay_within_their_ranges(targets: np.ndarray) -> None:
