@@ -12,7 +12,7 @@ from pathlib import Path
 from throwcollect.config.schema import Config, RobotConfig
 from throwcollect.config.values import with_values
 from throwcollect.coordinator.onlooker import SILENT, Onlooker
-from throwcollect.dataset.creation import create, refuse_taken
+from throwcollect.dataset.creation import create, refuse_many_files, refuse_taken
 from throwcollect.dataset.directory import TRIALS
 from throwcollect.dataset.throws_table import ThrowsTable
 from throwcollect.errors import ConfigError, DatasetError
@@ -78,6 +78,7 @@ def _check_trials(config: Config, points: Points, *, processes: int, onlooker: O
     # The table checks the task, which may be of another package and broken: without this, each trial would be refused.
     ThrowsTable((), config)
     count = len(points.values)
+    refuse_many_files(config, Rounds(config).limit if config.grows else count)
     size = max(_TRIALS_A_PIECE, count // _MOST_PIECES)
     if count >= _ANNOUNCED_TRIALS:
         onlooker.say(f"plan: checks {count} trials")

@@ -30,6 +30,8 @@ VERSION = 9
 BAG_SECTION = "rosbag2_bagfile_information"
 """The only section of the file."""
 _MOST_BYTES = 10_000_000
+MOST_FILES = 30_000
+"""Most files of a bag: with the longest names, their metadata then just stay below the size that `from_yaml` reads."""
 _ROS_DISTRO = "jazzy"
 """Release whose interface definitions the messages follow."""
 _MOST_NEARBY = 5

@@ -6,9 +6,11 @@ from contextlib import ExitStack, suppress
 from pathlib import Path
 
 from throwcollect.config.loader import dump_yaml
+from throwcollect.config.schema import Config
+from throwcollect.dataset.bag import MOST_FILES
 from throwcollect.dataset.directory import CONFIG, PLAN, TRIALS
 from throwcollect.dataset.lock import hold_lock
-from throwcollect.errors import ConfigError
+from throwcollect.errors import ConfigError, Problem
 from throwcollect.files import write_file
 from throwcollect.sweep.plan import Plan
 from throwcollect.sweep.point_file import encode_points
@@ -25,9 +27,10 @@ def create(directory: Path, plan: Plan, *, listed: Points | None = None) -> None
         listed: Points for ``trials.parquet``, where the sampler of the configuration finds them; None if it needs none.
 
     Raises:
-        ConfigError: If the directory holds files already, or cannot be made.
+        ConfigError: If the directory holds files already, or cannot be made, or the dataset would have too many files.
         DatasetError: If the files cannot be written; nothing is left behind then.
     """
+    refuse_many_files(plan.config, len(plan.trials))
     try:
         # A directory that the user made before is left in place if this fails.
         made = not directory.exists()
@@ -36,6 +39,20 @@ def create(directory: Path, plan: Plan, *, listed: Points | None = None) -> None
         raise _make_unusable_error(directory, error) from error
     with hold_lock(directory, needed=False):
         _fill(directory, plan, listed, made=made)
+
+
+def refuse_many_files(config: Config, trials: int) -> None:
+    """Refuse a dataset with so many recordings that no command would read its metadata.
+
+    Raises:
+        ConfigError: If it would have more than `MOST_FILES`.
+    """
+    files = -(-trials // config.record.trials_per_shard)
+    if files > MOST_FILES:
+        raise ConfigError(
+            [Problem(f"{trials} trials would be in {files} files", key="record.trials_per_shard")],
+            expected=f"at most {MOST_FILES} files, so {-(-trials // MOST_FILES)} trials a file or more",
+        )
 
 
 def refuse_taken(directory: Path) -> None:

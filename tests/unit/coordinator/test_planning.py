@@ -44,6 +44,18 @@ def test_a_used_directory_is_refused_before_trials_are_drawn(tmp_path: Path, mon
             prepare.prepare(Config.model_validate(CONFIG), directory, sweep_directory=tmp_path)
 
 
+@pytest.mark.parametrize("change", [{"trials": 30_001}, {"trials": None, "until": {"landed": 3001}}])
+def test_a_dataset_of_too_many_files_is_refused_before_trials_are_checked(
+    change: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(prepare, "feasibility_check", lambda _: pytest.fail("trials are checked"))
+    sampler = {"sweep": {**CONFIG["sweep"], "sampler": "sobol"}}
+    config = Config.model_validate({**CONFIG, **sampler, **change, "record": {"trials_per_shard": 1}})
+    with pytest.raises(ConfigError, match=r"record.trials_per_shard: 300.. trials would be in 300.. files") as caught:
+        prepare.draw_plan(config, directory=Path())
+    assert caught.value.expected == "at most 30000 files, so 2 trials a file or more"
+
+
 def test_drawing_and_checking_of_a_large_plan_are_announced(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(prepare, "_ANNOUNCED_TRIALS", 400)
     monkeypatch.setattr(prepare, "_MOST_PIECES", 1)

@@ -272,3 +272,13 @@ def test_a_dataset_that_was_created_can_be_filled_by_another_writer(collection: 
 def test_a_writer_cannot_open_a_directory_without_a_dataset(tmp_path: Path) -> None:
     with pytest.raises(DatasetError, match=r"holds no config\.yaml"):
         DatasetWriter.open(tmp_path)
+
+
+def test_a_dataset_of_more_files_than_can_be_read_is_not_created(
+    make_collection: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("throwcollect.dataset.creation.MOST_FILES", 2)
+    collection = make_collection({"trials": 5, "record": {"trials_per_shard": 2}})
+    with pytest.raises(ConfigError, match="5 trials would be in 3 files"):
+        create(tmp_path / "dataset", collection.plan)
+    assert not (tmp_path / "dataset").exists()
