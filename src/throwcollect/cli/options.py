@@ -7,6 +7,8 @@ from typing import Annotated
 
 import typer
 
+from throwcollect.cli.printing import print_progress
+
 ConfigArgument = Annotated[
     # The loader checks that the file can be read, and its message is better than that of typer.
     Path,
@@ -14,7 +16,15 @@ ConfigArgument = Annotated[
 ]
 DatasetArgument = Annotated[Path, typer.Argument(metavar="DIR", help="Directory of the dataset.", readable=False)]
 OutputArgument = Annotated[Path, typer.Argument(metavar="OUTPUT", help="Directory to write; must be new or empty.")]
-JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON.")]
+
+
+def _choose_output(json: bool) -> bool:
+    print_progress(not json)
+    return json
+
+
+JsonOption = Annotated[bool, typer.Option("--json", callback=_choose_output, help="Print JSON.")]
+"""With it, a command prints one document, and only warnings and errors to standard error."""
 SetOption = Annotated[
     list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Replace a key of the file; may be repeated.")
 ]

@@ -13,6 +13,23 @@ tell = partial(typer.echo, err=True)
 """Print a remark to standard error, where it does not mix with the result."""
 
 
+def print_progress(wanted: bool = True) -> None:
+    """Print, or do not print, from now on what is logged about long work: to standard error, as a remark."""
+    import logging
+
+    from throwcollect.progress_log import LOGGER
+
+    class Printer(logging.Handler):
+        """Prints records."""
+
+        def emit(self, record: logging.LogRecord) -> None:
+            tell(record.getMessage())
+
+    logger = logging.getLogger(LOGGER)
+    logger.setLevel(logging.INFO)
+    logger.handlers = [Printer()] if wanted else []
+
+
 def print_json(document: object, *, default: Callable[[Any], object] | None = None) -> None:
     """Print a JSON document; `default` is as for `json.dumps`."""
     typer.echo(jsonlib.dumps(document, indent=2, default=default))

@@ -15,6 +15,7 @@ from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.summary import Info
 from throwcollect.errors import DatasetError
 from throwcollect.files import is_there
+from throwcollect.progress_log import log_progress
 from throwcollect.sweep.arrow_column import find_range, find_rows
 from throwcollect.wording import command, join_names
 
@@ -103,7 +104,7 @@ def digest(directory: Path) -> str:
     dataset = Dataset.open(directory)
     stated = dict(zip(dataset.throws["trial"].to_pylist(), dataset.throws["digest"].to_pylist(), strict=True))
     digests = []
-    for episode in dataset.episodes():
+    for episode in log_progress(dataset.episodes(), len(dataset.recorded), "episode", "checked"):
         trial = episode.header.trial
         try:
             episode.check_records()

@@ -30,6 +30,7 @@ from throwcollect.dataset.verify_tables import find_wrong_trials
 from throwcollect.episode.channels import Channels
 from throwcollect.errors import DatasetError, ForeignPlanError
 from throwcollect.files import read_text, write_file
+from throwcollect.progress_log import log_progress
 from throwcollect.robots.description import full_description
 from throwcollect.sweep.plan import Plan
 from throwcollect.sweep.trials import Trial
@@ -138,7 +139,8 @@ def _rebuild(directory: Path) -> Rebuilt:
         )
     earlier = read_earlier_rows(directory, plan)
     recordings, named = _Recordings(plan), {row["shard"] for row in earlier.values()}
-    for name in list_shards(plan):
+    names = list_shards(plan)
+    for name in log_progress(names, len(names), "recording", "looked through"):
         if (directory / name).exists():
             # A new table and a new manifest would make the damage look as if it had been collected.
             if findings := recordings.read(directory / name):

@@ -13,6 +13,7 @@ from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.recovery import find_episodes
 from throwcollect.dataset.throws_table import Row, ThrowsTable
 from throwcollect.files import StrPath, is_there
+from throwcollect.progress_log import log_progress
 from throwcollect.sweep.plan import Plan
 from throwcollect.wording import format_count
 
@@ -55,7 +56,8 @@ def _list_rows(directory: Path, plan: Plan) -> Iterator[Row]:
     """Make the rows of the refused trials, and of those whose episodes are on disk as `resume` would keep them."""
     table = ThrowsTable.of(plan)
     yield from (table.make_refused_row(plan.trial(number)) for number in plan.trials.refused)
-    for name in list_shards(plan):
+    names = list_shards(plan)
+    for name in log_progress(names, len(names), "recording", "looked through"):
         final = directory / name
         # The unfinished file comes first: when it vanishes in this moment, the final one is there.
         episodes = find_episodes(path_of_part(final), plan) | find_episodes(final, plan)

@@ -6,7 +6,6 @@ A file that cannot be read is reported, and everything that does not depend on i
 from __future__ import annotations
 
 import reprlib
-import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -38,11 +37,11 @@ from throwcollect.dataset.verify_shard import ShardReport, check_shard
 from throwcollect.dataset.verify_tables import Tables, check_tables
 from throwcollect.errors import DatasetError
 from throwcollect.files import is_there
+from throwcollect.progress_log import log_progress
 from throwcollect.robots.description import is_available as robot_is_available
 from throwcollect.side_by_side import working_side_by_side
 from throwcollect.sweep.digest import is_digest
 from throwcollect.sweep.plan import Plan
-from throwcollect.wording import format_count
 
 _MANY_EPISODES = 1000
 """From this number of episodes on, starting processes that check files side by side saves time."""
@@ -60,7 +59,6 @@ def verify(
     *,
     check_of: CheckOf | None = None,
     processes: int = 1,
-    say: Callable[[str], object] = lambda _: None,
 ) -> list[Finding]:
     """Check a dataset.
 
@@ -75,7 +73,6 @@ def verify(
         check_of: Makes the check that says which trials the plan refuses; None leaves refusals unchecked.
         processes: How many processes may check the recordings of a large dataset. If more than one, they may import the
             program that calls this, as those of `multiprocessing` do.
-        say: Receives the progress of the check of a large dataset.
 
     Returns:
         What is wrong, file by file; empty when nothing is.
@@ -95,7 +92,7 @@ def verify(
         findings.append(Finding.of(METADATA, error))
     tables = check_tables(directory)
     # Other processes check the recordings, while this one hashes files and draws the plan again.
-    with _checking_shards(directory, tables, processes, say) as reports:
+    with _checking_shards(directory, tables, processes) as reports:
         findings += find_manifest_problems(directory, tables.config.name if tables.config else None)
         findings += tables.findings
         findings += _find_plan_problems(directory, tables, check_of)
@@ -149,15 +146,11 @@ def _find_plan_problems(directory: Path, tables: Tables, check_of: CheckOf | Non
 
 
 @contextmanager
-def _checking_shards(
-    directory: Path, tables: Tables, processes: int, say: Callable[[str], object]
-) -> Iterator[Iterator[tuple[str, ShardReport]]]:
+def _checking_shards(directory: Path, tables: Tables, processes: int) -> Iterator[Iterator[tuple[str, ShardReport]]]:
     """Start to check the files that rows name, or all that are there if there are no rows."""
     expected = _list_trials_by_file(directory, tables)
     names = sorted(_list_shards(directory) if expected is None else expected)
     many = expected is not None and sum(map(len, expected.values())) >= _MANY_EPISODES
-    if many:
-        say(f"checks {format_count(len(names), 'recording')}")
     with working_side_by_side(
         names,
         _make_file_check,
@@ -166,19 +159,7 @@ def _checking_shards(
         doing="checks recordings",
         fork=True,
     ) as reports:
-        yield _report_progress(zip(names, reports, strict=True), len(names), say if many else lambda _: None)
-
-
-def _report_progress(
-    reports: Iterator[tuple[str, ShardReport]], count: int, say: Callable[[str], object]
-) -> Iterator[tuple[str, ShardReport]]:
-    """Pass the reports on, and say how many there are every few seconds."""
-    last_told = time.monotonic()
-    for number, report in enumerate(reports, start=1):
-        yield report
-        if number < count and time.monotonic() >= last_told + _TELL_EVERY_S:
-            last_told = time.monotonic()
-            say(f"{number} of {format_count(count, 'recording')} checked")
+        yield log_progress(zip(names, reports, strict=True), len(names), "recording", "checked")
 
 
 def _make_file_check(

@@ -30,6 +30,7 @@ from throwcollect.episode.episode_message import Episode
 from throwcollect.episode.restamp import Restamper
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.files import new_directory, write_file
+from throwcollect.progress_log import log_progress
 from throwcollect.robots.description import full_description
 from throwcollect.sweep.digest import trial_digests
 from throwcollect.sweep.plan import Plan, make_trials
@@ -92,7 +93,8 @@ def _write(sources: Sequence[Source], directory: Path, name: str | None) -> Deri
     with closing(DatasetWriter(directory, plan, channels=channels)) as writer:
         write_file(directory / SOURCES, encode_sources(sources))
         table = ThrowsTable.of(plan)
-        for episode, row in _restamp_episodes(sources, Restamper(config, channels)):
+        restamped = _restamp_episodes(sources, Restamper(config, channels))
+        for episode, row in log_progress(restamped, len(plan.trials), "trial", "written"):
             if table.later <= row.keys():
                 result = table.result(row)
             else:

@@ -17,6 +17,7 @@ from throwcollect.dataset.moments import Moments
 from throwcollect.dataset.reader import Dataset
 from throwcollect.episode.record import Samples
 from throwcollect.files import StrPath
+from throwcollect.progress_log import log_progress
 
 QUANTILES = (0.01, 0.05, 0.25, 0.5, 0.75, 0.95, 0.99)
 _PLACES = frozenset({"trial", "chunk_offset"})
@@ -98,7 +99,7 @@ def statistics(directory: StrPath) -> Statistics:
     """
     dataset = Dataset.open(directory)
     moments, left_out = None, 0
-    for episode in dataset.episodes():
+    for episode in log_progress(dataset.episodes(), len(dataset.recorded), "episode", "read"):
         with locating_damage(dataset, episode.header.trial):
             rows = _stack_signals(episode.samples(dataset.joints))
         finite = rows[np.isfinite(rows).all(axis=1)]

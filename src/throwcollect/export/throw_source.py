@@ -18,6 +18,7 @@ from throwcollect.episode.record import Samples
 from throwcollect.errors import DatasetError
 from throwcollect.export.resampling import count_resampled, resample
 from throwcollect.export.signals import Signal, list_signals, unit_of
+from throwcollect.progress_log import ProgressLog
 from throwcollect.robots.quintic_curve import sample_quintic
 from throwcollect.robots.trajectory import JointTrajectory
 from throwcollect.tasks.task import trajectory_of
@@ -78,6 +79,7 @@ class ExportSource:
         signals: Quantities of each throw over time.
         shards: Throws of each recording, by the name of its file without ending; all in order of trials.
         table: One row a trial, with ``description`` and ``unit`` in the metadata of each column.
+        progress: Logs how many of its trials have been exported.
     """
 
     dataset: Dataset
@@ -86,6 +88,7 @@ class ExportSource:
     signals: tuple[Signal, ...]
     shards: Mapping[str, tuple[ExportableThrow, ...]]
     table: pa.Table
+    progress: ProgressLog
 
     @classmethod
     def open(cls, directory: Path, *, rate_hz: int | None = None) -> ExportSource:
@@ -115,6 +118,7 @@ class ExportSource:
             list_signals(dataset.joints, dataset.moving_joints, targets),
             _list_entries(dataset, rate_hz),
             add_units(dataset.throws),
+            ProgressLog(len(dataset.throws), "trial", "exported"),
         )
 
     @property
@@ -140,6 +144,7 @@ class ExportSource:
             target = {column.name: planned.target[column.name] for column in self.targets}
             signals |= {name: np.full((len(samples), 1), value) for name, value in target.items()}
             yield ThrowSeries(entry.trial, entry.succeeded, signals, trajectory, target)
+            self.progress.note(entry.trial + 1)
 
 
 def _list_entries(dataset: Dataset, rate_hz: int) -> dict[str, tuple[ExportableThrow, ...]]:

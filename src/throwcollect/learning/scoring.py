@@ -16,6 +16,7 @@ from throwcollect.learning.distilling import DistilledMap
 from throwcollect.learning.fitting import count_needed_throws, fit_throws, number_cells
 from throwcollect.learning.learned_map import KeyRole, LearnedMap, find_nearest, no_correction
 from throwcollect.learning.score import Adapted, Errors, Score, ThrowAtTarget, Trained
+from throwcollect.progress_log import log_progress
 from throwcollect.side_by_side import limit_processes
 
 SIZES = (30, 100, 300, 1000, 3000, 10_000)
@@ -246,7 +247,7 @@ def _throw(learned: LearnedMap, lists: Sequence[Array], given: Array, world: Sim
     places = np.full((len(points), len(learned.targets)), np.nan)
     processes = limit_processes(processes, len(thrown))
     throws = world.throw_many([points[number] for number in thrown], processes=processes)
-    for number, throw in zip(thrown, throws, strict=True):
+    for number, throw in log_progress(zip(thrown, throws, strict=True), len(thrown), "throw", "simulated"):
         if throw.outcome == world.config.task.success:
             places[number] = [throw.row[column] for column in learned.targets]
     return np.split(places, len(lists))

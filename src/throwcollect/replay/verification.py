@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
 
@@ -21,7 +21,6 @@ def verify_dataset(
     *,
     replay: int | None = None,
     processes: int = 1,
-    say: Callable[[str], object] = lambda _: None,
 ) -> list[Finding]:
     """Check a finished dataset: its files against each other, its episodes against physics, its plan against the robot.
 
@@ -34,7 +33,6 @@ def verify_dataset(
             for none.
         processes: How many processes may check the recordings of a large dataset; if there are several, each imports
             the main program, as processes of `multiprocessing` do.
-        say: Called with the progress of the check of a large dataset.
 
     Returns:
         The problems, file by file; empty if there are none.
@@ -51,7 +49,7 @@ def verify_dataset(
         # If the dataset cannot be opened, `verify` below reports why.
         with suppress(DatasetError):
             require_simulating(Dataset.open(directory).config.sim.engine)
-    findings = verify(Path(directory), check_of=feasibility_check, processes=processes, say=say)
+    findings = verify(Path(directory), check_of=feasibility_check, processes=processes)
     if replay is not None:
         findings += _replay_findings(Path(directory), replay)
     return findings

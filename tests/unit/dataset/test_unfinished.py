@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 
 import throwcollect
+from throwcollect import progress_log
 from throwcollect.dataset import recovery, unfinished
 from throwcollect.dataset.creation import create
 from throwcollect.dataset.inspect import info
@@ -48,6 +49,18 @@ def test_an_unfinished_dataset_has_rows_of_the_trials_that_have_ended(
     )
     with pytest.raises(DatasetError, match=r"throwcollect\.digest is missing"):
         _ = dataset.digest
+
+
+def test_loading_a_large_unfinished_dataset_tells_its_progress(
+    collection: Any, tmp_path: Path, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(progress_log, "_EVERY_S", 0.0)
+    with (
+        pytest.warns(throwcollect.UnfinishedDatasetWarning),
+        caplog.at_level("INFO", logger=progress_log.LOGGER),
+    ):
+        throwcollect.load(begin(collection, tmp_path / "dataset", [0, 1, 2]))
+    assert caplog.messages == ["1 of 3 recordings looked through", "2 of 3 recordings looked through"]
 
 
 def test_a_dataset_that_is_being_collected_advises_wait_and_not_resume(collection: Any, tmp_path: Path) -> None:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import typer
 
 from throwcollect.cli.options import DatasetArgument, JsonOption
-from throwcollect.cli.printing import print_result
+from throwcollect.cli.printing import print_progress, print_result
 from throwcollect.cli.streams import ensure_written
 from throwcollect.units import unit_of_name
 from throwcollect.wording import command, format_count
@@ -34,6 +34,7 @@ def show_digest(directory: DatasetArgument) -> None:
     """Print the digest of all episodes in trial order."""
     from throwcollect.dataset.inspect import digest
 
+    print_progress()
     typer.echo(digest(directory))
 
 

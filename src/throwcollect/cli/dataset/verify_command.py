@@ -9,7 +9,6 @@ import typer
 
 from throwcollect.cli.options import DatasetArgument, JsonOption
 from throwcollect.cli.printing import print_result
-from throwcollect.cli.terminal import display
 from throwcollect.engine_packages import require_engine
 from throwcollect.errors import DatasetError
 from throwcollect.extras import MissingExtraError, install_command, require
@@ -36,7 +35,7 @@ def verify_dataset(
     from throwcollect.dataset.verify import find_unchecked
     from throwcollect.replay.verification import verify_dataset as verify
 
-    findings = verify(directory, replay=replay, processes=count_cores(), say=display(quiet=json, bar=False).say)
+    findings = verify(directory, replay=replay, processes=count_cores())
     if findings:
         print_result([asdict(finding) for finding in findings], "\n".join(map(str, findings)), json=json)
         raise DatasetError(f"{directory}: {format_count(len(findings), 'finding')}")
