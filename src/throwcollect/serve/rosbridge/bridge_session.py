@@ -49,7 +49,10 @@ class BridgeSession:
         Raises:
             ConfigError: If the topic has another type, or none is named and it has none or several.
         """
-        types = dict(self.node.get_topic_names_and_types()).get(topic, [])
+        # Only the endpoints of this topic are asked for: a list of all topics, made for each of thousands of requests,
+        # would keep all clients of the bridge waiting.
+        endpoints = self.node.get_publishers_info_by_topic(topic) + self.node.get_subscriptions_info_by_topic(topic)
+        types = sorted({each.topic_type for each in endpoints})
         if not wanted:
             if len(types) != 1:
                 what = f"has {len(types)} types" if types else "is published by nobody, and no type is named"

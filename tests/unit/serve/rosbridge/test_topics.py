@@ -323,3 +323,21 @@ def test_a_leaving_client_withdraws_its_topics_services_and_actions(bridge: Brid
     wait_for(lambda: all(there()))
     party.client.close()
     wait_for(lambda: not any(there()))
+
+
+def test_a_subscription_does_not_list_all_topics(party: Party, node: Node, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Thousands of subscriptions would otherwise take time that grows with their square."""
+    publisher = node.create_publisher(String, "/listed", 10)
+    party.call("rosapi/get_time")
+    lists: list[str] = []
+
+    def list_all() -> list[Any]:
+        lists.append("all")
+        return []
+
+    monkeypatch.setattr(party.client.session.node, "get_topic_names_and_types", list_all)
+    party.ask(op="subscribe", topic="/listed", type="std_msgs/String")
+    wait_for_listener(publisher)
+    publisher.publish(String(data="heard"))
+    assert party.next(op="publish")["msg"] == {"data": "heard"}
+    assert lists == []
