@@ -130,15 +130,15 @@ class BridgeClient:
                 self._host.submit(lambda: self.say("error", _LOSS))
             return
         self._inbox.put(frame)
-        self._host.submit(self.handle_frames)
+        self._host.submit(self._handle_next)
 
     def close(self) -> None:
         """Withdraw all that the client had."""
         self._host.submit(self._close)
 
-    def handle_frames(self) -> None:
-        """Handle the frames of the client; without a router, they wait."""
-        while self._inbox and self._host.is_connected and not self._is_closed:
+    def _handle_next(self) -> None:
+        """Handle one frame of the client, so that other clients have their turn; without a router, frames wait."""
+        if self._inbox and self._host.is_connected and not self._is_closed:
             self._handle(self._inbox.take())
 
     def lose(self) -> None:
@@ -155,7 +155,9 @@ class BridgeClient:
         # This message cancels the error that `lose` has sent, so clients that only want errors get it, too.
         if self._level != "none":
             self.answer({"op": "status", "level": "info", "msg": "the router of the run is back"}, Form())
-        self.handle_frames()
+        # These frames came without a router, and the actions that `receive` submitted for them have let them wait.
+        for _ in range(self.waiting):
+            self._host.submit(self._handle_next)
 
     def later(self, seconds: float, action: Callable[[], None]) -> None:
         """Call an action after a time [s]."""

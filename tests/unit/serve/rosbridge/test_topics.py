@@ -341,3 +341,16 @@ def test_a_subscription_does_not_list_all_topics(party: Party, node: Node, monke
     publisher.publish(String(data="heard"))
     assert party.next(op="publish")["msg"] == {"data": "heard"}
     assert lists == []
+
+
+def test_requests_of_one_client_do_not_keep_another_waiting(bridge: Bridge, party: Party) -> None:
+    other, begin = Party(bridge), threading.Event()
+    party.call("rosapi/get_time")
+    bridge.submit(lambda: begin.wait(PATIENCE_S))
+    party.ask(op="call_service", service="/rosapi/get_time")
+    other.ask(op="call_service", service="/rosapi/get_time")
+    party.ask(op="call_service", service="/rosapi/get_time")
+    begin.set()
+    wait_for(lambda: len(party.times) == 3 and other.times)
+    assert other.times[0] < party.times[2]
+    other.client.close()
