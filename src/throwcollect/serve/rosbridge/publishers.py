@@ -106,6 +106,7 @@ class Publishers(Belongings[Advertised]):
             if known.type_name != type_name:
                 raise ConfigError(f"{topic} is advertised as {known.type_name} already", expected="that type")
             return known
+        self._require_room(f"advertise: {topic}")
         depth = min(request.natural_or("queue_size", _DEPTH) or _DEPTH, _LONGEST_QUEUE)
         advertised = Advertised(self._client, topic, type_name, request.flag("latch"), depth)
         advertised.open()

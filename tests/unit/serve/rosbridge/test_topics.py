@@ -17,7 +17,7 @@ from tests.unit.serve.rosbridge.conftest import PATIENCE_S, Party, wait_for, wai
 
 from rclzenoh.interfaces import serialize
 from throwcollect.ros import DurabilityPolicy, Node, QoSProfile, get_message
-from throwcollect.serve.rosbridge import Bridge, subscriptions
+from throwcollect.serve.rosbridge import Bridge, belongings, subscriptions
 from throwcollect.serve.rosbridge.subscriptions import RateLimit, SubscribedTopic, SubscriptionRequest
 
 String: Any = get_message("std_msgs/msg/String")
@@ -341,6 +341,16 @@ def test_a_subscription_does_not_list_all_topics(party: Party, node: Node, monke
     publisher.publish(String(data="heard"))
     assert party.next(op="publish")["msg"] == {"data": "heard"}
     assert lists == []
+
+
+def test_a_client_has_a_limited_number_of_topics(party: Party, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(belongings, "_MOST", 2)
+    for op in ("subscribe", "advertise"):
+        for name in ("/many_1", "/many_2", "/many_3", "/many_2"):
+            party.ask(op=op, id=f"{op} {name}", topic=name, type="std_msgs/String")
+        assert party.next(op="status")["msg"].startswith(f"{op}: /many_3: this client has 2 of these already")
+    party.call("rosapi/get_time")
+    assert len([each for each in party.got() if each["op"] == "status"]) == 2
 
 
 def test_requests_of_one_client_do_not_keep_another_waiting(bridge: Bridge, party: Party) -> None:
