@@ -143,7 +143,7 @@ def _find_file(directory: Path, path: str) -> Path:
 
 def _is_finished(directory: Path) -> bool:
     # A dataset that another run continues is not finished, even if it has a manifest.
-    grows = any(each.status == "running" and each.place.directory == directory for each in Records().all())
+    grows = any(each.status == "running" for each in Records().into(directory))
     return not grows and (directory / MANIFEST).is_file()
 
 

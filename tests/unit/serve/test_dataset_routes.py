@@ -13,6 +13,7 @@ import pytest
 from starlette.testclient import TestClient
 from tests.unit.serve.conftest import Remember, make_end_fields
 
+from throwcollect.runs.records import Records, Run
 from throwcollect.serve import dataset_routes
 
 URL = "/api/v1/collections"
@@ -188,3 +189,19 @@ def test_a_damaged_manifest_is_an_error(client: TestClient, directory: Path) -> 
         answer = client.get(f"{URL}/a/{what}")
         assert answer.status_code == 500
         assert "is not the manifest of a dataset" in answer.json()["title"]
+
+
+def test_a_request_for_a_dataset_reads_no_records_of_other_datasets(
+    client: TestClient, directory: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """There may be thousands of records, and each would add to the time of every request."""
+    assert directory.is_dir()
+    read: list[str] = []
+
+    def read_all(_: Records) -> list[Run]:
+        read.append("all")
+        return []
+
+    monkeypatch.setattr(Records, "all", read_all)
+    assert client.get(f"{URL}/a/files").status_code == 200
+    assert read == []
