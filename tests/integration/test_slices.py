@@ -224,9 +224,18 @@ def test_joining_can_be_repeated_after_a_kill_at_any_point(frozen: Path, whole: 
 
 
 def test_slices_of_different_numbers_are_not_joined(frozen: Path) -> None:
-    collect(frozen, "0/2", "1/3")
+    collect(frozen, "0/2")
+    # Two tasks that begin at once can still do this, as neither sees a finished slice of the other.
+    shutil.copytree(frozen / SLICES / "0-of-2", frozen / SLICES / "1-of-3")
     with pytest.raises(ConfigError, match="slices of 2 and of 3"):
         join(frozen)
+
+
+def test_a_slice_that_could_never_be_joined_is_not_collected(frozen: Path) -> None:
+    collect(frozen, "0/2")
+    with pytest.raises(ConfigError, match="slice 1/3 cannot be joined with those there, which are slices of 2"):
+        collect_slice(frozen, Slice(1, 3), overrides=INPROCESS)
+    assert find_finished(frozen) == {Slice(0, 2)}
 
 
 def test_slices_of_another_plan_are_not_joined(frozen: Path, config: Path, tmp_path: Path) -> None:

@@ -67,7 +67,14 @@ def collect_slice(
     directory = Path(directory)
     config = read_frozen_config(directory, overrides)
     plan = Plan.read(directory / PLAN, config, slice=slice)
-    if slice in find_finished(directory):
+    finished = find_finished(directory)
+    # They could never be joined, which otherwise only the join would tell, after all tasks have run.
+    if others := sorted({each.count for each in finished} - {slice.count}):
+        raise ConfigError(
+            f"{directory}: slice {slice} cannot be joined with those there, which are slices of {others[0]}",
+            expected=f"slices I/{others[0]}",
+        )
+    if slice in finished:
         onlooker.say(f"{directory}: slice {slice} is finished, nothing is left to do")
         return False
     again = command("up", "--slice", slice, "--output", directory)
