@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import threading
 import time
+from collections import deque
 from collections.abc import Callable
+from contextlib import suppress
+from functools import partial
 from typing import Any
 
 import zenoh
@@ -35,6 +38,11 @@ class Client(Receiver):
         self.srv_type = srv_type
         self.qos_profile = qos_profile
         self._pending: dict[int, tuple[Future, Callable[[Any], Any]]] = {}
+        # A service keeps as many requests as its quality of service says, and drops the oldest of more. So the client
+        # lets no more be under way; but a request for the result of a goal is answered only when the goal ends.
+        self._most_under_way = None if srv_name.endswith(_PATIENT_SERVICE) else qos_profile.queue_length
+        self._under_way = 0
+        self._unsent: deque[Callable[[], None]] = deque()
         self._sequence = 0
         self._lock = threading.Lock()
         self._endpoint = Endpoint(node, EntityKind.CLIENT, srv_name, srv_type.TYPE, qos_profile)
@@ -86,6 +94,22 @@ class Client(Receiver):
             raise InvalidHandle(f"{self.service_name}: the client was destroyed")
         # The future is noted before the request is sent, because the thread that spins may get the response at once.
         self._pending[sequence] = future, convert
+        with self._lock:
+            waits = self._under_way == self._most_under_way
+            if waits:
+                self._unsent.append(partial(self._send, querier, sequence, payload))
+            else:
+                self._under_way += 1
+        if not waits:
+            self._send(querier, sequence, payload)
+        return future
+
+    def _send(self, querier: Any, sequence: int, payload: bytes) -> None:
+        """Send a request.
+
+        Raises:
+            InvalidHandle: If the session was closed.
+        """
         # Zenoh drops the handler after the last reply, which puts the number into the queue after all replies.
         handler = zenoh.handlers.Callback(self.deliver, drop=lambda: self.deliver(sequence), indirect=False)
         attachment = Attachment(sequence, time.time_ns(), self._endpoint.gid).pack()
@@ -94,12 +118,23 @@ class Client(Receiver):
         except zenoh.ZError as error:
             del self._pending[sequence]
             raise self._endpoint.invalid(error) from error
-        return future
+
+    def _send_next(self) -> None:
+        """Send the request that has waited longest, because another one is no longer under way."""
+        with self._lock:
+            if not self._unsent:
+                self._under_way -= 1
+                return
+            send = self._unsent.popleft()
+        # Once the session is closed, nobody is left to answer.
+        with suppress(InvalidHandle):
+            send()
 
     def handle(self, item: zenoh.Reply | int) -> None:
         """Decode a response and complete its future; a number means that its request gets no further response."""
         if isinstance(item, int):
             self._pending.pop(item, None)
+            self._send_next()
             return
         sample = item.ok
         if sample is None:
@@ -124,4 +159,5 @@ class Client(Receiver):
         self._querier = None
         self._endpoint.close()
         self._pending.clear()
+        self._unsent.clear()
         self.discard_all()

@@ -127,6 +127,29 @@ def test_a_request_that_arrives_while_the_service_is_destroyed_gets_no_response(
     assert replies == [None]
 
 
+def test_a_client_sends_no_more_requests_than_the_service_keeps(rig, pair):
+    server, _, client = pair
+    server.create_service(SetBool, "~/set", answer)
+    assert client.wait_for_service(5)
+    # Nobody spins meanwhile, so a service that was sent all of them would drop most.
+    futures = [client.call_async(SetBool.Request(data=number % 2 == 0)) for number in range(100)]
+    assert rig.spin(lambda: all(future.done() for future in futures))
+    assert [future.result().success for future in futures] == [number % 2 == 0 for number in range(100)]
+
+
+def test_requests_that_get_no_answer_let_those_that_wait_be_sent(rig, pair):
+    server, _, client = pair
+    unanswered = [client.call_async(SetBool.Request()) for _ in range(30)]
+    # Each ends at once, as nobody offers the service yet.
+    assert rig.spin(lambda: not client._unsent)
+    server.create_service(SetBool, "~/set", answer)
+    assert client.wait_for_service(5)
+    last = client.call_async(SetBool.Request(data=True))
+    assert rig.spin(last.done)
+    assert last.result().success
+    assert not any(future.done() for future in unanswered)
+
+
 def test_a_request_that_is_not_handled_gets_an_error_with_the_reason(rig, pair):
     server, node, client = pair
     service = server.create_service(SetBool, "~/set", answer, qos_profile=QoSProfile(depth=1))

@@ -157,8 +157,7 @@ class Lookout:
             if written in known:
                 run, instance = known[written]
                 # A later run may have continued the dataset, which the record of this run does not show.
-                if instance.can_be_resumed != (resumable_now := can_be_resumed(run)):
-                    instance = replace(instance, can_be_resumed=resumable_now)
+                instance = replace(instance, can_be_resumed=can_be_resumed(run))
             else:
                 try:
                     run = records.get(name)

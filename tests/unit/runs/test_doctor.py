@@ -74,7 +74,7 @@ def test_doctor_examines_robots_of_other_packages_and_notes_failures(
     assert found["planar_arm"] == ("ok", f"the planar arm, {PLUGINS / 'planar_arm' / 'planar_arm.urdf'}")
     assert found["absent"][0] == found["lost"][0] == "note"
     assert "the robot absent of an unknown package cannot be loaded: ModuleNotFoundError" in found["absent"][1]
-    assert "the robot lost of an unknown package cannot describe itself: OSError: the disk" in found["lost"][1]
+    assert "the robot lost of an unknown package cannot find its files: OSError: the disk" in found["lost"][1]
     assert (checks["robot"].status, checks["robot"].finding.partition(" of ")[0]) == ("ok", "Talos")
     monkeypatch.undo()
     members._find_members.cache_clear()

@@ -70,6 +70,15 @@ def test_a_client_sends_a_goal_and_gets_feedback_and_result(party: Party, arm: A
     }
 
 
+def test_each_of_many_goals_that_are_sent_at_once_gets_its_result(party: Party, arm: Arm) -> None:
+    # An action keeps ten requests that it has not looked at yet, and drops further ones.
+    numbers = [str(number) for number in range(300)]
+    for number in numbers:
+        send(party, "a", number=number)
+    results = wait_for(lambda: len(found := [each for each in party.got() if "action" in each]) == 300 and found)
+    assert {each["id"]: each["status"] for each in results} == dict.fromkeys(numbers, SUCCEEDED)
+
+
 def test_a_client_can_cancel_a_goal_and_gets_no_unwanted_feedback(party: Party, arm: Arm) -> None:
     send(party, "wait")
     party.ask(op="cancel_action_goal", id="g", action="follow")
