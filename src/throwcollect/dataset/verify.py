@@ -45,7 +45,6 @@ from throwcollect.sweep.plan import Plan
 
 _MANY_EPISODES = 1000
 """From this number of episodes on, starting processes that check files side by side saves time."""
-_TELL_EVERY_S = 2.0
 _UNFINISHED = (".part", ".new")
 _short = reprlib.Repr()
 _short.maxstring = _short.maxother = 120

@@ -109,24 +109,22 @@ def aim(learned: LearnedMap, targets: Array, context: Array, choice: Choice = Ch
     def carry_over(scaled: tuple[float, ...]) -> Array:
         return learned.carry_over(np.array(scaled, np.float64))
 
-    blocks = [slice(first, first + _TOGETHER) for first in range(0, len(targets), _TOGETHER)]
-    found = [
-        _aim_at_once(
-            learned, targets[block], context[block], choice, [*map(carry_over, map(tuple, context[block].tolist()))]
-        )
-        for block in blocks
-    ]
+    found = []
+    for first in range(0, len(targets), _TOGETHER):
+        block = slice(first, first + _TOGETHER)
+        landings = [carry_over(tuple(scaled)) for scaled in context[block].tolist()]
+        found.append(_aim_at_once(learned, targets[block], context[block], landings, choice))
     parameters, predicted, nearest = (np.concatenate(column) for column in zip(*found, strict=True))
     away, missed = (np.linalg.norm(places - targets, axis=1) for places in (nearest, predicted))
     return Aims(parameters, predicted, nearest, (away <= REACH) & (missed <= TOLERANCE))
 
 
 def _aim_at_once(
-    learned: LearnedMap, targets: Array, context: Array, choice: Choice, landings: Sequence[Array]
+    learned: LearnedMap, targets: Array, context: Array, landings: Sequence[Array], choice: Choice
 ) -> tuple[Array, Array, Array]:
     """Find parameters for a few targets, with predicted places and with the places where the nearest throws ended.
 
-    The landings say where all throws would have ended with the context of each target, each ``(n_throws, n_targets)``.
+    The landings are where all throws would have ended with the context of each target, shape ``(n_throws, n_targets)``.
     """
     numbers = np.arange(len(targets))
     count = _STARTS if choice is Choice.NEAREST else _MANY_STARTS
