@@ -175,7 +175,7 @@ class RecordConfig(Section):
     zstd_level: Annotated[int, Field(ge=-7, le=19), Key(Effect.ENCODING)] = -1
     """Compression level of the MCAP chunks; with -1 they are as small as with 1, and faster to write and read."""
     trials_per_shard: Annotated[PositiveInt, Key(Effect.FILES)] = 1000
-    """Trials in one MCAP file."""
+    """Trials in one MCAP file; a dataset has at most 30,000 files."""
 
     def _find_contradictions(self) -> Iterator[tuple[str, str]]:
         if missing := [topic for topic in ("joint_states", "ball/odometry") if topic not in self.topics]:
