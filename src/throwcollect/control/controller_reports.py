@@ -13,7 +13,7 @@ from throwcollect.control.goal import TrajectoryPoint
 
 
 class GoalStatus(IntEnum):
-    """Where a goal is (action_msgs/msg/GoalStatus)."""
+    """State of a goal (action_msgs/msg/GoalStatus)."""
 
     EXECUTING = 2
     SUCCEEDED = 4

@@ -57,7 +57,7 @@ def joint_limits(robot: Robot) -> JointLimits:
         except (KeyError, ValueError) as error:
             raise ConfigError(f"{path}: joint {name}: limit is not readable: {error}") from error
         lower, upper, velocity, effort, *_ = rows[-1]
-        # Written so that a number that is not one is refused, too.
+        # A comparison with NaN is false, so this refuses NaN, too.
         if not (-math.inf < lower <= upper < math.inf and velocity >= 0 and effort >= 0):
             found = ", ".join(f"{key} {limit.get(key)}" for key in ("lower", "upper", "velocity", "effort"))
             raise ConfigError(

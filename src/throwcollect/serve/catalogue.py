@@ -35,7 +35,7 @@ LONGEST_NAME = 63
 NAME = rf"[a-z0-9][a-z0-9_-]{{0,{LONGEST_NAME - 1}}}"
 """Names of components and ids of instances, which become names of files and containers, and parts of URLs."""
 ENTRY = r"(?!\.)[A-Za-z0-9_.-]{1,80}"
-"""What clients may ask for as the name of a file or a directory: a run that anybody has begun, or a model."""
+"""Names of runs and models that clients may ask for; none of them is a path to another directory."""
 
 
 def _check_name(text: str) -> str:

@@ -155,7 +155,7 @@ class BridgeClient:
         # This message cancels the error that `lose` has sent, so clients that only want errors get it, too.
         if self._level != "none":
             self.answer({"op": "status", "level": "info", "msg": "the router of the run is back"}, Form())
-        # These frames came without a router, and the actions that `receive` submitted for them have let them wait.
+        # `receive` has submitted an action for each of these frames, which left it where it was, without a router.
         for _ in range(self.waiting):
             self._host.submit(self._handle_next)
 
