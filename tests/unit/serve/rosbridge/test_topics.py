@@ -343,14 +343,22 @@ def test_a_subscription_does_not_list_all_topics(party: Party, node: Node, monke
     assert lists == []
 
 
-def test_a_client_has_a_limited_number_of_topics(party: Party, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_client_has_a_limited_number_of_topics_services_and_actions(
+    party: Party, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(belongings, "_MOST", 2)
-    for op in ("subscribe", "advertise"):
+    kinds = {
+        "subscribe": ("topic", "std_msgs/String"),
+        "advertise": ("topic", "std_msgs/String"),
+        "advertise_service": ("service", "std_srvs/SetBool"),
+        "advertise_action": ("action", "control_msgs/FollowJointTrajectory"),
+    }
+    for op, (word, kind) in kinds.items():
         for name in ("/many_1", "/many_2", "/many_3", "/many_2"):
-            party.ask(op=op, id=f"{op} {name}", topic=name, type="std_msgs/String")
+            party.ask(op=op, id=f"{op} {name}", type=kind, **{word: name})
         assert party.next(op="status")["msg"].startswith(f"{op}: /many_3: this client has 2 of these already")
     party.call("rosapi/get_time")
-    assert len([each for each in party.got() if each["op"] == "status"]) == 2
+    assert len([each for each in party.got() if each["op"] == "status"]) == len(kinds)
 
 
 def test_requests_of_one_client_do_not_keep_another_waiting(bridge: Bridge, party: Party) -> None:
