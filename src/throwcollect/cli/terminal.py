@@ -5,7 +5,6 @@ from __future__ import annotations
 import sys
 import time
 from contextlib import AbstractContextManager
-from types import TracebackType
 from typing import TYPE_CHECKING
 
 from throwcollect.coordinator.onlooker import Onlooker
@@ -37,9 +36,7 @@ class _Lines(Onlooker, AbstractContextManager["_Lines"]):
         self._next = 0.0
         self._shown: Progress | None = None
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         pass
 
     def update(self, progress: Progress) -> None:
@@ -95,9 +92,7 @@ class _Bar(Onlooker):
         self._live.start()
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._live.stop()
 
     def update(self, progress: Progress) -> None:

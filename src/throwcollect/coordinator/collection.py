@@ -12,7 +12,6 @@ import time
 from collections import Counter, deque
 from collections.abc import Callable, Iterable
 from pathlib import Path
-from types import TracebackType
 
 from throwcollect.coordinator.acceptance import Acceptance
 from throwcollect.coordinator.growth import Growth
@@ -111,9 +110,7 @@ class TrialCollection:
     def __enter__(self) -> TrialCollection:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._replay.close()
         self.writer.close()
 

@@ -6,7 +6,6 @@ from collections.abc import Callable
 from contextlib import ExitStack
 from enum import Enum
 from pathlib import Path
-from types import TracebackType
 from typing import cast
 
 from throwcollect.config.schema import Config
@@ -66,9 +65,7 @@ class PreparedRun:
     def __enter__(self) -> PreparedRun:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         if self._fate is None:
             self._fate = _Fate.GIVEN_UP
         # The directory stays locked until the files that were made in it are removed.

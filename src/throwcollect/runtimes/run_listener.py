@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
-from types import TracebackType
 
 from throwcollect import ros
 from throwcollect.coordinator.progress import Progress
@@ -51,9 +50,7 @@ class RunListener:
     def __enter__(self) -> RunListener:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         if self._node is not None:
             self._node.destroy_node()
             ros.shutdown(context=self._context)

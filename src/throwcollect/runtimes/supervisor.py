@@ -6,7 +6,6 @@ import math
 import signal
 import time
 from collections.abc import Callable, Collection, Iterable, Sequence
-from types import TracebackType
 
 from throwcollect.config.run import RunConfig
 from throwcollect.errors import Interrupted, UnreachableError, WorkerError
@@ -51,9 +50,7 @@ class Supervisor:
     def __enter__(self) -> Supervisor:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.host.close()
 
     def start(self, *, found: Collection[str] = ()) -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Mapping, Sequence
-from types import TracebackType
 
 import numpy as np
 import pybullet
@@ -55,9 +54,7 @@ class Renderer:
     def __enter__(self) -> Renderer:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         pybullet.disconnect(self._client)
 
     def place(self, joints: Mapping[str, float], ball: Vector) -> None:
