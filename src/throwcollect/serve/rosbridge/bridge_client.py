@@ -8,7 +8,6 @@ from collections.abc import Callable, Mapping
 from typing import Protocol
 
 from throwcollect.errors import ConfigError, ThrowcollectError
-from throwcollect.serve.rosbridge.bridge_session import BridgeSession
 from throwcollect.serve.rosbridge.client_goals import Goal, Goals
 from throwcollect.serve.rosbridge.codec import Frame, encode, fragments, read_frame
 from throwcollect.serve.rosbridge.file_server import GET_FILE, give_file
@@ -16,7 +15,7 @@ from throwcollect.serve.rosbridge.inbox import Inbox
 from throwcollect.serve.rosbridge.offered_actions import OfferedAction
 from throwcollect.serve.rosbridge.offered_services import OfferedService
 from throwcollect.serve.rosbridge.offers import Offers
-from throwcollect.serve.rosbridge.peer import Level
+from throwcollect.serve.rosbridge.peer import Level, PeerHost
 from throwcollect.serve.rosbridge.publishers import Publishers
 from throwcollect.serve.rosbridge.questions import Questions
 from throwcollect.serve.rosbridge.reassembly import Reassembly
@@ -34,23 +33,12 @@ _LOSS = "too many requests wait for the router of the run; further ones are drop
 _numbers = itertools.count()
 
 
-class ClientHost(Protocol):
+class ClientHost(PeerHost, Protocol):
     """A bridge as its clients see it."""
-
-    @property
-    def session(self) -> BridgeSession:
-        """The bridge's place in the ROS graph."""
-
-    @property
-    def offered(self) -> set[str]:
-        """The services by which one knows what the clients of the bridge offer."""
 
     @property
     def is_connected(self) -> bool:
         """Whether the bridge has a place in the ROS graph by now."""
-
-    def later(self, seconds: float, action: Callable[[], None]) -> None:
-        """Call an action after a time [s], in the bridge's thread."""
 
     def submit(self, action: Callable[[], None]) -> None:
         """Call an action soon, in the bridge's thread; may be called in any thread."""
@@ -63,7 +51,7 @@ class BridgeClient:
     """One client. Any thread may call `receive` and `close`; only the bridge's thread may call everything else."""
 
     def __init__(self, host: ClientHost, send: Callable[[Frame], None], *, read_only: bool) -> None:
-        self._host = host
+        self.host = host
         self._send = send
         self._read_only = read_only
         self._inbox = Inbox()
@@ -105,16 +93,6 @@ class BridgeClient:
         }
 
     @property
-    def session(self) -> BridgeSession:
-        """The place of the bridge in the ROS graph."""
-        return self._host.session
-
-    @property
-    def offered(self) -> set[str]:
-        """The services by which one knows what the clients of the bridge offer."""
-        return self._host.offered
-
-    @property
     def waiting(self) -> int:
         """Number of received frames that wait to be handled."""
         return len(self._inbox)
@@ -124,21 +102,21 @@ class BridgeClient:
 
         Without a router, frames wait. If too many wait, further ones are dropped, and the client is told once.
         """
-        if self._inbox.is_full and not self._host.is_connected:
+        if self._inbox.is_full and not self.host.is_connected:
             if not self._was_told_of_loss:
                 self._was_told_of_loss = True
-                self._host.submit(lambda: self.say("error", _LOSS))
+                self.host.submit(lambda: self.say("error", _LOSS))
             return
         self._inbox.put(frame)
-        self._host.submit(self._handle_next)
+        self.host.submit(self._handle_next)
 
     def close(self) -> None:
         """Withdraw all that the client had."""
-        self._host.submit(self._close)
+        self.host.submit(self._close)
 
     def _handle_next(self) -> None:
         """Handle one frame of the client, so that other clients have their turn; without a router, frames wait."""
-        if self._inbox and self._host.is_connected and not self._is_closed:
+        if self._inbox and self.host.is_connected and not self._is_closed:
             self._handle(self._inbox.take())
 
     def lose(self) -> None:
@@ -157,11 +135,7 @@ class BridgeClient:
             self.answer({"op": "status", "level": "info", "msg": "the router of the run is back"}, Form())
         # `receive` has submitted an action for each of these frames, which left it where it was, without a router.
         for _ in range(self.waiting):
-            self._host.submit(self._handle_next)
-
-    def later(self, seconds: float, action: Callable[[], None]) -> None:
-        """Call an action after a time [s]."""
-        self._host.later(seconds, action)
+            self.host.submit(self._handle_next)
 
     def send(self, frame: Frame, fragment_size: int = 0) -> None:
         """Send a frame, in parts if it is a text longer than ``fragment_size``, unless that is 0."""
@@ -187,7 +161,7 @@ class BridgeClient:
         if not self._is_closed:
             self._is_closed = True
             self._inbox.clear()
-            self._host.forget(self)
+            self.host.forget(self)
             for part in self._parts:
                 part.close()
 

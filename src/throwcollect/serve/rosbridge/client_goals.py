@@ -74,7 +74,7 @@ class Goals(Errands[Goal]):
         on_feedback = goal.send_feedback if request.flag("feedback") else None
         type_name = request.text("action_type")
         action_type = find_interface("action", type_name)
-        if goal.name not in dict(ros.get_action_names_and_types(self._client.session.node)):
+        if goal.name not in dict(ros.get_action_names_and_types(self._client.host.session.node)):
             raise ConfigError(f"nobody offers an action {goal.name}")
         message = action_type.Goal()
         values = request.any("args")
@@ -83,7 +83,7 @@ class Goals(Errands[Goal]):
             raise ConfigError(f"send_action_goal: a goal with the id {goal.id} is under way already")
         key = goal.name, type_name
         if key not in self._action_clients:
-            self._action_clients[key] = ros.ActionClient(self._client.session.node, action_type, goal.name)
+            self._action_clients[key] = ros.ActionClient(self._client.host.session.node, action_type, goal.name)
         client = self._action_clients[key]
 
         def send() -> None:

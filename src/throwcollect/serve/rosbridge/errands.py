@@ -99,7 +99,7 @@ class Errands(Generic[AnErrand]):
                 self.fail(errand, f"{errand.name}: {error}")
             self._watch(errand, is_ready)
         elif time.monotonic() < deadline:
-            self._client.later(_POLL_S, partial(self._send_when_ready, errand, is_ready, send, deadline))
+            self._client.host.later(_POLL_S, partial(self._send_when_ready, errand, is_ready, send, deadline))
         else:
             self.fail(errand, self._unoffered.format(errand.name))
 
@@ -108,6 +108,6 @@ class Errands(Generic[AnErrand]):
         if not errand.is_open:
             return
         if is_ready():
-            self._client.later(_WATCH_S, partial(self._watch, errand, is_ready))
+            self._client.host.later(_WATCH_S, partial(self._watch, errand, is_ready))
         else:
             self.fail(errand, self._gone.format(errand.name))

@@ -39,7 +39,7 @@ class OfferedAction:
     def open(self) -> None:
         """Offer it."""
         self._server = ros.ActionServer(
-            self._client.session.node, self._type, self._name, self._execute, cancel_callback=self._cancel
+            self._client.host.session.node, self._type, self._name, self._execute, cancel_callback=self._cancel
         )
 
     def close(self) -> None:
@@ -53,7 +53,7 @@ class OfferedAction:
         for number in list(self._goals):
             self._finish(number, self._type.Result(), GoalStatus.ABORTED)
         # The action is withdrawn a bit later, so that nodes that wait for a result get it first.
-        self._client.later(FAREWELL_S, server.destroy)
+        self._client.host.later(FAREWELL_S, server.destroy)
 
     def lose(self) -> None:
         """Forget the session, which has ended, and all goals that came by it."""

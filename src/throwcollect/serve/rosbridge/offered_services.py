@@ -34,12 +34,12 @@ class OfferedService:
 
     def open(self) -> None:
         """Offer it."""
-        self._service = self._client.session.node.create_service(self._type, self._name, self._serve)
+        self._service = self._client.host.session.node.create_service(self._type, self._name, self._serve)
 
     def close(self) -> None:
         """Withdraw the service; nodes that wait for an answer get none."""
         if self._service is not None:
-            self._client.session.node.destroy_service(self._service)
+            self._client.host.session.node.destroy_service(self._service)
         # This ends callbacks that wait for the client. The service is withdrawn, so their answers are not sent.
         for future, response in self._pending.values():
             future.set_result(response)

@@ -53,7 +53,7 @@ class Offers(Belongings[ABelonging]):
             self._require_room(f"{request.op}: {name}")
         offered.open()
         self._by_name[name] = offered
-        self._client.offered.add(name + self._probe)
+        self._client.host.offered.add(name + self._probe)
 
     def unadvertise(self, request: BridgeRequest) -> None:
         """Withdraw something.
@@ -74,13 +74,13 @@ class Offers(Belongings[ABelonging]):
         return lambda request: operation(self._find(request), request)
 
     def _withdraw(self, name: str) -> None:
-        self._client.offered.discard(name + self._probe)
+        self._client.host.offered.discard(name + self._probe)
         self._by_name.pop(name).close()
 
     def _is_taken(self, name: str) -> bool:
         # All clients offer through the one node of the bridge, so the graph does not tell their offers apart.
         service = name + self._probe
-        return service in self._client.offered or self._client.session.is_offered_by_others(service)
+        return service in self._client.host.offered or self._client.host.session.is_offered_by_others(service)
 
     def _find(self, request: BridgeRequest) -> ABelonging:
         name = absolute_name(request.text(self._kind))

@@ -1,4 +1,4 @@
-"""The interface of a client for its own parts, which carry out its operations."""
+"""The interfaces of a client and its bridge for the parts of the client, which carry out its operations."""
 
 from __future__ import annotations
 
@@ -13,19 +13,27 @@ Level = Literal["info", "warning", "error"]
 """How much a status message matters."""
 
 
-class Peer(Protocol):
-    """A client. Only the thread of the bridge calls these methods."""
+class PeerHost(Protocol):
+    """A bridge as the parts of its clients see it."""
 
     @property
     def session(self) -> BridgeSession:
-        """The place of the bridge in the ROS graph."""
+        """The bridge's place in the ROS graph."""
 
     @property
     def offered(self) -> set[str]:
         """The services by which one knows what the clients of the bridge offer; all clients share this set."""
 
     def later(self, seconds: float, action: Callable[[], None]) -> None:
-        """Call an action after a time [s]."""
+        """Call an action after a time [s], in the bridge's thread."""
+
+
+class Peer(Protocol):
+    """A client. Only the thread of the bridge calls these methods."""
+
+    @property
+    def host(self) -> PeerHost:
+        """The bridge that the client is connected to."""
 
     def send(self, frame: Frame, fragment_size: int = 0) -> None:
         """Send a frame, in parts if it is a text longer than ``fragment_size``, unless that is 0."""

@@ -45,7 +45,7 @@ class Advertised:
         if self.latched:
             qos.durability = ros.DurabilityPolicy.TRANSIENT_LOCAL
         message_type = ros.get_message(self.type_name)
-        self.publisher = self.client.session.node.create_publisher(message_type, self.topic, qos)
+        self.publisher = self.client.host.session.node.create_publisher(message_type, self.topic, qos)
 
     def lose(self) -> None:
         """Forget the session, which has ended."""
@@ -54,7 +54,7 @@ class Advertised:
     def close(self) -> None:
         """Withdraw the topic."""
         if self.publisher is not None:
-            self.client.session.node.destroy_publisher(self.publisher)
+            self.client.host.session.node.destroy_publisher(self.publisher)
 
 
 class Publishers(Belongings[Advertised]):
@@ -100,7 +100,7 @@ class Publishers(Belongings[Advertised]):
                 raise ConfigError(f"publish: {error}") from error
 
     def _advertise(self, topic: str, request: BridgeRequest, wanted: str) -> Advertised:
-        type_name = self._client.session.type_of(topic, wanted)
+        type_name = self._client.host.session.type_of(topic, wanted)
         known = self._by_name.get(topic)
         if known is not None:
             if known.type_name != type_name:
@@ -116,4 +116,4 @@ class Publishers(Belongings[Advertised]):
     def _stamp(self, message: Any, values: object) -> None:
         """Set the stamp of the header to the present time; `fill` replaces it if the client has one."""
         if message.get_fields_and_field_types().get("header") == _HEADER and isinstance(values, Mapping):
-            message.header.stamp = self._client.session.node.get_clock().now().to_msg()
+            message.header.stamp = self._client.host.session.node.get_clock().now().to_msg()

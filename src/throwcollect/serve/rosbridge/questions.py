@@ -44,7 +44,7 @@ class Questions(Errands[Errand]):
         """
         if len(self._open) >= _MOST:
             raise ConfigError(f"{service}: {_MOST} requests wait for an answer already")
-        client = self._client.session.service_client(service, type_name)
+        client = self._client.host.session.service_client(service, type_name)
         question = Errand(service, failed)
 
         def finish(future: Any) -> None:
@@ -57,4 +57,4 @@ class Questions(Errands[Errand]):
         self.begin(question, client.service_is_ready, send, min(READY_S, timeout_s))
         if timeout_s < float("inf"):
             late = f"{service}: no answer within {timeout_s:g} s"
-            self._client.later(timeout_s, partial(self.fail, question, late))
+            self._client.host.later(timeout_s, partial(self.fail, question, late))

@@ -70,7 +70,7 @@ class Rosapi:
 
     @property
     def _node(self) -> ros.Node:
-        return self._client.session.node
+        return self._client.host.session.node
 
     def _find_topics(self) -> dict[str, str]:
         """Topics that clients may have, with their types."""

@@ -103,7 +103,7 @@ class Parameters:
 
     def list_all(self, call: Call) -> None:
         """Answer with the names of the parameters of all nodes that answer in time."""
-        session = self._client.session
+        session = self._client.host.session
         offered = dict(session.node.get_service_names_and_types())
         nodes = [
             service.rpartition("/")[0]
@@ -148,7 +148,7 @@ class Parameters:
             answer(unset)
 
     def _is_offered(self, service: str) -> bool:
-        return service in dict(self._client.session.node.get_service_names_and_types())
+        return service in dict(self._client.host.session.node.get_service_names_and_types())
 
 
 def _read_name(call: Call) -> tuple[str, str]:

@@ -59,7 +59,7 @@ def call_node(client: Peer, questions: Questions, call: Call, request: BridgeReq
         ConfigError: If there is no such service, or it cannot be called like this.
     """
     service = absolute_name(call.given)
-    types = dict(client.session.node.get_service_names_and_types()).get(service, [])
+    types = dict(client.host.session.node.get_service_names_and_types()).get(service, [])
     if not types:
         raise ConfigError(f"nobody offers a service {service}")
     named = full_name("srv", request.text_or("type", ""))

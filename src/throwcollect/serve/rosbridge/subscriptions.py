@@ -93,7 +93,7 @@ class SubscribedTopic:
         self.requests: dict[object, SubscriptionRequest] = {}
         self._merged = SubscriptionRequest()
         self._feed: Feed | None = None
-        self._pace = RateLimit(self._send, client.later)
+        self._pace = RateLimit(self._send, client.host.later)
 
     def want(self, name: object, request: SubscriptionRequest) -> None:
         """Add one subscription of the client, or change it."""
@@ -108,7 +108,7 @@ class SubscribedTopic:
 
     def open(self) -> None:
         """Begin to listen, in the session of the bridge."""
-        self._feed = self._client.session.listen(self._topic, self.type_name, self._pace.offer)
+        self._feed = self._client.host.session.listen(self._topic, self.type_name, self._pace.offer)
 
     def lose(self) -> None:
         """Forget the session, which has ended, and all messages that came by it."""
@@ -160,7 +160,7 @@ class Subscriptions(Belongings[SubscribedTopic]):
             request.natural_or("queue_length", 0),
             request.form(),
         )
-        type_name = self._client.session.type_of(topic, request.text_or("type", ""))
+        type_name = self._client.host.session.type_of(topic, request.text_or("type", ""))
         subscription = self._by_name.get(given)
         if subscription is not None and subscription.type_name != type_name:
             raise ConfigError(

@@ -190,8 +190,10 @@ def test_messages_that_wait_for_their_time_are_forgotten_when_their_subscription
     sent: list[str] = []
     feed = SimpleNamespace(remove=lambda _: None)
     client: Any = SimpleNamespace(
-        session=SimpleNamespace(listen=lambda _topic, _type, listener: heard.append(listener) or feed),
-        later=lambda _seconds, action: timers.append(action),
+        host=SimpleNamespace(
+            session=SimpleNamespace(listen=lambda _topic, _type, listener: heard.append(listener) or feed),
+            later=lambda _seconds, action: timers.append(action),
+        ),
         send=lambda frame, _size: sent.append(frame),
     )
     heard: list[Callable[[Any], None]] = []
@@ -335,7 +337,7 @@ def test_a_subscription_does_not_list_all_topics(party: Party, node: Node, monke
         lists.append("all")
         return []
 
-    monkeypatch.setattr(party.client.session.node, "get_topic_names_and_types", list_all)
+    monkeypatch.setattr(party.client.host.session.node, "get_topic_names_and_types", list_all)
     party.ask(op="subscribe", topic="/listed", type="std_msgs/String")
     wait_for_listener(publisher)
     publisher.publish(String(data="heard"))
