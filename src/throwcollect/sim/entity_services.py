@@ -17,7 +17,7 @@ from throwcollect.ros.srv import (
 from throwcollect.sim.body_messages import body_state, entity_state
 from throwcollect.sim.entities import EntityInfo
 from throwcollect.sim.entity_filter import select
-from throwcollect.sim.service_results import answering
+from throwcollect.sim.service_results import offer
 from throwcollect.sim.simulation import Simulation
 
 
@@ -27,17 +27,14 @@ class EntityServices:
     def __init__(self, node: Node, simulation: Simulation) -> None:
         self._simulation = simulation
         self._entities = simulation.entities
-        for service, name, fill in (
-            (GetEntities, "get_entities", self._list),
-            (GetEntitiesStates, "get_entities_states", self._list_states),
-            (GetEntityState, "get_entity_state", self._get_state),
-            (SetEntityState, "set_entity_state", self._set_state),
-            (GetEntityInfo, "get_entity_info", self._get_info),
-            (SetEntityInfo, "set_entity_info", self._set_info),
-            (GetEntityBounds, "get_entity_bounds", self._get_bounds),
-            (DeleteEntity, "delete_entity", self._delete),
-        ):
-            node.create_service(service, name, answering(service, fill))
+        offer(node, GetEntities, "get_entities", self._list)
+        offer(node, GetEntitiesStates, "get_entities_states", self._list_states)
+        offer(node, GetEntityState, "get_entity_state", self._get_state)
+        offer(node, SetEntityState, "set_entity_state", self._set_state)
+        offer(node, GetEntityInfo, "get_entity_info", self._get_info)
+        offer(node, SetEntityInfo, "set_entity_info", self._set_info)
+        offer(node, GetEntityBounds, "get_entity_bounds", self._get_bounds)
+        offer(node, DeleteEntity, "delete_entity", self._delete)
 
     def _list(self, request: GetEntities.Request, response: GetEntities.Response) -> None:
         response.entities = select(self._entities, request.filters)

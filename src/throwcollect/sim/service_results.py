@@ -6,14 +6,15 @@ from collections.abc import Callable
 from typing import Any, Protocol, TypeVar
 
 from throwcollect.errors import ConfigError, RequestError
+from throwcollect.ros import Node
 from throwcollect.ros.msg import Result
 
 Fill = Callable[[Any, Any], None]
 """Function of a request and a response that fills the response."""
 
 
-def answering(service: Any, fill: Fill) -> Callable[[Any, Any], Any]:
-    """Make the callback of a service: `fill` fills the response, or raises an error, with which the service answers."""
+def offer(node: Node, service: Any, name: str, fill: Fill) -> None:
+    """Offer a service of a node: `fill` fills the response, or raises an error, with which the service answers."""
 
     def answer(request: Any, response: Any) -> Any:
         response.result.result = Result.RESULT_OK
@@ -25,7 +26,7 @@ def answering(service: Any, fill: Fill) -> Callable[[Any, Any], Any]:
             return refusal(service.Response, RequestError("RESULT_OPERATION_FAILED", str(error)))
         return response
 
-    return answer
+    node.create_service(service, name, answer)
 
 
 class _WithResult(Protocol):

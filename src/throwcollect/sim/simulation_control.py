@@ -7,7 +7,7 @@ from throwcollect.ros import Node
 from throwcollect.ros.msg import SimulatorFeatures as Features
 from throwcollect.ros.srv import GetSimulationState, GetSimulatorFeatures, ResetSimulation, SetSimulationState
 from throwcollect.sim.entity_services import EntityServices
-from throwcollect.sim.service_results import answering
+from throwcollect.sim.service_results import offer
 from throwcollect.sim.simulation import Scope, Simulation, StateCode
 from throwcollect.sim.spawn_services import SpawnServices
 from throwcollect.version import __version__
@@ -51,12 +51,9 @@ class SimulationControl:
         self._simulation = simulation
         # This service has no result code, unlike all others.
         node.create_service(GetSimulatorFeatures, "get_simulator_features", self._get_features)
-        for service, name, fill in (
-            (GetSimulationState, "get_simulation_state", self._get_state),
-            (SetSimulationState, "set_simulation_state", self._set_state),
-            (ResetSimulation, "reset_simulation", self._reset),
-        ):
-            node.create_service(service, name, answering(service, fill))
+        offer(node, GetSimulationState, "get_simulation_state", self._get_state)
+        offer(node, SetSimulationState, "set_simulation_state", self._set_state)
+        offer(node, ResetSimulation, "reset_simulation", self._reset)
         EntityServices(node, simulation)
         SpawnServices(node, simulation)
 

@@ -14,7 +14,7 @@ from throwcollect.ros.srv import GetSpawnables, SpawnEntities, SpawnEntity
 from throwcollect.sim.body_messages import body_state
 from throwcollect.sim.entities import WORLD_FRAME
 from throwcollect.sim.resources import find_resources, load_model
-from throwcollect.sim.service_results import answering, refusal
+from throwcollect.sim.service_results import offer, refusal
 from throwcollect.sim.simulation import Simulation
 
 _MOST_REQUESTS = 200
@@ -33,12 +33,9 @@ class SpawnServices:
         self._trial = simulation.trial
         self._entities = simulation.entities
         self._robot = robot_of(simulation.config)
-        for service, name, fill in (
-            (SpawnEntity, "spawn_entity", self._spawn_one),
-            (SpawnEntities, "spawn_entities", self._spawn_all),
-            (GetSpawnables, "get_spawnables", self._list_spawnables),
-        ):
-            node.create_service(service, name, answering(service, fill))
+        offer(node, SpawnEntity, "spawn_entity", self._spawn_one)
+        offer(node, SpawnEntities, "spawn_entities", self._spawn_all)
+        offer(node, GetSpawnables, "get_spawnables", self._list_spawnables)
 
     def _spawn_one(self, request: SpawnEntity.Request, response: SpawnEntity.Response) -> None:
         self._trial.require_free()
