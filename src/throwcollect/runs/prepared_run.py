@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import ExitStack
-from enum import Enum
 from pathlib import Path
 from typing import cast
 
@@ -17,13 +16,6 @@ from throwcollect.runs.run_record import RunRecord, Summary
 from throwcollect.runs.token import JoinToken
 from throwcollect.runtimes.ports import format_endpoint, reach_from_elsewhere
 from throwcollect.runtimes.runtime import Place, Runtime
-
-
-class _Fate(Enum):
-    """What became of a prepared run, as the words of the error if somebody launches it afterwards."""
-
-    LAUNCHED = "was launched already"
-    GIVEN_UP = "was given up when its block was left"
 
 
 class PreparedRun:
@@ -60,14 +52,15 @@ class PreparedRun:
         self._runtime = runtime
         self._held = held or ExitStack()
         self._undo = undo or ExitStack()
-        self._fate: _Fate | None = None
+        self._fate: str | None = None
+        """What became of the run, as the words of the error if somebody launches it afterwards."""
 
     def __enter__(self) -> PreparedRun:
         return self
 
     def __exit__(self, *_: object) -> None:
         if self._fate is None:
-            self._fate = _Fate.GIVEN_UP
+            self._fate = "was given up when its block was left"
         # The directory stays locked until the files that were made in it are removed.
         with self._held:
             self._undo.close()
@@ -145,7 +138,7 @@ class PreparedRun:
         """
         if self._fate is not None:
             raise ConflictError(
-                f"run {self._run.run}: {self._fate.value}", expected="a run that is prepared and not launched"
+                f"run {self._run.run}: {self._fate}", expected="a run that is prepared and not launched"
             )
-        self._fate = _Fate.LAUNCHED
+        self._fate = "was launched already"
         self._undo.pop_all()
