@@ -112,13 +112,7 @@ class Models:
             DatasetError: If it is damaged.
         """
         (aim,) = self._load(name).aim([target])
-        return AimView(
-            target=aim.target.tolist(),
-            parameters=aim.parameters,
-            predicted=aim.predicted.tolist(),
-            reachable=aim.reachable,
-            nearest=aim.nearest.tolist(),
-        )
+        return AimView(**aim.as_dict())
 
     def _load(self, name: str) -> Model:
         # Names of models become names of directories.
