@@ -291,7 +291,7 @@ class Records:
 
     def all(self) -> list[Run]:
         """All runs whose records can be read, the latest last."""
-        return self._read_all(self.ids())
+        return self.read(self.ids())
 
     def into(self, directory: Path) -> list[Run]:
         """Runs that collect, or have collected, into a directory, and not into a volume; the latest last."""
@@ -304,10 +304,10 @@ class Records:
             text = _read_bytes(self._runs / f"{run}.json")
             return any(name in text for name in written)
 
-        runs = self._read_all(filter(names_it, self.ids()))
+        runs = self.read(filter(names_it, self.ids()))
         return [run for run in runs if run.record.volume is None and run.record.directory in names]
 
-    def _read_all(self, ids: Iterable[str]) -> list[Run]:
+    def read(self, ids: Iterable[str]) -> list[Run]:
         """Those of the runs whose records can be read, the latest last."""
         runs = []
         for run in ids:
@@ -334,7 +334,7 @@ class Records:
             changed_ns = self.read_change_ns(run)
             return changed_ns is not None and changed_ns / NS_PER_S <= before.timestamp()
 
-        for run in self._read_all(filter(may_be_old, self.ids())):
+        for run in self.read(filter(may_be_old, self.ids())):
             record = run.record
             # The record of a run whose nodes may outlive its launcher is kept: nothing else describes these nodes.
             over = run.status == "ended" or (run.status == "died" and not _may_outlive(record))

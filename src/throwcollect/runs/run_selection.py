@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Sequence
-from contextlib import suppress
 from pathlib import Path
 
 from throwcollect.dataset.directory import config_path
@@ -132,10 +131,7 @@ def _find_only_living(records: Records, ids: Sequence[str], named: str) -> str:
     Raises:
         ConfigError: If none lives, or more than one.
     """
-    runs = []
-    for run in ids:
-        with suppress(ConfigError):
-            runs.append(records.get(run))
+    runs = records.read(ids)
     living = [run for run in runs if run.status == "running"]
     if len(living) == 1:
         return living[0].id
