@@ -6,6 +6,7 @@ import atexit
 import inspect
 import signal
 import threading
+import time
 import weakref
 from collections.abc import Callable
 from contextlib import suppress
@@ -17,14 +18,14 @@ from typing import TypeVar
 import zenoh
 
 from rclzenoh.domain import domain_of_environment
-from rclzenoh.exceptions import NotInitializedException
+from rclzenoh.exceptions import NoRouterError, NotInitializedException
 from rclzenoh.graph import Graph
-from rclzenoh.session import open_session
-from rclzenoh.session_config import environment_config
+from rclzenoh.session_config import environment_config, in_words
 
 _T = TypeVar("_T")
 
 _open: weakref.WeakSet[Context] = weakref.WeakSet()
+_PATIENCE_S, _RETRY_S = 5.0, 0.1
 _ARRIVAL_S = 1.0
 """Longest time for which a subscriber that reads nothing can delay the end of a session."""
 
@@ -133,6 +134,26 @@ class Context:
                 _let_messages_arrive(session, self._domain_id)
             finally:
                 session.close()  # type: ignore[no-untyped-call]
+
+
+def open_session(config: zenoh.Config) -> zenoh.Session:
+    """Open a session with a router, which may just be starting; the caller has to close it.
+
+    Zenoh itself waits for a router only if the configuration has ``connect/timeout_ms``, which it lacks by default.
+
+    Raises:
+        NoRouterError: If there is no router within some seconds.
+    """
+    zenoh.try_init_log_from_env()  # type: ignore[no-untyped-call]
+    begin = time.monotonic()
+    while True:
+        try:
+            return zenoh.open(config)
+        except zenoh.ZError as error:
+            waited = time.monotonic() - begin
+            if waited > _PATIENCE_S:
+                raise NoRouterError(config.get_json("connect/endpoints"), round(waited, 1), in_words(error)) from error
+            time.sleep(_RETRY_S)
 
 
 def _let_messages_arrive(session: zenoh.Session, domain_id: int) -> None:

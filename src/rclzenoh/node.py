@@ -6,13 +6,18 @@ from typing import Any
 
 from rclzenoh.context import Context
 from rclzenoh.exceptions import InvalidHandle
-from rclzenoh.interfaces.msg import Log, ParameterEvent
+from rclzenoh.interfaces.msg import Clock, Log, ParameterEvent
 from rclzenoh.node_endpoints import NodeEndpoints
 from rclzenoh.node_graph import NodeGraph
 from rclzenoh.node_parameters import NodeParameters
+from rclzenoh.parameter import Parameter
 from rclzenoh.parameter_service import offer_parameters
-from rclzenoh.qos import qos_profile_parameter_events, qos_profile_rosout
-from rclzenoh.time_source import TimeSource
+from rclzenoh.qos import QoSProfile, ReliabilityPolicy, qos_profile_parameter_events, qos_profile_rosout
+from rclzenoh.subscription import Subscription
+from rclzenoh.time import Time
+
+_CLOCK_TOPIC = "/clock"
+_USE_SIM_TIME = "use_sim_time"
 
 
 class Node(NodeEndpoints, NodeGraph, NodeParameters):
@@ -50,7 +55,7 @@ class Node(NodeEndpoints, NodeGraph, NodeParameters):
         self._parameter_events = self.create_publisher(
             ParameterEvent, "/parameter_events", qos_profile_parameter_events
         )
-        self._time_source = TimeSource(self, self)
+        self._time_source = _TimeSource(self)
         if start_parameter_services:
             offer_parameters(self, self)
         if is_taken:
@@ -78,3 +83,34 @@ class Node(NodeEndpoints, NodeGraph, NodeParameters):
             self._rosout.publish(message)
         except InvalidHandle:
             self._logger.sink = None  # The node or its session has ended; standard error has the message anyway.
+
+
+class _TimeSource:
+    """Sets the clock of a node by the topic ``/clock`` while its parameter ``use_sim_time`` is true."""
+
+    def __init__(self, node: Node) -> None:
+        self._node = node
+        self._clock = node.get_clock()
+        self._subscription: Subscription | None = None
+        node.add_post_set_parameters_callback(self._on_parameters)
+        node.declare_parameter(_USE_SIM_TIME, False)
+
+    def _on_parameters(self, parameters: list[Parameter]) -> None:
+        for parameter in parameters:
+            if parameter.name == _USE_SIM_TIME:
+                self._use_sim_time(bool(parameter.value))
+
+    def _use_sim_time(self, active: bool) -> None:
+        if active == (self._subscription is not None):
+            # A node that sets its clock itself goes on if it is told what it does already.
+            return
+        self._clock.activate(active)
+        if self._subscription is None:
+            qos = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
+            self._subscription = self._node.create_subscription(Clock, _CLOCK_TOPIC, self._on_clock, qos)
+        else:
+            self._node.destroy_subscription(self._subscription)
+            self._subscription = None
+
+    def _on_clock(self, message: Clock) -> None:
+        self._clock.set_ros_time_override(Time.from_msg(message.clock))

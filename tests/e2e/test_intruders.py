@@ -77,8 +77,8 @@ import pinocchio, pyarrow.parquet, scipy.stats
 import throwcollect.coordinator.coordinator_process, throwcollect.coordinator.resume, throwcollect.dataset.reader
 import throwcollect.cli.node_commands, throwcollect.engines.bullet.bullet_engine, throwcollect.sim.simulation_process
 from throwcollect.cli.main import main
-from rclzenoh import session
-session._PATIENCE_S = 0.5
+from rclzenoh import context
+context._PATIENCE_S = 0.5
 {BECOME_NOBODY}
 main()
 """

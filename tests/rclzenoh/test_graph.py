@@ -4,9 +4,9 @@ import os
 
 import zenoh
 
+from rclzenoh.context import open_session
 from rclzenoh.interfaces import get_message, get_service
 from rclzenoh.keys import parse_token
-from rclzenoh.session import open_session
 from rclzenoh.session_config import environment_config
 
 String = get_message("std_msgs/msg/String")

@@ -4,14 +4,14 @@ import threading
 import pytest
 import zenoh
 
-from rclzenoh import session
+from rclzenoh import context
+from rclzenoh.context import open_session
 from rclzenoh.exceptions import ConfigurationError, NoRouterError
-from rclzenoh.session import open_session
 from rclzenoh.session_config import environment_config, router_config
 
 
 def test_a_missing_router_is_an_error_that_names_the_endpoint(environment, monkeypatch):
-    monkeypatch.setattr(session, "_PATIENCE_S", 0.2)
+    monkeypatch.setattr(context, "_PATIENCE_S", 0.2)
     monkeypatch.setenv("ZENOH_CONFIG_OVERRIDE", 'connect/endpoints=["tcp/127.0.0.1:1"]')
     with pytest.raises(NoRouterError, match=r"connecting to .*tcp/127.0.0.1:1") as caught:
         open_session(environment_config())
@@ -20,7 +20,7 @@ def test_a_missing_router_is_an_error_that_names_the_endpoint(environment, monke
 
 
 def test_a_session_waits_for_its_router_as_long_as_its_configuration_says(environment, monkeypatch):
-    monkeypatch.setattr(session, "_PATIENCE_S", 0.0)
+    monkeypatch.setattr(context, "_PATIENCE_S", 0.0)
     with socket.create_server(("127.0.0.1", 0)) as probe:
         unused = f"tcp/127.0.0.1:{probe.getsockname()[1]}"
     monkeypatch.setenv("ZENOH_CONFIG_OVERRIDE", f'connect/endpoints=["{unused}"];connect/timeout_ms=20000')

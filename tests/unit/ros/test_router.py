@@ -5,7 +5,7 @@ import time
 
 import pytest
 
-from rclzenoh import session
+from rclzenoh import context
 from rclzenoh.session_config import OVERRIDE_VARIABLE, client_override, is_protected
 from throwcollect import ros
 from throwcollect.errors import ConfigError, ThrowcollectError
@@ -71,7 +71,7 @@ def override_of(endpoint, key):
 def test_a_protected_router_admits_only_clients_with_its_key(environment, rig, monkeypatch, key, tmp_path):
     stranger = RunKey(tmp_path / "stranger")
     stranger.create()
-    monkeypatch.setattr(session, "_PATIENCE_S", 0.1)
+    monkeypatch.setattr(context, "_PATIENCE_S", 0.1)
     with router("tls/127.0.0.1:0", key) as endpoint:
         monkeypatch.setenv(OVERRIDE_VARIABLE, override_of(endpoint, key))
         assert is_protected()

@@ -296,7 +296,7 @@ def test_a_wrong_argument_gives_one_clear_message_and_exit_code_2(
 def test_without_a_router_commands_say_that_there_is_no_session(
     say: Callable[..., Said], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("rclzenoh.session._PATIENCE_S", 0.1)
+    monkeypatch.setattr("rclzenoh.context._PATIENCE_S", 0.1)
     monkeypatch.setenv(OVERRIDE_VARIABLE, 'connect/endpoints=["tcp/127.0.0.1:9"]')
     said = say("node", "list")
     assert said.code == 2
