@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-import gc
 import math
-import signal
 import time
 from collections.abc import Callable
 from pathlib import Path
-from types import FrameType
 
 from throwcollect import ros
 from throwcollect.coordinator.collection import TrialCollection
 from throwcollect.coordinator.coordinator_node import Coordinator
 from throwcollect.errors import WorkerError
 from throwcollect.heartbeat import Heartbeat
-from throwcollect.interruption import stop_signals
-from throwcollect.ros.self_check import check_answers
+from throwcollect.ros.self_check import begin_to_serve
 from throwcollect.side_by_side import count_cores
 
 _IDLE_S = 0.05
@@ -48,22 +44,7 @@ def run(directory: Path, *, patience_s: float = math.inf) -> None:
         if not ros.joins_protected():
             collection.writer.note("exposed")
         node = Coordinator(collection)
-
-        executor = ros.SingleThreadedExecutor()
-        executor.add_node(node)
-        asked = False
-
-        def ask_to_drain(_number: int, _frame: FrameType | None) -> None:
-            # Only the loop drains, because a signal may come in the middle of anything, even of draining.
-            nonlocal asked
-            asked = True
-            ros.stop_waiting(executor)
-
-        for number in stop_signals():
-            signal.signal(number, ask_to_drain)
-        check_answers(node, executor)
-        # The present objects stay until the end, so the garbage collector need not go through them again and again.
-        gc.freeze()
+        executor, stopped = begin_to_serve(node)
         heartbeat = Heartbeat()
 
         def keep_answering() -> None:
@@ -72,7 +53,7 @@ def run(directory: Path, *, patience_s: float = math.inf) -> None:
             executor.spin_once(timeout_sec=_IDLE_S)
 
         try:
-            _collect(node, collection, executor, heartbeat, is_to_drain=lambda: asked, patience_s=patience_s)
+            _collect(node, collection, executor, heartbeat, stopped, patience_s=patience_s)
             collection.finish(meanwhile=keep_answering, say=_say)
         finally:
             node.destroy_node()
@@ -84,11 +65,11 @@ def _collect(
     collection: TrialCollection,
     executor: ros.Executor,
     heartbeat: Heartbeat,
+    stopped: Callable[[], int],
     *,
-    is_to_drain: Callable[[], bool],
     patience_s: float,
 ) -> None:
-    """Collect until all trials have ended or, after a request to drain, those that run.
+    """Collect until all trials have ended or, after a signal that asks to stop, those that run.
 
     Raises:
         WorkerError: If no simulation is there for longer than `patience_s`.
@@ -96,7 +77,7 @@ def _collect(
     told = seen = time.monotonic()
     while not collection.finished:
         heartbeat.beat()
-        if is_to_drain():
+        if stopped():
             collection.drain()
         # Messages of simulations come first; other work is done when there is none.
         waiting = collection.backlog or collection.grow_plan()

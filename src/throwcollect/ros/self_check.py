@@ -1,17 +1,51 @@
-"""Checks that a node can be reached at all, before it announces that it is ready."""
+"""Begins to serve with nodes: handles signals, and checks that the nodes can be reached before they say so."""
 
 from __future__ import annotations
 
+import gc
+import signal
 import time
+from collections.abc import Callable
+from types import FrameType
 from typing import Any
 
 from throwcollect import ros
 from throwcollect.errors import WorkerError
+from throwcollect.interruption import stop_signals
 from throwcollect.ros.middleware import Middleware
 
 _ANSWER_S = 10.0
 _AGAIN_S = 1.0
 _LOOK_S = 0.05
+
+
+def begin_to_serve(*nodes: ros.Node) -> tuple[ros.Executor, Callable[[], int]]:
+    """Put nodes into an executor, which the caller then spins until a signal asks this process to stop.
+
+    Returns:
+        The executor, and a function that tells the number of the last signal that asked to stop; 0 if none has.
+
+    Raises:
+        WorkerError: If the first node does not answer itself within ten seconds.
+    """
+    executor = ros.SingleThreadedExecutor()
+    for node in nodes:
+        executor.add_node(node)
+    stopped = 0
+
+    def stop(number: int, _frame: FrameType | None) -> None:
+        # Only the loop of the caller acts on it, because a signal may come in the middle of anything.
+        nonlocal stopped
+        stopped = number
+        # That loop may be waiting for messages, and would see `stopped` only after that.
+        ros.stop_waiting(executor)
+
+    for number in stop_signals():
+        signal.signal(number, stop)
+    check_answers(nodes[0], executor)
+    # The objects made so far stay until the end, so the garbage collector need not go through them again and again.
+    gc.freeze()
+    return executor, lambda: stopped
 
 
 def check_answers(node: ros.Node, executor: ros.Executor) -> None:

@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-import gc
 import signal
 from pathlib import Path
-from types import FrameType
 
 from throwcollect import ros
 from throwcollect.config.loader import load
 from throwcollect.config.schema import Config
 from throwcollect.errors import ConfigError
 from throwcollect.heartbeat import Heartbeat, ready_line
-from throwcollect.interruption import stop_signals
 from throwcollect.members import load_member
-from throwcollect.ros.self_check import check_answers
+from throwcollect.ros.self_check import begin_to_serve
 from throwcollect.sim.simulation import Simulation
 from throwcollect.sim.simulation_node import SimulationNode
 
@@ -70,34 +67,19 @@ def run(config: Path, *, name: str, namespace: str | None = None) -> None:
         node = SimulationNode(name, simulation, namespace=namespace)
     except ros.NameValidationException as error:
         raise ConfigError(str(error)) from error
-    executor = ros.SingleThreadedExecutor()
     nodes = (node, *node.other_nodes)
-    for served in nodes:
-        executor.add_node(served)
-    stopped = 0
-
-    def stop(number: int, _frame: FrameType | None) -> None:
-        nonlocal stopped
-        stopped = number
-        # The loop may be waiting for messages, and would see `stopped` only after that.
-        ros.stop_waiting(executor)
-
-    for number in stop_signals():
-        signal.signal(number, stop)
-    check_answers(node, executor)
-    # The objects made so far stay until the end, so the garbage collector need not go through them again and again.
-    gc.freeze()
+    executor, stopped = begin_to_serve(*nodes)
     heartbeat = Heartbeat()
     print(ready_line(name), flush=True)
     try:
-        while not stopped and not node.quitting:
+        while not stopped() and not node.quitting:
             heartbeat.beat()
             # Messages come first, so that a cancel or a reset has its effect before time goes on.
             ros.spin_some(executor, timeout_sec=0.0 if simulation.running else node.patience_s)
             if simulation.running:
                 simulation.advance(watched=node.watched)
             node.follow_up()
-        node.get_logger().info(f"ends: {signal.Signals(stopped).name if stopped else 'a client asked for it'}")
+        node.get_logger().info(f"ends: {signal.Signals(stopped()).name if stopped() else 'a client asked for it'}")
     finally:
         for served in reversed(nodes):
             served.destroy_node()
