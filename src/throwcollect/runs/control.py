@@ -5,12 +5,11 @@ from __future__ import annotations
 import os
 import signal
 import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack, contextmanager, suppress
+from collections.abc import Callable, Sequence
+from contextlib import suppress
 from typing import TYPE_CHECKING
 
 from throwcollect.errors import ConfigError, ConflictError, ThrowcollectError, WorkerError
-from throwcollect.ros.graph_names import make_own_name
 from throwcollect.ros.router_endpoint import answers
 from throwcollect.runs.records import Records, Run
 from throwcollect.runs.run_record import RunRecord
@@ -26,8 +25,6 @@ from throwcollect.runtimes.registry import get_runtime
 from throwcollect.wording import command
 
 if TYPE_CHECKING:
-    from throwcollect.ros import Executor, Node
-    from throwcollect.ros.connection import Connection
     from throwcollect.ros.msg import SetParametersResult
 
 _POLL_S = 0.05
@@ -138,10 +135,12 @@ def set_parameter(run: Run, nodes: Sequence[str], name: str, value: float | str)
     connection = run.connection
     if connection is None or not answers(connection.endpoint, patience_s=_ANSWER_S):
         raise _silent(run, nodes[0])
-    with join_for_a_moment(connection) as (asking, executor):
-        from throwcollect.ros import Parameter
-        from throwcollect.ros.srv import SetParameters
+    connection.middleware.joining.settle()
+    from throwcollect.ros import Parameter
+    from throwcollect.ros.srv import SetParameters
+    from throwcollect.runtimes.run_listener import take_part
 
+    with take_part(connection) as (asking, executor):
         request = SetParameters.Request(parameters=[Parameter(name, value=value).to_parameter_msg()])
         futures = []
         for node in nodes:
@@ -156,23 +155,6 @@ def set_parameter(run: Run, nodes: Sequence[str], name: str, value: float | str)
             if not future.done():
                 raise _silent(run, node)
         return [future.result().results[0] for future in futures]
-
-
-@contextmanager
-def join_for_a_moment(connection: Connection) -> Iterator[tuple[Node, Executor]]:
-    """Join the ROS graph of a run, on its middleware, with a hidden node and the executor that it spins in."""
-    connection.middleware.joining.settle()
-    from throwcollect import ros
-
-    context = ros.Context()
-    ros.init(context=context, connection=connection)
-    with ExitStack() as undo:
-        undo.callback(ros.shutdown, context=context)
-        node = ros.Node(make_own_name(), context=context)
-        undo.callback(node.destroy_node)
-        executor = ros.SingleThreadedExecutor(context=context)
-        executor.add_node(node)
-        yield node, executor
 
 
 def _silent(run: Run, node: str) -> WorkerError:

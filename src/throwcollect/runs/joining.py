@@ -17,7 +17,6 @@ from throwcollect.ros.connection import Connection
 from throwcollect.ros.middleware import Middleware
 from throwcollect.ros.router_endpoint import answers
 from throwcollect.run_key import RunKey
-from throwcollect.runs.control import join_for_a_moment
 from throwcollect.runs.own_directory import make_own_directory
 from throwcollect.runs.token import JoinToken
 from throwcollect.runtimes.local import LocalNodes
@@ -124,10 +123,12 @@ def _read_configuration(connection: Connection, token: JoinToken) -> str:
             f"run {token.run}: no router answers at {connection.endpoint}",
             hint="is the run over, or does a firewall keep its port closed?",
         )
-    with join_for_a_moment(connection) as (node, executor):
-        from throwcollect.ros.srv import GetParameters
-        from throwcollect.runtimes.node_collection import CONFIGURATION
+    connection.middleware.joining.settle()
+    from throwcollect.ros.srv import GetParameters
+    from throwcollect.runtimes.node_collection import CONFIGURATION
+    from throwcollect.runtimes.run_listener import take_part
 
+    with take_part(connection) as (node, executor):
         client = node.create_client(GetParameters, f"/{LAUNCHER}/get_parameters")
         if not client.wait_for_service(_ANSWER_S):
             raise WorkerError(f"run {token.run}: its launcher cannot be found at {connection.endpoint}")

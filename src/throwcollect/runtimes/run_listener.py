@@ -1,10 +1,11 @@
-"""Receives the progress reports of a run, for its launcher and for everybody who follows the run."""
+"""Takes part in the ROS graph of a run, and receives its progress reports, for its launcher and all who follow it."""
 
 from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
 
 from throwcollect import ros
 from throwcollect.coordinator.progress import Progress
@@ -17,6 +18,27 @@ from throwcollect.ros.router_endpoint import answers
 
 _SILENT_S = 8.0
 """Reports come several times a second; after this silence the connection may be broken, so it is made anew."""
+
+
+@contextmanager
+def take_part(connection: Connection, name: str | None = None) -> Iterator[tuple[ros.Node, ros.Executor]]:
+    """Take part in the ROS graph of a run with a node and the executor that it spins in, in a context of their own.
+
+    By default, the node has a unique and hidden name.
+
+    Raises:
+        ConfigError: If the connection cannot be used.
+        ThrowcollectError: If there is no router.
+    """
+    context = ros.Context()
+    ros.init(context=context, connection=connection)
+    with ExitStack() as undo:
+        undo.callback(ros.shutdown, context=context)
+        node = ros.Node(name or make_own_name(), context=context)
+        undo.callback(node.destroy_node)
+        executor = ros.SingleThreadedExecutor(context=context)
+        executor.add_node(node)
+        yield node, executor
 
 
 class RunListener:
@@ -43,7 +65,8 @@ class RunListener:
         self._name = name or make_own_name()
         self._silent_s = _SILENT_S if reports else math.inf
         self._on_connect = on_connect
-        self._node: ros.Node | None = None
+        self._executor: ros.Executor | None = None
+        self._leave = ExitStack()
         self._connection: Connection | None = None
         self._heard_at = 0.0
 
@@ -51,10 +74,8 @@ class RunListener:
         return self
 
     def __exit__(self, *_: object) -> None:
-        if self._node is not None:
-            self._node.destroy_node()
-            ros.shutdown(context=self._context)
-            self._node = None
+        self._executor = None
+        self._leave.close()
 
     def spin(self, connection: Connection | None, seconds: float) -> None:
         """Wait for a report, or for the router, for at most this number of seconds.
@@ -68,27 +89,24 @@ class RunListener:
         if connection is not None and elsewhere and answers(connection.endpoint):
             self.__exit__(None, None, None)
             self._connect(connection)
-        if self._node is not None:
+        if self._executor is not None:
             self._executor.spin_once(timeout_sec=seconds)
         else:
             time.sleep(seconds)
 
     def _connect(self, connection: Connection) -> None:
         self._heard_at = time.monotonic()
-        self._context = ros.Context()
         try:
-            ros.init(context=self._context, connection=connection)
+            node, self._executor = self._leave.enter_context(take_part(connection, self._name))
         # A `ConfigError` is a `ThrowcollectError`, too, but another attempt would fail in the same way.
         except ConfigError:
             raise
         except ThrowcollectError:
             # The router answered a moment ago, so it has just ended; the next attempt finds the next router.
             return
-        self._node, self._connection = ros.Node(self._name, context=self._context), connection
-        self._executor = ros.SingleThreadedExecutor(context=self._context)
-        self._executor.add_node(self._node)
-        self._node.create_subscription(String, PROGRESS_TOPIC, self._hear, PROGRESS_QOS)
-        self._on_connect(self._node)
+        self._connection = connection
+        node.create_subscription(String, PROGRESS_TOPIC, self._hear, PROGRESS_QOS)
+        self._on_connect(node)
 
     def _hear(self, message: String) -> None:
         if (progress := Progress.read(message.data)) is not None:
