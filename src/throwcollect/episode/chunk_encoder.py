@@ -9,9 +9,10 @@ import zstandard
 from mcap.opcode import Opcode
 
 from throwcollect.episode.channels import Channels
-from throwcollect.episode.chunk import MESSAGE_HEADER, RECORD_PREFIX_BYTES, Chunk
+from throwcollect.episode.chunk import MESSAGE_HEADER, RECORD_PREFIX_BYTES
 from throwcollect.episode.message_table import MessageTable
 from throwcollect.episode.record import ControllerSamples, Samples
+from throwcollect.episode.recorded_chunk import RecordedChunk
 from throwcollect.episode.topics import Recording
 
 
@@ -28,12 +29,13 @@ class ChunkEncoder:
             row += MESSAGE_HEADER.pack(Opcode.MESSAGE, length, number, 0, 0, 0) + template
         self._row = row
 
-    def encode(self, samples: Samples, controllers: Mapping[str, ControllerSamples] | None = None) -> Chunk:
-        """Encode and compress an episode; see `lay_out`."""
-        return self.compress(self.lay_out(samples, controllers))
+    def encode(
+        self, samples: Samples, controllers: Mapping[str, ControllerSamples] | None = None
+    ) -> tuple[RecordedChunk, MessageTable]:
+        """Encode an episode, with set points of each controller whose state is recorded, by name.
 
-    def lay_out(self, samples: Samples, controllers: Mapping[str, ControllerSamples] | None = None) -> MessageTable:
-        """Write the message records of an episode, with set points of each controller whose state is recorded, by name.
+        Returns:
+            The state chunk, and its message records.
 
         Raises:
             KeyError: If the set points of a recorded controller are missing.
@@ -45,9 +47,5 @@ class ChunkEncoder:
             headers["sequence"] = np.arange(len(samples))
             headers["log_time"] = headers["publish_time"] = samples.stamps_ns
             topic.fill(table.messages(channel).view(topic.layout.dtype)[:, 0], recording)
-        return table
-
-    def compress(self, table: MessageTable) -> Chunk:
-        """Make the chunk of the records that `lay_out` has written."""
         data, times = self._compressor.compress(table.contents), table.log_times
-        return Chunk.of(table.contents, data, start_ns=int(times[0]), end_ns=int(times[-1]))
+        return RecordedChunk.of(table.contents, data, start_ns=int(times[0]), end_ns=int(times[-1])), table

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from dataclasses import dataclass
 from functools import cached_property
 
 from throwcollect.episode.chunk import Chunk
@@ -10,18 +11,23 @@ from throwcollect.episode.message_table import MessageList
 from throwcollect.errors import DatasetError
 
 
+@dataclass(frozen=True, eq=False)
 class RecordedChunk:
     """A chunk that is decompressed and hashed once, when that is needed.
 
     Attributes:
         chunk: The recorded messages, compressed.
-        stated_sha256: SHA-256 of the uncompressed message records in hexadecimal, as it was written beside them; None
-            if it is not known yet.
+        records_sha256: SHA-256 of the uncompressed message records in hexadecimal, as it was written beside them.
     """
 
-    def __init__(self, chunk: Chunk, stated_sha256: str | None = None) -> None:
-        self.chunk = chunk
-        self.stated_sha256 = stated_sha256
+    chunk: Chunk
+    records_sha256: str
+
+    @classmethod
+    def of(cls, contents: bytes | bytearray | memoryview, data: bytes, *, start_ns: int, end_ns: int) -> RecordedChunk:
+        """Make the chunk of message records, which are given both uncompressed and compressed."""
+        chunk = Chunk.of(contents, data, start_ns=start_ns, end_ns=end_ns)
+        return cls(chunk, hashlib.sha256(contents).hexdigest())
 
     @cached_property
     def contents(self) -> bytes:
@@ -31,15 +37,6 @@ class RecordedChunk:
             DatasetError: If the chunk is damaged.
         """
         return self.chunk.decompress()
-
-    @cached_property
-    def records_sha256(self) -> str:
-        """SHA-256 of the uncompressed message records in hexadecimal: `stated_sha256`, or else computed.
-
-        Raises:
-            DatasetError: If it has to be computed and the chunk is damaged.
-        """
-        return self.stated_sha256 or self._contents_sha256
 
     @cached_property
     def messages(self) -> MessageList:

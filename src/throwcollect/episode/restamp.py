@@ -5,7 +5,6 @@ Nothing in an episode but its stamps depends on its slot, so the result has the 
 
 from __future__ import annotations
 
-import hashlib
 from dataclasses import replace
 
 import numpy as np
@@ -66,8 +65,7 @@ class Restamper:
     def _pack(self, contents: bytearray, like: Chunk, by_ns: int) -> RecordedChunk:
         """Make the chunk of records that are `by_ns` later than the records of the chunk `like`."""
         data = zstandard.compress(contents, self._config.record.zstd_level)
-        chunk = Chunk.of(contents, data, start_ns=like.start_ns + by_ns, end_ns=like.end_ns + by_ns)
-        return RecordedChunk(chunk, hashlib.sha256(contents).hexdigest())
+        return RecordedChunk.of(contents, data, start_ns=like.start_ns + by_ns, end_ns=like.end_ns + by_ns)
 
     def _move(self, table: MessageTable, by_ns: int) -> None:
         if list(table.columns) != list(self._topics):

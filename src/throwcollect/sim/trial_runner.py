@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -13,7 +12,6 @@ from throwcollect.episode.channels import Channels
 from throwcollect.episode.chunk_encoder import ChunkEncoder
 from throwcollect.episode.episode_message import Delivery, Episode
 from throwcollect.episode.record import EpisodeHeader, Samples, find_infinite_columns
-from throwcollect.episode.recorded_chunk import RecordedChunk
 from throwcollect.errors import ThrowcollectError
 from throwcollect.members import explain_failure
 from throwcollect.robots.description import full_description, robot_of, start_posture
@@ -102,12 +100,10 @@ class TrialRunner:
             trajectory=begun.trajectory.digest if begun else "",
             lease=begun.token if begun else "",
         )
-        table = self._encoder.lay_out(samples, states)
+        state, table = self._encoder.encode(samples, states)
         # The samples are judged as readers of the dataset see them: recorded velocities are in the ball's frame.
         result = self._judge(config, begun.trajectory, table.samples, header) if begun else ""
-        state = RecordedChunk(self._encoder.compress(table), hashlib.sha256(table.contents).hexdigest())
-        episode = Episode(header, state)
-        return Delivery(episode, result, conditions.to_json())
+        return Delivery(Episode(header, state), result, conditions.to_json())
 
     def _judge(self, config: Config, trajectory: JointTrajectory, samples: Samples, header: EpisodeHeader) -> str:
         """Judge a trial; return its result in JSON.

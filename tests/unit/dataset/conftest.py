@@ -19,7 +19,6 @@ from throwcollect.episode.channels import Channels
 from throwcollect.episode.chunk_encoder import ChunkEncoder
 from throwcollect.episode.episode_message import Episode
 from throwcollect.episode.record import Contact, ControllerSamples, EpisodeHeader, GoalOutcome, Samples
-from throwcollect.episode.recorded_chunk import RecordedChunk
 from throwcollect.robots.description import full_description, start_posture
 from throwcollect.robots.quintic_curve import sample_quintic
 from throwcollect.robots.talos import TALOS
@@ -117,7 +116,7 @@ class Collection:
             )
             for name in ("arm_right_controller", "torso_controller")
         }
-        return Episode(header, RecordedChunk(self.encoder.encode(samples, targets)))
+        return Episode(header, self.encoder.encode(samples, targets)[0])
 
     def result(self, episode: Episode) -> ThrowResult:
         config = self.plan.config_of(self.plan.trials[episode.header.trial])

@@ -33,7 +33,7 @@ from throwcollect.dataset.writer import DatasetWriter
 from throwcollect.derive.selection import sample
 from throwcollect.episode import channels as declared
 from throwcollect.episode.channels import Channel, Qos
-from throwcollect.episode.chunk import Chunk, encode_records
+from throwcollect.episode.chunk import encode_records
 from throwcollect.episode.episode_message import Delivery, Episode, pack, unpack
 from throwcollect.episode.recorded_chunk import RecordedChunk
 from throwcollect.run_key import Signer
@@ -71,8 +71,8 @@ def add_images(episode: Episode, change: Callable[[list[records.Message]], None]
     change(messages)
     contents = encode_records(*messages)
     data = zstandard.ZstdCompressor(level=1).compress(contents)
-    chunk = Chunk.of(contents, data, start_ns=start, end_ns=messages[-1].log_time)
-    return Episode(episode.header, RecordedChunk(episode.chunk), RecordedChunk(chunk))
+    images = RecordedChunk.of(contents, data, start_ns=start, end_ns=messages[-1].log_time)
+    return Episode(episode.header, episode.state, images)
 
 
 class Filmed(Collection):

@@ -64,7 +64,7 @@ def messages_of(contents: bytes) -> list[tuple[int, Message]]:
 
 def test_a_chunk_has_one_message_per_channel_and_sample(full: ChunkEncoder, make_samples: Any, targets: Any) -> None:
     samples = make_samples(50)
-    messages = [message for _, message in messages_of(full.encode(samples, targets).decompress())]
+    messages = [message for _, message in messages_of(full.encode(samples, targets)[0].contents)]
     assert [message.channel_id for message in messages] == [3, 4, 5, 6, 8, 11] * 50
     assert [message.sequence for message in messages[::6]] == list(range(50))
     assert [message.log_time for message in messages[3::6]] == samples.stamps_ns.tolist()
@@ -76,7 +76,7 @@ def test_messages_made_topic_by_topic_have_the_bytes_of_the_chunk(
 ) -> None:
     """What a listener receives live is what the dataset holds."""
     samples = make_samples(50)
-    table = MessageTable(full.encode(samples, targets).decompress(), 50)
+    table = MessageTable(full.encode(samples, targets)[0].contents, 50)
     topics = {
         3: "/joint_states",
         4: "/ball/odometry",
@@ -99,7 +99,7 @@ def test_encoding_controller_states_without_set_points_is_an_error(full: ChunkEn
 @pytest.mark.parametrize("count", [1, 2, 500])
 def test_samples_can_be_read_back_from_a_chunk(encoder: ChunkEncoder, make_samples: Any, count: int) -> None:
     samples = make_samples(count)
-    read = MessageTable(encoder.encode(samples).decompress(), count).samples
+    read = MessageTable(encoder.encode(samples)[0].contents, count).samples
     for field in fields(Samples):
         assert np.allclose(getattr(samples, field.name), getattr(read, field.name), rtol=0, atol=1e-14)
     assert np.array_equal(samples.stamps_ns, read.stamps_ns)
@@ -108,12 +108,12 @@ def test_samples_can_be_read_back_from_a_chunk(encoder: ChunkEncoder, make_sampl
 
 def test_equal_samples_give_equal_chunks(make_samples: Any) -> None:
     encoders = [ChunkEncoder(Channels(Config(), URDF), level=3) for _ in range(2)]
-    chunk = encoders[0].encode(make_samples(30))
-    assert chunk == encoders[1].encode(make_samples(30))
+    chunk = encoders[0].encode(make_samples(30))[0].chunk
+    assert chunk == encoders[1].encode(make_samples(30))[0].chunk
 
 
 def test_the_mcap_library_can_read_the_record_of_a_chunk(encoder: ChunkEncoder, make_samples: Any) -> None:
-    chunk = encoder.encode(make_samples(20))
+    chunk = encoder.encode(make_samples(20))[0].chunk
     read = McapChunk.read(ReadDataStream(io.BytesIO(chunk.record()[9:])))
     assert (read.compression, read.data, read.uncompressed_size) == ("zstd", chunk.data, len(chunk.decompress()))
     assert (read.message_start_time, read.message_end_time) == (10**10, 10**10 + 19 * 4_000_000)
@@ -122,7 +122,7 @@ def test_the_mcap_library_can_read_the_record_of_a_chunk(encoder: ChunkEncoder, 
 
 
 def test_message_indexes_point_at_the_messages(encoder: ChunkEncoder, make_samples: Any) -> None:
-    contents = encoder.encode(make_samples(20)).decompress()
+    contents = encoder.encode(make_samples(20))[0].contents
     table = MessageTable(contents, 20)
     for channel in (3, 4):
         index = MessageIndex.read(ReadDataStream(io.BytesIO(table.message_index(channel)[9:])))
@@ -135,7 +135,7 @@ def test_message_indexes_point_at_the_messages(encoder: ChunkEncoder, make_sampl
 def test_a_chunk_record_with_a_changed_or_missing_byte_is_refused(
     encoder: ChunkEncoder, make_samples: Any, at: int
 ) -> None:
-    record = bytearray(encoder.encode(make_samples(20)).record())
+    record = bytearray(encoder.encode(make_samples(20))[0].chunk.record())
     if at == -1:
         del record[-1]
     else:
@@ -145,7 +145,7 @@ def test_a_chunk_record_with_a_changed_or_missing_byte_is_refused(
 
 
 def test_a_chunk_whose_data_or_crc_is_wrong_is_not_decompressed(encoder: ChunkEncoder, make_samples: Any) -> None:
-    chunk = encoder.encode(make_samples(20))
+    chunk = encoder.encode(make_samples(20))[0].chunk
     bomb = zstandard.ZstdCompressor().compress(bytes(50_000_000))
     for data, message in [
         (chunk.data[:-1], "cannot be decompressed"),
@@ -160,7 +160,7 @@ def test_a_chunk_whose_data_or_crc_is_wrong_is_not_decompressed(encoder: ChunkEn
 
 
 def test_records_that_do_not_fit_the_number_of_samples_are_refused(encoder: ChunkEncoder, make_samples: Any) -> None:
-    contents = encoder.encode(make_samples(20)).decompress()
+    contents = encoder.encode(make_samples(20))[0].contents
     row = len(contents) // 20
     changed = bytearray(contents)
     changed[3 * row + 9] = 9
@@ -181,7 +181,7 @@ def test_records_that_do_not_fit_the_number_of_samples_are_refused(encoder: Chun
 def test_records_without_the_expected_topics_or_layout_hold_no_samples(
     encoder: ChunkEncoder, make_samples: Any
 ) -> None:
-    contents = encoder.encode(make_samples(2)).decompress()
+    contents = encoder.encode(make_samples(2))[0].contents
     size = 9 + struct.unpack_from("<Q", contents, 1)[0]
     with pytest.raises(DatasetError, match="no messages of /ball/odometry"):
         _ = MessageTable(contents[:size], 1).samples
@@ -199,9 +199,13 @@ def test_records_without_the_expected_topics_or_layout_hold_no_samples(
 def test_samples_for_joints_other_than_the_recorded_ones_are_refused(
     encoder: ChunkEncoder, header: EpisodeHeader, make_samples: Any
 ) -> None:
-    contents = encoder.encode(make_samples(50)).decompress()
-    assert Episode(header, RecordedChunk(as_chunk(contents))).samples(TALOS.joints).position.shape == (50, 32)
-    renamed = Episode(header, RecordedChunk(as_chunk(contents.replace(b"head_1_joint", b"neck_1_joint"))))
+
+    def record(contents: bytes) -> RecordedChunk:
+        return RecordedChunk.of(contents, zstandard.compress(contents), start_ns=10**10, end_ns=10**10 + 49 * 4_000_000)
+
+    contents = encoder.encode(make_samples(50))[0].contents
+    assert Episode(header, record(contents)).samples(TALOS.joints).position.shape == (50, 32)
+    renamed = Episode(header, record(contents.replace(b"head_1_joint", b"neck_1_joint")))
     assert renamed.table.joints == tuple(joint.replace("head_1", "neck_1") for joint in TALOS.joints)
     assert renamed.samples().position.tolist() == make_samples(50).position.tolist()
     with pytest.raises(DatasetError, match=r"joint 29 of the joint states is neck_1_joint\n.*head_1_joint"):
@@ -212,7 +216,7 @@ def test_samples_for_joints_other_than_the_recorded_ones_are_refused(
 
 def test_a_changed_time_of_a_record_no_longer_fits_the_stamps(encoder: ChunkEncoder, make_samples: Any) -> None:
     samples = make_samples(5)
-    contents = bytearray(encoder.encode(samples).decompress())
+    contents = bytearray(encoder.encode(samples)[0].contents)
     assert MessageTable(bytes(contents), 5).are_timed_by(samples.stamps_ns)
     contents[len(contents) // 5 + 11] ^= 1
     assert not MessageTable(bytes(contents), 5).are_timed_by(samples.stamps_ns)
@@ -224,7 +228,7 @@ def test_every_changed_part_of_a_record_header_no_longer_fits_the_stamps(
     encoder: ChunkEncoder, make_samples: Any, place: int, channel: int
 ) -> None:
     samples = make_samples(5)
-    contents = bytearray(encoder.encode(samples).decompress())
+    contents = bytearray(encoder.encode(samples)[0].contents)
     contents[4 * len(contents) // 5 + MessageTable(contents, 5).columns[channel].offset + place] ^= 1
     assert not MessageTable(bytes(contents), 5).are_timed_by(samples.stamps_ns)
 
@@ -232,7 +236,7 @@ def test_every_changed_part_of_a_record_header_no_longer_fits_the_stamps(
 def test_a_negative_stamp_does_not_fit_a_record_time_with_the_same_bits(
     encoder: ChunkEncoder, make_samples: Any
 ) -> None:
-    contents = bytearray(encoder.encode(make_samples(1)).decompress())
+    contents = bytearray(encoder.encode(make_samples(1))[0].contents)
     table = MessageTable(contents, 1)
     for channel in table.columns:
         table.headers(channel)["log_time"] = table.headers(channel)["publish_time"] = 2**64 - 1

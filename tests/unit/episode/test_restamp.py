@@ -33,7 +33,7 @@ def record_as(collection: Collection, *, as_trial: int) -> Episode:
     }
     header = replace(header, trial=as_trial, start_ns=header.start_ns + by_ns, contacts=contacts)
     samples = replace(samples, stamps_ns=samples.stamps_ns + by_ns)
-    return Episode(header, RecordedChunk(collection.encoder.encode(samples, targets)))
+    return Episode(header, collection.encoder.encode(samples, targets)[0])
 
 
 @pytest.fixture(scope="module")

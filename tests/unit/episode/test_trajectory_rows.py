@@ -17,7 +17,7 @@ from throwcollect.robots.talos import TALOS
 @pytest.fixture(scope="module")
 def contents(make_samples: Any) -> bytes:
     config = Config.model_validate({"name": "rows", "sweep": {"parameters": {"task.duration_s": {"min": 1, "max": 2}}}})
-    return ChunkEncoder(Channels(config, full_description(config)), level=1).encode(make_samples(20)).decompress()
+    return ChunkEncoder(Channels(config, full_description(config)), level=1).encode(make_samples(20))[0].contents
 
 
 def test_the_columns_of_a_trajectory_hold_the_recorded_samples(contents: bytes, make_samples: Any) -> None:

@@ -32,14 +32,14 @@ HEADER = EpisodeHeader(0, 16_000_000_000, "landed", (Contact("spoon", 16_000_000
 
 
 def episode(samples: Samples = SAMPLES, header: EpisodeHeader = HEADER) -> Episode:
-    return Episode(header, RecordedChunk(ENCODER.encode(samples)))
+    return Episode(header, ENCODER.encode(samples)[0])
 
 
 def test_an_episode_has_no_differences_from_itself_and_some_from_one_with_other_channels() -> None:
     assert compare(episode(), episode()).differences == ()
     further = Config.model_validate({"record": {"topics": ["joint_states", "ball/odometry", "clock"]}})
-    with_clock = ChunkEncoder(Channels(further, full_description(further)), level=1).encode(SAMPLES)
-    found = compare(episode(), Episode(HEADER, RecordedChunk(with_clock)))
+    with_clock = ChunkEncoder(Channels(further, full_description(further)), level=1).encode(SAMPLES)[0]
+    found = compare(episode(), Episode(HEADER, with_clock))
     assert found.differences == ("other channels than joint states and ball differ",)
 
 
