@@ -1,9 +1,19 @@
-"""Writes the reference of all keys from the models; `throwcollect.config.reference` prints it."""
+"""Print the reference of all keys, as `docs/configuration.md` has it, from the models of the configuration.
+
+``python packaging/configuration_reference.py > docs/configuration.md`` writes the page anew.
+"""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+
+from throwcollect import members
+
+if __name__ == "__main__":
+    # The page must not depend on what is installed beside throwcollect, and the imports below make the kinds of keys
+    # from the members that are not left out.
+    members.leave_out_others()
 
 from throwcollect.config.kinds import all_joints
 from throwcollect.config.loader import value_as_yaml
@@ -15,7 +25,7 @@ from throwcollect.config.values import sweepable_keys
 _INTRODUCTION = """\
 # Configuration
 
-<!-- Printed by `python -m throwcollect.config.reference`; edit the docstrings in src/throwcollect/config instead. -->
+<!-- Printed by `python packaging/configuration_reference.py`; edit the docstrings in src/throwcollect/config. -->
 
 A configuration is a YAML 1.2 file. Every key may be left out, unless it is marked as required; `throwcollect config`
 prints all keys with the values that they then have, and `throwcollect config --schema` the JSON Schema for editors.
@@ -158,3 +168,7 @@ def _list_sweepable() -> str:
 
 def _generalise(match: re.Match[str]) -> str:
     return "<joint>.<index>" if match[2] else "<joint>"
+
+
+if __name__ == "__main__":
+    print(page(), end="")
