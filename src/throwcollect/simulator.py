@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from threading import RLock
 
 import numpy as np
@@ -27,8 +27,7 @@ from throwcollect.coordinator.prepare import feasibility_check
 from throwcollect.dataset.judging import judge_episode
 from throwcollect.dataset.throw import Throw
 from throwcollect.dataset.throws_table import ThrowsTable
-from throwcollect.episode.episode_message import Episode
-from throwcollect.episode.trajectory_rows import trajectory_rows
+from throwcollect.dataset.trajectory_columns import ThrowInMemory
 from throwcollect.errors import ConfigError, ConflictError, PlanError, Problem
 from throwcollect.extras import require
 from throwcollect.files import StrPath
@@ -221,7 +220,7 @@ class Simulator:
         row = table.row(trial, judge_episode(with_values(self.config, trial.values), episode), None)
         # In a dataset, these two values come from a shard; the row was made without one.
         row |= {"samples": episode.header.samples, "digest": episode.digest}
-        return Throw(table.table([row]), 0, keys, _Simulated(episode), self._source)
+        return Throw(table.table([row]), 0, keys, ThrowInMemory(episode), self._source)
 
 
 def _locate(problem: Problem, index: int, point: Point) -> Problem:
@@ -238,31 +237,6 @@ def _locate(problem: Problem, index: int, point: Point) -> Problem:
 def _make_row(values: Point) -> NDArray[np.float64]:
     """Make a table of values as its only row, shape ``(1, n_values)``."""
     return np.array([list(values.values())], np.float64).reshape(1, len(values))
-
-
-@dataclass(frozen=True)
-class _Simulated:
-    """The episode of a throw that exists only in memory."""
-
-    episode: Episode
-
-    @property
-    def start_ns(self) -> int:
-        return self.episode.header.start_ns
-
-    @property
-    def samples(self) -> int:
-        return self.episode.header.samples
-
-    @property
-    def joints(self) -> tuple[str, ...]:
-        return self.episode.table.joints
-
-    def read(self) -> Episode:
-        return self.episode
-
-    def read_rows(self) -> NDArray[np.void]:
-        return trajectory_rows(self.episode.state.contents, self.samples, self.joints)
 
 
 def _begin(config: Config, source: str) -> Callable[[tuple[int, Point]], Throw]:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from itertools import groupby
 from operator import attrgetter
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -56,39 +56,15 @@ Column = NDArray[Any]
 _LARGE_BYTES = 4 << 20
 
 
-class Recorded(Protocol):
-    """The episode of a throw, in a file or in memory."""
-
-    @property
-    def start_ns(self) -> int:
-        """Simulated time at which the trial starts [ns]."""
-
-    @property
-    def samples(self) -> int:
-        """Number of samples."""
-
-    @property
-    def joints(self) -> tuple[str, ...]:
-        """Joints that are recorded, in the order of their columns."""
-
-    def read(self) -> Episode:
-        """Read the episode.
-
-        Raises:
-            DatasetError: If it is not where it should be, or its records are damaged; the samples are not looked at.
-        """
-
-    def read_rows(self) -> NDArray[np.void]:
-        """Read the rows of its samples; see `trajectory_rows`.
-
-        Raises:
-            DatasetError: If the episode is not where it should be, or its chunk is damaged.
-        """
-
-
 @dataclass(frozen=True)
 class StoredThrow:
-    """The episode of a throw in an MCAP file, whose chunk begins at `offset` [bytes]; see `Recorded` for the others."""
+    """The episode of a throw in an MCAP file, whose chunk begins at `offset` [bytes].
+
+    Attributes:
+        start_ns: Simulated time at which the trial starts [ns].
+        samples: Number of samples.
+        joints: Joints that are recorded, in the order of their columns.
+    """
 
     trial: int
     start_ns: int
@@ -101,7 +77,7 @@ class StoredThrow:
         """Read the episode from its file.
 
         Raises:
-            DatasetError: If the file is damaged there, or has another trial.
+            DatasetError: If the file is damaged there, or has another trial; the samples are not looked at.
         """
         with open_mcap(self.path) as contents:
             try:
@@ -114,9 +90,47 @@ class StoredThrow:
         return episode
 
     def read_rows(self) -> NDArray[np.void]:
-        """Read the rows of its samples from its file; see `Recorded`."""
+        """Read the rows of its samples from its file; see `trajectory_rows`.
+
+        Raises:
+            DatasetError: If the episode is not where it should be, or its chunk is damaged.
+        """
         (rows,) = read_stored_rows([self])
         return rows
+
+
+@dataclass(frozen=True)
+class ThrowInMemory:
+    """The episode of a throw that is in no file; its attributes are those of a `StoredThrow`."""
+
+    episode: Episode
+
+    @property
+    def start_ns(self) -> int:
+        """Simulated time at which the trial starts [ns]."""
+        return self.episode.header.start_ns
+
+    @property
+    def samples(self) -> int:
+        """Number of samples."""
+        return self.episode.header.samples
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """Joints that are recorded, in the order of their columns."""
+        return self.episode.table.joints
+
+    def read(self) -> Episode:
+        """Return the episode."""
+        return self.episode
+
+    def read_rows(self) -> NDArray[np.void]:
+        """View the rows of its samples; see `trajectory_rows`."""
+        return trajectory_rows(self.episode.state.contents, self.samples, self.joints)
+
+
+Recorded = StoredThrow | ThrowInMemory
+"""The episode of a throw, in a file or in memory."""
 
 
 def name_components(column: str, joints: Sequence[str]) -> tuple[str, ...]:
