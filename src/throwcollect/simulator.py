@@ -74,20 +74,15 @@ class Simulator:
                 raise refuse_argument(
                     "overrides", "win over a file, got a Config", hint="load_config(FILE, overrides) applies them"
                 )
-            self._start(config, config.name)
+            self.config, self._source = config, config.name
         elif isinstance(config, str | os.PathLike):
-            self._start(load(config, overrides), os.fspath(config))
+            self.config, self._source = load(config, overrides), os.fspath(config)
         else:
             raise refuse_argument(
                 "config", f"got {show_value(config)}", expected="a YAML file, or a Config as load_config gives it"
             )
-
-    def _start(self, config: Config, source: str) -> None:
-        """Make the robot and the physics engine of a configuration; `source` names it in messages, such as its file."""
-        self._source = source
         # A throw changes the robot's model and the world. A handler of a signal may close during a throw of its thread.
         self._lock = RLock()
-        self.config: Config = config
         self._check = feasibility_check(self.config)
         self._replayer = Replayer(self.config)
 
@@ -241,6 +236,6 @@ def _make_row(values: Point) -> NDArray[np.float64]:
 
 def _begin(config: Config, source: str) -> Callable[[tuple[int, Point]], Throw]:
     """Make the simulator of a process of `Simulator.throw_many`; the file is not read, because it may have changed."""
-    simulator = Simulator.__new__(Simulator)
-    simulator._start(config, source)
+    simulator = Simulator(config)
+    simulator._source = source
     return simulator._throw_numbered
