@@ -8,7 +8,7 @@ file ``<name>_00000.mcap``, and the other vanishes.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
@@ -19,6 +19,7 @@ from throwcollect.dataset.bag import FileSummary
 from throwcollect.dataset.directory import path_of_part
 from throwcollect.dataset.manifest import FileEntry, RunningHash
 from throwcollect.dataset.mcap_file import McapFile, RecordGroup, episode_run
+from throwcollect.dataset.throws_table import Row
 from throwcollect.episode.channels import Channels
 from throwcollect.episode.episode_message import Episode
 from throwcollect.errors import DatasetError
@@ -76,12 +77,14 @@ class OpenShard:
 
     Attributes:
         missing: Trials that neither have an episode nor are known to be lost.
+        rows: Rows of the table of throws of its trials that have ended, by trial.
         path: Final path of the shard.
         part: Path of the shard while it is filled.
     """
 
     def __init__(self, path: Path, channels: Channels) -> None:
         self.missing: set[int] = set()
+        self.rows: dict[int, Row] = {}
         self.path = path
         self.part = path_of_part(path)
         self._channels = channels
@@ -89,10 +92,6 @@ class OpenShard:
         self._size = 0
         self._synced = True
         self._runs: dict[int, tuple[int, RecordGroup]] = {}
-
-    def expect(self, trials: Iterable[int]) -> None:
-        """Wait for the episodes, or losses, of more trials."""
-        self.missing.update(trials)
 
     def adopt(self, runs: Runs) -> None:
         """Go on with the unfinished file of a shard, which has these runs; what follows the last of them is cut off.

@@ -78,8 +78,6 @@ class DatasetWriter:
         self._unfinished: set[int] = set()
         self._shards: dict[int, OpenShard] = {}
         """Unfinished shards with at least one trial that has ended."""
-        self._rows: dict[int, dict[int, Row]] = {}
-        """Rows of their trials that have ended."""
         self._recordings: dict[int, Recording] = {}
         """The file of each finished shard that has one."""
         self._finished_rows = RowStore(directory, self._table.schema)
@@ -157,7 +155,7 @@ class DatasetWriter:
             elif episodes or not self._get_shard(number).missing:
                 self._finish_shard_if_complete(number)
             else:
-                del self._shards[number], self._rows[number]
+                del self._shards[number]
         if count:
             self.note("recovered", episodes=count)
         return count
@@ -232,7 +230,7 @@ class DatasetWriter:
         shard.append(episode)
         # The offset is not known before the shard is written in order of trials; `_close_shard` puts it in.
         place = EpisodePlace(shard.path.name, -1, episode.header.samples, episode.digest)
-        row = self._rows[number][trial] = self._make_row(trial, result, place)
+        row = shard.rows[trial] = self._make_row(trial, result, place)
         ends = {name: row[name] for name in self._config.task.targets if row.get(name) is not None}
         self.note("commit", trial=trial, outcome=result.outcome.value, digest=episode.digest, **ends)
         self._finish_shard_if_complete(number)
@@ -244,8 +242,9 @@ class DatasetWriter:
             DatasetError: If the trial is not waited for, or the shard that it completes cannot be written.
         """
         number = self._find_waiting_shard(trial)
-        self._shards[number].missing.remove(trial)
-        self._rows[number][trial] = self._make_row(trial, task_of(self._config).lose(reason), None)
+        shard = self._get_shard(number)
+        shard.missing.remove(trial)
+        shard.rows[trial] = self._make_row(trial, task_of(self._config).lose(reason), None)
         self.note("lost", trial=trial, reason=reason)
         self._finish_shard_if_complete(number)
 
@@ -321,7 +320,8 @@ class DatasetWriter:
         for number in self._layout.numbers_of(trials.numbers):
             self._unfinished.add(number)
             if number in self._shards:
-                self._shards[number].expect(each for each in self._layout.to_run(number) if each in trials.numbers)
+                added = (each for each in self._layout.to_run(number) if each in trials.numbers)
+                self._shards[number].missing.update(added)
             # A shard of refused trials alone waits for no episode, and nothing would finish it later.
             if number in self._shards or next(self._layout.to_run(number), None) is None:
                 self._finish_shard_if_complete(number)
@@ -334,19 +334,21 @@ class DatasetWriter:
         self._unfinished.discard(number)
         if number not in self._shards:
             return []
-        self._shards.pop(number).close()
-        return [*self._rows.pop(number).values()]
+        shard = self._shards.pop(number)
+        shard.close()
+        return [*shard.rows.values()]
 
     def _reopen(self, number: int, rows: list[Row]) -> None:
         """Go on filling a shard after some of its trials have left the plan; `rows` are the rows that it had."""
         self._unfinished.add(number)
         [left] = find_left([self._layout.part(number)], self._channels)
         self._take_left(number, left)
+        shard = self._get_shard(number)
         # Lost trials have no episode by which `find_left` would find them, so their rows are kept.
         for row in rows:
             if row["outcome"] == LOST and row["trial"] in self._layout.members(number):
-                self._rows[number][row["trial"]] = row
-                self._shards[number].missing.discard(row["trial"])
+                shard.rows[row["trial"]] = row
+                shard.missing.discard(row["trial"])
 
     def _take_left(self, number: int, left: LeftOfShard) -> list[RecoveredEpisode]:
         """Take in what is left of an unfinished shard; returns its episodes in order of trials."""
@@ -354,15 +356,14 @@ class DatasetWriter:
         episodes = recover_shard(shard, left)
         for each in episodes:
             place = replace(each.place, shard=shard.path.name)
-            self._rows[number][each.trial] = self._make_row(each.trial, each.result, place)
+            shard.rows[each.trial] = self._make_row(each.trial, each.result, place)
         return episodes
 
     def _get_shard(self, number: int) -> OpenShard:
         """Return an unfinished shard, which takes memory only once it has been asked for."""
         if number not in self._shards:
-            shard = OpenShard(self._layout.path(number), self._channels)
-            shard.expect(self._layout.to_run(number))
-            self._shards[number], self._rows[number] = shard, {}
+            self._shards[number] = OpenShard(self._layout.path(number), self._channels)
+            self._shards[number].missing.update(self._layout.to_run(number))
         return self._shards[number]
 
     def _make_row(self, trial: int, result: Result, place: EpisodePlace | None) -> Row:
@@ -380,11 +381,10 @@ class DatasetWriter:
             self._close_shard(number, shard.finish())
 
     def _close_shard(self, number: int, finished: FinishedShard) -> None:
-        ended, refused = self._rows.pop(number), self._table.make_refused_row
-        rows = [ended.get(trial) or refused(self.plan.trial(trial)) for trial in self._layout.members(number)]
+        shard, refused = self._shards.pop(number), self._table.make_refused_row
+        rows = [shard.rows.get(trial) or refused(self.plan.trial(trial)) for trial in self._layout.members(number)]
         for row in rows:
             row["chunk_offset"] = finished.offsets.get(row["trial"])
         self.take_shard(number, finished.recording, self._table.table(rows))
-        shard = self._shards.pop(number)
         if finished.recording is not None:
             self.note("shard", name=shard.path.name)

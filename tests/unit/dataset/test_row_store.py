@@ -35,10 +35,8 @@ class ShardWithoutFile:
     def __init__(self, path: Path, _channels: object) -> None:
         self.path = path
         self.missing: set[int] = set()
+        self.rows: dict[int, Any] = {}
         self.offsets: dict[int, int] = {}
-
-    def expect(self, trials: Any) -> None:
-        self.missing.update(trials)
 
     def append(self, episode: Any) -> None:
         self.missing.remove(episode.header.trial)
