@@ -15,6 +15,7 @@ from pathlib import Path
 
 from throwcollect.build import build_digest
 from throwcollect.coordinator.acceptance import Acceptance
+from throwcollect.dataset.creation import create
 from throwcollect.dataset.judging import judge_episode
 from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.writer import DatasetWriter
@@ -58,7 +59,8 @@ def measure(directory: Path) -> tuple[float, float]:
 
 
 def _take_in(messages: list[bytes], plan: Plan, acceptance: Acceptance, directory: Path) -> float:
-    writer = DatasetWriter.create(directory, plan)
+    create(directory, plan)
+    writer = DatasetWriter(directory, plan)
     task = task_of(plan.config)
     columns = task.columns
     began = time.perf_counter()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from contextlib import closing
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -14,6 +15,7 @@ from throwcollect.config.target_columns import is_target
 from throwcollect.config.values import reason_not_sweepable
 from throwcollect.dataset.bag import refuse_other_directory
 from throwcollect.dataset.configuration import unfitting_plan
+from throwcollect.dataset.creation import create
 from throwcollect.dataset.directory import CONFIG, PLAN, SHARD_SUFFIX, THROWS, TRIALS, config_path
 from throwcollect.dataset.misses import read_targets
 from throwcollect.dataset.rebuild import read_earlier_rows, reason_lost
@@ -93,8 +95,8 @@ def repair(directory: Path, output: Path, *, remake: Remake) -> Repaired:
     plan = _read_or_remake_plan(directory, config, remake, remarks)
     earlier = read_earlier_rows(directory, plan)
     with new_directory(output) as beside:
-        writer = DatasetWriter.create(beside, plan, listed=_find_list(directory, plan, remarks))
-        try:
+        create(beside, plan, listed=_find_list(directory, plan, remarks))
+        with closing(DatasetWriter(beside, plan)) as writer:
             digests = {trial: row["digest"] for trial, row in earlier.items() if row["digest"] is not None}
             sorting = _Sorting(plan, writer, digests, remarks)
             for path in sorted(directory.iterdir()):
@@ -103,8 +105,6 @@ def repair(directory: Path, output: Path, *, remake: Remake) -> Repaired:
             sorting.settle(directory)
             lost = sorting.give_up(earlier)
             writer.finish()
-        finally:
-            writer.close()
     return Repaired(len(plan.trials), len(sorting.taken), lost, tuple(sorting.differing), tuple(remarks))
 
 

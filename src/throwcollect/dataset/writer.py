@@ -18,7 +18,6 @@ import pyarrow as pa
 from throwcollect.config.loader import dump_yaml
 from throwcollect.config.schema import Config
 from throwcollect.dataset.configuration import read_config
-from throwcollect.dataset.creation import create
 from throwcollect.dataset.data_card import count_outcomes, data_card
 from throwcollect.dataset.directory import CARD, CONFIG, MANIFEST, METADATA, PLAN, THROWS
 from throwcollect.dataset.journal import Event, Journal, was_open
@@ -36,7 +35,6 @@ from throwcollect.errors import DatasetError
 from throwcollect.files import remove, write_file
 from throwcollect.robots.description import full_description
 from throwcollect.sweep.plan import Plan
-from throwcollect.sweep.points import Points
 from throwcollect.sweep.round_file import append_round
 from throwcollect.sweep.trials import Trials
 from throwcollect.tasks.result import LOST, Result
@@ -88,17 +86,6 @@ class DatasetWriter:
     def plan(self) -> Plan:
         """The trials."""
         return self._layout.plan
-
-    @classmethod
-    def create(cls, directory: Path, plan: Plan, *, listed: Points | None = None) -> DatasetWriter:
-        """Create a dataset and open it; see `creation.create`.
-
-        Raises:
-            ConfigError: If the directory holds files already, or cannot be made.
-            DatasetError: If the files cannot be written; nothing is left behind then.
-        """
-        create(directory, plan, listed=listed)
-        return cls(directory, plan)
 
     @classmethod
     def open(cls, directory: Path) -> DatasetWriter:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from tests.unit.sweep.own_plan import make_plan
 
 from throwcollect.config.schema import Config
+from throwcollect.dataset.creation import create
 from throwcollect.dataset.writer import DatasetWriter
 from throwcollect.episode.channels import Channels
 from throwcollect.episode.chunk_encoder import ChunkEncoder
@@ -23,6 +24,7 @@ from throwcollect.robots.description import full_description, start_posture
 from throwcollect.robots.quintic_curve import sample_quintic
 from throwcollect.robots.talos import TALOS
 from throwcollect.sweep.plan import Plan
+from throwcollect.sweep.points import Points
 from throwcollect.tasks.free_flight import ballistic_positions
 from throwcollect.tasks.task import task_of
 from throwcollect.tasks.throw.throw_result import ThrowResult
@@ -95,6 +97,11 @@ def _product(turns: NDArray[np.float64], quaternion: NDArray[np.float64]) -> NDA
     )
 
 
+def create_and_open(directory: Path, plan: Plan, *, listed: Points | None = None) -> DatasetWriter:
+    create(directory, plan, listed=listed)
+    return DatasetWriter(directory, plan)
+
+
 class Collection:
     """A plan and the throws of its trials."""
 
@@ -141,7 +148,7 @@ class Collection:
         lost: Iterable[int] = (),
         change: Change | None = None,
     ) -> Path:
-        writer = DatasetWriter.create(directory, self.plan)
+        writer = create_and_open(directory, self.plan)
         self.fill(writer, range(len(self.plan.trials)) if trials is None else trials, lost=lost, change=change)
         writer.finish(wall_s=1.5, simulations=2)
         writer.close()

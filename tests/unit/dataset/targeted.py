@@ -5,10 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-from tests.unit.dataset.conftest import Change, Collection
+from tests.unit.dataset.conftest import Change, Collection, create_and_open
 
 from throwcollect.coordinator.prepare import make_self_contained
-from throwcollect.dataset.writer import DatasetWriter
 from throwcollect.sweep.point_file import read_points
 
 LIST = """\
@@ -35,7 +34,7 @@ def collect_targeted(directory: Path, text: str = LIST, *, height_m: float = 0.0
     """Collect a list to a finished dataset."""
     collection = plan_targeted(directory, text, height_m=height_m)
     listed = read_points(directory.with_suffix(".csv"), collection.config)
-    writer = DatasetWriter.create(directory, collection.plan, listed=listed)
+    writer = create_and_open(directory, collection.plan, listed=listed)
     collection.fill(writer, range(len(collection.plan.trials)), change=change)
     writer.finish(wall_s=1.5, simulations=2)
     writer.close()

@@ -10,6 +10,7 @@ from typing import Any
 
 import pyarrow.parquet as pq
 import pytest
+from tests.unit.dataset.conftest import create_and_open
 from tests.unit.dataset.damage import flip
 from tests.unit.sweep.own_plan import make_plan
 
@@ -18,7 +19,6 @@ from throwcollect.dataset.mcap_reader import open_mcap
 from throwcollect.dataset.repair import DifferingEpisode, LostTrial, repair
 from throwcollect.dataset.scan import scan_whole
 from throwcollect.dataset.verify import verify
-from throwcollect.dataset.writer import DatasetWriter
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.sweep.plan import Plan
 
@@ -105,7 +105,7 @@ def test_repair_loses_only_the_damaged_episode(collection: Any, dataset: Path, o
     assert repaired.episodes == 6
     assert verify(output) == []
     assert {path.name: path.read_bytes() for path in dataset.iterdir()} == before
-    writer = DatasetWriter.create(tmp_path / "same", collection.plan)
+    writer = create_and_open(tmp_path / "same", collection.plan)
     collection.fill(writer, [0, 1, 2, 3, 5, 6])
     writer.append_lost(4, "no whole episode of it was left")
     writer.finish(wall_s=1.0)
@@ -129,7 +129,7 @@ def test_repair_keeps_trials_that_were_lost_before_and_does_not_count_them(
 
 def test_repair_finishes_an_unfinished_dataset(collection: Any, tmp_path: Path, output: Path) -> None:
     directory = tmp_path / "begun"
-    writer = DatasetWriter.create(directory, collection.plan)
+    writer = create_and_open(directory, collection.plan)
     collection.fill(writer, [5, 0, 2, 1, 3])
     writer.close()
     repaired = repair(directory, output, remake=never)

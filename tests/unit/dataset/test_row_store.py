@@ -11,6 +11,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
+from tests.unit.dataset.conftest import create_and_open
 
 from throwcollect.dataset import writer
 from throwcollect.dataset.bag import FileSummary
@@ -75,7 +76,7 @@ def test_a_trial_of_a_finished_shard_takes_little_memory(
 ) -> None:
     monkeypatch.setattr(writer, "OpenShard", ShardWithoutFile)
     plan = make_collection({"trials": TRIALS, "record": {"trials_per_shard": PER_SHARD}}).plan
-    filled = writer.DatasetWriter.create(tmp_path / "dataset", plan)
+    filled = create_and_open(tmp_path / "dataset", plan)
     used = []
     tracemalloc.start()
     try:

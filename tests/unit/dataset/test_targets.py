@@ -12,7 +12,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.parquet as pq
 import pytest
-from tests.unit.dataset.conftest import Collection
+from tests.unit.dataset.conftest import Collection, create_and_open
 from tests.unit.dataset.mutations import fit_manifest
 from tests.unit.dataset.targeted import LIST, WITHOUT_TARGETS, collect_targeted, plan_targeted
 
@@ -202,7 +202,7 @@ def test_a_repaired_dataset_has_the_targets_and_the_list(targeted: Path, tmp_pat
 def test_a_resumed_collection_keeps_its_targets(targeted: Path, tmp_path: Path) -> None:
     collection = plan_targeted(tmp_path / "data")
     shutil.copy(targeted / "trials.parquet", tmp_path / "trials.parquet")
-    writer = DatasetWriter.create(tmp_path / "data", collection.plan)
+    writer = create_and_open(tmp_path / "data", collection.plan)
     shutil.copy(targeted / "trials.parquet", tmp_path / "data" / "trials.parquet")
     collection.fill(writer, [0, 3])
     writer.close()

@@ -10,6 +10,7 @@ from typing import Any
 
 import pyarrow.parquet as pq
 import pytest
+from tests.unit.dataset.conftest import create_and_open
 
 from throwcollect.config.loader import load
 from throwcollect.dataset.creation import create
@@ -60,7 +61,7 @@ def test_keys_under_run_do_not_change_the_files(make_collection: Any, tmp_path: 
 
 def test_a_shard_has_a_temporary_name_until_its_last_trial_is_in(collection: Any, tmp_path: Path) -> None:
     directory = tmp_path / "dataset"
-    writer = DatasetWriter.create(directory, collection.plan)
+    writer = create_and_open(directory, collection.plan)
     collection.fill(writer, [1, 2])
     assert sorted(path.name for path in directory.glob("*.mcap*")) == ["quick_00000.mcap.part"]
     collection.fill(writer, [0])
@@ -72,7 +73,7 @@ def test_a_shard_has_a_temporary_name_until_its_last_trial_is_in(collection: Any
 
 def test_a_shard_without_any_episode_leaves_no_file(collection: Any, tmp_path: Path) -> None:
     directory = tmp_path / "dataset"
-    writer = DatasetWriter.create(directory, collection.plan)
+    writer = create_and_open(directory, collection.plan)
     with file_size_limit(0), pytest.raises(DatasetError, match="cannot be written"):
         collection.fill(writer, [0])
     assert (directory / "quick_00000.mcap.part").exists()
@@ -87,7 +88,7 @@ def test_an_open_shard_holds_each_episode_as_soon_as_it_is_appended(collection: 
     from mcap.records import Chunk, Metadata
     from mcap.stream_reader import StreamReader
 
-    writer = DatasetWriter.create(tmp_path / "dataset", collection.plan)
+    writer = create_and_open(tmp_path / "dataset", collection.plan)
     for arrived, trial in enumerate([2, 0], start=1):
         collection.fill(writer, [trial])
         with (tmp_path / "dataset" / "quick_00000.mcap.part").open("rb") as file:
@@ -175,7 +176,7 @@ def test_a_dataset_that_cannot_be_written_leaves_no_directory(collection: Any, t
 def test_an_episode_that_does_not_fit_on_the_disk_leaves_the_shard_as_it_was(
     collection: Any, collected: Path, tmp_path: Path
 ) -> None:
-    writer = DatasetWriter.create(tmp_path / "dataset", collection.plan)
+    writer = create_and_open(tmp_path / "dataset", collection.plan)
     collection.fill(writer, [0])
     part = tmp_path / "dataset" / "quick_00000.mcap.part"
     before = part.read_bytes()
@@ -194,7 +195,7 @@ def test_an_episode_that_does_not_fit_on_the_disk_leaves_the_shard_as_it_was(
 def test_collecting_can_go_on_after_the_first_episode_did_not_fit_on_the_disk(
     collection: Any, collected: Path, tmp_path: Path
 ) -> None:
-    writer = DatasetWriter.create(tmp_path / "dataset", collection.plan)
+    writer = create_and_open(tmp_path / "dataset", collection.plan)
     with file_size_limit(5000), pytest.raises(DatasetError, match="cannot be written: File too large"):
         collection.fill(writer, [0])
     collection.fill(writer, range(7))
@@ -206,7 +207,7 @@ def test_a_shard_that_cannot_be_finished_on_a_full_disk_keeps_all_its_episodes_f
     collection: Any, collected: Path, tmp_path: Path
 ) -> None:
     directory = tmp_path / "dataset"
-    writer = DatasetWriter.create(directory, collection.plan)
+    writer = create_and_open(directory, collection.plan)
     collection.fill(writer, [0, 1])
     # The finished file is larger than the open one by its summary.
     with (
@@ -225,7 +226,7 @@ def test_a_shard_that_cannot_be_finished_on_a_full_disk_keeps_all_its_episodes_f
 
 def test_the_writer_refuses_second_refused_and_unknown_episodes(collection: Any, tmp_path: Path) -> None:
     collection.refuse(3, "too fast")
-    writer = DatasetWriter.create(tmp_path / "dataset", collection.plan)
+    writer = create_and_open(tmp_path / "dataset", collection.plan)
     collection.fill(writer, [0])
     for trial in (0, 3):
         with pytest.raises(DatasetError, match=f"no episode of trial {trial} is waited for"):
@@ -240,7 +241,7 @@ def test_the_writer_refuses_second_refused_and_unknown_episodes(collection: Any,
 
 
 def test_the_writer_refuses_a_damaged_episode(collection: Any, tmp_path: Path) -> None:
-    writer = DatasetWriter.create(tmp_path / "dataset", collection.plan)
+    writer = create_and_open(tmp_path / "dataset", collection.plan)
     whole = collection.episode(0)
     chunk = whole.chunk
     damaged = Episode(whole.header, RecordedChunk(replace(chunk, crc=chunk.crc ^ 1), whole.state.records_sha256))
@@ -252,7 +253,7 @@ def test_the_writer_refuses_a_damaged_episode(collection: Any, tmp_path: Path) -
 
 
 def test_a_dataset_with_missing_trials_is_not_finished(collection: Any, tmp_path: Path) -> None:
-    writer = DatasetWriter.create(tmp_path / "dataset", collection.plan)
+    writer = create_and_open(tmp_path / "dataset", collection.plan)
     collection.fill(writer, [0, 1, 3, 4, 5, 6])
     with pytest.raises(DatasetError, match="lacks 1 trial, such as 2"):
         writer.finish(wall_s=1.0)

@@ -6,11 +6,10 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
-from tests.unit.dataset.conftest import Collection
+from tests.unit.dataset.conftest import Collection, create_and_open
 
 from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.verify import verify
-from throwcollect.dataset.writer import DatasetWriter
 from throwcollect.derive.selection import merge
 from throwcollect.derive.source import source
 from throwcollect.derive.split import SQUARES, _find_cells, assign, split
@@ -40,7 +39,7 @@ def some(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Twelve throws, the last four of which do not land."""
     collection = Collection({"trials": 12})
     directory = tmp_path_factory.mktemp("split") / "some"
-    writer = DatasetWriter.create(directory, collection.plan)
+    writer = create_and_open(directory, collection.plan)
     collection.fill(writer, range(8))
     collection.fill(writer, range(8, 12), change=hold_ball)
     writer.finish(wall_s=1.0)
