@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 from throwcollect.dataset.reader import Dataset
+from throwcollect.episode.record import EpisodeHeader, Samples
 from throwcollect.errors import DatasetError
 from throwcollect.wording import command
 
@@ -25,3 +26,14 @@ def locating_damage(dataset: Dataset, trial: int) -> Iterator[None]:
         located = error.locate(dataset.directory, f"trial {trial}")
         located.hint = located.hint or command("dataset", "verify", dataset.directory)
         raise located from error
+
+
+def read_samples(dataset: Dataset, trial: int) -> tuple[EpisodeHeader, Samples]:
+    """Read header and samples of a trial's episode.
+
+    Raises:
+        DatasetError: If there is no episode, it is not where the table says, or it is damaged.
+    """
+    with locating_damage(dataset, trial):
+        episode = dataset.episode(trial)
+        return episode.header, episode.samples(dataset.joints)

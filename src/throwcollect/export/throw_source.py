@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from throwcollect.arguments import is_whole, refuse_argument, show_value
 from throwcollect.config.target_columns import TargetColumn
-from throwcollect.dataset.damage import locating_damage
+from throwcollect.dataset.damage import read_samples
 from throwcollect.dataset.reader import Dataset
 from throwcollect.episode.record import Samples
 from throwcollect.errors import DatasetError
@@ -134,13 +134,11 @@ class ExportSource:
         """
         dataset = self.dataset
         for entry in entries:
-            with locating_damage(dataset, entry.trial):
-                episode = dataset.episode(entry.trial)
-                recorded = episode.samples(dataset.joints)
+            header, recorded = read_samples(dataset, entry.trial)
             samples = resample(recorded, recorded_hz=dataset.config.record.rate_hz, rate_hz=self.rate_hz)
             planned = dataset.plan.trial(entry.trial)
             trajectory = trajectory_of(dataset.plan.config_of(planned))
-            signals = _compute_signals(samples, trajectory, episode.header.start_ns)
+            signals = _compute_signals(samples, trajectory, header.start_ns)
             target = {column.name: planned.target[column.name] for column in self.targets}
             signals |= {name: np.full((len(samples), 1), value) for name, value in target.items()}
             yield ThrowSeries(entry.trial, entry.succeeded, signals, trajectory, target)

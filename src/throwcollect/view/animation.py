@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from throwcollect.config.schema import Config
-from throwcollect.dataset.damage import locating_damage
+from throwcollect.dataset.damage import read_samples
 from throwcollect.dataset.reader import Dataset
 from throwcollect.engines.bullet.renderer import Renderer
 from throwcollect.episode.record import Samples
@@ -73,8 +73,7 @@ def render(directory: Path, output: Path, *, trial: int | None = None, slow: flo
     dataset = Dataset.open(directory)
     row = choose_rows(dataset, None if trial is None else [trial])[0]
     config = dataset.plan.config_of(dataset.plan.trial(row["trial"]))
-    with locating_damage(dataset, row["trial"]):
-        samples = dataset.episode(row["trial"]).samples(dataset.joints)
+    _, samples = read_samples(dataset, row["trial"])
     pictures = _draw_all(config, dataset.joints, samples, row, slow)
     if kind == "GIF":
         pictures = _reduce_colours(pictures)

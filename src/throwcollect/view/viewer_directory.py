@@ -8,11 +8,10 @@ from pathlib import Path
 from typing import Any
 
 from throwcollect.dataset.bag import BAG_SECTION, bag_information, to_yaml
-from throwcollect.dataset.damage import locating_damage
+from throwcollect.dataset.damage import read_samples
 from throwcollect.dataset.directory import METADATA
 from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.throws_table import Row
-from throwcollect.episode.record import Samples
 from throwcollect.files import new_directory
 from throwcollect.view.drawn_robot import draw_robot_of
 from throwcollect.view.foxglove import layout
@@ -61,7 +60,7 @@ def view(directory: Path, output: Path, trials: Iterable[int] | None = None) -> 
         path = beside / RECORDING
         with path.open("wb") as stream:
             recording = ViewRecording(stream, config)
-            recording.write(throws, lambda throw: _read_samples(dataset, throw.row))
+            recording.write(throws, lambda throw: read_samples(dataset, throw.row["trial"])[1])
             summary = recording.finish(RECORDING)
         information = {BAG_SECTION: bag_information([summary], recording.channels, {})}
         (beside / METADATA).write_text(to_yaml(information), encoding="utf-8")
@@ -84,13 +83,8 @@ def _schedule(dataset: Dataset, rows: Iterable[Row]) -> list[ShownThrow]:
     """Schedule throws one after another with a pause, regardless of their times in the dataset."""
     throws, start = [], _FIRST_NS
     for row in rows:
-        samples = _read_samples(dataset, row)
+        _, samples = read_samples(dataset, row["trial"])
         config = dataset.plan.config_of(dataset.plan.trial(row["trial"]))
         throws.append(ShownThrow(row, config, start, samples.ball_position.copy()))
         start += int(samples.stamps_ns[-1] - samples.stamps_ns[0]) + _PAUSE_NS
     return throws
-
-
-def _read_samples(dataset: Dataset, row: Row) -> Samples:
-    with locating_damage(dataset, row["trial"]):
-        return dataset.episode(row["trial"]).samples(dataset.joints)

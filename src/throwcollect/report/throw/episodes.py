@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from throwcollect.config.schema import Config
-from throwcollect.dataset.damage import locating_damage
+from throwcollect.dataset.damage import read_samples
 from throwcollect.dataset.reader import Dataset
-from throwcollect.episode.record import EpisodeHeader, Samples
+from throwcollect.episode.record import EpisodeHeader
 from throwcollect.report.outcomes import LANDED, Outcomes
 from throwcollect.report.throw.landings import Landings
 from throwcollect.robots.quintic_curve import sample_positions
@@ -101,7 +101,7 @@ def measure_residuals(dataset: Dataset) -> Residuals:
     chosen = np.sort(np.random.default_rng(0).permutation(trials)[:MOST_RESIDUALS])
     distances = []
     for trial in chosen.tolist():
-        header, samples = _read(dataset, trial)
+        header, samples = read_samples(dataset, trial)
         config = dataset.plan.config_of(dataset.plan.trial(trial))
         distance = flight_residual(samples, header, config=config)
         if distance is not None:
@@ -131,7 +131,7 @@ def read_paths(dataset: Dataset, trials: Sequence[int]) -> Iterator[BallPath]:
     """
     outcomes = dataset.throws["outcome"]
     for trial in trials:
-        header, samples = _read(dataset, trial)
+        header, samples = read_samples(dataset, trial)
         release_ns = _find_release(header, dataset.config)
         release = None if release_ns is None else int(np.searchsorted(samples.stamps_ns, release_ns))
         yield BallPath(trial, outcomes[trial].as_py(), samples.ball_position, release)
@@ -143,7 +143,7 @@ def read_motion(dataset: Dataset, trial: int) -> JointMotion:
     Raises:
         DatasetError: If the episode is not where the table says, or is damaged.
     """
-    header, samples = _read(dataset, trial)
+    header, samples = read_samples(dataset, trial)
     config = dataset.plan.config_of(dataset.plan.trial(trial))
     trajectory = trajectory_of(config)
     times = samples.seconds_since(header.start_ns)
@@ -157,12 +157,6 @@ def read_motion(dataset: Dataset, trial: int) -> JointMotion:
         measured=samples.position[:, columns],
         release_s=None if release_ns is None else header.seconds_at(release_ns),
     )
-
-
-def _read(dataset: Dataset, trial: int) -> tuple[EpisodeHeader, Samples]:
-    with locating_damage(dataset, trial):
-        episode = dataset.episode(trial)
-        return episode.header, episode.samples(dataset.joints)
 
 
 def _find_release(header: EpisodeHeader, config: Config) -> int | None:
