@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from throwcollect.episode.frames import WORLD
-from throwcollect.view.throw_status import HARDWARE, NAME
+from throwcollect.view.viewer_recording import FACTS_HARDWARE, FACTS_NAME
 
 _SCENE = "3D!throws"
 _BALL = "Plot!ball"
@@ -28,7 +28,7 @@ def layout(joints: Sequence[str]) -> bytes:
             [*shares, _describe_series("-1", "lower limit"), _describe_series("1", "upper limit")],
             "Joint positions within their limits",
         ),
-        _FACTS: {"topicToRender": "/view/facts", "selectedHardwareId": HARDWARE, "selectedName": NAME},
+        _FACTS: {"topicToRender": "/view/facts", "selectedHardwareId": FACTS_HARDWARE, "selectedName": FACTS_NAME},
     }
     document = {
         "configById": panels,

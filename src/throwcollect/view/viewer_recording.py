@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import IO
+from typing import IO, Any
 
 from mcap.writer import CompressionType, Writer
 
@@ -16,14 +16,24 @@ from throwcollect.dataset.mcap_file import LIBRARY, PROFILE, declarations
 from throwcollect.episode.channels import Channel, Qos
 from throwcollect.episode.frames import FrameTree, read_frames
 from throwcollect.episode.record import Samples
-from throwcollect.episode.topics import Recording, ball_odometry, joint_states, transform_message, transforms
+from throwcollect.episode.topics import (
+    Recording,
+    ball_odometry,
+    joint_states,
+    make_header,
+    transform_message,
+    transforms,
+)
 from throwcollect.robots.description import full_description, robot_of
 from throwcollect.tools.tool import tool_of
 from throwcollect.view.drawn_robot import ball_urdf, draw_robot_of
 from throwcollect.view.markers import all_markers, path_cloud, shape_markers, throw_markers
 from throwcollect.view.sampled import ball_speed, range_shares
 from throwcollect.view.shown_throws import ShownThrow
-from throwcollect.view.throw_status import throw_facts
+
+FACTS_NAME = "throw"
+FACTS_HARDWARE = "throwcollect"
+"""Hardware id of the facts of a throw; a layout names them for a panel by this and `FACTS_NAME`."""
 
 _SAMPLED = Qos("volatile", 100)
 _LATCHED = Qos("transient_local", 1)
@@ -90,7 +100,7 @@ class ViewRecording:
             self._put_looks(throw)
             self._put("/view/throw", throw.start_ns, throw_markers(throw))
             self._put("/view/path", throw.start_ns, path_cloud(throw))
-            self._put("/view/facts", throw.start_ns, throw_facts(throw))
+            self._put("/view/facts", throw.start_ns, _make_facts(throw))
             self._put_samples(samples(throw), throw.start_ns)
 
     def finish(self, name: str) -> FileSummary:
@@ -141,3 +151,25 @@ class ViewRecording:
 
 def _read_frames(config: Config) -> FrameTree:
     return read_frames(full_description(config), base_height=config.robot.base_height_m)
+
+
+def _make_facts(throw: ShownThrow) -> Any:
+    """A diagnostic_msgs/DiagnosticArray with the row of a throw, without columns that are null.
+
+    Its only status is OK if the trial succeeded, else a warning.
+    """
+    row = throw.row
+    status, pair = (get_message(f"diagnostic_msgs/msg/{name}") for name in ("DiagnosticStatus", "KeyValue"))
+    shown = status(
+        level=status.OK if row["outcome"] == throw.config.task.success else status.WARN,
+        name=FACTS_NAME,
+        hardware_id=FACTS_HARDWARE,
+        message=": ".join(part for part in (f"trial {row['trial']} {row['outcome']}", row["reason"]) if part),
+        values=[pair(key=key, value=_write_text(value)) for key, value in row.items() if value is not None],
+    )
+    header = make_header("", throw.start_ns)
+    return get_message("diagnostic_msgs/msg/DiagnosticArray")(header=header, status=[shown])
+
+
+def _write_text(value: object) -> str:
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
