@@ -19,6 +19,7 @@ from throwcollect.dataset.verify_motion import find_ball_problems, find_joint_pr
 from throwcollect.episode.channels import Channels
 from throwcollect.episode.episode_message import Episode
 from throwcollect.episode.record import Samples, find_infinite_columns
+from throwcollect.episode.topics import read_stamps
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.robots.description import robot_of, touchable_bodies
 from throwcollect.sweep.plan import Plan
@@ -187,11 +188,9 @@ def _find_message_problems(episode: Episode, channels: Channels) -> Iterator[str
             yield f"messages of {topic.name} are not laid out as {topic.type_name} is written here"
             continue
         rows = messages.view(topic.layout.dtype)[:, 0]
-        for name in topic.layout.dtype.names or ():
-            if name.endswith(("stamp.sec", "clock.sec")):
-                stamps = rows[name].astype(np.int64) * NS_PER_S + rows[name.replace(".sec", ".nanosec")]
-                if not np.array_equal(stamps, episode.table.log_times):
-                    yield f"stamps of {topic.name} ({name.removesuffix('.sec')}) differ from the times of its records"
+        for stamp in topic.stamps:
+            if not np.array_equal(read_stamps(rows, stamp), episode.table.log_times):
+                yield f"stamps of {topic.name} ({stamp}) differ from the times of its records"
 
 
 def _find_record_problems(stored: StoredEpisode) -> Iterator[str]:

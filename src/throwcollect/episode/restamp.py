@@ -20,22 +20,13 @@ from throwcollect.episode.recorded_chunk import RecordedChunk
 from throwcollect.episode.topics import put_stamps, read_stamps
 from throwcollect.errors import DatasetError
 
-_SECONDS = ("stamp.sec", "clock.sec")
-"""Ends of the paths of fields with the seconds of a stamp; durations, such as `time_from_start`, stay as they are."""
-
 
 class Restamper:
     """Gives episodes of one configuration other numbers; threads may share a restamper."""
 
     def __init__(self, config: Config, channels: Channels) -> None:
         self._config = config
-        self._topics = {
-            channel.id: (
-                topic,
-                [name.removesuffix(".sec") for name in topic.layout.dtype.names or () if name.endswith(_SECONDS)],
-            )
-            for channel, topic in channels.recorded.items()
-        }
+        self._topics = {channel.id: topic for channel, topic in channels.recorded.items()}
 
     def restamp(self, episode: Episode, trial: int) -> Episode:
         """Make the episode that trial `trial` of the configuration would have yielded.
@@ -70,7 +61,7 @@ class Restamper:
     def _move(self, table: MessageTable, by_ns: int) -> None:
         if list(table.columns) != list(self._topics):
             raise DatasetError(f"chunk: has the channels {list(table.columns)}", expected=f"{list(self._topics)}")
-        for channel, (topic, stamps) in self._topics.items():
+        for channel, topic in self._topics.items():
             messages = table.messages(channel)
             if not topic.layout.describes_message(messages[0].tobytes()):
                 raise DatasetError(f"chunk: messages of {topic.name} are not laid out as {topic.type_name} is here")
@@ -79,7 +70,7 @@ class Restamper:
                 # Times are unsigned, and the way to an earlier slot is negative.
                 headers[time] = headers[time].astype(np.int64) + by_ns
             rows = messages.view(topic.layout.dtype)[:, 0]
-            for stamp in stamps:
+            for stamp in topic.stamps:
                 put_stamps(rows, stamp, read_stamps(rows, stamp) + by_ns)
 
 
