@@ -16,7 +16,7 @@ from throwcollect.episode.topics import (
     clock,
     controller_state,
     joint_states,
-    transform_message,
+    make_fixed_transforms,
     transforms,
 )
 from throwcollect.robots.description import robot_of
@@ -142,13 +142,9 @@ class Channels:
     def encode_latched_messages(self, stamp_ns: int) -> dict[Channel, bytes]:
         """Encode the CDR messages of the latched channels; `stamp_ns` is the stamp of the static transforms [ns]."""
         description, static = self.latched
-        fixed = [
-            transform_message(frame.parent, frame.child, frame.translation, frame.rotation_xyzw, stamp_ns)
-            for frame in self._frames.fixed
-        ]
         return {
             description: serialize(get_message(description.type_name)(data=self.robot)),
-            static: serialize(get_message(static.type_name)(transforms=fixed)),
+            static: serialize(make_fixed_transforms(self._frames.fixed, stamp_ns)),
         }
 
 

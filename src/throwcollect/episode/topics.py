@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rclzenoh.interfaces import deserialize, get_message
-from throwcollect.episode.frames import WORLD, MovingFrame
+from throwcollect.episode.frames import WORLD, Frame, MovingFrame
 from throwcollect.episode.message_layout import MessageLayout
 from throwcollect.episode.record import ControllerSamples, Samples
 from throwcollect.errors import DatasetError
@@ -213,7 +213,7 @@ def transforms(frames: tuple[MovingFrame, ...], joints: Sequence[str]) -> Topic:
     kind = "tf2_msgs/msg/TFMessage"
     columns = [joints.index(frame.joint) for frame in frames]
     pairs = [(WORLD, BALL, (0.0, 0.0, 0.0)), *((frame.parent, frame.child, frame.translation) for frame in frames)]
-    message = get_message(kind)(transforms=[transform_message(*pair, (0.0, 0.0, 0.0, 1.0), 0) for pair in pairs])
+    message = get_message(kind)(transforms=[_make_transform(*pair, (0.0, 0.0, 0.0, 1.0), 0) for pair in pairs])
     variable = [f"transforms.{n}.{path}" for n in range(len(pairs)) for path in (*_STAMP, "transform.rotation")]
     layout = MessageLayout(message, [*variable, "transforms.0.transform.translation"])
 
@@ -230,7 +230,13 @@ def transforms(frames: tuple[MovingFrame, ...], joints: Sequence[str]) -> Topic:
     return Topic("/tf", kind, layout, fill)
 
 
-def transform_message(
+def make_fixed_transforms(frames: Sequence[Frame], stamp_ns: int) -> Any:
+    """Make the tf2_msgs/TFMessage of frames that never move."""
+    poses = ((frame.parent, frame.child, frame.translation, frame.rotation_xyzw) for frame in frames)
+    return get_message("tf2_msgs/msg/TFMessage")(transforms=[_make_transform(*pose, stamp_ns) for pose in poses])
+
+
+def _make_transform(
     parent: str,
     child: str,
     translation: tuple[float, float, float],

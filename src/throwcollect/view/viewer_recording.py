@@ -20,8 +20,8 @@ from throwcollect.episode.topics import (
     Recording,
     ball_odometry,
     joint_states,
+    make_fixed_transforms,
     make_header,
-    transform_message,
     transforms,
 )
 from throwcollect.robots.description import full_description, robot_of
@@ -114,15 +114,11 @@ class ViewRecording:
         looks = full_description(config), ball_urdf(config.ball), config.robot.base_height_m
         if looks == self._looks:
             return
-        string, transforms_type = get_message("std_msgs/msg/String"), get_message("tf2_msgs/msg/TFMessage")
+        string = get_message("std_msgs/msg/String")
         robot, tool = draw_robot_of(config), tool_of(config).link
         self._put("/robot_description", start, string(data=robot.urdf))
         self._put("/view/ball/robot_description", start, string(data=ball_urdf(config.ball)))
-        fixed = [
-            transform_message(frame.parent, frame.child, frame.translation, frame.rotation_xyzw, start)
-            for frame in _read_frames(config).fixed
-        ]
-        self._put("/tf_static", start, transforms_type(transforms=fixed))
+        self._put("/tf_static", start, make_fixed_transforms(_read_frames(config).fixed, start))
         parts = {"tool": [shape for shape in robot.shapes if shape.link == tool]}
         if self._looks is None:
             # The robot's meshes are large, and the same in all trials, so they are written only once.
