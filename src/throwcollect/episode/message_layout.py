@@ -103,14 +103,11 @@ class MessageLayout:
         # A fixed part begins and ends where this changes; beyond the message, everything counts as variable.
         changes = np.flatnonzero(np.diff(varies, prepend=True, append=True)).tolist()
         self._fixed_parts = [slice(start, end) for start, end in zip(changes[::2], changes[1::2], strict=True)]
-        self._fixed_bits = int.from_bytes(np.where(varies, 0, 255).astype(np.uint8).tobytes(), "little")
-        self._fixed = int.from_bytes(self.template, "little") & self._fixed_bits
 
     def describes_message(self, message: bytes | bytearray) -> bool:
-        """Say the same as `describes` about one message, in a tenth of the time."""
-        # One operation on an integer as long as the message is faster than several on arrays.
-        fixed = int.from_bytes(message, "little") & self._fixed_bits
-        return len(message) == len(self.template) and fixed == self._fixed
+        """Say the same as `describes` about one message, in a fraction of the time."""
+        alike = (message[part] == self.template[part] for part in self._fixed_parts)
+        return len(message) == len(self.template) and all(alike)
 
     def describes(self, rows: NDArray[np.uint8]) -> bool:
         """Say whether messages, shape ``(n, size)``, differ from the template in nothing but the variable fields."""
