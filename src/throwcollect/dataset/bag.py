@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from ruamel.yaml import YAML
 from ruamel.yaml.composer import Composer, ComposerError
@@ -21,10 +21,11 @@ from ruamel.yaml.events import AliasEvent
 from rclzenoh.interfaces import type_hash
 from throwcollect.config.yaml_nodes import line, reason
 from throwcollect.dataset.directory import METADATA, PLAN, has_files
-from throwcollect.dataset.next_command import find_next_command
+from throwcollect.dataset.lock import is_locked
 from throwcollect.episode.channels import Channel
 from throwcollect.errors import DatasetError
 from throwcollect.files import read_text
+from throwcollect.wording import command
 
 VERSION = 9
 BAG_SECTION = "rosbag2_bagfile_information"
@@ -135,6 +136,21 @@ def _parse(text: str) -> Any:
     yaml = YAML(typ="safe", pure=True)
     yaml.Composer = _PlainComposer
     return yaml.load(text)
+
+
+class NextCommand(NamedTuple):
+    """The state of an unfinished dataset, such as ``is not finished``; a command to go on with, and what it does."""
+
+    state: str
+    command: str
+    purpose: str
+
+
+def find_next_command(directory: Path) -> NextCommand:
+    """Find the state of an unfinished dataset; on file systems without locks, a run that works on it goes unnoticed."""
+    if is_locked(directory):
+        return NextCommand("is being collected", command("wait", "--run", directory), "waits for its end")
+    return NextCommand("is not finished", command("resume", directory), "goes on with it")
 
 
 def read_bag_metadata(directory: Path) -> Mapping[str, Any]:

@@ -6,9 +6,9 @@ import warnings
 from collections.abc import Iterator
 from pathlib import Path
 
+from throwcollect.dataset.bag import find_next_command
 from throwcollect.dataset.configuration import read_config
 from throwcollect.dataset.directory import METADATA, PLAN, list_shards, path_of_part
-from throwcollect.dataset.next_command import find_next_command
 from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.recovery import find_episodes
 from throwcollect.dataset.throws_table import Row, ThrowsTable
