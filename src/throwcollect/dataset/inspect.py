@@ -8,11 +8,11 @@ from pathlib import Path
 import pyarrow as pa
 
 from throwcollect.dataset.data_card import count_outcomes
-from throwcollect.dataset.dataset_digest import combine_digests
 from throwcollect.dataset.journal import measure_collected_s
 from throwcollect.dataset.misses import summarise_misses
 from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.summary import Info
+from throwcollect.dataset.summary_files import combine_digests
 from throwcollect.errors import DatasetError
 from throwcollect.files import is_there
 from throwcollect.progress_log import log_progress

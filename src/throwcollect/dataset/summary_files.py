@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+import hashlib
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 
+import numpy as np
 import pyarrow as pa
 
 from throwcollect.dataset.bag import BAG_SECTION, bag_information, to_yaml
-from throwcollect.dataset.dataset_digest import combine_digests
 from throwcollect.dataset.directory import CONFIG, FORMAT, MANIFEST, METADATA, PLAN, SOURCES, THROWS, TRIALS
 from throwcollect.dataset.manifest import entry_of, entry_of_file, manifest_text
 from throwcollect.dataset.misses import read_targets
@@ -16,6 +17,7 @@ from throwcollect.dataset.shard import Recording
 from throwcollect.episode.channels import Channels
 from throwcollect.files import replacing, write_all, write_file
 from throwcollect.sweep.parquet_file import encode_pieces
+from throwcollect.sweep.points import Targets
 
 WRITTEN = (THROWS, MANIFEST, METADATA)
 """Names of the files, in the order in which they are written: ``metadata.yaml`` marks a finished dataset."""
@@ -70,6 +72,21 @@ def write_description(
     ]
     write_file(directory / MANIFEST, manifest_text(name, entries).encode())
     write_file(directory / METADATA, metadata)
+
+
+def combine_digests(digests: Iterable[str], targets: Targets | None) -> str:
+    """Compute SHA-256 over the digests of all episodes in order of trials, each as 32 bytes; digests are hexadecimal.
+
+    The targets of all trials follow, if trials have some, as no episode contains them: of each column its name, a zero
+    byte, and the number of each trial as a little-endian double, the NaN 0x7ff8000000000000 where it has none.
+    """
+    combined = hashlib.sha256()
+    for digest in digests:
+        combined.update(bytes.fromhex(digest))
+    for name, values in () if targets is None else zip(targets.names, targets.values.T, strict=True):
+        combined.update(name.encode() + b"\0")
+        combined.update(np.where(np.isnan(values), np.nan, values).astype("<f8").tobytes())
+    return combined.hexdigest()
 
 
 def _read_digests(throws: pa.Table, on_piece: Callable[[], object]) -> Iterator[str]:

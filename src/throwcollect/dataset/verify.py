@@ -13,7 +13,6 @@ from typing import Any
 
 from throwcollect.config.schema import Config
 from throwcollect.dataset.bag import BAG_SECTION, FileSummary, bag_information, from_yaml, read_bag_metadata
-from throwcollect.dataset.dataset_digest import combine_digests
 from throwcollect.dataset.directory import (
     CARD,
     CONFIG,
@@ -30,6 +29,7 @@ from throwcollect.dataset.findings import Finding
 from throwcollect.dataset.manifest import find_changed_files, find_manifest_problems, read_manifest
 from throwcollect.dataset.mcap_file import MAGIC
 from throwcollect.dataset.mcap_reader import open_mcap
+from throwcollect.dataset.summary_files import combine_digests
 from throwcollect.dataset.throws_table import read_throws_table
 from throwcollect.dataset.verify_episode import EpisodeCheck
 from throwcollect.dataset.verify_plan import CheckOf, can_draw, find_drawing_problems, find_refusal_problems
