@@ -109,7 +109,7 @@ def submit(
         # Only from here on, because a directory that was refused holds the files of somebody else.
         undo.callback(_remove, directory, made=made, planned=planned)
         if not live:
-            Plan.read(directory / PLAN, read_frozen_config(directory), slice=Slice(0, tasks))
+            Plan.read(directory / PLAN, read_frozen_config(directory)).slice_of(Slice(0, tasks))
         image = str(scripts.image) if scripts.image else None
         submission = Submission(complete.name, tasks, tuple(scripts.program), image, live=live)
         submitted = _submit(scripts, submission, slices, onlooker)

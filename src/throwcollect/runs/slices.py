@@ -66,7 +66,7 @@ def collect_slice(
     started = datetime.now(timezone.utc)
     directory = Path(directory)
     config = read_frozen_config(directory, overrides)
-    plan = Plan.read(directory / PLAN, config, slice=slice)
+    plan = Plan.read(directory / PLAN, config).slice_of(slice)
     finished = find_finished(directory)
     # They could never be joined, which otherwise only the join would tell, after all tasks have run.
     if others := sorted({each.count for each in finished} - {slice.count}):

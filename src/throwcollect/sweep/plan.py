@@ -127,18 +127,16 @@ class Plan:
         return encode_table(make_table(columns, schema))
 
     @classmethod
-    def read(cls, path: Path, config: Config, *, slice: Slice | None = None) -> Plan:
+    def read(cls, path: Path, config: Config) -> Plan:
         """Read a plan that was written for a configuration.
 
         Args:
             path: File that `write` wrote; rounds that were added later lie beside it.
             config: The configuration; its section `run` may differ.
-            slice: Slice to cut out of the plan of the file; None for all of it.
 
         Raises:
             DatasetError: If the file is missing, damaged, or no plan.
             ForeignPlanError: If it is the plan of another configuration.
-            ConfigError: If the plan has fewer shards than there are slices.
         """
         with open_parquet(path) as file:
             metadata = file.schema_arrow.metadata or {}
@@ -177,8 +175,7 @@ class Plan:
         if trials.first:
             raise DatasetError(_MISNUMBERED, path=path)
         read_rounds(path, trials)
-        plan = cls(config, trials)
-        return plan if slice is None else plan.slice_of(slice)
+        return cls(config, trials)
 
 
 def draw_first_points(config: Config, *, directory: Path) -> Points:

@@ -89,7 +89,7 @@ def test_a_slice_of_a_plan_keeps_the_numbers_of_its_trials(plan: Plan) -> None:
 
 def test_a_slice_can_be_read_from_the_file_of_the_plan_and_from_its_own(plan: Plan, tmp_path: Path) -> None:
     plan.write(tmp_path / "plan.parquet")
-    part = Plan.read(tmp_path / "plan.parquet", plan.config, slice=Slice(1, 2))
+    part = Plan.read(tmp_path / "plan.parquet", plan.config).slice_of(Slice(1, 2))
     assert part == plan.slice_of(Slice(1, 2))
     part.write(tmp_path / "part.parquet")
     assert Plan.read(tmp_path / "part.parquet", plan.config) == part
