@@ -18,7 +18,6 @@ import traceback
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from functools import cache
-from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points
 from types import MappingProxyType
 from typing import Any, ClassVar, get_args, get_origin, get_type_hints
@@ -175,9 +174,9 @@ def explain_failure(family: str, name: str, doing: str, *, passing: tuple[type[E
 
 
 def _load(path: str) -> Any:
-    """Import an object ``module:name`` of our own."""
-    module, _, name = path.partition(":")
-    return getattr(import_module(module), name)
+    """Import an object ``module:name``."""
+    # Unlike `getattr`, an entry point also finds an attribute of an attribute.
+    return EntryPoint("", path, "").load()
 
 
 def _import(path: str, what: str) -> Any:
@@ -188,8 +187,7 @@ def _import(path: str, what: str) -> Any:
     """
     try:
         with explain_missing():
-            # Unlike `getattr`, an entry point also finds an attribute of an attribute.
-            return EntryPoint("", path, "").load()
+            return _load(path)
     except ThrowcollectError:
         raise
     except Exception as error:
