@@ -89,7 +89,7 @@ def working_side_by_side(
 
     processes = min(processes, len(pieces))
     if processes <= 1:
-        yield _do_here(pieces, begin, arguments)
+        yield map(begin(*arguments), pieces)
         return
     # If there are several threads, new interpreters are started: a fork could wait for ever for another thread's lock.
     context = multiprocessing.get_context("fork" if fork and threading.active_count() == 1 else "spawn")
@@ -138,12 +138,6 @@ def _hiding_working_directory() -> Iterator[None]:
                 del os.environ[_SAFE_PATH]
             else:
                 os.environ[_SAFE_PATH] = before
-
-
-def _do_here(
-    pieces: Sequence[_Piece], begin: Callable[..., Callable[[_Piece], _Found]], arguments: tuple[Any, ...]
-) -> Iterator[_Found]:
-    yield from map(begin(*arguments), pieces)
 
 
 _make: list[Callable[[], Callable[[Any], Any]]] = []
