@@ -91,7 +91,7 @@ def remove_plan(directory: Path, *, made: bool) -> None:
 def _fill(directory: Path, plan: Plan, listed: Points | None, *, made: bool) -> None:
     refuse_taken(directory)
     with ExitStack() as undo:
-        undo.callback(_clear, directory, remove=made)
+        undo.callback(remove_plan, directory, made=made)
         write_file(directory / CONFIG, dump_yaml(plan.config).encode())
         if listed is not None:
             write_file(directory / TRIALS, encode_points(listed))
@@ -103,11 +103,3 @@ def _fill(directory: Path, plan: Plan, listed: Points | None, *, made: bool) -> 
 def _make_unusable_error(directory: Path, error: OSError | RecursionError) -> ConfigError:
     reason = error.strerror if isinstance(error, OSError) else "it has too many levels"
     return ConfigError(f"{directory}: cannot be used as directory of a dataset: {reason}")
-
-
-def _clear(directory: Path, *, remove: bool) -> None:
-    with suppress(OSError):
-        for path in directory.iterdir():
-            path.unlink()
-        if remove:
-            directory.rmdir()

@@ -249,7 +249,7 @@ class Dataset(Sequence[Throw]):
     @property
     def recorded(self) -> Dataset:
         """The throws that have a trajectory: all but the refused and the lost."""
-        return self._replace_throws(self.throws.filter(self.throws["shard"].is_valid()))
+        return replace(self, throws=self.throws.filter(self.throws["shard"].is_valid()))
 
     def episode(self, trial: int) -> Episode:
         """Read the episode of a trial by its number, with everything that was recorded.
@@ -306,7 +306,7 @@ class Dataset(Sequence[Throw]):
             return self._take(Expression(which, place="select", is_argument=False).rows(self.throws))
         if isinstance(which, pc.Expression):
             try:
-                return self._replace_throws(self.throws.filter(which))
+                return replace(self, throws=self.throws.filter(which))
             except pa.ArrowException as error:
                 raise ConfigError(f"select: {str(error).splitlines()[0]}") from error
         values = _make_array(which)
@@ -315,13 +315,13 @@ class Dataset(Sequence[Throw]):
                 raise ConfigError(
                     f"select: a mask of {len(values)}", expected=f"one boolean for each of {len(self)} throws"
                 )
-            return self._replace_throws(self.throws.filter(values))
+            return replace(self, throws=self.throws.filter(values))
         # A number above the largest int64 becomes a negative one, which no trial has.
         rows = pc.index_in(values.cast(pa.int64(), safe=False), value_set=self.throws["trial"].combine_chunks())
         if rows.null_count:
             missing = values.filter(pc.is_null(rows))[0]
             raise DatasetError(f"no trial {missing} among the {len(self)} throws", path=self.directory)
-        return self._replace_throws(self.throws.take(rows))
+        return replace(self, throws=self.throws.take(rows))
 
     def trajectories(
         self, columns: Iterable[str] = COLUMNS, *, joints: Iterable[str] | None = None, threads: int | None = None
@@ -372,10 +372,7 @@ class Dataset(Sequence[Throw]):
         ]
 
     def _take(self, rows: Iterable[int]) -> Dataset:
-        return self._replace_throws(self.throws.take(pa.array(rows, pa.int64())))
-
-    def _replace_throws(self, throws: pa.Table) -> Dataset:
-        return replace(self, throws=throws)
+        return replace(self, throws=self.throws.take(pa.array(rows, pa.int64())))
 
 
 def _make_array(which: Any) -> pa.Array:

@@ -17,7 +17,6 @@ from throwcollect.config.schema import Config
 from throwcollect.dataset.creation import create
 from throwcollect.dataset.damage import locating_damage
 from throwcollect.dataset.directory import CARD, SOURCES
-from throwcollect.dataset.inspect import info
 from throwcollect.dataset.judging import judge_episode
 from throwcollect.dataset.reader import Dataset
 from throwcollect.dataset.throws_table import Row, ThrowsTable
@@ -110,7 +109,7 @@ def _write(sources: Sequence[Source], directory: Path, name: str | None) -> Deri
         trials=len(plan.trials),
         offered=sum(len(each.dataset.throws) for each in sources),
         without_episode=dict(sorted(without.items())),
-        digest=info(directory).digest,
+        digest=Dataset.open(directory).digest,
         repeated=_count_repeated(sources, config, points),
     )
 
