@@ -71,7 +71,8 @@ def render(directory: Path, output: Path, *, trial: int | None = None, slow: flo
         )
     require("PIL")
     dataset = Dataset.open(directory)
-    row = choose_rows(dataset, None if trial is None else [trial])[0]
+    shown = dataset.recorded[:1] if trial is None else dataset
+    row = choose_rows(shown, None if trial is None else [trial])[0]
     config = dataset.plan.config_of(dataset.plan.trial(row["trial"]))
     _, samples = read_samples(dataset, row["trial"])
     pictures = _draw_all(config, dataset.joints, samples, row, slow)

@@ -41,11 +41,14 @@ def choose_rows(dataset: Dataset, trials: Iterable[int] | None) -> list[Row]:
         if not chosen:
             raise DatasetError("no trial has an episode: there is nothing to show", path=dataset.directory)
         return chosen
-    rows, numbers = dataset.throws.to_pylist(), list(trials)
-    for number in numbers:
-        if not 0 <= number < len(rows):
-            raise ConfigError(f"{dataset.directory}: no trial {number}", expected=f"0 to {len(rows) - 1}")
-        if rows[number]["shard"] is None:
-            reason = f"{rows[number]['outcome']}: {rows[number]['reason']}"
+    rows: list[Row] = []
+    for number in trials:
+        if not 0 <= number < len(dataset):
+            raise ConfigError(f"{dataset.directory}: no trial {number}", expected=f"0 to {len(dataset) - 1}")
+        # Rows are made one by one, as those of a million trials would take 3 GB.
+        row = dataset[number].row
+        if row["shard"] is None:
+            reason = f"{row['outcome']}: {row['reason']}"
             raise DatasetError(f"trial {number} has no episode: {reason}", path=dataset.directory)
-    return [rows[number] for number in numbers]
+        rows.append(row)
+    return rows
