@@ -23,7 +23,7 @@ from throwcollect.dataset.mcap_reader import StoredEpisode
 from throwcollect.dataset.provenance import Provenance, read_provenance, write_provenance
 from throwcollect.dataset.recovery import remove_unfinished
 from throwcollect.dataset.summary_files import WRITTEN, write_description
-from throwcollect.dataset.throws_table import Row, ThrowsTable, read_throws_table
+from throwcollect.dataset.throws_table import Row, RowsByTrial, ThrowsTable, read_throws_table
 from throwcollect.dataset.verify_episode import EpisodeCheck
 from throwcollect.dataset.verify_shard import check_shard
 from throwcollect.dataset.verify_tables import find_wrong_trials
@@ -191,7 +191,7 @@ def _correct_card(path: Path, before: pa.Table, after: pa.Table) -> None:
 def read_earlier_rows(directory: Path, plan: Plan) -> Mapping[int, Row]:
     """Read the rows of the table of throws that a dataset has, by trial; none if it cannot be read."""
     with suppress(DatasetError):
-        return {row["trial"]: row for row in read_throws_table(directory / THROWS, plan).to_pylist()}
+        return RowsByTrial(read_throws_table(directory / THROWS, plan))
     return {}
 
 
