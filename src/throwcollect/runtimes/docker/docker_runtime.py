@@ -95,7 +95,8 @@ class DockerRuntime(Runtime):
         from throwcollect.runtimes.docker.held_runs import find_held_runs
 
         try:
-            return find_held_runs(connect(timeout_s=_LOOK_S))
+            with closing(connect(timeout_s=_LOOK_S)) as client:
+                return find_held_runs(client)
         except WorkerError:
             return []
 
@@ -109,7 +110,8 @@ class DockerRuntime(Runtime):
         from throwcollect.runtimes.docker.held_runs import find_held_runs
 
         try:
-            return any(found.nodes for found in find_held_runs(connect()) if found.run_id == run)
+            with closing(connect()) as client:
+                return any(found.nodes for found in find_held_runs(client) if found.run_id == run)
         except WorkerError as error:
             if error.__cause__ is None or not timed_out(error.__cause__):
                 return False
@@ -120,7 +122,8 @@ class DockerRuntime(Runtime):
         from throwcollect.runtimes.docker.docker_engine import connect
         from throwcollect.runtimes.docker.held_runs import remove
 
-        return remove(connect(), run, volumes=volumes)
+        with closing(connect()) as client:
+            return remove(client, run, volumes=volumes)
 
 
 def _refuse_other_machine() -> None:
