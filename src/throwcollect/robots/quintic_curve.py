@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from throwcollect.control.interpolation import quintic
 from throwcollect.robots.trajectory import JointTrajectory
 
 _ORDERS = np.arange(6)
@@ -60,15 +59,10 @@ def _find_polynomials(
     knots = trajectory.times
     if len(knots) < 2:
         raise ValueError(f"a curve needs at least two points, got {len(knots)}")
-    spans = knots[1:] - knots[:-1]
-    scale = spans[:, np.newaxis]
-    origin, moved = trajectory.positions[:-1], trajectory.positions[1:] - trajectory.positions[:-1]
-    v0, v1 = trajectory.velocities[:-1] * scale, trajectory.velocities[1:] * scale
-    a0, a1 = trajectory.accelerations[:-1] * scale**2, trajectory.accelerations[1:] * scale**2
-    coefficients = np.stack([origin, *quintic(moved, v0, v1, a0, a1)], axis=1)
+    coefficients = trajectory.quintics
     # Only the inner knots are searched, so that times outside of the trajectory belong to its first or last segment.
     segments = knots[1:-1].searchsorted(times, side="right")
-    spans = spans[segments]
+    spans = (knots[1:] - knots[:-1])[segments]
     u = np.minimum(np.maximum((times - knots[segments]) / spans, 0.0), 1.0)
     rows = coefficients.reshape(len(coefficients), -1).take(segments, axis=0)
     # Time is the last axis, so that arithmetic runs along memory.

@@ -9,6 +9,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from throwcollect.control.interpolation import quintic
+
 
 @dataclass(frozen=True)
 class JointTrajectory:
@@ -45,6 +47,18 @@ class JointTrajectory:
                 raise ValueError(f"{name} of a trajectory hold numbers that are not finite")
         if not points or (np.diff(self.times) <= 0).any():
             raise ValueError("times of a trajectory should increase")
+
+    @cached_property
+    def quintics(self) -> NDArray[np.float64]:
+        """Coefficients of the quintic of each segment, lowest power first, shape ``(n_points - 1, 6, n_joints)``.
+
+        Their variable is the share of the segment that has passed.
+        """
+        scale = (self.times[1:] - self.times[:-1])[:, np.newaxis]
+        origin, moved = self.positions[:-1], self.positions[1:] - self.positions[:-1]
+        v0, v1 = self.velocities[:-1] * scale, self.velocities[1:] * scale
+        a0, a1 = self.accelerations[:-1] * scale**2, self.accelerations[1:] * scale**2
+        return np.stack([origin, *quintic(moved, v0, v1, a0, a1)], axis=1)
 
     @cached_property
     def digest(self) -> str:
