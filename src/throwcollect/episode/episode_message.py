@@ -80,7 +80,7 @@ class Episode:
         return MessageTable(self.state.contents, self.header.samples)
 
     def samples(self, joints: Sequence[str] | None = None) -> Samples:
-        """Read the samples, as views of the records where possible; `joints` must have been recorded, in this order.
+        """Read the samples; `joints` must have been recorded, in this order.
 
         Raises:
             DatasetError: If the chunk is damaged, its messages have another layout than this version writes, or other

@@ -100,7 +100,8 @@ def rotate(quaternion_xyzw: NDArray[np.float64], *vectors: NDArray[np.float64], 
     v = _repeat_axes(np.array([vector.T for vector in vectors]).swapaxes(0, 1))
     # v' = v + w t + u × t with t = 2 u × v, for a unit quaternion (u, w).
     t = _repeat_axes(2 * _compute_cross(u, v))
-    return np.ascontiguousarray((v[:3] + w * t[:3] + _compute_cross(u, t)).transpose(1, 2, 0))
+    turned: NDArray[np.float64] = (v[:3] + w * t[:3] + _compute_cross(u, t)).transpose(1, 2, 0)
+    return turned
 
 
 def _repeat_axes(axes: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -175,18 +176,19 @@ def _fill_ball_odometry(rows: Rows, recording: Recording) -> None:
 def read_samples(joint_rows: Rows, ball_rows: Rows) -> Samples:
     """Read samples from the messages of `joint_states` and `ball_odometry`, each of shape ``(n_samples,)``.
 
-    Joint columns and the ball's pose are views of the messages; velocities are turned back into world.
+    Velocities are turned back into world. The numbers of each joint and each axis lie side by side in memory: in the
+    messages they are kilobytes apart and not aligned, so that arithmetic with them takes several times as long.
     """
-    orientation = ball_rows["pose.pose.orientation"]
+    orientation = np.asfortranarray(ball_rows["pose.pose.orientation"])
     linear, angular = rotate(
         orientation, ball_rows["twist.twist.linear"], ball_rows["twist.twist.angular"], inverse=False
     )
     return Samples(
         stamps_ns=read_stamps(joint_rows, "header.stamp"),
-        position=joint_rows["position"],
-        velocity=joint_rows["velocity"],
-        effort=joint_rows["effort"],
-        ball_position=ball_rows["pose.pose.position"],
+        position=np.asfortranarray(joint_rows["position"]),
+        velocity=np.asfortranarray(joint_rows["velocity"]),
+        effort=np.asfortranarray(joint_rows["effort"]),
+        ball_position=np.asfortranarray(ball_rows["pose.pose.position"]),
         ball_orientation_xyzw=orientation,
         ball_linear_velocity=linear,
         ball_angular_velocity=angular,
