@@ -192,7 +192,6 @@ HARMLESS = {
     "robots/clear_postures.py": {"np.linalg.norm", "@"},  # bounds, compared with room to spare
     "sim/urdf.py": {"np.linalg.norm", "np.linalg.eigh", "@"},  # whether a model can be spawned
     "tasks/dmp.py": {"np.linalg.lstsq"},  # weights for a YAML file
-    "tasks/free_flight.py": {"np.linalg.norm"},  # `verify` compares with it
 }
 
 

@@ -46,16 +46,16 @@ def find_joint_problems(trial: RecordedTrial) -> Iterator[str]:
     samples, config, trajectory = trial.samples, trial.config, trial.trajectory
     robot = robot_of(config)
     locked = find_locked_joints(config)
-    columns = [robot.joints.index(joint) for joint in locked]
-    away = (samples.position[:, columns] != list(locked.values())).any(axis=0)
-    moved = (samples.velocity[:, columns] != 0).any(axis=0) | (samples.effort[:, columns] != 0).any(axis=0)
-    for joint, is_away, has_moved in zip(locked, away, moved, strict=True):
-        if is_away:
-            yield f"{joint} is locked at {locked[joint]:.6g} rad and is somewhere else"
-        if has_moved:
-            yield f"{joint} is locked, and moves or has a torque"
+    lowest, highest = samples.position.min(axis=0).tolist(), samples.position.max(axis=0).tolist()
     torques, limits = np.abs(samples.effort), joint_limits(robot).effort * config.robot.effort_scale
-    peaks = torques.max(axis=0) / limits
+    most = torques.max(axis=0)
+    moved = np.maximum(most, np.abs(samples.velocity).max(axis=0)).tolist()
+    for joint, low, high, motion in zip(robot.joints, lowest, highest, moved, strict=True):
+        if joint in locked and not low == locked[joint] == high:
+            yield f"{joint} is locked at {locked[joint]:.6g} rad and is somewhere else"
+        if joint in locked and motion:
+            yield f"{joint} is locked, and moves or has a torque"
+    peaks = most / limits
     if peaks.max() > 1 + 1e-6:
         joint = robot.joints[int(peaks.argmax())]
         yield f"the torque of {joint} is {peaks.max():.4f} of the most that its motor has"
@@ -72,12 +72,14 @@ def find_joint_problems(trial: RecordedTrial) -> Iterator[str]:
         followed = int((torques / limits >= _AT_LIMIT).any(axis=1).argmax())
     wanted = _compute_motor_positions(trial)[:followed]
     moving = [robot.joints.index(joint) for joint in trajectory.joints]
-    errors = np.abs(samples.position[:followed, moving] - wanted)
+    # In memory, the numbers of a joint lie side by side, so whole rows of the transposed arrays are copied.
+    positions, velocities = samples.position.T[moving].T[:followed], samples.velocity.T[moving].T[:followed]
+    errors = np.abs(positions - wanted)
     if followed and errors.max() > tolerance:
         joint = trajectory.joints[int(errors.max(axis=0).argmax())]
         said = f"departs from the trajectory of the trial by {errors.max():.3g} rad"
         yield f"{joint} {said}, although its torque is below its limit"
-    excess = _measure_velocity_excess(samples.position[:followed, moving], samples.velocity[:followed, moving], trial)
+    excess = _measure_velocity_excess(positions, velocities, trial)
     if excess.size and excess.max() > _CHANGE_RADPS2 * tolerance / _FOLLOW_RAD:
         joint = trajectory.joints[int(excess.max(axis=0).argmax())]
         yield f"{joint} moves otherwise than its velocities say"
@@ -92,8 +94,8 @@ def _measure_velocity_excess(
         Excess by the time between samples [rad/s²], negative inside the range, shape ``(n_samples - 1, n_joints)``.
     """
     hz = trial.config.record.rate_hz
-    middle, half = (velocities[1:] + velocities[:-1]) / 2, np.abs(np.diff(velocities, axis=0)) / 2
-    excess: NDArray[np.float64] = (np.abs(np.diff(positions, axis=0) * hz - middle) - half) * hz
+    middle, half = (velocities[1:] + velocities[:-1]) / 2, np.abs(velocities[1:] - velocities[:-1]) / 2
+    excess: NDArray[np.float64] = (np.abs((positions[1:] - positions[:-1]) * hz - middle) - half) * hz
     return excess
 
 
@@ -194,32 +196,37 @@ def _measure_departures(
     position, velocity = ballistic_steps(
         samples.ball_position[:-1], samples.ball_linear_velocity[:-1], steps=stride, config=config
     )
-    spin = samples.ball_angular_velocity
+    spin, orientation = samples.ball_angular_velocity, samples.ball_orientation_xyzw
     rate = _measure_lengths(spin[:-1])
-    turned = _turn(samples.ball_orientation_xyzw[:-1], spin[:-1], stride / config.sim.physics_hz)
+    turned = _turn(orientation[:-1], spin[:-1], stride / config.sim.physics_hz)
     # A quaternion and its negative are the same orientation.
-    cosine = _multiply_rows(turned, samples.ball_orientation_xyzw[1:])
-    apart = 2 * _measure_lengths(turned * np.sign(cosine)[:, np.newaxis] - samples.ball_orientation_xyzw[1:])
+    cosine = _multiply_rows(turned, orientation[1:])
+    apart = 2 * _measure_lengths(turned * np.sign(cosine)[:, np.newaxis] - orientation[1:])
     apart[rate > _MOST_TURN_RAD * config.sim.physics_hz] = 0.0
     return {
         "position": (_measure_lengths(samples.ball_position[1:] - position), _POSITION_M, "m"),
         "velocity": (_measure_lengths(samples.ball_linear_velocity[1:] - velocity), _VELOCITY_MPS, "m/s"),
-        "spin": (_measure_lengths(np.diff(spin, axis=0)), _SPIN * np.maximum(rate, 1.0), "rad/s"),
+        "spin": (_measure_lengths(spin[1:] - spin[:-1]), _SPIN * np.maximum(rate, 1.0), "rad/s"),
         "orientation": (apart, _ORIENTATION_RAD, "rad"),
     }
 
 
 def _turn(orientation: NDArray[np.float64], spin: NDArray[np.float64], duration_s: float) -> NDArray[np.float64]:
     """Turn unit quaternions (xyzw) with constant angular velocities in world [rad/s]; shape ``(n, 4)``."""
-    rate = _measure_lengths(spin)[:, np.newaxis]
-    half = rate * (duration_s / 2)
+    half = _measure_lengths(spin) * (duration_s / 2)
     # sin(x)/x, also where nothing turns.
-    axis = spin * (duration_s / 2 * np.sinc(half / np.pi))
-    vector, scalar = orientation[:, :3], orientation[:, 3:]
+    ax, ay, az = spin.T * (duration_s / 2 * np.sinc(half / np.pi))
+    qx, qy, qz, qw = orientation.T
     turn = np.cos(half)
     # This is the product of two quaternions, that of the turn and the orientation.
-    turned = turn * vector + scalar * axis + np.cross(axis, vector)
-    return np.hstack([turned, turn * scalar - _multiply_rows(axis, vector)[:, np.newaxis]])
+    return np.array(
+        [
+            turn * qx + qw * ax + ay * qz - az * qy,
+            turn * qy + qw * ay + az * qx - ax * qz,
+            turn * qz + qw * az + ax * qy - ay * qx,
+            turn * qw - ax * qx - ay * qy - az * qz,
+        ]
+    ).T
 
 
 def _multiply_rows(left: NDArray[np.float64], right: NDArray[np.float64]) -> NDArray[np.float64]:

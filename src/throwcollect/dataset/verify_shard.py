@@ -244,7 +244,8 @@ class _ShardCheck:
                 self._report_gap(expected, resumed=stored.offset)
             if self.model is not None:
                 # The model gets the bytes as they are in the file, whose indexes and CRC are compared with the model's.
-                self.model.append(replace(stored.run(), data=contents.slice(stored.offset, stored.end)))
+                run = stored.intact_run if found.intact else stored.run()
+                self.model.append(replace(run, data=contents.slice(stored.offset, stored.end)))
                 # The bytes of episodes are checked elsewhere, so here only those before and behind them are kept.
                 self.expected.clear()
             self._check_place(stored)

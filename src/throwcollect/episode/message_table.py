@@ -40,6 +40,8 @@ _HEADERS = np.dtype(
 """`MESSAGE_HEADER`, of many records at once."""
 _ALIKE_BYTES = 11
 """Size of opcode, length and channel, which are the same in all records of a channel."""
+_TIMES = np.dtype([("sequence", "<u4"), ("log_time", "<u8"), ("publish_time", "<u8")])
+"""The rest of `MESSAGE_HEADER`."""
 _STAMP_OFFSET = 4
 """Place of the stamp in a message that begins with its std_msgs/Header: behind the CDR encapsulation [bytes]."""
 
@@ -157,11 +159,14 @@ class MessageTable(RowLayout):
 
     def are_timed_by(self, stamps_ns: NDArray[np.int64]) -> bool:
         """Say whether all records are numbered from 0, with these times of logging and publication [ns]."""
-        return all(
-            np.array_equal(headers["sequence"], np.arange(len(self)))
-            and np.array_equal(headers["log_time"], stamps_ns)
-            and np.array_equal(headers["publish_time"], stamps_ns)
-            for headers in map(self.headers, self.columns)
+        expected = np.empty(len(self), _TIMES)
+        expected["sequence"] = np.arange(len(self))
+        expected["log_time"] = expected["publish_time"] = self.log_times
+        bytes_of_all = expected.tobytes()
+        starts = [column.offset + _ALIKE_BYTES for column in self.columns.values()]
+        # Copying the bytes of each channel and comparing these takes a third of the time that its numbers take.
+        return np.array_equal(self.log_times, stamps_ns) and all(
+            self._table[:, start : start + _TIMES.itemsize].tobytes() == bytes_of_all for start in starts
         )
 
     def messages(self, channel: int) -> NDArray[np.uint8]:
@@ -184,7 +189,7 @@ class MessageTable(RowLayout):
 
     @cached_property
     def samples(self) -> Samples:
-        """The samples; joint columns and the ball's pose are views of the records.
+        """The samples, copied from the records.
 
         Raises:
             DatasetError: If joint states or the ball's odometry are missing, or have another layout than this version

@@ -58,7 +58,8 @@ def ballistic_steps(
     dt, drag_per_m = 1 / config.sim.physics_hz, _drag_per_m(config)
     gravity = np.array([0.0, 0.0, -config.scene.gravity_mps2])
     for _ in range(steps):
-        braking = drag_per_m * np.linalg.norm(velocity, axis=1, keepdims=True)
+        vx, vy, vz = velocity.T
+        braking = (drag_per_m * np.sqrt(vx * vx + vy * vy + vz * vz))[:, np.newaxis]
         velocity = velocity + (gravity - braking * velocity) * dt
         position = position + velocity * dt
     return position, velocity

@@ -54,11 +54,11 @@ def explain_drop(samples: Samples, header: EpisodeHeader, release: BallState, *,
     speed of a fall through the depth of the cup. When the tool brakes, the ball still has to roll over the rim. So the
     highest speed counts that the tool had while the ball, at its own speed, covered the radius of the rim.
     """
-    speed = math.hypot(*release.velocity)
+    speed, cup = math.hypot(*release.velocity), tool_of(config)
     direction = [part / (speed or 1.0) for part in release.velocity]
-    least = _LEAST_SHARE * math.sqrt(2 * config.scene.gravity_mps2 * tool_of(config).depth_m)
+    least = _LEAST_SHARE * math.sqrt(2 * config.scene.gravity_mps2 * cup.depth_m)
     release_ns = header.start_ns + round(release.time_s * NS_PER_S)
-    since_ns = release_ns - (tool_of(config).rim_radius_m / speed * NS_PER_S if speed else math.inf)
+    since_ns = release_ns - (cup.rim_radius_m / speed * NS_PER_S if speed else math.inf)
     last = min(int(np.searchsorted(samples.stamps_ns, release_ns)), len(samples) - 1)
     tool = ToolMotion(config)
     fastest = -math.inf
