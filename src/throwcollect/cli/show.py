@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from throwcollect.cli.options import ConfigArgument, JsonOption, SetOption, TrialsOption, overrides
-from throwcollect.cli.printing import format_number, print_json, print_result, tell
+from throwcollect.cli.printing import format_number, print_json, print_json_list, print_result, tell
 from throwcollect.cli.streams import end_with_reader
 from throwcollect.cli.terminal import display
 from throwcollect.config.default_path import DEFAULT_CONFIG
@@ -78,7 +78,7 @@ def plan(
         else:
             found = prepare(config, output, sweep_directory=path.parent, processes=count_cores(), onlooker=shown)
     if json:
-        rows = [
+        print_json_list(
             {
                 "trial": trial.number,
                 "values": dict(trial.values),
@@ -88,8 +88,7 @@ def plan(
                 **({"target": dict(trial.target)} if found.trials.target_names else {}),
             }
             for trial in found.trials
-        ]
-        print_json(rows)
+        )
         return
     names = (*found.keys, *found.trials.target_names)
     listed = found.trials if output is None else ()

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
+from itertools import groupby
 from pathlib import Path
 from typing import Any
 
@@ -137,23 +138,9 @@ def _rebuild(directory: Path) -> Rebuilt:
         raise DatasetError(
             "was changed since the plan was made", path=directory / PLAN, place=f"trial {min(wrong)}", hint=repair
         )
-    earlier = read_earlier_rows(directory, plan)
-    recordings, named = _Recordings(plan), {row["shard"] for row in earlier.values()}
-    names = list_shards(plan)
-    for name in log_progress(names, len(names), "recording", "looked through"):
-        if (directory / name).exists():
-            # A new table and a new manifest would make the damage look as if it had been collected.
-            if findings := recordings.read(directory / name):
-                raise DatasetError(str(findings[0]), path=directory, hint=repair)
-        # A file that no row names may be missing: all of its trials were refused, or lost.
-        elif name in named:
-            raise DatasetError(f"{name} is missing", path=directory, hint=repair)
-    table, task = ThrowsTable.of(plan), task_of(config)
-    rows = [
-        recordings.rows.get(trial.number) or _make_row_without_episode(table, task, trial, earlier.get(trial.number))
-        for trial in plan.trials
-    ]
-    throws = table.table(rows)
+    earlier, recordings = read_earlier_rows(directory, plan), _Recordings(plan)
+    throws = pa.concat_tables(_tabulate(directory, plan, recordings, earlier, repair)).combine_chunks()
+    outcomes = list(zip(throws["trial"].to_pylist(), throws["outcome"].to_pylist(), strict=True))
     channels = recordings.channels or Channels(config, full_description(config))
     written = [*WRITTEN]
     if not (directory / CARD).exists():
@@ -167,18 +154,49 @@ def _rebuild(directory: Path) -> Rebuilt:
         write_file(directory / CARD, data_card(config.without_run(), throws, provenance).encode())
         written.append(CARD)
     rejudged = tuple(
-        Rejudged(trial, before["outcome"], row["outcome"])
-        for row in rows
-        if (before := earlier.get(trial := row["trial"])) and before["outcome"] != row["outcome"]
+        Rejudged(trial, before["outcome"], outcome)
+        for trial, outcome in outcomes
+        if (before := earlier.get(trial)) and before["outcome"] != outcome
     )
     # People may have edited the card, so only its numbers are corrected.
     if rejudged and CARD not in written:
-        _correct_card(directory / CARD, table.table(earlier.values()), throws)
+        before = pa.table({"outcome": [row["outcome"] for row in earlier.values()]})
+        _correct_card(directory / CARD, before, throws)
         written.append(CARD)
     files = [(summary, entry_of_file(directory / summary.path)) for summary in recordings.summaries]
     write_description(directory, config.name, throws, channels, files)
-    lost = tuple(row["trial"] for row in rows if row["outcome"] == LOST)
-    return Rebuilt(len(rows), len(recordings.rows), lost, rejudged, tuple(written))
+    lost = tuple(trial for trial, outcome in outcomes if outcome == LOST)
+    episodes = len(throws) - throws["digest"].null_count
+    return Rebuilt(len(throws), episodes, lost, rejudged, tuple(written))
+
+
+def _tabulate(
+    directory: Path, plan: Plan, recordings: _Recordings, earlier: Mapping[int, Row], repair: str
+) -> Iterator[pa.Table]:
+    """Read the recordings one after the other, and make the table of the trials of each.
+
+    No more than the rows of one recording are held at once, as rows take ten times the memory of a table.
+
+    Raises:
+        DatasetError: If a recording is missing or damaged; its hint is `repair`.
+    """
+    table, task = ThrowsTable.of(plan), task_of(plan.config)
+    named = {row["shard"] for row in earlier.values()}
+    shards = groupby(plan.trials, lambda trial: shard_of(plan, trial.number))
+    for name, trials in log_progress(shards, len(list_shards(plan)), "recording", "looked through"):
+        recordings.rows.clear()
+        if (directory / name).exists():
+            # A new table and a new manifest would make the damage look as if it had been collected.
+            if findings := recordings.read(directory / name):
+                raise DatasetError(str(findings[0]), path=directory, hint=repair)
+        # A file that no row names may be missing: all of its trials were refused, or lost.
+        elif name in named:
+            raise DatasetError(f"{name} is missing", path=directory, hint=repair)
+        yield table.table(
+            recordings.rows.get(trial.number)
+            or _make_row_without_episode(table, task, trial, earlier.get(trial.number))
+            for trial in trials
+        )
 
 
 def _correct_card(path: Path, before: pa.Table, after: pa.Table) -> None:
@@ -213,7 +231,7 @@ class _Recordings:
     """The contents of the MCAP files of a dataset, which are read one after the other.
 
     Attributes:
-        rows: Rows of the episodes, by trial and in order of files.
+        rows: Rows of the episodes that were read since it was last cleared, by trial.
         summaries: What the bag's metadata say of each file.
         channels: What is recorded; None if there is no file.
     """

@@ -11,6 +11,7 @@ from throwcollect.dataset.reader import Dataset
 from throwcollect.engine_packages import require_engine
 from throwcollect.errors import DatasetError
 from throwcollect.extras import require
+from throwcollect.progress_log import log_progress
 from throwcollect.replay.comparison import Comparison, compare
 from throwcollect.side_by_side import count_cores, limit_processes, work_side_by_side
 from throwcollect.trial.choice import choose_trials
@@ -52,7 +53,8 @@ def simulate_side_by_side(
     """
     require_simulating(engine)
     processes = limit_processes(count_cores(), len(trials))
-    return work_side_by_side(trials, begin, arguments, processes=processes, doing="simulates")
+    simulated = work_side_by_side(trials, begin, arguments, processes=processes, doing="simulates")
+    return log_progress(simulated, len(trials), "throw", "simulated")
 
 
 def require_simulating(engine: str) -> None:

@@ -90,13 +90,12 @@ def _begin(directory: Path, engine: str) -> Callable[[int], Deviation]:
     config = own.model_copy(update={"sim": own.sim.model_copy(update={"engine": engine})})
     table = ThrowsTable(plan.keys, config, plan.trials.target_names)
     replayer = Replayer(config)
-    rows = {row["trial"]: row for row in dataset.throws.to_pylist()}
 
     def simulate(number: int) -> Deviation:
         """Simulate a trial, and compare its row with the stored one."""
         trial = plan.trial(number)
         result = judge_episode(with_values(config, trial.values), replayer.run(trial))
-        stored, again = rows[number], table.row(trial, result, None)
+        stored, again = dataset[number].row, table.row(trial, result, None)
         # Columns of text, and numbers that only one of the two rows has, cannot be compared.
         compared = [
             column

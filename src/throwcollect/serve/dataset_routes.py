@@ -171,7 +171,8 @@ def _list_names(directory: Path) -> list[str]:
 
 def _read_landings(directory: Path) -> LandingPoints:
     """Read the landings of a finished dataset."""
-    table = read_parquet(directory / THROWS)
+    # All columns of a million throws would take half a gigabyte.
+    table = read_parquet(directory / THROWS, (*_LANDING, "digest"))
     recorded = table.filter(table["digest"].is_valid())
     outcomes = {each["values"]: each["counts"] for each in recorded["outcome"].value_counts().to_pylist()}
     rows: list[Any] = []

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -50,14 +50,14 @@ class _Sink(io.RawIOBase):
         return len(data)
 
 
-def read_parquet(path: Path) -> Any:
-    """Read the Arrow table of a Parquet file and check every value of it.
+def read_parquet(path: Path, columns: Sequence[str] | None = None) -> Any:
+    """Read the Arrow table of a Parquet file, or those of some columns that it has, and check every value of it.
 
     Raises:
         DatasetError: If the file is missing or damaged, or announces more than any table of a dataset holds.
     """
     with open_parquet(path) as file:
-        table = file.read()
+        table = file.read(columns)
         table.validate(full=True)
     return table
 

@@ -22,7 +22,7 @@ from throwcollect.files import write_file
 from throwcollect.robots.description import PACKAGE
 from throwcollect.view.camera import Camera, camera_on
 from throwcollect.view.drawn_robot import BALL_RGBA, draw_robot_of
-from throwcollect.view.shown_throws import choose_rows
+from throwcollect.view.shown_throws import choose_throws
 
 images = lazily("PIL.Image")
 drawing = lazily("PIL.ImageDraw")
@@ -71,8 +71,7 @@ def render(directory: Path, output: Path, *, trial: int | None = None, slow: flo
         )
     require("PIL")
     dataset = Dataset.open(directory)
-    shown = dataset.recorded[:1] if trial is None else dataset
-    row = choose_rows(shown, None if trial is None else [trial])[0]
+    row = choose_throws(dataset, None if trial is None else [trial])[0].row
     config = dataset.plan.config_of(dataset.plan.trial(row["trial"]))
     _, samples = read_samples(dataset, row["trial"])
     pictures = _draw_all(config, dataset.joints, samples, row, slow)

@@ -29,26 +29,22 @@ class ShownThrow:
     path: NDArray[np.float64]
 
 
-def choose_rows(dataset: Dataset, trials: Iterable[int] | None) -> list[Row]:
-    """Choose the rows of the table of throws that are shown: some trials in their order, or all that have an episode.
+def choose_throws(dataset: Dataset, trials: Iterable[int] | None) -> Dataset:
+    """Choose the throws that are shown: some trials in their order, or all that have an episode.
 
     Raises:
         ConfigError: If there is no such trial.
         DatasetError: If a trial has no episode, or none has one.
     """
     if trials is None:
-        chosen: list[Row] = dataset.recorded.throws.to_pylist()
-        if not chosen:
+        if not len(recorded := dataset.recorded):
             raise DatasetError("no trial has an episode: there is nothing to show", path=dataset.directory)
-        return chosen
-    rows: list[Row] = []
-    for number in trials:
+        return recorded
+    numbers = list(trials)
+    for number in numbers:
         if not 0 <= number < len(dataset):
             raise ConfigError(f"{dataset.directory}: no trial {number}", expected=f"0 to {len(dataset) - 1}")
-        # Rows are made one by one, as those of a million trials would take 3 GB.
-        row = dataset[number].row
-        if row["shard"] is None:
-            reason = f"{row['outcome']}: {row['reason']}"
+        if not (throw := dataset[number]).recorded:
+            reason = f"{throw.outcome}: {throw.reason}"
             raise DatasetError(f"trial {number} has no episode: {reason}", path=dataset.directory)
-        rows.append(row)
-    return rows
+    return dataset.select(numbers)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -11,11 +11,12 @@ from throwcollect.dataset.bag import BAG_SECTION, bag_information, to_yaml
 from throwcollect.dataset.damage import read_samples
 from throwcollect.dataset.directory import METADATA
 from throwcollect.dataset.reader import Dataset
-from throwcollect.dataset.throws_table import Row
+from throwcollect.episode.record import Samples
 from throwcollect.files import new_directory
+from throwcollect.progress_log import log_progress
 from throwcollect.view.drawn_robot import draw_robot_of
 from throwcollect.view.foxglove import layout
-from throwcollect.view.shown_throws import ShownThrow, choose_rows
+from throwcollect.view.shown_throws import ShownThrow, choose_throws
 from throwcollect.view.viewer_recording import ViewRecording
 
 RECORDING = "throws.mcap"
@@ -24,6 +25,8 @@ LAYOUT = "foxglove.json"
 # Stamps begin above 0: in ROS, a stamp of 0 means the latest transform, and in `ViewRecording` no stamp yet.
 _FIRST_NS = 1_000_000_000
 _PAUSE_NS = 1_000_000_000
+_MOST_PATHS = 1000
+"""Most paths that are drawn behind each throw, as one message holds all of them: 7 MB."""
 
 
 @dataclass(frozen=True)
@@ -53,14 +56,17 @@ def view(directory: Path, output: Path, trials: Iterable[int] | None = None) -> 
         DatasetError: If the dataset is damaged or not finished, a trial has no episode, or `output` cannot be written.
     """
     dataset = Dataset.open(directory)
-    throws = _schedule(dataset, choose_rows(dataset, trials))
+    throws = choose_throws(dataset, trials)
+    # The step is rounded up, so that there are never more paths than allowed.
+    some = throws[:: -(-len(throws) // _MOST_PATHS)]
     config = dataset.config
     robot = draw_robot_of(config)
     with new_directory(output) as beside:
         path = beside / RECORDING
         with path.open("wb") as stream:
             recording = ViewRecording(stream, config)
-            recording.write(throws, lambda throw: read_samples(dataset, throw.row["trial"])[1])
+            paths = [throw for throw, _ in _schedule(dataset, some)]
+            recording.write(paths, log_progress(_schedule(dataset, throws), len(throws), "throw", "written"))
             summary = recording.finish(RECORDING)
         information = {BAG_SECTION: bag_information([summary], recording.channels, {})}
         (beside / METADATA).write_text(to_yaml(information), encoding="utf-8")
@@ -79,12 +85,11 @@ def view(directory: Path, output: Path, trials: Iterable[int] | None = None) -> 
     )
 
 
-def _schedule(dataset: Dataset, rows: Iterable[Row]) -> list[ShownThrow]:
+def _schedule(dataset: Dataset, throws: Dataset) -> Iterator[tuple[ShownThrow, Samples]]:
     """Schedule throws one after another with a pause, regardless of their times in the dataset."""
-    throws, start = [], _FIRST_NS
-    for row in rows:
-        _, samples = read_samples(dataset, row["trial"])
-        config = dataset.plan.config_of(dataset.plan.trial(row["trial"]))
-        throws.append(ShownThrow(row, config, start, samples.ball_position.copy()))
+    start = _FIRST_NS
+    for throw in throws:
+        _, samples = read_samples(dataset, throw.trial)
+        config = dataset.plan.config_of(dataset.plan.trial(throw.trial))
+        yield ShownThrow(throw.row, config, start, samples.ball_position.copy()), samples
         start += int(samples.stamps_ns[-1] - samples.stamps_ns[0]) + _PAUSE_NS
-    return throws

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import IO, Any
 
@@ -87,21 +87,23 @@ class ViewRecording:
             for channel in channels
         }
 
-    def write(self, throws: Sequence[ShownThrow], samples: Callable[[ShownThrow], Samples]) -> None:
+    def write(self, paths: Sequence[ShownThrow], throws: Iterable[tuple[ShownThrow, Samples]]) -> None:
         """Write throws in order of time, at least one, with their samples and everything else that viewers draw.
+
+        The paths of all of `paths`, the first of which is the first throw, are drawn behind each throw.
 
         Raises:
             DatasetError: If an episode cannot be read.
             ConfigError: If the robot's files cannot be read.
         """
-        self._put_looks(throws[0])
-        self._put("/view/throws", throws[0].start_ns, all_markers(throws))
-        for throw in throws:
+        self._put_looks(paths[0])
+        self._put("/view/throws", paths[0].start_ns, all_markers(paths))
+        for throw, samples in throws:
             self._put_looks(throw)
             self._put("/view/throw", throw.start_ns, throw_markers(throw))
             self._put("/view/path", throw.start_ns, path_cloud(throw))
             self._put("/view/facts", throw.start_ns, _make_facts(throw))
-            self._put_samples(samples(throw), throw.start_ns)
+            self._put_samples(samples, throw.start_ns)
 
     def finish(self, name: str) -> FileSummary:
         """Write the end of the file, and sum up its contents for a bag's metadata; `name` is the file's name there."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from throwcollect.dataset.rebuild import NO_EPISODE, rebuild
+from throwcollect.dataset.throws_table import Row, ThrowsTable
 from throwcollect.dataset.verify import verify
 from throwcollect.errors import DatasetError
 
@@ -49,6 +51,19 @@ def test_rebuild_restores_derived_files_byte_for_byte(mixed: Path, spoiled: Path
         assert (spoiled / name).read_bytes() == (mixed / name).read_bytes()
     assert "wall time" not in (spoiled / "README.md").read_text()
     assert verify(spoiled) == []
+
+
+def test_rebuild_holds_the_rows_of_one_recording_at_a_time(spoiled: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    made, counts = ThrowsTable.table, []
+
+    def count_rows(table: ThrowsTable, rows: Iterable[Row]) -> pa.Table:
+        rows = list(rows)
+        counts.append(len(rows))
+        return made(table, rows)
+
+    monkeypatch.setattr(ThrowsTable, "table", count_rows)
+    rebuild(spoiled)
+    assert counts == [3, 3, 1]
 
 
 def test_rebuild_restores_the_data_card_from_the_provenance(mixed: Path, spoiled: Path) -> None:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import logging
 from pathlib import Path
 
 import pytest
 
+from throwcollect import progress_log
 from throwcollect.dataset.reader import Dataset
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.replay.other_engine import Deviation, Distribution, distributions, simulate_with
@@ -57,6 +59,15 @@ def test_deviations_are_those_of_the_rows_of_both_engines(dataset: Path) -> None
             for column in ("release_speed_mps", "flight_time_s", "landing_x_m"):
                 assert each.values[column] == pytest.approx(again.row[column] - row[column], abs=1e-12)
             assert not each.values.keys() & {"trial", "outcome", "task.duration_s"}
+
+
+def test_throws_that_are_simulated_again_are_counted(
+    dataset: Path, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(progress_log, "_EVERY_S", 0.0)
+    with caplog.at_level(logging.INFO, logger=progress_log.LOGGER):
+        list(simulate_with(dataset, "ballistic", [4, 1]))
+    assert caplog.messages == ["1 of 2 throws simulated"]
 
 
 def test_a_picture_that_cannot_be_written_is_refused_with_the_reason(tmp_path: Path) -> None:

@@ -8,6 +8,7 @@ import json
 import shutil
 import tarfile
 from pathlib import Path
+from typing import Any
 
 import pytest
 from starlette.testclient import TestClient
@@ -15,6 +16,7 @@ from tests.unit.serve.conftest import Remember, make_end_fields
 
 from throwcollect.runs.records import Records, Run
 from throwcollect.serve import dataset_routes
+from throwcollect.sweep.parquet_file import read_parquet
 
 URL = "/api/v1/collections"
 
@@ -90,6 +92,21 @@ def test_the_landings_of_a_finished_dataset_are_returned(client: TestClient, dir
     assert [(outcome, trial) for _, _, outcome, trial in landings] == [("landed", 0), ("landed", 1), ("landed", 2)]
     assert all(isinstance(x, float) and 0 < x < 20 for x, *_ in landings)
     assert (found["total"], found["is_finished"], found["has_more"]) == (3, True, False)
+
+
+def test_landings_are_read_without_the_other_columns(
+    client: TestClient, directory: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    read: list[str] = []
+
+    def note_columns(*given: Any) -> Any:
+        table = read_parquet(*given)
+        read.extend(table.column_names)
+        return table
+
+    monkeypatch.setattr(dataset_routes, "read_parquet", note_columns)
+    client.get(f"{URL}/a/landings")
+    assert sorted(read) == ["digest", "landing_x_m", "landing_y_m", "outcome", "trial"]
 
 
 def test_too_many_landings_are_thinned_out(

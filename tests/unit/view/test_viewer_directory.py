@@ -23,6 +23,7 @@ from throwcollect.episode.record import EpisodeHeader, Samples
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.robots.limits import joint_limits
 from throwcollect.robots.talos import TALOS
+from throwcollect.view import viewer_directory
 from throwcollect.view.drawn_robot import draw_robot_of
 from throwcollect.view.viewer_directory import View, view
 
@@ -94,6 +95,17 @@ def test_throws_follow_one_another_in_the_chosen_order(collected: Path, messages
         states, odometry = states[count:], odometry[count:]
         start = int(stamps[-1]) + 1_000_000_000
     assert not states
+
+
+def test_of_many_throws_only_some_paths_are_drawn_behind_each(
+    collected: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(viewer_directory, "_MOST_PATHS", 2)
+    written = view(collected, tmp_path / "view", [5, 0, 3])
+    messages = messages_of(written.recording)
+    (_, behind), *others = messages["/view/throws"]
+    assert [marker.id for marker in behind.markers if marker.ns == "paths"] == [5, 3]
+    assert (others, len(messages["/view/throw"]), written.throws) == ([], 3, 3)
 
 
 def test_the_ball_speed_is_that_of_the_samples(collected: Path, messages: Messages) -> None:

@@ -12,6 +12,7 @@ from throwcollect.config.schema import Config
 from throwcollect.dataset.damage import read_samples
 from throwcollect.dataset.reader import Dataset
 from throwcollect.episode.record import EpisodeHeader
+from throwcollect.progress_log import log_progress
 from throwcollect.report.outcomes import LANDED, Outcomes
 from throwcollect.report.throw.landings import Landings
 from throwcollect.robots.quintic_curve import sample_positions
@@ -100,7 +101,7 @@ def measure_residuals(dataset: Dataset) -> Residuals:
     # Episodes are chosen at random, as every n-th point of a Sobol sequence or a grid would lie on a lattice.
     chosen = np.sort(np.random.default_rng(0).permutation(trials)[:MOST_RESIDUALS])
     distances = []
-    for trial in chosen.tolist():
+    for trial in log_progress(chosen.tolist(), len(chosen), "flight", "compared"):
         header, samples = read_samples(dataset, trial)
         config = dataset.plan.config_of(dataset.plan.trial(trial))
         distance = flight_residual(samples, header, config=config)
