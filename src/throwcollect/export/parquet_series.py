@@ -10,6 +10,8 @@ import pyarrow.parquet as pq
 PATH = "chunk-{chunk_index:03d}/file-{file_index:03d}.parquet"
 FILES_PER_CHUNK = 1000
 MEGABYTES_PER_FILE = 100
+_TABLES_PER_FILE = 5000
+"""Most tables in a file: the writer holds 13 kB about each of them in memory until the file is finished."""
 
 
 class ParquetSeries:
@@ -22,6 +24,7 @@ class ParquetSeries:
     def __init__(self, directory: Path) -> None:
         self._directory = directory
         self._writer: pq.ParquetWriter | None = None
+        self._tables = 0
         self.paths: list[Path] = []
 
     def close(self) -> None:
@@ -32,7 +35,9 @@ class ParquetSeries:
 
     def place(self) -> tuple[int, int]:
         """Find the numbers of the directory and the file that the next table goes to."""
-        if self.paths and self.paths[-1].stat().st_size >= MEGABYTES_PER_FILE * 2**20:
+        if self._tables >= _TABLES_PER_FILE or (
+            self.paths and self.paths[-1].stat().st_size >= MEGABYTES_PER_FILE * 2**20
+        ):
             self.close()
         # If a file is open, the last path is its path, and the next table goes there.
         return divmod(len(self.paths) - (self._writer is not None), FILES_PER_CHUNK)
@@ -49,4 +54,6 @@ class ParquetSeries:
             path.parent.mkdir(parents=True, exist_ok=True)
             self._writer = pq.ParquetWriter(path, table.schema, compression="zstd")
             self.paths.append(path)
+            self._tables = 0
         self._writer.write_table(table)
+        self._tables += 1

@@ -197,10 +197,11 @@ def test_the_exported_table_also_has_trials_without_an_episode(exported: Export,
     assert table.schema.field("landing_x_m").metadata[b"unit"] == b"m"
 
 
+@pytest.mark.parametrize(("limit", "least"), [("MEGABYTES_PER_FILE", 0), ("_TABLES_PER_FILE", 1)])
 def test_data_files_and_directories_are_split_at_their_limits(
-    source: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, exported: Export
+    limit: str, least: int, source: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, exported: Export
 ) -> None:
-    monkeypatch.setattr(parquet_series, "MEGABYTES_PER_FILE", 0)
+    monkeypatch.setattr(parquet_series, limit, least)
     monkeypatch.setattr(parquet_series, "FILES_PER_CHUNK", 3)
     export(source, tmp_path / "out", to="lerobot")
     names = sorted(str(path.relative_to(tmp_path / "out")) for path in (tmp_path / "out" / "data").rglob("*.parquet"))
