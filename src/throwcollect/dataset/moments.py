@@ -24,6 +24,8 @@ class Moments:
     @classmethod
     def of(cls, rows: NDArray[np.float64]) -> Moments:
         """Compute the moments of some rows, shape ``(n_rows, n_columns)``, at least one."""
+        # Sums run along memory, and their last bits depend on the order.
+        rows = np.ascontiguousarray(rows)
         mean = rows.mean(axis=0)
         return cls(len(rows), rows.min(axis=0), rows.max(axis=0), mean, ((rows - mean) ** 2).sum(axis=0))
 

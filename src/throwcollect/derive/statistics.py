@@ -144,9 +144,7 @@ def _summarise_column(numbers: NDArray[np.float64], *, nulls: int) -> ColumnStat
 
 def _stack_signals(samples: Samples) -> NDArray[np.float64]:
     """Stack all signals side by side, shape ``(n_samples, n_signals)``."""
-    columns = [getattr(samples, attribute) for attribute in (_JOINT_GROUPS | _BALL_GROUPS).values()]
-    # Sums run along memory, and their last bits depend on the order.
-    return np.ascontiguousarray(np.hstack(columns))
+    return np.hstack([getattr(samples, attribute) for attribute in (_JOINT_GROUPS | _BALL_GROUPS).values()])
 
 
 def _summarise_signals(moments: Moments, joints: tuple[str, ...]) -> dict[str, dict[str, SignalStatistics]]:

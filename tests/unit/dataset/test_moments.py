@@ -16,3 +16,10 @@ def test_moments_of_portions_add_up_to_those_of_the_whole() -> None:
     assert moments.maximum.tolist() == rows.max(axis=0).tolist()
     assert moments.mean == pytest.approx(rows.mean(axis=0), rel=1e-14)
     assert moments.std == pytest.approx(rows.std(axis=0), rel=1e-9, abs=1e-12)
+
+
+def test_moments_do_not_depend_on_the_layout_in_memory() -> None:
+    rows = np.random.default_rng(0).normal(1e3, [1.0, 1e-3], size=(1000, 2))
+    moments, others = Moments.of(rows), Moments.of(np.asfortranarray(rows))
+    assert others.mean.tolist() == moments.mean.tolist()
+    assert others.squares.tolist() == moments.squares.tolist()
