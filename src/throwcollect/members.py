@@ -190,7 +190,8 @@ def _import(path: str, what: str) -> Any:
             return _load(path)
     except ThrowcollectError:
         raise
-    except Exception as error:
+    # `SystemExit` would end the process without a word.
+    except (Exception, SystemExit) as error:
         raise ConfigError(f"{what} cannot be loaded: {type(error).__name__}: {error}", hint=_WAY_OUT) from error
 
 

@@ -120,6 +120,11 @@ from throwcollect.robots.robot import Robot
 
 NUMBER = 3
 
+def __getattr__(name):
+    if name == "UNLICENSED":
+        raise SystemExit(0)
+    raise AttributeError(f"module 'broken' has no attribute {name!r}")
+
 class Stopped(Engine):
     def close(self): ...
 
@@ -170,6 +175,7 @@ def find_what_is_said(text: str, family: str, value: str, directory: Path, monke
     [
         ("robots", "broken:ARM", " cannot be loaded: AttributeError: module 'broken' has no attribute 'ARM'"),
         ("robots", "not_there:ARM", " cannot be loaded: ModuleNotFoundError: No module named 'not_there'"),
+        ("engines", "broken:UNLICENSED", " cannot be loaded: SystemExit: 0"),
         ("robots", "broken:NUMBER", ": broken:NUMBER: should be an instance of Robot, is 3"),
         ("exporters", "broken:NUMBER", ": broken:NUMBER: should be an instance of Exporter, is 3"),
         (

@@ -78,7 +78,8 @@ class ReplayCheck:
                 evidence="\n".join(
                     f"trial {trial}: {digests[trial]} in the dataset, {again.get(trial)}" for trial in wrong
                 ),
-                hint="this machine does not compute the same each time, or something has changed what was simulated",
+                hint="this machine, or a package that adds an engine, does not compute the same each time, or "
+                "something has changed what was simulated",
             )
         if not trials:
             return None

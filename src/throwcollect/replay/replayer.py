@@ -41,8 +41,9 @@ class Replayer:
 
         Raises:
             ThrowcollectError: If a controller refuses its goal, or the samples are not finite, as in a collection.
+            MemberError: If the engine or the task comes from another package and fails.
         """
         self._runner.begin(trial.number, trial.values)
         while (delivery := self._runner.hand_over()) is None:
-            self._simulation.advance(watched=False)
+            self._runner.advance(watched=False)
         return delivery

@@ -261,5 +261,6 @@ def _may_go_on(node: NodeExit) -> bool:
 
 
 def _quote_last_line(node: NodeExit) -> str:
-    lines = node.log.splitlines()
+    # Lines that belong to a message, such as its hint, are indented.
+    lines = [line for line in node.log.splitlines() if not line.startswith(" ")]
     return f"; its log ends: {lines[-1]}" if lines else ""

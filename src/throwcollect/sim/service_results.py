@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, Protocol, TypeVar
 
-from throwcollect.errors import ConfigError, RequestError
+from throwcollect.errors import ConfigError, MemberError, RequestError
 from throwcollect.ros import Node
 from throwcollect.ros.msg import Result
 
@@ -22,7 +22,7 @@ def offer(node: Node, service: Any, name: str, fill: Fill) -> None:
             fill(request, response)
         except RequestError as error:
             return refusal(service.Response, error)
-        except ConfigError as error:
+        except (ConfigError, MemberError) as error:
             return refusal(service.Response, RequestError("RESULT_OPERATION_FAILED", str(error)))
         return response
 

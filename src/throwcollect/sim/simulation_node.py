@@ -134,6 +134,14 @@ class SimulationNode(Node):
         self._notice_listeners()
         return bool(self._listened) or any(controller.watched for controller in self._subscribed)
 
+    def advance(self) -> None:
+        """Run for a stretch of time; see `TrialRunner.advance`.
+
+        Raises:
+            MemberError: If the engine comes from another package, and fails while no trial runs, or again in the reset.
+        """
+        self._runner.advance(watched=self.watched)
+
     def follow_up(self) -> None:
         """Publish what has happened since the last call: time, samples, feedback, results, the episode."""
         simulation = self._simulation

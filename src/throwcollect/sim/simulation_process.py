@@ -77,7 +77,7 @@ def run(config: Path, *, name: str, namespace: str | None = None) -> None:
             # Messages come first, so that a cancel or a reset has its effect before time goes on.
             ros.spin_some(executor, timeout_sec=0.0 if simulation.running else node.patience_s)
             if simulation.running:
-                simulation.advance(watched=node.watched)
+                node.advance()
             node.follow_up()
         node.get_logger().info(f"ends: {signal.Signals(stopped()).name if stopped() else 'a client asked for it'}")
     finally:

@@ -12,7 +12,7 @@ from throwcollect.episode.channels import Channels
 from throwcollect.episode.chunk_encoder import ChunkEncoder
 from throwcollect.episode.episode_message import Delivery, Episode
 from throwcollect.episode.record import EpisodeHeader, Samples, find_infinite_columns
-from throwcollect.errors import ThrowcollectError
+from throwcollect.errors import MemberError, ThrowcollectError
 from throwcollect.members import explain_failure
 from throwcollect.robots.description import full_description, robot_of, start_posture
 from throwcollect.robots.trajectory import JointTrajectory
@@ -31,7 +31,7 @@ class _Begun:
 
 
 class TrialRunner:
-    """Begins trials and hands over their episodes; the caller advances the simulation in between.
+    """Begins trials and hands over their episodes; the caller calls `advance` in between.
 
     Attributes:
         channels: The topics that are recorded of a trial.
@@ -45,6 +45,7 @@ class TrialRunner:
         self._encoder = ChunkEncoder(self.channels, level=config.record.zstd_level)
         self._columns = task_of(config).columns
         self._begun: _Begun | None = None
+        self._failure: MemberError | None = None
 
     def begin(self, trial: int, values: Mapping[str, float], *, token: str = "") -> None:
         """Begin a trial, and give its controllers the goals that follow from its configuration.
@@ -74,6 +75,23 @@ class TrialRunner:
         self.release_lease()
         self._simulation.end_lease()
 
+    def advance(self, *, watched: bool) -> None:
+        """Run for a stretch of time; a trial in which the engine fails is dropped, and `hand_over` raises the error.
+
+        Args:
+            watched: Whether a client listens, so that the stretch has to be short.
+
+        Raises:
+            MemberError: If the engine comes from another package, and fails while no trial runs, or again in the reset.
+        """
+        try:
+            self._simulation.advance(watched=watched)
+        except MemberError as error:
+            if self._begun is None:
+                raise
+            self.drop()
+            self._failure = error
+
     def hand_over(self) -> Delivery | None:
         """Return the episode of a trial that has ended, only once; None if there is none.
 
@@ -81,8 +99,11 @@ class TrialRunner:
 
         Raises:
             ThrowcollectError: If the episode has numbers that are not finite, which no dataset may have.
-            MemberError: If the task comes from another package and fails.
+            MemberError: If the task comes from another package and fails, or the engine has failed in this trial.
         """
+        failure, self._failure = self._failure, None
+        if failure is not None:
+            raise failure
         ended = self._simulation.episode()
         if ended is None:
             return None

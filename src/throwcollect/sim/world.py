@@ -9,10 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from throwcollect.config.schema import Config
-from throwcollect.engine_packages import require_engine
 from throwcollect.engines.engine import BALL_NUMBERS, BodyState, Engine, Observer, Sample, State, Steps, ball_of
 from throwcollect.episode.record import REST_S, REST_SPEED_MPS, Contact, EndReason, Samples
-from throwcollect.members import load_member
 from throwcollect.robots.description import (
     Description,
     find_locked_joints,
@@ -21,6 +19,7 @@ from throwcollect.robots.description import (
     robot_of,
     start_posture,
 )
+from throwcollect.sim.checked_engine import make_engine
 from throwcollect.sim.contact_log import ContactLog
 from throwcollect.sim.motors import Motors
 from throwcollect.sim.recording import BALL_HEIGHT, BALL_LINEAR_VELOCITY, to_samples
@@ -73,8 +72,7 @@ class World(Observer):
     _forgotten: int
 
     def __init__(self, config: Config) -> None:
-        require_engine(config.sim.engine)
-        self.engine: Engine = load_member("engines", config.sim.engine)()
+        self.engine: Engine = make_engine(config.sim.engine)
         self.spawned = SpawnedBodies(self.engine)
         self._joints = robot_of(config).joints
         self._described: tuple[object, Description] | None = None

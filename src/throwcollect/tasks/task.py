@@ -19,6 +19,9 @@ from throwcollect.tasks.joint_measures import explain_failed_goal, explain_viola
 from throwcollect.tasks.minimum_jerk import minimum_jerk_trajectory
 from throwcollect.tasks.result import LIMIT_VIOLATED, LOST, TRACKING_FAILED, AnyResult, Outcome, Result, ResultColumns
 
+_WHOLE = range(-(2**63), 2**63)
+"""Whole numbers that a column of the table of throws can hold."""
+
 
 @dataclass(frozen=True)
 class Failure:
@@ -108,7 +111,11 @@ class Task(ABC, Generic[AnyResult]):
             failure = Failure(self.outcomes(TRACKING_FAILED), refusal)
         elif failure is None and (violation := explain_violation(result)):
             failure = Failure(self.outcomes(LIMIT_VIOLATED), violation)
-        return replace(result, outcome=failure.outcome, reason=failure.reason) if failure else result
+        if failure:
+            result = replace(result, outcome=failure.outcome, reason=failure.reason)
+        if not is_own("tasks", self.config.task.name):
+            _check_storable(self.columns, result)
+        return result
 
     @abstractmethod
     def assess(self, result: AnyResult, samples: Samples, header: EpisodeHeader) -> tuple[AnyResult, Failure | None]:
@@ -126,6 +133,20 @@ class Task(ABC, Generic[AnyResult]):
     def lose(self, reason: str) -> AnyResult:
         """Make the result of a trial of which no simulation returned an episode."""
         return self.results(self.outcomes(LOST), reason=reason)
+
+
+def _check_storable(columns: ResultColumns[Any], result: Result) -> None:
+    """Make sure that the table of throws can hold the whole numbers and the reason of a result.
+
+    Raises:
+        ValueError: If it cannot.
+    """
+    # Texts with surrogates cannot be encoded; type checkers let them pass.
+    (result.reason or "").encode()
+    values = columns.write(result)
+    for column in columns.columns:
+        if column.kind == "count" and (value := values[column.name]) is not None and value not in _WHOLE:
+            raise ValueError(f"its result.{column.name}: should be from -2^63 to 2^63 - 1, is {value}")
 
 
 def task_of(config: Config) -> Task[Any]:

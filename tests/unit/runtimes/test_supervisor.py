@@ -168,7 +168,7 @@ def test_nodes_that_already_run_are_not_started_again(runtime: FakeRuntime, cloc
 
 def test_a_lost_node_is_restarted_and_reported(runtime: FakeRuntime, clock: Clock) -> None:
     supervisor = supervise(runtime)
-    runtime.die("sim_1", log="first\nlast words")
+    runtime.die("sim_1", log="first\nlast words\n  try: something else")
     end, news = supervisor.poll()
     assert end is None
     assert news == ["sim_1 was lost (exit code 3) and is started again; its log ends: last words"]

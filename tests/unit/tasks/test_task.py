@@ -1,11 +1,20 @@
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
+from typing import Any
+
 import pytest
 
 from throwcollect.config.schema import Config
+from throwcollect.episode.record import EpisodeHeader, Samples
 from throwcollect.errors import ConfigError
+from throwcollect.replay.replayer import Replayer
 from throwcollect.robots.talos import TALOS
+from throwcollect.sweep.trials import Trial
+from throwcollect.tasks.result_columns import Count, measured
 from throwcollect.tasks.task import task_of
+from throwcollect.tasks.throw.throw_result import ThrowResult
+from throwcollect.tasks.throw.throw_task import ThrowTask
 
 
 def test_a_trajectory_has_the_moving_joints_in_the_order_of_the_robot():
@@ -33,3 +42,34 @@ def test_motion_that_cannot_be_computed_is_refused():
     weights = {"arm_right_4_joint": [1e6] * 20}
     with pytest.raises(ConfigError, match="settle"):
         task_of(Config(task={"trajectory": {"family": "dmp", "weights": weights}})).trajectory()
+
+
+@dataclass(frozen=True)
+class _CountedResult(ThrowResult):
+    bounces: int | None = measured(Count("How often the ball bounced."))
+
+
+def _judge_of_another_package(monkeypatch: pytest.MonkeyPatch, **values: Any) -> _CountedResult:
+    class Counted(ThrowTask):
+        results = _CountedResult
+
+        def assess(self, result: Any, samples: Samples, header: EpisodeHeader) -> Any:
+            return replace(result, **values), None
+
+    monkeypatch.setattr("throwcollect.tasks.task.is_own", lambda *_: False)
+    replayer = Replayer(config := Config.model_validate({"sim": {"engine": "ballistic"}}))
+    episode = replayer.run(Trial(0, {}, 0, ""))
+    replayer.close()
+    task = Counted(config)
+    judged: _CountedResult = task.judge(episode.samples(TALOS.joints), episode.header, task.trajectory())
+    return judged
+
+
+def test_a_result_of_another_package_that_the_table_cannot_hold_is_an_error(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    assert _judge_of_another_package(monkeypatch, bounces=2**63 - 1).bounces == 2**63 - 1
+    with pytest.raises(ValueError, match=f"result.bounces: should be from -2\\^63 to 2\\^63 - 1, is {2**63}"):
+        _judge_of_another_package(monkeypatch, bounces=2**63)
+    with pytest.raises(ValueError, match="surrogates not allowed"):
+        _judge_of_another_package(monkeypatch, reason="\ud800")
