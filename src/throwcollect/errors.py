@@ -196,7 +196,7 @@ class UnreachableError(ThrowcollectError):
 
 
 class MemberError(ThrowcollectError):
-    """A robot, task, format or other part of another package fails where it is used; the message names that package."""
+    """A robot, engine, task or other part of another package fails where it is used; the message names that package."""
 
 
 class RequestError(ThrowcollectError):

@@ -123,6 +123,7 @@ def test_a_right_engine_of_another_package_makes_the_same_episode(monkeypatch: p
             "on_sample should be called for step 1, is called for 0",
         ),
         ("run", tell(sample=lambda step, row: [(float(step), row)]), "on_sample: step: should be a valid integer"),
+        ("run", tell(sample=lambda step, row: [(step, [*row])]), "on_sample: sample: should be a valid tuple, is ["),
         ("run", tell(stops=False), "is the last one"),
         ("run", tell(touch=lambda step, _: (step, "spoon")), "on_touch: bodies: should be a valid frozenset, is 'spoo"),
         (
@@ -134,6 +135,7 @@ def test_a_right_engine_of_another_package_makes_the_same_episode(monkeypatch: p
         ("is_as_loaded", None, "what is_as_loaded returns: should be a valid boolean, is None"),
         ("state", None, "what state returns: should be an instance of State, is None"),
         ("state", change_state(touching=frozenset({"cup"})), "'cup' touches the ball, but there is no such tool"),
+        ("state", change_state(sample=(0.0,)), "ValueError: a sample should have 28 numbers, has 1"),
         ("_sample", change_sample(lambda row: row[:-1]), "ValueError: a sample should have 28 numbers, has 27"),
         ("_sample", change_sample(list), "sample: should be a valid tuple, is ["),
         ("_sample", change_sample(lambda row: (math.nan, *row[1:])), "sample.0: should be a finite number, is nan"),
