@@ -1,5 +1,6 @@
 """Every configuration that comes with the project can be collected."""
 
+import json
 from pathlib import Path
 
 import pytest
@@ -26,6 +27,6 @@ def test_a_configuration_is_collected_and_verified(config: Path, tmp_path: Path)
     assert summary["episodes"] > 0
     assert verify(tmp_path / "data") == []
     # Another process simulates all of them again; `up` would start one that imports everything anew.
-    again = call("dataset", "replay", tmp_path / "data", "--all")
+    again = call("dataset", "replay", tmp_path / "data", "--all", "--json")
     assert (again.returncode, again.stderr) == (0, "")
-    assert f": {summary['episodes']} throws replayed, the same bit for bit" in again.stdout
+    assert [each["differences"] for each in json.loads(again.stdout)] == [[]] * summary["episodes"]

@@ -44,8 +44,8 @@ def test_a_collection_has_all_files_and_verify_finds_nothing_wrong(reference: Pa
 
 def test_replayed_throws_equal_the_stored_ones_bit_for_bit(reference: Path) -> None:
     said = call_here("dataset", "replay", reference, "--all", "--sample", "5")
-    assert (said.returncode, said.stderr) == (0, "")
-    assert said.stdout == f"{reference}: 5 throws replayed, the same bit for bit\n"
+    # On a busy machine, the command also tells on standard error how far it has come.
+    assert (said.returncode, said.stdout) == (0, f"{reference}: 5 throws replayed, the same bit for bit\n")
 
 
 def test_a_simulator_gives_the_throws_of_the_dataset(config: Path, reference: Path) -> None:
