@@ -39,7 +39,7 @@ def print_json_list(items: Iterable[object]) -> None:
     """Print a list as `print_json` does, but item by item, as the text of a large one need not fit into memory."""
     separator = "["
     for item in items:
-        # Texts in JSON have no line breaks, so these are all between its parts.
+        # JSON escapes the line breaks of texts, so all that are left are those of the layout.
         text = jsonlib.dumps(item, indent=2).replace("\n", "\n  ")
         typer.echo(f"{separator}\n  {text}", nl=False)
         separator = ","

@@ -94,7 +94,9 @@ class _CheckedEngine(_Checked):
     """Stands for an engine of another package; it also checks that states, samples and steps fit the scene."""
 
     _known: frozenset[str] = frozenset()
+    """Names that the scene has for what may touch the ball; further bodies come on top of them."""
     _numbers = 0
+    """How many numbers a sample of the scene has."""
 
     @property
     def bodies(self) -> Bodies | None:
@@ -166,8 +168,11 @@ class _StepChecker(Observer):
         self._observer = observer
         self._stride = steps.stride
         self._due = steps.first_sample
+        """The step of which the next sample is due."""
         self._told = 0
+        """The last step of which the engine has told anything."""
         self._last = len(steps.velocities)
+        """The last step to take: the last of all, or the one at which the observer stops the engine."""
 
     def on_touch(self, step: int, bodies: frozenset[str]) -> None:
         """Check and pass on that other bodies touch the ball.
