@@ -118,6 +118,28 @@ def load_member(family: str, name: str) -> Any:
     return found
 
 
+@cache
+def find_broken(family: str) -> Mapping[str, ThrowcollectError]:
+    """Find the members of a family that cannot be loaded, each with its error.
+
+    They come from other packages, and concern nobody who does not name them.
+    """
+    errors: dict[str, ThrowcollectError] = {}
+    for name in names_of(family):
+        try:
+            if not is_own(family, name):
+                load_member(family, name)
+        except ThrowcollectError as error:
+            errors[name] = error
+    return MappingProxyType(errors)
+
+
+def usable_names(family: str) -> tuple[str, ...]:
+    """List the names of the members of a family that can be loaded, in the order of `names_of`."""
+    broken = find_broken(family)
+    return tuple(name for name in names_of(family) if name not in broken)
+
+
 def is_own(family: str, name: str) -> bool:
     """Whether a member comes with throwcollect, and not from another package."""
     return name in _OWN[family]

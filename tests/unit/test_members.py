@@ -289,6 +289,32 @@ def test_a_broken_engine_is_an_error_before_a_run_begins(tmp_path: Path) -> None
     assert "sim_0" not in done.stderr
 
 
+def test_broken_members_stop_only_configurations_that_name_them(tmp_path: Path) -> None:
+    for family in ("robots", "tools", "tasks"):
+        install(tmp_path, f"broken_{family}", family, "not_there:Member")
+    named = "trials: 3\ntask:\n  name: mine\ntool: {name: mine}\n"
+    (tmp_path / "named.yaml").write_text(named)
+    commands = [["config", "named.yaml"], ["init", "--task", "mine"], ["init"], ["config", "throwcollect.yaml"]]
+    path = os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")])
+    done = [
+        subprocess.run(
+            [sys.executable, "-m", "throwcollect", *command],
+            cwd=tmp_path,
+            env={**os.environ, "PYTHONPATH": path},
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        for command in commands
+    ]
+    assert [each.returncode for each in done] == [2, 2, 0, 0], done
+    lines = sorted(done[0].stderr.removeprefix("throwcollect: ").splitlines())
+    for line, (number, key) in zip(lines, [(3, "task"), (4, "tool")], strict=True):
+        said = f"named.yaml:{number}: {key}.name: the {key} mine of broken_{key}s 1.0 cannot be loaded: ModuleNotFound"
+        assert line.startswith(said)
+    assert done[1].stderr.startswith("throwcollect: the task mine of broken_tasks 1.0 cannot be loaded: ModuleNotFound")
+
+
 @pytest.mark.parametrize("debug", ["", "1"])
 def test_an_exception_in_a_member_is_reported_as_a_fault_of_its_package(
     debug: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]

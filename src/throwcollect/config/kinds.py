@@ -9,7 +9,7 @@ from typing import Annotated, Any
 from pydantic import AfterValidator, BeforeValidator, Field, GetJsonSchemaHandler, ValidationInfo, WithJsonSchema
 from pydantic_core import CoreSchema
 
-from throwcollect.members import load_member, names_of
+from throwcollect.members import load_member, usable_names
 
 
 class ContradictionError(ValueError):
@@ -33,8 +33,8 @@ class UnknownJointError(ValueError):
 
 
 def all_joints() -> tuple[str, ...]:
-    """List the joints of all robots, each once."""
-    robots = [load_member("robots", name) for name in names_of("robots")]
+    """List the joints of all robots that can be loaded, each once."""
+    robots = [load_member("robots", name) for name in usable_names("robots")]
     return tuple(dict.fromkeys(joint for robot in robots for joint in robot.joints))
 
 

@@ -10,13 +10,13 @@ import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from pydantic import Field, PositiveInt
+from pydantic import BeforeValidator, Field, PositiveInt
 
 from throwcollect.config.cluster import ClusterConfig
 from throwcollect.config.containers import ContainersConfig
 from throwcollect.config.controllers import ControllersConfig
 from throwcollect.config.key import Effect, Key
-from throwcollect.config.kinds import Angle, Joint, Name
+from throwcollect.config.kinds import Angle, ContradictionError, Joint, Name
 from throwcollect.config.motion import DynamicMovementPrimitive, MinimumJerk
 from throwcollect.config.run import RunConfig
 from throwcollect.config.section import Section, any_of
@@ -24,7 +24,7 @@ from throwcollect.config.sweep import MOST_TRIALS, Parameter, Range, SweepConfig
 from throwcollect.config.task_config import TaskConfig
 from throwcollect.config.tool_config import ToolConfig
 from throwcollect.config.until import UntilConfig
-from throwcollect.members import load_member, names_of
+from throwcollect.members import find_broken, load_member, names_of, usable_names
 
 __all__ = [
     "FASTEST",
@@ -41,15 +41,26 @@ __all__ = [
 
 def _make_section_type(family: str) -> Any:
     """Make the type of a key that holds the section of any member of a family; its key `name` says which."""
-    sections = {name: load_member(family, name) for name in names_of(family)}
+    sections = {name: load_member(family, name) for name in usable_names(family)}
+    broken = find_broken(family)
     default = next(iter(sections))
-    return any_of(sections, lambda value: value.get("name", default) if isinstance(value, dict) else None)
+
+    def choose(value: Any) -> Any:
+        return value.get("name", default) if isinstance(value, dict) else None
+
+    def refuse_broken(value: Any) -> Any:
+        error = broken.get(name) if isinstance(name := choose(value), str) else None
+        if error is not None:
+            raise ContradictionError({"name": "; try: ".join(filter(None, [error.message, error.hint]))})
+        return value
+
+    return Annotated[any_of(sections, choose), BeforeValidator(refuse_broken)]
 
 
 def _make_until_type() -> Any:
     """Make the type of the key `until`, which holds the section `until` of a task; its only key says which."""
     sections: dict[str, type[UntilConfig]] = {}
-    for name in names_of("tasks"):
+    for name in usable_names("tasks"):
         until = load_member("tasks", name).until
         # Tasks may have the same success. The first task's section is taken, so that packages cannot replace our own.
         sections.setdefault(until.outcome(), until)

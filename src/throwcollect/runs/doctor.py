@@ -15,7 +15,7 @@ from typing import Literal
 from throwcollect import ros_installation
 from throwcollect.build import build_digest
 from throwcollect.engine_packages import PACKAGES
-from throwcollect.errors import ConfigError, MemberError
+from throwcollect.errors import ConfigError, MemberError, ThrowcollectError
 from throwcollect.extras import (
     EXTRA_OF,
     MissingExtraError,
@@ -25,7 +25,7 @@ from throwcollect.extras import (
     install_command,
     is_installed,
 )
-from throwcollect.members import explain_failure, load_member, names_of
+from throwcollect.members import explain_failure, find_broken, load_member, names_of
 from throwcollect.robots.description import joint_model
 from throwcollect.robots.robot import Robot
 from throwcollect.robots.talos import TALOS
@@ -40,6 +40,9 @@ _SIMULATION_MEMORY_GIB = 0.3
 
 _ROS_ROUTER_PORT = 7447
 """Port at which ROS 2 nodes on rmw_zenoh_cpp look for a router."""
+
+_LOADED = ("tools", "engines", "tasks", "runtimes", "exporters")
+"""The families whose members need no more than to be loaded; robots also have to describe themselves."""
 
 _LEAST_DISK_GIB = 1.0
 _DIGITS = 10
@@ -94,7 +97,20 @@ def _check_robot(name: str) -> Check:
             package = f" of example-robot-data {version('example-robot-data')}" if is_own else ""
             return Check(check, "ok", f"{robot.title}{package}, {robot.urdf_path}")
     except (ConfigError, MemberError, MissingExtraError, MissingLibraryError) as error:
-        return Check(check, "problem" if is_own else "note", "; try: ".join(filter(None, [error.message, error.hint])))
+        return Check(check, "problem" if is_own else "note", _explain(error))
+
+
+def _check_members() -> list[Check]:
+    """Note members of other packages that cannot be loaded: only configurations that name them need them."""
+    return [
+        Check(f"{family.removesuffix('s')} {name}", "note", _explain(error))
+        for family in _LOADED
+        for name, error in find_broken(family).items()
+    ]
+
+
+def _explain(error: ThrowcollectError) -> str:
+    return "; try: ".join(filter(None, [error.message, error.hint]))
 
 
 def _check_extras() -> Check:
@@ -113,6 +129,8 @@ def _check_runtime(name: str) -> Check | None:
             return get_runtime(name).check()
     except MissingExtraError as error:
         return Check(name, "note", f"{error.package} is not installed; try: {error.hint}")
+    except ConfigError:
+        return None  # `_check_members` reports it
 
 
 def _check_port() -> Check:
@@ -147,7 +165,7 @@ def _check_embedded() -> Check:
     try:
         chosen = "rclpy" if uses_rclpy() else "the embedded backend"
     except ConfigError as error:
-        return Check("embedded", "problem", f"{found}; {'; try: '.join(filter(None, [error.message, error.hint]))}")
+        return Check("embedded", "problem", f"{found}; {_explain(error)}")
     value = os.environ.get(VARIABLE)
     return Check("embedded", "ok", f"{found}; nodes run on {chosen}, as {VARIABLE} is {value or 'not set'}")
 
@@ -171,4 +189,4 @@ def examine(directory: Path) -> list[Check]:
         _check_embedded,
     ]
     of_runtimes = [found for name in names_of("runtimes") if (found := _check_runtime(name)) is not None]
-    return [*(check() for check in machine), *of_runtimes, _check_port(), _check_disk(directory)]
+    return [*(check() for check in machine), *_check_members(), *of_runtimes, _check_port(), _check_disk(directory)]

@@ -13,7 +13,7 @@ from pathlib import Path, PurePosixPath
 from throwcollect.config.loader import load
 from throwcollect.dataset.directory import config_path
 from throwcollect.errors import ConfigError, NotFoundError
-from throwcollect.members import load_member, names_of
+from throwcollect.members import load_member, usable_names
 from throwcollect.robots.appearance import read_urdf
 from throwcollect.robots.description import full_description
 from throwcollect.robots.robot import Robot
@@ -176,13 +176,13 @@ def _find_packages() -> Mapping[str, Path]:
 
 @lru_cache(maxsize=1)
 def _read_descriptions() -> Sequence[tuple[str, Robot]]:
-    """Read the descriptions of all robots.
+    """Read the descriptions of all robots that can be loaded.
 
     Raises:
         ConfigError: If one cannot be read.
     """
     descriptions = []
-    for name in names_of("robots"):
+    for name in usable_names("robots"):
         robot: Robot = load_member("robots", name)
         try:
             descriptions.append((robot.urdf_path.read_text(encoding="utf-8"), robot))

@@ -41,6 +41,8 @@ def make_starter(robot: str, task: str, sampler: str) -> dict[str, str]:
     ):
         if name not in known:
             raise ConfigError(f"{option} {name}: no such {option[2:]} is installed", expected=" or ".join(known))
+    # A task of another package that cannot be loaded is reported here, before a configuration names it.
+    load_member("tasks", task)
     motion = find_first_motion(robot, task)
     start, end, duration_s = motion
     joint = max(end, key=lambda name: abs(end[name] - start[name]))

@@ -1,6 +1,7 @@
 import json
 import socketserver
 import threading
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from http.server import BaseHTTPRequestHandler
 from importlib.metadata import EntryPoint, EntryPoints, version
@@ -60,15 +61,34 @@ def lack_disk() -> Path:
 LOST_ARM = replace(TALOS, name="lost", share=lack_disk)
 
 
+@pytest.fixture
+def install(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[str, Mapping[str, str]], None]]:
+    """Adds members of another package to a family, by name, until the test ends."""
+    points: dict[str, EntryPoints] = {}
+    caches = (members._find_members, members.find_broken)
+
+    def install(family: str, places: Mapping[str, str]) -> None:
+        group = f"throwcollect.{family}"
+        points[group] = EntryPoints(EntryPoint(name, place, group) for name, place in places.items())
+        for cached in caches:
+            cached.cache_clear()
+
+    def select(group: str) -> EntryPoints:
+        return points.get(group, EntryPoints())
+
+    monkeypatch.setattr(members, "entry_points", lambda group=None: select(group) if group else Mock(select=select))
+    yield install
+    monkeypatch.undo()
+    for cached in caches:
+        cached.cache_clear()
+
+
 def test_doctor_examines_robots_of_other_packages_and_notes_failures(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, install: Callable[[str, Mapping[str, str]], None]
 ) -> None:
     monkeypatch.syspath_prepend(PLUGINS)
-    group = "throwcollect.robots"
     places = {"planar_arm": "planar_arm.robot:PLANAR_ARM", "absent": "not_there:ARM", "lost": f"{__name__}:LOST_ARM"}
-    points = EntryPoints(EntryPoint(name, place, group) for name, place in places.items())
-    monkeypatch.setattr(members, "entry_points", lambda **_: points)
-    members._find_members.cache_clear()
+    install("robots", places)
     checks = {check.name: check for check in examine(tmp_path)}
     found = {name: (checks[f"robot {name}"].status, checks[f"robot {name}"].finding) for name in places}
     assert found["planar_arm"] == ("ok", f"the planar arm, {PLUGINS / 'planar_arm' / 'planar_arm.urdf'}")
@@ -76,8 +96,20 @@ def test_doctor_examines_robots_of_other_packages_and_notes_failures(
     assert "the robot absent of an unknown package cannot be loaded: ModuleNotFoundError" in found["absent"][1]
     assert "the robot lost of an unknown package cannot find its files: OSError: the disk" in found["lost"][1]
     assert (checks["robot"].status, checks["robot"].finding.partition(" of ")[0]) == ("ok", "Talos")
-    monkeypatch.undo()
-    members._find_members.cache_clear()
+
+
+def test_doctor_notes_broken_members_of_other_packages(
+    tmp_path: Path, install: Callable[[str, Mapping[str, str]], None]
+) -> None:
+    families = ("tools", "engines", "tasks", "runtimes", "exporters")
+    for family in families:
+        install(family, {"absent": "not_there:X"})
+    noted = {check.name: (check.status, check.finding) for check in examine(tmp_path) if check.name.endswith(" absent")}
+    assert list(noted) == [f"{family.removesuffix('s')} absent" for family in families]
+    for name, (status, finding) in noted.items():
+        said = f"the {name} of an unknown package cannot be loaded: ModuleNotFoundError: No module named 'not_there'; t"
+        assert status == "note"
+        assert finding.startswith(said)
 
 
 def backends(directory: Path) -> dict[str, tuple[str, str]]:
