@@ -182,7 +182,8 @@ def replacing(path: Path) -> Iterator[int]:
 def new_directory(path: Path) -> Iterator[Path]:
     """Make a directory that gets its name if the block ends well, and vanishes if it does not.
 
-    There must be nothing of that name, or only an empty directory.
+    There must be nothing of that name, or only an empty directory. Errors of the block name its files as they would
+    have been called, because nobody else knows the hidden directory.
 
     Yields:
         A hidden directory beside `path`, to write into meanwhile.
@@ -217,6 +218,10 @@ def new_directory(path: Path) -> Iterator[Path]:
         os.rename(beside, path)
     except OSError as error:
         raise unwritable(path, error) from error
+    except DatasetError as error:
+        if error.path is None or not error.path.is_relative_to(beside):
+            raise
+        raise error.locate(path / error.path.relative_to(beside)) from error
     finally:
         # After the rename, nothing has this name any more.
         shutil.rmtree(beside, ignore_errors=True)

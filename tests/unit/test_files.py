@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from throwcollect.errors import ConfigError
+from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.files import beside, new_directory, write_all
 
 
@@ -55,3 +55,18 @@ def test_replacing_the_working_directory_is_refused_before_the_work(
     for spelling in (Path(), tmp_path):
         with pytest.raises(ConfigError, match="is the working directory"), new_directory(spelling):
             pytest.fail("it began")
+
+
+def test_an_error_in_a_new_directory_names_the_file_as_it_would_have_been_called(tmp_path: Path) -> None:
+    def fail(file: str) -> None:
+        with new_directory(tmp_path / "new") as outer, new_directory(outer / "part") as inner:
+            raise DatasetError("cannot be written", path=inner / file, place="byte 17", hint="free space")
+
+    with pytest.raises(DatasetError) as caught:
+        fail("plan.parquet")
+    assert (caught.value.path, caught.value.hint) == (tmp_path / "new" / "part" / "plan.parquet", "free space")
+    assert caught.value.message == f"{tmp_path}/new/part/plan.parquet: byte 17: cannot be written"
+    # A file elsewhere, such as one of the source, keeps its name.
+    with pytest.raises(DatasetError, match=f"^{tmp_path}/source: byte 17: cannot be written"):
+        fail(str(tmp_path / "source"))
+    assert list(tmp_path.iterdir()) == []
