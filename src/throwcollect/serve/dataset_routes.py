@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import io
 import os
 import tarfile
@@ -66,6 +67,7 @@ class LandingPoints(BaseModel):
 def make_dataset_routes(instances: Instances) -> APIRouter:
     """Make the routes on collections."""
     router = APIRouter(prefix="/collections/{instance}")
+    reporting = asyncio.Lock()
 
     @router.post("/resume", status_code=202)
     def resume(instance: str) -> InstanceState:
@@ -96,19 +98,11 @@ def make_dataset_routes(instances: Instances) -> APIRouter:
         )
 
     @router.get("/report", response_class=FileResponse)
-    def report(instance: str) -> FileResponse:
+    async def report(instance: str) -> FileResponse:
         """The report on a finished dataset: one page with everything inside."""
-        from throwcollect.report.write import write_report
-
-        directory = _find_finished(instances, instance)
-        scratch = tempfile.TemporaryDirectory(prefix="throwcollect-report-")
-        page = Path(scratch.name) / f"{instance}.html"
-        try:
-            write_report(directory, page)
-        except BaseException:
-            scratch.cleanup()
-            raise
-        return FileResponse(page, filename=page.name, background=BackgroundTask(scratch.cleanup))
+        # A report needs 100 MB and a core for seconds. Clients that wait for theirs hold no thread, as others need it.
+        async with reporting:
+            return await asyncio.to_thread(lambda: _report(_find_finished(instances, instance), instance))
 
     @router.get("/landings")
     def landings(instance: str, first: Annotated[int, Query(ge=0, le=_MOST_FIRST)] = 0) -> LandingPoints:
@@ -139,6 +133,20 @@ def _find_file(directory: Path, path: str) -> Path:
         raise NotFoundError(f"{directory}: the dataset has no file {path!r}")
     check_regular(directory / path)
     return directory / path
+
+
+def _report(directory: Path, name: str) -> FileResponse:
+    """Write the report on a dataset into a file that vanishes when it was sent."""
+    from throwcollect.report.write import write_report
+
+    scratch = tempfile.TemporaryDirectory(prefix="throwcollect-report-")
+    page = Path(scratch.name) / f"{name}.html"
+    try:
+        write_report(directory, page)
+    except BaseException:
+        scratch.cleanup()
+        raise
+    return FileResponse(page, filename=page.name, background=BackgroundTask(scratch.cleanup))
 
 
 def _is_finished(directory: Path) -> bool:

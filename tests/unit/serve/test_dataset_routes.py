@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+import asyncio
 import hashlib
 import io
 import json
 import shutil
 import tarfile
+import time
 from pathlib import Path
 from typing import Any
 
+import httpx
 import pytest
 from starlette.testclient import TestClient
-from tests.unit.serve.conftest import Remember, make_end_fields
+from tests.unit.serve.conftest import HOST, Remember, Served, make_end_fields
 
 from throwcollect.runs.records import Records, Run
 from throwcollect.serve import dataset_routes
@@ -174,6 +177,29 @@ def test_the_report_of_a_finished_dataset_is_one_page_and_leaves_no_file(
     assert answer.text.rstrip().endswith("</html>")
     assert sorted(directory.rglob("*")) == before
     assert not list((tmp_path / "scratch").iterdir())
+
+
+def test_reports_that_are_asked_for_at_the_same_time_are_written_one_after_the_other(
+    served: Served, directory: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    events: list[str] = []
+
+    def write(directory: Path, page: Path) -> None:
+        events.append("begins")
+        time.sleep(0.05)
+        page.write_text("a report")
+        events.append("ends")
+
+    async def ask() -> list[str]:
+        headers = {"Authorization": f"Bearer {served.keys.full}"}
+        transport = httpx.ASGITransport(served.app)
+        async with httpx.AsyncClient(transport=transport, base_url=f"http://{HOST}", headers=headers) as client:
+            answers = await asyncio.gather(*(client.get(f"{URL}/a/report") for _ in range(3)))
+        return [answer.text for answer in answers]
+
+    monkeypatch.setattr("throwcollect.report.write.write_report", write)
+    assert asyncio.run(ask()) == ["a report"] * 3
+    assert events == ["begins", "ends"] * 3
 
 
 def test_files_of_an_unfinished_dataset_are_refused(client: TestClient, directory: Path, remember: Remember) -> None:
