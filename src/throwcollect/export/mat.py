@@ -22,6 +22,7 @@ from throwcollect.export.npz import to_array
 from throwcollect.export.readme import Layout, list_joints
 from throwcollect.export.throw_source import ExportableThrow, ExportSource, ThrowSeries, read_metadata
 from throwcollect.extras import lazily
+from throwcollect.progress_log import log_progress
 from throwcollect.robots.quintic_curve import sample_quintic
 from throwcollect.robots.trajectory import JointTrajectory
 from throwcollect.tasks.dmp import fit_dmp, kernels, roll_out
@@ -208,11 +209,13 @@ def _describe_primitives(motions: Sequence[tuple[JointTrajectory, TaskConfig]], 
     """Describe the DMPs of throws: those of their configurations, else ones fitted to the commanded motions."""
     to_fit = [motion for motion, task in motions if not isinstance(task.trajectory, DynamicMovementPrimitive)]
     fitted = iter(_fit_primitives(to_fit))
+    # Rolling them out takes three times as long as reading the throws.
+    logged = log_progress(motions, len(motions), "motion", "described")
     return [
         _describe_primitive(motion, task.trajectory, task.duration_s, rate_hz)
         if isinstance(task.trajectory, DynamicMovementPrimitive)
         else _describe_primitive(motion, next(fitted), float(motion.times[-1]), rate_hz, fitted=True)
-        for motion, task in motions
+        for motion, task in logged
     ]
 
 

@@ -49,6 +49,7 @@ def test_plan_with_json_still_warns_of_a_robot_below_the_ground(tmp_path: Path) 
         ("filter {data} {new} --where trial<3", "2 of 3 trials written"),
         ("merge {data} {new}", "3 of 4 trials written"),
         ("export {data} {new} --to npz", "3 of 4 trials exported"),
+        ("export {data} {new} --to mat", "1 of 2 motions described"),
         ("report {data} -o {new}.html", "3 of 4 flights compared"),
         ("view {data} {new}", "3 of 4 throws written"),
     ],
