@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from throwcollect.learning.arrays import Array, Exponents, Matrix
+from throwcollect.progress_log import ProgressLog
 from throwcollect.reproducible_math import matmul, solve
 
 DEGREES = (1, 2, 3, 4)
@@ -114,13 +115,18 @@ def cross_validate(inputs: Array, outputs: Array, folds: NDArray[np.int64], *, m
         folds: Number of the fold of each sample, shape ``(n,)``.
         minor: Number of minor inputs, as `list_exponents` takes it.
     """
-    errors = {}
+    errors: dict[int, Array] = {}
     numbers = np.unique(folds)
+    # With many inputs and samples, this takes minutes.
+    log = ProgressLog(len(DEGREES) * len(numbers), "polynomial", "fitted")
     for degree in DEGREES:
         exponents = list_exponents(inputs.shape[1], degree, minor=minor)
         if degree > 1 and len(exponents) * SAMPLES_PER_TERM > len(inputs):
             break
-        parts = [_Sums.of(inputs[folds == fold], outputs[folds == fold], exponents) for fold in numbers]
+        parts: list[_Sums] = []
+        for fold in numbers:
+            parts.append(_Sums.of(inputs[folds == fold], outputs[folds == fold], exponents))
+            log.note(len(errors) * len(numbers) + len(parts))
         distances = np.empty(len(inputs))
         for fold, left_out in zip(numbers, parts, strict=True):
             others = _Sums.add([part for part in parts if part is not left_out])
