@@ -48,6 +48,13 @@ def write_report(directory: Path, page: Path, *, pictures: Path | None = None, m
             from throwcollect.report.painter import write_pictures
 
             written = tuple(pictures / path.name for path in write_pictures(report.sections, unfinished))
-    # The page is written last, because it may lie in the directory of the pictures, which exists only now.
-    write_file(page, text)
+        # Without the page, no pictures may stay either, because they would be in the way of the same command.
+        write_file(_find_place(page, pictures, unfinished), text)
     return Written(page, written)
+
+
+def _find_place(page: Path, pictures: Path | None, unfinished: Path | None) -> Path:
+    """Find where to write the page: if it will lie among the pictures, in their directory while it is unfinished."""
+    if pictures and unfinished and page.resolve().is_relative_to(pictures.resolve()):
+        return unfinished / page.resolve().relative_to(pictures.resolve())
+    return page

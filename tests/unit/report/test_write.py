@@ -93,6 +93,12 @@ def test_the_page_can_be_written_into_the_directory_of_the_pictures(together: Wr
     assert len(together.pictures) == 9
 
 
+def test_no_pictures_stay_if_the_page_cannot_be_written(collected: Path, tmp_path: Path) -> None:
+    with pytest.raises(DatasetError, match=r"none/page\.html: cannot be written"):
+        write_report(collected, tmp_path / "none" / "page.html", pictures=tmp_path / "pictures")
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_a_report_without_plotly_says_what_to_install(
     collected: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
