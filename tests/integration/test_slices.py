@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 
 from tests.e2e.collection import CONFIG, FAST, fingerprints, write_config
-from throwcollect import runs
+from throwcollect import progress_log, runs
 from throwcollect.config.loader import load
 from throwcollect.coordinator.prepare import prepare
 from throwcollect.dataset.directory import METADATA
@@ -126,6 +126,16 @@ def test_joined_slices_give_the_files_of_one_collection(frozen: Path, whole: Pat
     join(frozen)
     assert fingerprints(frozen) == fingerprints(whole)
     assert not (frozen / SLICES).exists()
+
+
+def test_joining_tells_how_many_slices_are_joined(
+    frozen: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    collect(frozen, "0/2", "1/2")
+    monkeypatch.setattr(progress_log, "_EVERY_S", 0.0)
+    with caplog.at_level("INFO", logger=progress_log.LOGGER):
+        join(frozen)
+    assert caplog.messages == ["1 of 2 slices joined"]
 
 
 def test_a_finished_slice_has_few_files(frozen: Path) -> None:

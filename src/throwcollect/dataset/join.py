@@ -25,6 +25,7 @@ from throwcollect.dataset.throws_table import read_throws
 from throwcollect.dataset.writer import DatasetWriter
 from throwcollect.errors import ConfigError, DatasetError
 from throwcollect.files import open_regular, unreadable, unwritable
+from throwcollect.progress_log import log_progress
 from throwcollect.sweep.plan import Plan
 from throwcollect.sweep.slice import Slice
 from throwcollect.wording import command, format_count
@@ -76,7 +77,7 @@ def _join(directory: Path) -> None:
             hint=f"{command('up', '--slice', missing[0], '--output', directory)} collects the first of them",
         )
     with closing(DatasetWriter(directory, plan)) as writer:
-        for each in slices:
+        for each in log_progress(slices, len(slices), "slice", "joined"):
             _take(directory, plan.slice_of(each), each, writer)
         writer.finish()
 
