@@ -37,6 +37,8 @@ _DEFAULT_MODE = "peer"
 """Mode of the sessions whose configuration names none."""
 _SETTINGS = {
     "scouting/multicast/enabled": False,
+    # With shared memory, no session would open where /dev/shm is missing or full; rmw_zenoh_cpp has none, either.
+    "transport/shared_memory/enabled": False,
     # All subscribers of rmw_zenoh_cpp are advanced ones, which order samples by the time stamps of the session.
     "timestamping/enabled": True,
     "queries_default_timeout": 600_000,

@@ -13,6 +13,7 @@ from rclzenoh.session_config import (
     connect_endpoint,
     environment_config,
     is_protected,
+    router_config,
 )
 
 ENDPOINT = "tls/127.0.0.1:7447"
@@ -64,6 +65,11 @@ def test_without_a_mode_the_router_is_that_of_a_peer(monkeypatch, tmp_path):
 def test_an_empty_list_of_endpoints_names_no_router(monkeypatch):
     monkeypatch.setenv(OVERRIDE_VARIABLE, "connect/endpoints=[]")
     assert connect_endpoint() is None
+
+
+@pytest.mark.parametrize("make", [environment_config, lambda: client_config(ENDPOINT), lambda: router_config(ENDPOINT)])
+def test_a_session_needs_no_shared_memory(make):
+    assert make().get_json("transport/shared_memory/enabled") == "false"
 
 
 def test_a_malformed_environment_is_refused(monkeypatch):

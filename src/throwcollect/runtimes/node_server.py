@@ -335,9 +335,9 @@ def _set_title(module: str, *arguments: str) -> None:
 def _exit_at_once(code: int) -> NoReturn:
     """End this process without the usual end of the interpreter, which writes to all memory that nodes share.
 
-    Nodes have closed their files and sessions before. Zenoh leaves files of such a process in /dev/shm; the next
-    process that ends as usual, which is the launcher, removes them. Nodes on genuine ROS 2 do not end in this way,
-    because its libraries clean up after the end of the interpreter.
+    Nodes have closed their files and sessions before. If the user has given Zenoh shared memory, it leaves files of
+    such a process in /dev/shm; the next process that ends as usual, which is the launcher, removes them. Nodes on
+    genuine ROS 2 do not end in this way, because its libraries clean up after the end of the interpreter.
     """
     # `multiprocessing` ends its forked processes in the same way.
     atexit._run_exitfuncs()
