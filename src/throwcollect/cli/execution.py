@@ -24,6 +24,8 @@ from throwcollect.wording import is_text, printable
 
 _WRONG_PATHS = (errno.ENAMETOOLONG, errno.ELOOP, errno.EACCES, errno.ENOTDIR)
 """System errors that a path from the user may cause, and that are no errors of this program."""
+_NO_TEMPORARY_DIRECTORY = "No usable temporary directory found"
+"""Beginning of the message of Python's `tempfile`."""
 _STRAY_NUMBER = re.compile(r"(option: -|\(-?)[.\d][\d. -]*\)?$")
 """End of typer's messages on a number that belongs to no option or argument."""
 _OPTIONS = {"rate_hz": "--rate"}
@@ -114,5 +116,7 @@ def _describe(error: Exception) -> tuple[str, int]:
         return (f"{message}\n{expected}  try: {usage}" if message else ""), error.exit_code
     if isinstance(error, OSError) and error.errno in _WRONG_PATHS and error.filename is not None:
         return f"{error.filename}: {error.strerror}", ConfigError.exit_code
+    if isinstance(error, OSError) and (error.strerror or "").startswith(_NO_TEMPORARY_DIRECTORY):
+        return "no directory for temporary files can be written\n  try: name one in TMPDIR", ConfigError.exit_code
     where = "  try: THROWCOLLECT_DEBUG=1 shows where; please report it"
     return f"internal error: {type(error).__name__}: {error}\n{where}", 1

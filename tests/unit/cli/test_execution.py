@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import tempfile
 
 import pytest
 
@@ -37,6 +38,17 @@ def test_an_error_about_a_configuration_key_names_the_key_unchanged(capsys: pyte
     both = NotFoundError([Problem("is not there", "task.end"), Problem("is not there", "seed", argument=True)])
     assert describe(both, capsys) == "throwcollect: task.end: is not there\n--seed: is not there\n"
     assert describe(ConfigError("no target"), capsys) == "throwcollect: no target\n"
+
+
+def test_a_machine_without_a_directory_for_temporary_files_is_told_what_to_name(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(tempfile, "tempdir", None)
+    monkeypatch.setattr(tempfile, "_candidate_tempdir_list", lambda: ["/proc/nowhere"])
+    with pytest.raises(FileNotFoundError) as caught:
+        tempfile.gettempdir()
+    said = "throwcollect: no directory for temporary files can be written\n  try: name one in TMPDIR\n"
+    assert describe(caught.value, capsys) == said
 
 
 @pytest.mark.parametrize("numbers", [["1.4", "-0.2"], ["1.4", "0.2"], ["1.4", "-.2"], ["1.4", "0.2", "0.1"]])
