@@ -261,6 +261,6 @@ def _may_go_on(node: NodeExit) -> bool:
 
 
 def _quote_last_line(node: NodeExit) -> str:
-    # Lines that belong to a message, such as its hint, are indented.
-    lines = [line for line in node.log.splitlines() if not line.startswith(" ")]
+    # Lines that belong to a message, such as its hint, are indented; those below a message of Rust have a label.
+    lines = [line for line in node.log.splitlines() if not line.startswith((" ", "note: "))]
     return f"; its log ends: {lines[-1]}" if lines else ""

@@ -166,9 +166,10 @@ def test_nodes_that_already_run_are_not_started_again(runtime: FakeRuntime, cloc
     assert runtime.started == ["sim_0"]
 
 
-def test_a_lost_node_is_restarted_and_reported(runtime: FakeRuntime, clock: Clock) -> None:
+@pytest.mark.parametrize("hint", ["  try: something else", "note: run with `RUST_BACKTRACE=1` environment variable"])
+def test_a_lost_node_is_restarted_and_reported(hint: str, runtime: FakeRuntime, clock: Clock) -> None:
     supervisor = supervise(runtime)
-    runtime.die("sim_1", log="first\nlast words\n  try: something else")
+    runtime.die("sim_1", log=f"first\nlast words\n{hint}")
     end, news = supervisor.poll()
     assert end is None
     assert news == ["sim_1 was lost (exit code 3) and is started again; its log ends: last words"]
