@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from throwcollect.cli.options import ConfigArgument, DatasetArgument
-from throwcollect.cli.streams import only_log
+from throwcollect.cli.streams import only_log, write_utf_8
 from throwcollect.config.default_path import DEFAULT_CONFIG
 from throwcollect.errors import LossError, NotFoundError
 from throwcollect.wording import format_count
@@ -94,6 +94,7 @@ def simulate(directory: DatasetArgument, trials: list[int]) -> None:
     from throwcollect.replay.replayer import Replayer
     from throwcollect.sweep.plan import Plan
 
+    write_utf_8()
     plan = Plan.read(directory / PLAN, load(directory / CONFIG))
     known = plan.trials.numbers
     if unknown := [trial for trial in trials if trial not in known]:

@@ -21,6 +21,9 @@ if TYPE_CHECKING:
 _READER_IS_GONE = (errno.EPIPE, errno.EIO)
 """Errors of a pipe whose reader has ended, and of a terminal that was closed."""
 
+_ERRORS = "backslashreplace"
+"""What is done about characters that cannot be encoded: the name of a file may hold bytes that are no text."""
+
 
 class ReaderGone(Exception):
     """The reader of standard output has ended, and the command has nothing else to do than to print."""
@@ -92,6 +95,14 @@ def has_reader() -> bool:
 def only_log() -> None:
     """Ignore lost output, because it is only the log of a node."""
     _set_kind("log")
+    write_utf_8()
+
+
+def write_utf_8() -> None:
+    """Write UTF-8 whatever encoding the user wants, because other processes of the run read the output."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(encoding="utf-8", errors=_ERRORS)
 
 
 def ensure_written(*, reader_may_leave: bool = False, hint: str | None = None) -> None:
@@ -133,7 +144,6 @@ def _open_text(number: int, as_started: TextIO | None) -> TextIO:
     return io.TextIOWrapper(
         io.BufferedWriter(_Stream(number, "w", closefd=False)),
         encoding=chosen.encoding if chosen else "utf-8",
-        # The name of a file may hold bytes that are no text.
-        errors="backslashreplace",
+        errors=_ERRORS,
         line_buffering=prompt,
     )
