@@ -17,7 +17,7 @@ import typer
 from typer.exceptions import TyperException
 
 from throwcollect.cli.streams import ReaderGone, ensure_written
-from throwcollect.errors import ConfigError, Interrupted, ThrowcollectError
+from throwcollect.errors import ConfigError, Interrupted, ThrowcollectError, WorkerError
 from throwcollect.extras import explain_missing
 from throwcollect.interruption import stop_signals
 from throwcollect.wording import is_text, printable
@@ -26,6 +26,8 @@ _WRONG_PATHS = (errno.ENAMETOOLONG, errno.ELOOP, errno.EACCES, errno.ENOTDIR)
 """System errors that a path from the user may cause, and that are no errors of this program."""
 _NO_TEMPORARY_DIRECTORY = "No usable temporary directory found"
 """Beginning of the message of Python's `tempfile`."""
+_PROCESSES_OF_RUNS = ("launch", "begin", "router", "sim", "coordinator", "simulate")
+"""Commands that a run starts."""
 _STRAY_NUMBER = re.compile(r"(option: -|\(-?)[.\d][\d. -]*\)?$")
 """End of typer's messages on a number that belongs to no option or argument."""
 _OPTIONS = {"rate_hz": "--rate"}
@@ -61,12 +63,16 @@ def execute(command: Callable[..., Any]) -> NoReturn:
 def _check_surroundings() -> None:
     """Refuse a command line and a directory that cannot be written into records and names of files.
 
+    Processes of a run need no current directory, because they are given absolute paths. That of their user may be gone.
+
     Raises:
         ConfigError: If the current directory is gone, or it or a word of the command line is not UTF-8.
     """
     try:
         here = os.getcwd()
     except OSError as error:
+        if sys.argv[1:2] and sys.argv[1] in _PROCESSES_OF_RUNS:
+            return
         raise ConfigError(
             f"the current directory cannot be used: {error.strerror}", hint="go to another one"
         ) from error
@@ -116,7 +122,15 @@ def _describe(error: Exception) -> tuple[str, int]:
         return (f"{message}\n{expected}  try: {usage}" if message else ""), error.exit_code
     if isinstance(error, OSError) and error.errno in _WRONG_PATHS and error.filename is not None:
         return f"{error.filename}: {error.strerror}", ConfigError.exit_code
+    if isinstance(error, FileNotFoundError) and error.filename is None:
+        try:
+            # The current directory may have been removed while the command ran.
+            _check_surroundings()
+        except ConfigError as reason:
+            return str(reason), reason.exit_code
     if isinstance(error, OSError) and (error.strerror or "").startswith(_NO_TEMPORARY_DIRECTORY):
         return "no directory for temporary files can be written\n  try: name one in TMPDIR", ConfigError.exit_code
+    if isinstance(error, MemoryError):
+        return "out of memory\n  try: a machine with more of it, or a higher limit (ulimit -v)", WorkerError.exit_code
     where = "  try: THROWCOLLECT_DEBUG=1 shows where; please report it"
     return f"internal error: {type(error).__name__}: {error}\n{where}", 1

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import sys
 import tempfile
+from pathlib import Path
 
 import pytest
 
@@ -13,7 +15,7 @@ from throwcollect.cli.main import assemble_command
 from throwcollect.errors import ConfigError, NotFoundError, Problem
 
 
-def describe(error: Exception, capsys: pytest.CaptureFixture[str]) -> str:
+def describe(error: Exception, capsys: pytest.CaptureFixture[str], *, code: int = 2) -> str:
     """The message of a command that fails with this error."""
 
     def fail(**_: object) -> None:
@@ -21,7 +23,7 @@ def describe(error: Exception, capsys: pytest.CaptureFixture[str]) -> str:
 
     with pytest.raises(SystemExit) as ended:
         execute(fail)
-    assert ended.value.code == 2
+    assert ended.value.code == code
     return capsys.readouterr().err
 
 
@@ -49,6 +51,41 @@ def test_a_machine_without_a_directory_for_temporary_files_is_told_what_to_name(
         tempfile.gettempdir()
     said = "throwcollect: no directory for temporary files can be written\n  try: name one in TMPDIR\n"
     assert describe(caught.value, capsys) == said
+
+
+GONE = "throwcollect: the current directory cannot be used: No such file or directory\n  try: go to another one\n"
+
+
+def test_a_current_directory_that_is_removed_during_a_command_is_named(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "gone").mkdir()
+    monkeypatch.chdir(tmp_path / "gone")
+
+    def fail(**_: object) -> None:
+        (tmp_path / "gone").rmdir()
+        os.getcwd()
+
+    with pytest.raises(SystemExit) as ended:
+        execute(fail)
+    assert (ended.value.code, capsys.readouterr().err) == (2, GONE)
+
+
+@pytest.mark.parametrize(("command", "code"), [("simulate", 0), ("sim", 0), ("up", 2)])
+def test_only_processes_of_a_run_start_in_a_directory_that_is_gone(
+    command: str, code: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "gone").mkdir()
+    monkeypatch.chdir(tmp_path / "gone")
+    (tmp_path / "gone").rmdir()
+    monkeypatch.setattr(sys, "argv", ["throwcollect", command])
+    with pytest.raises(SystemExit) as ended:
+        execute(lambda **_: 0)
+    assert ended.value.code == code
+
+
+def test_a_lack_of_memory_is_told_in_a_sentence(capsys: pytest.CaptureFixture[str]) -> None:
+    assert describe(MemoryError(), capsys, code=3).startswith("throwcollect: out of memory\n  try: ")
 
 
 @pytest.mark.parametrize("numbers", [["1.4", "-0.2"], ["1.4", "0.2"], ["1.4", "-.2"], ["1.4", "0.2", "0.1"]])
