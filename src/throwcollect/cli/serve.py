@@ -37,10 +37,14 @@ def serve(
         typer.Option("--port", min=0, max=65535, help="Port; by default 8080, or a free one if that is taken."),
     ] = None,
     datasets: Annotated[
-        Path, typer.Option("--datasets", metavar="DIR", help="Directory in which instances write datasets.")
+        Path,
+        typer.Option("--datasets", metavar="DIR", file_okay=False, help="Directory in which instances write datasets."),
     ] = Path("datasets"),
     models: Annotated[
-        Path, typer.Option("--models", metavar="DIR", help="Directory of models, each in a directory of its own.")
+        Path,
+        typer.Option(
+            "--models", metavar="DIR", file_okay=False, help="Directory of models, each in a directory of its own."
+        ),
     ] = Path("models"),
     certificate: Annotated[
         Path | None, typer.Option("--tls-cert", metavar="FILE", help="Certificate in PEM: speak HTTPS.")

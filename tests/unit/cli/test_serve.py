@@ -1,0 +1,25 @@
+"""What `serve` refuses before it listens."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import pytest
+
+from throwcollect.cli.execution import execute
+from throwcollect.cli.main import assemble_command
+
+
+@pytest.mark.parametrize("option", ["--datasets", "--models"])
+def test_a_file_in_place_of_a_directory_is_refused(
+    option: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "file").touch()
+    # The address does not exist, so that the server ends, too, where the file is taken.
+    address = ["--host", "192.0.2.1", "--in-the-clear"]
+    monkeypatch.setattr(sys, "argv", ["throwcollect", "serve", *address, option, str(tmp_path / "file")])
+    with pytest.raises(SystemExit) as ended:
+        execute(assemble_command("serve"))
+    assert ended.value.code == 2
+    assert f"throwcollect: Invalid value for '{option}': dir '{tmp_path}/file' is a file." in capsys.readouterr().err
