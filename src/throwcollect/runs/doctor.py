@@ -30,6 +30,8 @@ from throwcollect.robots.description import joint_model
 from throwcollect.robots.robot import Robot
 from throwcollect.robots.talos import TALOS
 from throwcollect.ros.middleware import VARIABLE, uses_rclpy
+from throwcollect.runs.state_directory import state_directory
+from throwcollect.runtimes.ports import check_loopback
 from throwcollect.runtimes.registry import get_runtime
 from throwcollect.runtimes.runtime import Check
 from throwcollect.wording import format_count, join_names
@@ -133,7 +135,18 @@ def _check_runtime(name: str) -> Check | None:
         return None  # `_check_members` reports it
 
 
+def _check_state() -> Check:
+    try:
+        return Check("state", "ok", f"runs are remembered in {state_directory()}")
+    except ConfigError as error:
+        return Check("state", "problem", _explain(error))
+
+
 def _check_port() -> Check:
+    try:
+        check_loopback()
+    except ConfigError as error:
+        return Check("ports", "problem", _explain(error))
     with socket.socket() as probe:
         probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
@@ -189,4 +202,11 @@ def examine(directory: Path) -> list[Check]:
         _check_embedded,
     ]
     of_runtimes = [found for name in names_of("runtimes") if (found := _check_runtime(name)) is not None]
-    return [*(check() for check in machine), *_check_members(), *of_runtimes, _check_port(), _check_disk(directory)]
+    return [
+        *(check() for check in machine),
+        *_check_members(),
+        *of_runtimes,
+        _check_state(),
+        _check_port(),
+        _check_disk(directory),
+    ]

@@ -21,7 +21,7 @@ def reserve_port(run: RunConfig) -> socket.socket:
         ConfigError: If the port is taken, this machine does not have the address, or its loopback interface is down.
     """
     if run.listen is None:
-        _check_loopback()
+        check_loopback()
         return _bind(LOOPBACK, run.router_port, "run.router_port", hint="--set run.router_port=0 takes a free one")
     host, port = split_address(run.listen)
     return _bind(host, port, "run.listen", hint="tcp/0.0.0.0:PORT listens at all addresses of this machine")
@@ -32,7 +32,7 @@ def format_endpoint(protocol: str, host: str, port: int) -> str:
     return f"{protocol}/[{host}]:{port}" if ":" in host else f"{protocol}/{host}:{port}"
 
 
-def _check_loopback() -> None:
+def check_loopback() -> None:
     """Refuse a machine whose processes do not reach each other; in a new network namespace, the interface is down.
 
     Raises:

@@ -16,6 +16,8 @@ from throwcollect.members import names_of
 from throwcollect.robots.talos import TALOS
 from throwcollect.ros.middleware import VARIABLE, _choose_installed
 from throwcollect.runs.doctor import examine
+from throwcollect.runs.state_directory import STATE_VARIABLE
+from throwcollect.runtimes import ports
 from throwcollect.runtimes.docker import docker_engine
 from throwcollect.runtimes.docker.image import SOURCES_LABEL, default_tag
 
@@ -36,6 +38,7 @@ def test_doctor_finds_no_problem_on_a_machine_that_runs_the_tests(tmp_path: Path
         "rclpy",
         "embedded",
         "docker",
+        "state",
         "ports",
         "disk",
     ]
@@ -217,6 +220,22 @@ def test_doctor_notes_a_python_without_wheels_of_bullet(tmp_path: Path, monkeypa
     (python,) = [check for check in examine(tmp_path) if check.name == "python"]
     said = "3.12.3; pybullet has wheels for 3.10 and 3.11, MuJoCo (sim.engine) for this"
     assert (python.status, python.finding) == ("note", said)
+
+
+def test_doctor_reports_a_state_directory_and_a_loopback_interface_that_runs_cannot_use(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv(STATE_VARIABLE, str(tmp_path / "runs"))
+    checks = {check.name: check for check in examine(tmp_path)}
+    assert (checks["state"].status, checks["state"].finding) == ("ok", f"runs are remembered in {tmp_path / 'runs'}")
+    (tmp_path / "file").write_text("")
+    monkeypatch.setenv(STATE_VARIABLE, str(tmp_path / "file"))
+    # The system refuses to connect to this address, too, unless a socket has asked to broadcast.
+    monkeypatch.setattr(ports, "LOOPBACK", "255.255.255.255")
+    checks = {check.name: check for check in examine(tmp_path)}
+    assert checks["state"].status == checks["ports"].status == "problem"
+    assert checks["state"].finding.startswith(f"{tmp_path / 'file'}: runs cannot be remembered there: ")
+    assert "; try: set the loopback interface up" in checks["ports"].finding
 
 
 @pytest.mark.parametrize(("missing", "status"), [({"pybullet"}, "note"), ({"pybullet", "mujoco"}, "problem")])
