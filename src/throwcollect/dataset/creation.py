@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from contextlib import ExitStack, suppress
 from pathlib import Path
 
@@ -102,4 +103,6 @@ def _fill(directory: Path, plan: Plan, listed: Points | None, *, made: bool) -> 
 
 def _make_unusable_error(directory: Path, error: OSError | RecursionError) -> ConfigError:
     reason = error.strerror if isinstance(error, OSError) else "it has too many levels"
+    if isinstance(error, FileExistsError) and directory.is_symlink():
+        reason = f"it is a link to {os.readlink(directory)}, which is not there"
     return ConfigError(f"{directory}: cannot be used as directory of a dataset: {reason}")

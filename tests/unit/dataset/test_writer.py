@@ -164,6 +164,14 @@ def test_a_dataset_cannot_be_created_below_a_file(collection: Any, tmp_path: Pat
         create(tmp_path / "file" / "dataset", collection.plan)
 
 
+def test_a_dataset_cannot_be_created_at_a_link_that_leads_nowhere(collection: Any, tmp_path: Path) -> None:
+    link = tmp_path / "link"
+    link.symlink_to("nowhere")
+    with pytest.raises(ConfigError, match=r"link: cannot be used as .*: it is a link to nowhere, which is not there"):
+        create(link, collection.plan)
+    assert list(tmp_path.iterdir()) == [link]
+
+
 def test_a_dataset_that_cannot_be_written_leaves_no_directory(collection: Any, tmp_path: Path) -> None:
     with (
         file_size_limit(2000),
