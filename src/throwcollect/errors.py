@@ -54,6 +54,11 @@ class ThrowcollectError(Exception):
         self.hint = hint
         super().__init__(message)
 
+    @property
+    def one_line(self) -> str:
+        """The message and the hint, for places where only one line fits."""
+        return "; try: ".join(filter(None, [self.message, self.hint]))
+
     def __str__(self) -> str:
         return self._with_facts(self.message)
 

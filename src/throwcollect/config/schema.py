@@ -51,7 +51,7 @@ def _make_section_type(family: str) -> Any:
     def refuse_broken(value: Any) -> Any:
         error = broken.get(name) if isinstance(name := choose(value), str) else None
         if error is not None:
-            raise ContradictionError({"name": "; try: ".join(filter(None, [error.message, error.hint]))})
+            raise ContradictionError({"name": error.one_line})
         return value
 
     return Annotated[any_of(sections, choose), BeforeValidator(refuse_broken)]

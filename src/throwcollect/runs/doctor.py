@@ -15,7 +15,7 @@ from typing import Literal
 from throwcollect import ros_installation
 from throwcollect.build import build_digest
 from throwcollect.engine_packages import PACKAGES
-from throwcollect.errors import ConfigError, MemberError, ThrowcollectError
+from throwcollect.errors import ConfigError, MemberError
 from throwcollect.extras import (
     EXTRA_OF,
     MissingExtraError,
@@ -99,20 +99,16 @@ def _check_robot(name: str) -> Check:
             package = f" of example-robot-data {version('example-robot-data')}" if is_own else ""
             return Check(check, "ok", f"{robot.title}{package}, {robot.urdf_path}")
     except (ConfigError, MemberError, MissingExtraError, MissingLibraryError) as error:
-        return Check(check, "problem" if is_own else "note", _explain(error))
+        return Check(check, "problem" if is_own else "note", error.one_line)
 
 
 def _check_members() -> list[Check]:
     """Note members of other packages that cannot be loaded: only configurations that name them need them."""
     return [
-        Check(f"{family.removesuffix('s')} {name}", "note", _explain(error))
+        Check(f"{family.removesuffix('s')} {name}", "note", error.one_line)
         for family in _LOADED
         for name, error in find_broken(family).items()
     ]
-
-
-def _explain(error: ThrowcollectError) -> str:
-    return "; try: ".join(filter(None, [error.message, error.hint]))
 
 
 def _check_extras() -> Check:
@@ -139,14 +135,14 @@ def _check_state() -> Check:
     try:
         return Check("state", "ok", f"runs are remembered in {state_directory()}")
     except ConfigError as error:
-        return Check("state", "problem", _explain(error))
+        return Check("state", "problem", error.one_line)
 
 
 def _check_port() -> Check:
     try:
         check_loopback()
     except ConfigError as error:
-        return Check("ports", "problem", _explain(error))
+        return Check("ports", "problem", error.one_line)
     with socket.socket() as probe:
         probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
@@ -178,7 +174,7 @@ def _check_embedded() -> Check:
     try:
         chosen = "rclpy" if uses_rclpy() else "the embedded backend"
     except ConfigError as error:
-        return Check("embedded", "problem", f"{found}; {_explain(error)}")
+        return Check("embedded", "problem", f"{found}; {error.one_line}")
     value = os.environ.get(VARIABLE)
     return Check("embedded", "ok", f"{found}; nodes run on {chosen}, as {VARIABLE} is {value or 'not set'}")
 
