@@ -1,0 +1,39 @@
+import re
+from collections.abc import Iterator
+from importlib.metadata import EntryPoint, EntryPoints
+from unittest.mock import Mock
+
+import pytest
+
+from throwcollect import members
+from throwcollect.robots.talos import TALOS
+from throwcollect.serve import robot_files
+
+
+def forget() -> None:
+    for cached in (
+        members._find_members,
+        members.find_broken,
+        robot_files._read_descriptions,
+        robot_files._find_packages,
+    ):
+        cached.cache_clear()
+
+
+@pytest.fixture
+def _broken_robot(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """Another package has a robot that cannot be loaded."""
+    points = {"throwcollect.robots": EntryPoints([EntryPoint("broken", "not_there:ROBOT", "")])}
+    installed = Mock(select=lambda group: points.get(group, EntryPoints()))
+    monkeypatch.setattr(members, "entry_points", lambda group=None: installed.select(group) if group else installed)
+    forget()
+    yield
+    monkeypatch.undo()
+    forget()
+
+
+@pytest.mark.usefixtures("_broken_robot")
+def test_meshes_of_a_robot_are_found_although_another_one_is_broken() -> None:
+    assert set(members.find_broken("robots")) == {"broken"}
+    package, path = re.findall(r"package://([^/\"]+)/([^\"]+)", TALOS.urdf_path.read_text())[0]
+    assert robot_files.find_mesh(package, path) == (TALOS.directory / package / path).resolve()
