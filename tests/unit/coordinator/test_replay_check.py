@@ -71,7 +71,9 @@ def compare(check: ReplayCheck, digests: dict[int, str]) -> str | None:
     return check.compare(digests, meanwhile=lambda: time.sleep(0.01))
 
 
-def test_a_replay_check_uses_the_trials_that_were_begun_early(check, digests, started) -> None:
+def test_a_replay_check_uses_the_trials_that_were_begun_early(check, digests, started, monkeypatch) -> None:
+    # The process writes for this one, so it does not matter how the user wants to read output.
+    monkeypatch.setenv("PYTHONIOENCODING", "utf-16")
     check.begin(NUMBERS)
     assert compare(check, digests) == "2 trials simulated again in a fresh process: the same bit for bit"
     assert started == [words(CHOSEN)]
