@@ -43,8 +43,8 @@ _SIMULATION_MEMORY_GIB = 0.3
 _ROS_ROUTER_PORT = 7447
 """Port at which ROS 2 nodes on rmw_zenoh_cpp look for a router."""
 
-_LOADED = ("tools", "engines", "tasks", "runtimes", "exporters")
-"""The families whose members need no more than to be loaded; robots also have to describe themselves."""
+_LOADED = ("tools", "engines", "tasks", "exporters")
+"""The families whose members need no more than to be loaded; robots and runtimes are also tried."""
 
 _LEAST_DISK_GIB = 1.0
 _DIGITS = 10
@@ -127,8 +127,8 @@ def _check_runtime(name: str) -> Check | None:
             return get_runtime(name).check()
     except MissingExtraError as error:
         return Check(name, "note", f"{error.package} is not installed; try: {error.hint}")
-    except ConfigError:
-        return None  # `_check_members` reports it
+    except ConfigError as error:
+        return Check(name, "note", error.one_line)
 
 
 def _check_state() -> Check:
