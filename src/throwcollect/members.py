@@ -152,7 +152,7 @@ def load_part(family: str, name: str, path: str, kind: type | None = None) -> An
         ConfigError: If the member comes from another package, and the object cannot be imported or is not of this kind.
     """
     if is_own(family, name):
-        return _load(path)
+        return _load_own(path)
     where = f"{_describe(family, name)}: {path}"
     found = _import(path, where)
     if kind is not None:
@@ -199,6 +199,12 @@ def _load(path: str) -> Any:
     """Import an object ``module:name``."""
     # Unlike `getattr`, an entry point also finds an attribute of an attribute.
     return EntryPoint("", path, "").load()
+
+
+@cache
+def _load_own(path: str) -> Any:
+    """Import an object of our own, only once, because parts are asked for several times in every trial."""
+    return _load(path)
 
 
 def _import(path: str, what: str) -> Any:

@@ -58,6 +58,9 @@ class Curve:
         Returns:
             Positions [rad], velocities [rad/s] and accelerations [rad/s²], each of shape ``(n_joints,)``.
         """
+        if time_ns >= self.end_ns:
+            # From the end on, all powers but the lowest have coefficients of 0.
+            return self.position[0, -1], self.velocity[0, -1], self.acceleration[0, -1]
         times_ns = np.array([time_ns], dtype=np.int64)
         position, velocity, acceleration = (
             self._evaluate(coefficients, times_ns)[0]

@@ -30,7 +30,7 @@ class Grid:
         self._block_start = 0
         self._block = np.empty((0, 0))
         # A clock that stands still never gets to the end, so its last position is the position at the origin.
-        self._last = self._compute(self.end_index if step_ns else 0, 1)[0]
+        self._last = curve.state(curve.end_ns if step_ns else origin_ns)[0]
 
     def time_ns(self, index: int) -> int:
         """Compute the time of a point, since the trajectory's start [ns]."""

@@ -1,4 +1,4 @@
-"""Lays the samples of engines out as arrays."""
+"""Keeps the samples of engines, and lays them out as arrays."""
 
 from __future__ import annotations
 
@@ -14,10 +14,48 @@ from throwcollect.episode.record import Samples
 BALL_POSITION = slice(-13, -10)
 BALL_LINEAR_VELOCITY = slice(-6, -3)
 BALL_HEIGHT = -11
+_NUMBER_BYTES = 8
+
+
+class SampleLog:
+    """Keeps samples as packed numbers: to free their Python objects after a trial takes longer than to pack them all.
+
+    Attributes:
+        last: The sample that was recorded last.
+        forgotten: How many samples have been forgotten.
+
+    Args:
+        first: The first sample; all others have as many numbers.
+    """
+
+    def __init__(self, first: Sample) -> None:
+        self._pack = struct.Struct(f"{len(first)}d").pack
+        self._packed = bytearray()
+        self._width = len(first)
+        self.forgotten = 0
+        self.append(first)
+
+    def __len__(self) -> int:
+        return self.forgotten + len(self._packed) // (self._width * _NUMBER_BYTES)
+
+    def append(self, sample: Sample) -> None:
+        """Record a sample."""
+        self.last = sample
+        self._packed += self._pack(*sample)
+
+    def forget(self) -> None:
+        """Drop all samples but the last one, so that a world can go on for ever; numbers of samples stay."""
+        self.forgotten = len(self) - 1
+        self._packed = self._packed[-self._width * _NUMBER_BYTES :]
+
+    def table(self, first: int) -> NDArray[np.float64]:
+        """Copy the samples from number `first` on, which is not forgotten, shape ``(n_samples, n_numbers)``."""
+        skipped = (first - self.forgotten) * self._width
+        return np.array(np.frombuffer(self._packed)[skipped:]).reshape(-1, self._width)
 
 
 def to_samples(
-    rows: Sequence[Sample],
+    table: NDArray[np.float64],
     stamps_ns: NDArray[np.int64],
     joints: Sequence[str],
     moving: Sequence[str],
@@ -27,18 +65,14 @@ def to_samples(
     """Lay samples out as arrays of all joints.
 
     Args:
-        rows: The samples.
-        stamps_ns: Their simulated times [ns], shape ``(n_rows,)``.
+        table: The samples, shape ``(n_samples, n_numbers)``.
+        stamps_ns: Their simulated times [ns], shape ``(n_samples,)``.
         joints: All joints of the robot, in its order.
         moving: The joints that the samples hold.
         locked: Angle [rad] of each joint that the samples do not hold.
         offsets: True angle of each moving joint minus the angle that its sensor shows [rad], shape ``(n_moving,)``.
     """
-    count, width = len(rows), 3 * len(moving) + BALL_NUMBERS
-    # Packing row by row takes a third of the time in which NumPy makes an array of as many Python objects.
-    pack = struct.Struct(f"{width}d").pack
-    table = np.frombuffer(bytearray().join(pack(*row) for row in rows)).reshape(count, width)
-    position, velocity, effort = np.zeros((3, count, len(joints)))
+    position, velocity, effort = np.zeros((3, len(table), len(joints)))
     position[:, [joints.index(joint) for joint in locked]] = list(locked.values())
     columns = [joints.index(joint) for joint in moving]
     for array, values in zip((position, velocity, effort), np.split(table[:, :-BALL_NUMBERS], 3, axis=1), strict=True):

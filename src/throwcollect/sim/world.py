@@ -22,7 +22,7 @@ from throwcollect.robots.description import (
 from throwcollect.sim.checked_engine import make_engine
 from throwcollect.sim.contact_log import ContactLog
 from throwcollect.sim.motors import Motors
-from throwcollect.sim.recording import BALL_HEIGHT, BALL_LINEAR_VELOCITY, to_samples
+from throwcollect.sim.recording import BALL_HEIGHT, BALL_LINEAR_VELOCITY, SampleLog, to_samples
 from throwcollect.sim.scene import drag_of, physics_of, scene_of
 from throwcollect.sim.spawned import SpawnedBodies
 from throwcollect.tools.tool import tool_of
@@ -68,8 +68,7 @@ class World(Observer):
     _touching: frozenset[str]
     _targets: NDArray[np.float64]
     _sampled_target: Sequence[float]
-    _rows: list[Sample]
-    _forgotten: int
+    _log: SampleLog
 
     def __init__(self, config: Config) -> None:
         self.engine: Engine = make_engine(config.sim.engine)
@@ -95,7 +94,7 @@ class World(Observer):
     @property
     def recorded(self) -> int:
         """Number of samples recorded in this trial, the start state included."""
-        return self._forgotten + len(self._rows)
+        return len(self._log)
 
     def reset(self, trial: Config, *, start_ns: int = 0) -> None:
         """Put the world into the start state of a trial and record it as the first sample.
@@ -173,25 +172,23 @@ class World(Observer):
     def on_sample(self, step: int, sample: Sample) -> bool:
         """Record a sample after a step of the present `run`, and tell whether the run is over."""
         self.steps = self._first_step + step
-        self._rows.append(sample)
-        self.end_reason = self.end_reason or self._judge(self._targets[step].tolist())
+        before = self._log.last
+        self._log.append(sample)
+        self.end_reason = self.end_reason or self._judge(before, sample, self._targets[step].tolist())
         return self._stops_at_end and self.end_reason is not None
 
     def samples(self, first: int = 0) -> Samples:
         """Return recorded samples as arrays, from number `first` on; forgotten samples are left out."""
-        first = max(first, self._forgotten)
+        first = max(first, self._log.forgotten)
         steps = np.arange(first, self.recorded, dtype=np.int64) * self._stride
         # Each stamp is computed from its step, because sums of periods would drift: a period may be no whole number of
         # nanoseconds.
         stamps = self._start_ns + steps * NS_PER_S // self._hz
-        rows = self._rows[first - self._forgotten :]
-        return to_samples(rows, stamps, self._joints, self.moving, self._locked, self._offsets)
+        return to_samples(self._log.table(first), stamps, self._joints, self.moving, self._locked, self._offsets)
 
     def forget_samples(self) -> None:
-        """Drop all recorded samples but the last two, so that a world can go on for ever; numbers of samples stay."""
-        # `_judge` compares the last two samples.
-        self._forgotten += len(self._rows[:-2])
-        self._rows = self._rows[-2:]
+        """Drop all recorded samples but the last one, so that a world can go on for ever; numbers of samples stay."""
+        self._log.forget()
 
     def contacts(self) -> tuple[Contact, ...]:
         """List all intervals in which something pressed on the ball, by start time."""
@@ -275,15 +272,13 @@ class World(Observer):
 
     def _record_start(self) -> None:
         # The motor torques are taken from the settled state, because engines have none before the first step.
-        self._rows = [(*self._start_joints, *self.engine.state.sample[-BALL_NUMBERS:])]
-        self._forgotten = 0
+        self._log = SampleLog((*self._start_joints, *self.engine.state.sample[-BALL_NUMBERS:]))
 
     def _stamp_ns(self, step: int) -> int:
         return self._start_ns + step * NS_PER_S // self._hz
 
-    def _judge(self, target: Sequence[float]) -> EndReason | None:
-        """Find the reason for which the trial ends with the sample just recorded; None if the trial goes on."""
-        before, now = self._rows[-2:]
+    def _judge(self, before: Sample, now: Sample, target: Sequence[float]) -> EndReason | None:
+        """Find the reason for which the trial ends with a sample, by the one before; None if the trial goes on."""
         if now[BALL_HEIGHT] < self._landing_height <= before[BALL_HEIGHT] and self._tool not in self._contacts.bodies:
             return "landed"
         stands_still = target == self._sampled_target
