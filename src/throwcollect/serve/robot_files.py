@@ -12,8 +12,8 @@ from pathlib import Path, PurePosixPath
 
 from throwcollect.config.loader import load
 from throwcollect.dataset.directory import config_path
-from throwcollect.errors import ConfigError, NotFoundError
-from throwcollect.members import load_member, usable_names
+from throwcollect.errors import ConfigError, MemberError, NotFoundError
+from throwcollect.members import is_own, load_member, usable_names
 from throwcollect.robots.appearance import read_urdf
 from throwcollect.robots.description import full_description
 from throwcollect.robots.robot import Robot
@@ -176,16 +176,30 @@ def _find_packages() -> Mapping[str, Path]:
 
 @lru_cache(maxsize=1)
 def _read_descriptions() -> Sequence[tuple[str, Robot]]:
-    """Read the descriptions of all robots that can be loaded.
+    """Read the descriptions of all robots that can be loaded; robots of other packages may lack theirs.
 
     Raises:
-        ConfigError: If one cannot be read.
+        ConfigError: If that of a robot of our own cannot be read.
     """
     descriptions = []
     for name in usable_names("robots"):
         robot: Robot = load_member("robots", name)
         try:
-            descriptions.append((robot.urdf_path.read_text(encoding="utf-8"), robot))
-        except (OSError, UnicodeDecodeError) as error:
-            raise ConfigError(f"{robot.urdf_path}: cannot be read: {error}") from error
+            descriptions.append((_read_description(robot), robot))
+        except (ConfigError, MemberError):
+            # A run with a broken robot says so itself, and the meshes of all other robots must still be found.
+            if is_own("robots", name):
+                raise
     return descriptions
+
+
+def _read_description(robot: Robot) -> str:
+    """Read the description of a robot.
+
+    Raises:
+        ConfigError: If it cannot be read.
+    """
+    try:
+        return robot.urdf_path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise ConfigError(f"{robot.urdf_path}: cannot be read: {error}") from error
