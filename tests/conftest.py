@@ -9,6 +9,7 @@ import pytest
 from hypothesis import settings
 
 from tests.commands import command_server
+from throwcollect.runs.state_directory import STATE_VARIABLE
 
 # A shell may start tests in the background with SIGINT ignored, which all their processes would inherit.
 signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -23,6 +24,14 @@ def pytest_collection_finish() -> None:
     gc.collect()
     gc.freeze()
     gc.set_threshold(20_000, 20, 50)
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _state(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """Remember runs of tests where `throwcollect ps` of whoever runs the tests does not find them."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv(STATE_VARIABLE, str(tmp_path_factory.mktemp("state")))
+        yield
 
 
 @pytest.fixture(scope="session")

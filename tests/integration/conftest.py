@@ -25,19 +25,15 @@ from tests.integration.robot import (
 from throwcollect.ros import Context
 from throwcollect.ros.middleware import Middleware, uses_rclpy
 from throwcollect.ros.router import router
-from throwcollect.runs.state_directory import STATE_VARIABLE
 
 NAME = "sim_0"
 
 
 @pytest.fixture(scope="session", autouse=True)
-def _state(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+def _forked_commands(request: pytest.FixtureRequest) -> None:
     # Libraries of genuine ROS 2 may not survive a fork, so their simulations start by themselves.
     if not uses_rclpy():
         request.getfixturevalue("commands")
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv(STATE_VARIABLE, str(tmp_path_factory.mktemp("state")))
-        yield
 
 
 @pytest.fixture(scope="session")
