@@ -3,7 +3,7 @@
 Its layout names the parts of its data: ``header``, an `EpisodeHeader` in JSON; ``result``, the result of the trial in
 JSON; ``conditions``, the conditions of the episode in JSON; ``hashes``, the SHA-256 of the records of each chunk as 32
 bytes; ``chunk``, one or more MCAP Chunk records; and ``signature``, which covers all parts before it. The coordinator
-trusts a sender who has the key of the run, so it does not decompress, hash or judge the episode again.
+trusts a sender who has the key of the run, so it does not hash or judge the episode again.
 
 The same message carries a refusal: its header and its chunk are empty, its result is the reason, and its conditions
 are the token of the lease that was refused.
