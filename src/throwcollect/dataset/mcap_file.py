@@ -127,11 +127,7 @@ def episode_run(episode: Episode) -> RecordGroup:
     Raises:
         DatasetError: If a chunk of the episode is damaged.
     """
-    table = episode.table
-    chunks = [(episode.chunk, {channel: table.message_index(channel) for channel in table.columns})]
-    for sensor in episode.sensors:
-        messages = sensor.messages
-        chunks.append((sensor.chunk, {channel: messages.message_index(channel) for channel in messages.channels}))
+    chunks = [(each.chunk, indexes) for each, indexes in zip(episode.chunks, episode.message_indexes, strict=True)]
     facts = {
         "trial": str(episode.header.trial),
         "digest": episode.digest,

@@ -76,6 +76,21 @@ def count_indexed(index: bytes) -> int:
     return (len(index) - _MESSAGE_INDEX_HEADER.size) // _INDEX_ENTRY_BYTES
 
 
+def _cut_message_index(records: memoryview) -> tuple[int, bytes]:
+    """Take the Message Index record at the beginning of some records: its channel, and its bytes.
+
+    Raises:
+        DatasetError: If `encode_message_index` has not written it.
+    """
+    start = bytes(records[: _MESSAGE_INDEX_HEADER.size])
+    if len(start) == _MESSAGE_INDEX_HEADER.size:
+        _, length, channel, size = _MESSAGE_INDEX_HEADER.unpack(start)
+        end = _MESSAGE_INDEX_HEADER.size + size
+        if length == 6 + size and size % _INDEX_ENTRY_BYTES == 0 and end <= len(records):
+            return channel, bytes(records[:end])
+    raise DatasetError("chunk: a message index behind it cannot be read")
+
+
 @dataclass(frozen=True)
 class Chunk:
     """A compressed MCAP chunk.
@@ -134,19 +149,28 @@ class Chunk:
         return _CHUNK_HEADER.size + stored if is_ours else 0
 
     @classmethod
-    def parse_all(cls, records: memoryview) -> list[Chunk]:
-        """Read MCAP Chunk records that follow each other, at least one, without decompressing them.
+    def parse_all(cls, records: memoryview) -> tuple[list[Chunk], list[dict[int, bytes]]]:
+        """Read MCAP Chunk records, at least one, each with its Message Index records, without decompressing them.
+
+        Returns:
+            The chunks, and the index records of each by channel.
 
         Raises:
             DatasetError: If the bytes are anything else.
         """
         chunks: list[Chunk] = []
+        indexes: list[dict[int, bytes]] = []
         while records or not chunks:
             # Bytes that announce no size are taken as a whole, and `parse` refuses them.
             size = cls.read_announced_size(bytes(records[:CHUNK_HEADER_BYTES])) or len(records)
             chunks.append(cls.parse(records[:size]))
+            indexes.append({})
             records = records[size:]
-        return chunks
+            while records and records[0] == Opcode.MESSAGE_INDEX:
+                channel, index = _cut_message_index(records)
+                indexes[-1][channel] = index
+                records = records[len(index) :]
+        return chunks, indexes
 
     @classmethod
     def parse(cls, record: bytes | memoryview) -> Chunk:

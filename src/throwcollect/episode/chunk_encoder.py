@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 import zstandard
@@ -35,7 +36,7 @@ class ChunkEncoder:
         """Encode an episode, with set points of each controller whose state is recorded, by name.
 
         Returns:
-            The state chunk, and its message records.
+            The state chunk with its message indexes, and its message records.
 
         Raises:
             KeyError: If the set points of a recorded controller are missing.
@@ -48,4 +49,5 @@ class ChunkEncoder:
             headers["log_time"] = headers["publish_time"] = samples.stamps_ns
             topic.fill(table.messages(channel).view(topic.layout.dtype)[:, 0], recording)
         data, times = self._compressor.compress(table.contents), table.log_times
-        return RecordedChunk.of(table.contents, data, start_ns=int(times[0]), end_ns=int(times[-1])), table
+        chunk = RecordedChunk.of(table.contents, data, start_ns=int(times[0]), end_ns=int(times[-1]))
+        return replace(chunk, indexes=table.message_indexes), table

@@ -2,8 +2,9 @@
 
 Its layout names the parts of its data: ``header``, an `EpisodeHeader` in JSON; ``result``, the result of the trial in
 JSON; ``conditions``, the conditions of the episode in JSON; ``hashes``, the SHA-256 of the records of each chunk as 32
-bytes; ``chunk``, one or more MCAP Chunk records; and ``signature``, which covers all parts before it. The coordinator
-trusts a sender who has the key of the run, so it does not hash or judge the episode again.
+bytes; ``chunk``, one or more MCAP Chunk records, each with its Message Index records behind it; and ``signature``,
+which covers all parts before it. The coordinator trusts a sender who has the key of the run, so it does not decompress,
+hash or judge the episode again.
 
 The same message carries a refusal: its header and its chunk are empty, its result is the reason, and its conditions
 are the token of the lease that was refused.
@@ -15,7 +16,7 @@ import hashlib
 import itertools
 import re
 import struct
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import cache, cached_property
 from typing import NamedTuple
 
@@ -89,6 +90,16 @@ class Episode:
         if joints is not None:
             _require_joints(self.table.joints, tuple(joints))
         return self.table.samples
+
+    @cached_property
+    def message_indexes(self) -> tuple[Mapping[int, bytes], ...]:
+        """The MCAP Message Index records of each chunk, by channel.
+
+        Raises:
+            DatasetError: If a chunk that came without them is damaged.
+        """
+        sensors = (sensor.indexes or sensor.messages.message_indexes for sensor in self.sensors)
+        return (self.state.indexes or self.table.message_indexes, *sensors)
 
     @cached_property
     def digest(self) -> str:
@@ -182,7 +193,11 @@ def pack(handed: Delivery | TrialRefusal, signer: Signer) -> bytes:
             handed.result.encode(),
             handed.conditions.encode(),
             b"".join(bytes.fromhex(chunk.records_sha256) for chunk in episode.chunks),
-            b"".join(chunk.chunk.record() for chunk in episode.chunks),
+            b"".join(
+                part
+                for chunk, indexes in zip(episode.chunks, episode.message_indexes, strict=True)
+                for part in (chunk.chunk.record_header(), chunk.chunk.data, *indexes.values())
+            ),
         ]
     signature = signer.sign(*parts).encode()
     return b"".join((_encode_prefix([*map(len, parts), len(signature)]), *parts, signature))
@@ -227,11 +242,18 @@ def unpack(message: bytes, signer: Signer) -> Delivery | TrialRefusal:
     if not header:
         return TrialRefusal(token=texts[1], reason=texts[0])
     given = [hashes[start : start + _HASH_BYTES].hex() for start in range(0, len(hashes), _HASH_BYTES)]
-    return Delivery(make_episode(bytes(header), given, Chunk.parse_all(chunks)), *texts)
+    return Delivery(make_episode(bytes(header), given, *Chunk.parse_all(chunks)), *texts)
 
 
-def make_episode(header: bytes | str, hashes: Sequence[str], chunks: Sequence[Chunk]) -> Episode:
+def make_episode(
+    header: bytes | str,
+    hashes: Sequence[str],
+    chunks: Sequence[Chunk],
+    indexes: Sequence[Mapping[int, bytes]] = (),
+) -> Episode:
     """Make an episode of its header in JSON, its chunks, the state chunk first, and the SHA-256 of their records.
+
+    `indexes` has the Message Index records of each chunk by channel, if they came with the chunks.
 
     Raises:
         DatasetError: If the header cannot be read, a hash is no SHA-256 in hexadecimal, or there are not as many hashes
@@ -242,4 +264,5 @@ def make_episode(header: bytes | str, hashes: Sequence[str], chunks: Sequence[Ch
             raise DatasetError(f"episode: SHA-256 {given[:80]!r}", expected="64 hexadecimal digits")
     if len(hashes) != len(chunks) or not chunks:
         raise DatasetError(f"episode: {len(chunks)} chunks", expected=f"{len(hashes)}, as many as it has hashes of")
-    return Episode(header_from_json(header), *map(RecordedChunk, chunks, hashes))
+    known = indexes or [{}] * len(chunks)
+    return Episode(header_from_json(header), *map(RecordedChunk, chunks, hashes, known))

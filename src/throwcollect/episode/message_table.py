@@ -187,6 +187,11 @@ class MessageTable(RowLayout):
         offsets = np.arange(self.columns[channel].offset, self._table.size, self._table.shape[1])
         return encode_message_index(channel, self.headers(channel)["log_time"], offsets)
 
+    @property
+    def message_indexes(self) -> dict[int, bytes]:
+        """The Message Index records of all channels, by channel."""
+        return {channel: self.message_index(channel) for channel in self.columns}
+
     @cached_property
     def samples(self) -> Samples:
         """The samples, copied from the records.
@@ -243,6 +248,11 @@ class MessageList:
         """Encode the MCAP Message Index record of one channel."""
         rows = self.headers["channel"] == channel
         return encode_message_index(channel, self.headers["log_time"][rows], self.offsets[rows])
+
+    @property
+    def message_indexes(self) -> dict[int, bytes]:
+        """The Message Index records of all channels, by channel."""
+        return {channel: self.message_index(channel) for channel in self.channels}
 
     def move(self, by_ns: int) -> None:
         """Move all times and stamps by `by_ns` [ns], in the contents themselves, which must be a bytearray."""

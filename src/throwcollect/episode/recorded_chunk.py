@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import hashlib
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from functools import cached_property
 
 from throwcollect.episode.chunk import Chunk
@@ -18,10 +19,12 @@ class RecordedChunk:
     Attributes:
         chunk: The recorded messages, compressed.
         records_sha256: SHA-256 of the uncompressed message records in hexadecimal, as it was written beside them.
+        indexes: MCAP Message Index records of the chunk by channel, as they came with it; empty if they did not.
     """
 
     chunk: Chunk
     records_sha256: str
+    indexes: Mapping[int, bytes] = field(default_factory=dict)
 
     @classmethod
     def of(cls, contents: bytes | bytearray | memoryview, data: bytes, *, start_ns: int, end_ns: int) -> RecordedChunk:

@@ -3,6 +3,7 @@ from __future__ import annotations
 import hashlib
 from dataclasses import replace
 from typing import Any
+from unittest.mock import Mock
 
 import pytest
 from hypothesis import given, settings
@@ -11,6 +12,7 @@ from hypothesis import strategies as st
 from rclzenoh.interfaces import deserialize, get_message
 from throwcollect.config.schema import Config
 from throwcollect.episode.channels import Channels
+from throwcollect.episode.chunk import Chunk
 from throwcollect.episode.chunk_encoder import ChunkEncoder
 from throwcollect.episode.episode_message import (
     Delivery,
@@ -63,8 +65,25 @@ def test_the_message_of_an_episode_is_a_standard_array_that_names_its_parts(sent
     assert parts["result"].decode() == RESULT
     assert parts["conditions"].decode() == CONDITIONS
     assert parts["hashes"].hex() == sent.state.records_sha256
-    assert parts["chunk"] == sent.chunk.record()
+    assert parts["chunk"] == sent.chunk.record() + b"".join(sent.table.message_indexes.values())
     assert SIGNER.has_signed(parts.pop("signature").decode(), *parts.values())
+
+
+def test_message_indexes_come_with_an_episode_so_that_its_chunk_is_not_decompressed(
+    sent: Episode, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from_contents = Episode(sent.header, replace(sent.state, indexes={})).message_indexes
+    message = pack(Delivery(sent, RESULT, CONDITIONS), SIGNER)
+    monkeypatch.setattr(Chunk, "decompress", Mock(side_effect=AssertionError))
+    assert unpack(message, SIGNER).episode.message_indexes == from_contents
+
+
+@pytest.mark.parametrize("length", [1, 14, 15, -16])
+def test_an_episode_whose_message_index_is_cut_off_is_refused(sent: Episode, length: int) -> None:
+    *_, last = sent.state.indexes
+    damaged = Episode(sent.header, replace(sent.state, indexes={last: sent.state.indexes[last][:length]}))
+    with pytest.raises(DatasetError, match="a message index behind it cannot be read"):
+        unpack(pack(Delivery(damaged, RESULT, CONDITIONS), SIGNER), SIGNER)
 
 
 def test_the_digest_covers_header_and_records_but_not_their_compression(
