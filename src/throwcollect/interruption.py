@@ -5,6 +5,9 @@ from __future__ import annotations
 import ctypes
 import os
 import signal
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from types import FrameType
 from typing import NoReturn
 
@@ -37,6 +40,38 @@ def leave_when_stopped() -> None:
 
 def _leave(_number: int, _frame: FrameType | None) -> NoReturn:
     os._exit(130)
+
+
+@contextmanager
+def hold_stop_signals() -> Iterator[Callable[[], None]]:
+    """Hold signals that ask to stop back, while a library calls Python and ignores the exceptions that handlers raise.
+
+    They reach their handlers at the end, unless the block ends with an error. In other threads than the main one there
+    is nothing to hold back, because handlers never run there.
+
+    Yields:
+        Lets the signals that have come so far reach their handlers, at a place where these may raise an exception.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield lambda: None
+        return
+    came: list[int] = []
+    # Only handlers of Python raise exceptions.
+    handlers = {number: handler for number in stop_signals() if callable(handler := signal.getsignal(number))}
+
+    def let_through() -> None:
+        while came:
+            number = came.pop(0)
+            handlers[signal.Signals(number)](number, None)
+
+    for number in handlers:
+        signal.signal(number, lambda number, _frame: came.append(number))
+    try:
+        yield let_through
+    finally:
+        for number, handler in handlers.items():
+            signal.signal(number, handler)
+    let_through()
 
 
 def die_with_parent(parent: int) -> None:

@@ -1,9 +1,13 @@
-"""The end of a process whose parent dies."""
+"""The end of a process whose parent dies, and signals that are held back."""
 
+import signal
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 
 import pytest
+
+from throwcollect.interruption import hold_stop_signals
 
 CHILD = """
 import os, sys, time
@@ -33,3 +37,34 @@ def test_a_child_dies_with_its_parent_whenever_that_dies(
     # `run` returns when no process has the output open any more, which is when the child has ended.
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=60, check=False)
     assert (done.stdout, done.stderr) == (said, "")
+
+
+def test_signals_that_are_held_back_reach_their_handlers_where_they_are_let_through_or_at_the_end() -> None:
+    holding = hold_stop_signals()
+    let_through = holding.__enter__()
+    signal.raise_signal(signal.SIGINT)
+    with pytest.raises(KeyboardInterrupt):
+        let_through()
+    signal.raise_signal(signal.SIGINT)
+    with pytest.raises(KeyboardInterrupt):
+        holding.__exit__(None, None, None)
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+def test_a_signal_that_is_held_back_does_not_replace_an_error() -> None:
+    def fail() -> None:
+        with hold_stop_signals():
+            signal.raise_signal(signal.SIGINT)
+            raise OSError("full")
+
+    with pytest.raises(OSError, match="full"):
+        fail()
+
+
+def test_signals_are_not_held_back_in_other_threads_which_they_do_not_reach() -> None:
+    def hold() -> None:
+        with hold_stop_signals() as let_through:
+            let_through()
+
+    with ThreadPoolExecutor(1) as pool:
+        pool.submit(hold).result()

@@ -16,6 +16,7 @@ from throwcollect.export.readme import Layout, tabulate_signals
 from throwcollect.export.throw_source import ExportSource, ThrowSeries, read_metadata
 from throwcollect.extras import lazily
 from throwcollect.files import write_all
+from throwcollect.interruption import hold_stop_signals
 
 h5py = lazily("h5py")
 
@@ -59,7 +60,12 @@ ball_position_m = file["data/demo_{source.entries[0].trial}/obs/ball_position_m"
 def write(source: ExportSource, directory: Path) -> None:
     """Write a dataset as one HDF5 file; see `Exporter.write`."""
     config = source.dataset.config
-    with _Output(directory / "throws.hdf5") as output, h5py.File(output, "w") as file:
+    # The HDF5 library goes on after an exception in one of the output's methods, without what should have been written.
+    with (
+        hold_stop_signals() as let_through,
+        _Output(directory / "throws.hdf5") as output,
+        h5py.File(output, "w") as file,
+    ):
         file.attrs["digest_of_dataset"] = source.dataset.digest
         file.attrs["rate_hz"] = source.rate_hz
         data = file.create_group("data")
@@ -69,6 +75,7 @@ def write(source: ExportSource, directory: Path) -> None:
         for throw in source.throws(source.entries):
             _add_throw(data.create_group(f"demo_{throw.trial}"), throw, source)
             output.check()
+            let_through()
         succeeded = [f"demo_{entry.trial}" for entry in source.entries if entry.succeeded]
         file[f"mask/{config.task.success}"] = np.array(succeeded, dtype="S")
         _add_table(file.create_group("throws"), source.table, h5py.string_dtype())
