@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -245,6 +245,7 @@ class _Sorting:
 
     def settle(self, directory: Path) -> None:
         """Write the first waiting episode of each trial whose right one was not found, and remark on all of them."""
+        reading: dict[Path, Iterator[FoundEpisode]] = {}
         for trial, candidates in sorted(self.waiting.items()):
             for episode in candidates:
                 difference = f"an episode with digest {episode.digest}, not {episode.expected} as in {THROWS}"
@@ -254,7 +255,7 @@ class _Sorting:
                     kind = "right" if digest == episode.expected else "first"
                     self.remarks.append(f"{remark}; the {kind} one was taken from {file}")
                 else:
-                    self._write(episode.file, _find_again(directory / episode.file, episode))
+                    self._write(episode.file, _find_again(directory / episode.file, episode, reading))
                     self.differing.append(episode)
                     self.remarks.append(f"{remark}; kept, as it passes all other checks")
 
@@ -277,14 +278,22 @@ class _Sorting:
         return tuple(lost)
 
 
-def _find_again(path: Path, wanted: DifferingEpisode) -> Episode:
+def _find_again(path: Path, wanted: DifferingEpisode, reading: dict[Path, Iterator[FoundEpisode]]) -> Episode:
     """Read a waiting episode from its file once more, as only one episode at a time is kept in memory.
+
+    Args:
+        path: The file.
+        wanted: The episode.
+        reading: The file that was read last, and the episodes that follow there, as most files are in order of trials.
 
     Raises:
         DatasetError: If it is not there any more.
     """
-    for found in scan_whole(path):
-        episode = found.stored.episode
-        if (episode.header.trial, episode.digest) == (wanted.trial, wanted.digest):
-            return episode
+    for episodes in (reading.get(path, iter(())), scan_whole(path)):
+        reading.clear()
+        for found in episodes:
+            episode = found.stored.episode
+            if (episode.header.trial, episode.digest) == (wanted.trial, wanted.digest):
+                reading[path] = episodes
+                return episode
     raise DatasetError("was changed while it was read", path=path)

@@ -210,6 +210,28 @@ def test_repair_keeps_an_episode_that_differs_from_the_table_with_a_remark(
     assert verify(output) == []
 
 
+def test_repair_reads_a_swapped_recording_once_more_and_not_once_for_each_episode(
+    make_collection: Any, dataset: Path, output: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    other = make_collection().collect(
+        output.with_name("other"),
+        range(7),
+        change=lambda samples, header: (replace(samples, effort=samples.effort * 1.01), header),
+    )
+    shutil.copy(other / SHARD, dataset / SHARD)
+    scanned = []
+
+    def scan(path: Path) -> Any:
+        for found in scan_whole(path):
+            scanned.append(path.name)
+            yield found
+
+    monkeypatch.setattr("throwcollect.dataset.repair.scan_whole", scan)
+    repaired = repair(dataset, output, remake=never)
+    assert len(repaired.differing) > 1
+    assert scanned.count(SHARD) == 2 * len(repaired.differing)
+
+
 def test_repair_without_a_table_reports_no_differing_episode(make_collection: Any, dataset: Path, output: Path) -> None:
     other = make_collection().collect(dataset.parent / "other", change=scale_efforts)
     shutil.copy(other / SHARD, dataset / SHARD)
