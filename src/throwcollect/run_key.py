@@ -12,7 +12,7 @@ import hashlib
 import hmac
 import os
 from dataclasses import dataclass
-from datetime import datetime, timedelta, timezone
+from datetime import datetime
 from pathlib import Path
 
 from throwcollect.errors import ConfigError
@@ -23,9 +23,8 @@ KEY_VARIABLE = "THROWCOLLECT_KEY"
 
 _PRIVATE_KEY, _CERTIFICATE = "key.pem", "certificate.pem"
 _NAME = "throwcollect"
-_LASTS = timedelta(days=3650)
-_CLOCKS_DIFFER_BY = timedelta(days=1)
-"""Largest difference between the clocks of the machines of one run."""
+_FIRST_MOMENT, _LAST_MOMENT = datetime(1970, 1, 1), datetime(9999, 12, 31, 23, 59, 59)
+"""Whole time of a certificate, so that nodes let each other in whatever their clocks say, or are set to in a run."""
 _SECRET_BYTES = 32
 _PURPOSE = b"throwcollect signature 1\0"
 
@@ -180,15 +179,14 @@ def _make_pair(secret: bytes | None) -> tuple[bytes, bytes]:
     except ValueError as error:
         raise ConfigError("there is no key of this secret") from error
     name = x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, _NAME)])
-    now = datetime.now(timezone.utc)
     certificate = (
         x509.CertificateBuilder()
         .subject_name(name)
         .issuer_name(name)
         .public_key(key.public_key())
         .serial_number(x509.random_serial_number())
-        .not_valid_before(now - _CLOCKS_DIFFER_BY)
-        .not_valid_after(now + _LASTS)
+        .not_valid_before(_FIRST_MOMENT)
+        .not_valid_after(_LAST_MOMENT)
         .add_extension(x509.SubjectAlternativeName([x509.DNSName(_NAME)]), critical=False)
         # The TLS library of Zenoh (rustls) does not accept the certificate of a CA as the certificate of a peer.
         .add_extension(x509.BasicConstraints(ca=False, path_length=None), critical=True)

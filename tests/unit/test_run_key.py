@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 import zenoh
+from cryptography import x509
 
 from throwcollect.errors import ConfigError
 from throwcollect.run_key import KEY_VARIABLE, RunKey, Signer
@@ -66,6 +67,11 @@ def test_a_router_accepts_only_clients_with_its_key(tmp_path: Path) -> None:
         for changes in (settings(other), {}, {f"{TLS}root_ca_certificate": str(key.certificate)}):
             with pytest.raises(zenoh.ZError), session("client", {**connect, **changes}):
                 pass
+
+
+def test_a_certificate_is_valid_whatever_the_clocks_say(tmp_path: Path) -> None:
+    certificate = x509.load_pem_x509_certificate(make_key(tmp_path / "key").certificate.read_bytes())
+    assert (certificate.not_valid_before_utc.year, certificate.not_valid_after_utc.year) == (1970, 9999)
 
 
 def test_a_signature_is_valid_only_for_its_key_and_text(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

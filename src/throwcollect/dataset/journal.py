@@ -53,7 +53,7 @@ class Journal:
         try:
             lock(self._descriptor, directory)
             self._earlier_s = measure_collected_s(directory) or 0.0
-            self._opened = time.time()
+            self._opened_s = time.monotonic()
             size = os.fstat(self._descriptor).st_size
             if size and os.pread(self._descriptor, 1, size - 1) != b"\n":
                 # The process that wrote last was killed while it wrote a line.
@@ -66,8 +66,8 @@ class Journal:
 
     def measure_collected_s(self) -> float:
         """Add up the real time for which this process and earlier ones have collected [s], to the millisecond."""
-        # The clock may have been set back meanwhile.
-        return round(self._earlier_s + max(time.time() - self._opened, 0.0), 3)
+        # Unlike the time of day, this clock cannot be set meanwhile.
+        return round(self._earlier_s + time.monotonic() - self._opened_s, 3)
 
     def note(self, event: Event, **details: Any) -> None:
         """Append an event.
@@ -192,12 +192,14 @@ def measure_collected_s(directory: Path) -> float | None:
     their last event, and so do all if none has finished the dataset.
     """
     total: float | None = None
-    began = last = 0.0
+    last = 0.0
     for entry in read_journal(directory / JOURNAL):
         if entry.event == "opened":
-            total = (total or 0.0) + max(last - began, 0.0)
-            began = entry.time_s
+            total = total or 0.0
         elif entry.event == "finished" and entry.wall_s is not None:
-            total, began = entry.wall_s, entry.time_s
+            total = entry.wall_s
+        elif total is not None:
+            # If the clock was set back between two events, no time counts between them.
+            total += max(entry.time_s - last, 0.0)
         last = entry.time_s
-    return None if total is None else total + max(last - began, 0.0)
+    return total

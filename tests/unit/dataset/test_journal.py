@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import errno
 import json
+import time
 from contextlib import closing
 from pathlib import Path
 
@@ -87,6 +88,20 @@ def test_pauses_between_processes_do_not_count_as_collecting_time(tmp_path: Path
     assert measure_collected_s(tmp_path) is None
     journal_of(tmp_path, line("opened", 10.0), line("commit", 12.5), line("opened", 1000.0), line("finished", 1004.0))
     assert measure_collected_s(tmp_path) == 6.5
+
+
+def test_the_collecting_time_does_not_depend_on_a_clock_that_is_set_meanwhile(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with closing(Journal(tmp_path)) as journal:
+        a_year_on = time.time() + 365 * 86_400.0
+        monkeypatch.setattr(time, "time", lambda: a_year_on)
+        assert journal.measure_collected_s() < 60.0
+
+
+def test_only_the_moment_in_which_the_clock_is_set_back_does_not_count_as_collecting_time(tmp_path: Path) -> None:
+    journal_of(tmp_path, line("opened", 1000.0), line("commit", 1002.0), line("commit", 10.0), line("commit", 13.0))
+    assert measure_collected_s(tmp_path) == 5.0
 
 
 def test_the_collecting_time_is_the_one_that_the_finished_event_states(tmp_path: Path) -> None:
