@@ -16,7 +16,7 @@ from tests.unit.sweep.own_plan import make_plan
 
 from throwcollect.config.schema import Config
 from throwcollect.dataset.mcap_reader import open_mcap
-from throwcollect.dataset.repair import DifferingEpisode, LostTrial, repair
+from throwcollect.dataset.repair import DifferingEpisode, LostTrial, _find_again, repair
 from throwcollect.dataset.scan import scan_whole
 from throwcollect.dataset.verify import verify
 from throwcollect.errors import ConfigError, DatasetError
@@ -230,6 +230,16 @@ def test_repair_reads_a_swapped_recording_once_more_and_not_once_for_each_episod
     repaired = repair(dataset, output, remake=never)
     assert len(repaired.differing) > 1
     assert scanned.count(SHARD) == 2 * len(repaired.differing)
+
+
+def test_an_episode_is_found_again_wherever_the_one_found_before_lies(dataset: Path) -> None:
+    stored = [found.stored.episode for found in scan_whole(dataset / SHARD)]
+    wanted = [DifferingEpisode(episode.header.trial, SHARD, episode.digest, "") for episode in stored]
+    reading: dict[Path, Any] = {}
+    for index in (1, 0, 2):
+        assert _find_again(dataset / SHARD, wanted[index], reading).digest == stored[index].digest
+    with pytest.raises(DatasetError, match="was changed while it was read"):
+        _find_again(dataset / SHARD, replace(wanted[0], digest=""), reading)
 
 
 def test_repair_without_a_table_reports_no_differing_episode(make_collection: Any, dataset: Path, output: Path) -> None:

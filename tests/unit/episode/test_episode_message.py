@@ -1,6 +1,8 @@
 from __future__ import annotations
 
 import hashlib
+import struct
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 from unittest.mock import Mock
@@ -78,10 +80,19 @@ def test_message_indexes_come_with_an_episode_so_that_its_chunk_is_not_decompres
     assert unpack(message, SIGNER).episode.message_indexes == from_contents
 
 
-@pytest.mark.parametrize("length", [1, 14, 15, -16])
-def test_an_episode_whose_message_index_is_cut_off_is_refused(sent: Episode, length: int) -> None:
+@pytest.mark.parametrize(
+    "damage",
+    [
+        lambda index: index[:1],
+        lambda index: index[:15],
+        lambda index: index[:-16],
+        lambda index: index[:1] + struct.pack("<Q", len(index)) + index[9:],
+        lambda index: index[:1] + struct.pack("<QHI", 14, 1, 8) + bytes(8),
+    ],
+)
+def test_an_episode_with_a_damaged_message_index_is_refused(sent: Episode, damage: Callable[[bytes], bytes]) -> None:
     *_, last = sent.state.indexes
-    damaged = Episode(sent.header, replace(sent.state, indexes={last: sent.state.indexes[last][:length]}))
+    damaged = Episode(sent.header, replace(sent.state, indexes={last: damage(sent.state.indexes[last])}))
     with pytest.raises(DatasetError, match="a message index behind it cannot be read"):
         unpack(pack(Delivery(damaged, RESULT, CONDITIONS), SIGNER), SIGNER)
 
