@@ -22,6 +22,7 @@ from tests.cluster.conftest import BUILD, SHARED, USER
 from tests.e2e.collection import CONFIG, FAST, fingerprints, write_config
 from throwcollect import runs
 from throwcollect.errors import ConfigError
+from throwcollect.runs.state_directory import STATE_VARIABLE
 from throwcollect.runtimes.apptainer.sif import make_sif
 from throwcollect.runtimes.apptainer.sif_contents import check_sif, read_labels
 from throwcollect.runtimes.docker.image import save_image
@@ -58,9 +59,9 @@ def place(shared: Path, sif: Path) -> Path:
 
 
 def start(command: str, directory: Path, user: str = USER, **environment: str) -> subprocess.Popen[str]:
-    """A shell command of a user who has no home."""
+    """A shell command of a user who has no home; the directory in which this process remembers runs is not theirs."""
     return subprocess.Popen(
-        ["runuser", "-u", user, "--", "env", "-u", "HOME", "sh", "-c", command],
+        ["runuser", "-u", user, "--", "env", "-u", "HOME", "-u", STATE_VARIABLE, "sh", "-c", command],
         cwd=directory,
         env={**os.environ, **environment},
         stdout=subprocess.PIPE,
