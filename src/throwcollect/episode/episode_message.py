@@ -196,7 +196,7 @@ def pack(handed: Delivery | TrialRefusal, signer: Signer) -> bytes:
             b"".join(
                 part
                 for chunk, indexes in zip(episode.chunks, episode.message_indexes, strict=True)
-                for part in (chunk.chunk.record_header(), chunk.chunk.data, *indexes.values())
+                for part in (chunk.chunk.record(), *indexes.values())
             ),
         ]
     signature = signer.sign(*parts).encode()
