@@ -194,7 +194,8 @@ def new_directory(path: Path) -> Iterator[Path]:
     """
     try:
         if path.is_symlink() or (path.exists() and not (path.is_dir() and not any(path.iterdir()))):
-            raise ConfigError(f"{path}: exists", expected="a directory that is new or empty")
+            problem = "is a symbolic link" if path.is_symlink() else "exists"
+            raise ConfigError(f"{path}: {problem}", expected="a directory that is new or empty")
         taken = path.stat() if path.exists() else None
         if taken is not None and (path.is_mount() or os.path.samestat(taken, os.stat("."))):
             # Neither can be replaced, and without this check, that would show only when everything is written.

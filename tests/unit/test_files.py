@@ -57,6 +57,13 @@ def test_replacing_the_working_directory_is_refused_before_the_work(
             pytest.fail("it began")
 
 
+def test_a_link_to_an_empty_directory_is_refused_as_a_link(tmp_path: Path) -> None:
+    (tmp_path / "real").mkdir()
+    (tmp_path / "link").symlink_to("real")
+    with pytest.raises(ConfigError, match="link: is a symbolic link"), new_directory(tmp_path / "link"):
+        pytest.fail("it began")
+
+
 def test_an_error_in_a_new_directory_names_the_file_as_it_would_have_been_called(tmp_path: Path) -> None:
     def fail(file: str) -> None:
         with new_directory(tmp_path / "new") as outer, new_directory(outer / "part") as inner:

@@ -57,7 +57,11 @@ class _JointSchema:
 
 Joint = Annotated[str, AfterValidator(_require_joint), _JointSchema]
 Angle = Annotated[float, Field(ge=-6.3, le=6.3, json_schema_extra={"unit": "rad"})]
-Name = Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9_-]*$", max_length=64)]
+LONGEST_NAME = 64
+NAME_WORDS = f"up to {LONGEST_NAME} lower-case letters, digits, - and _, first a letter or digit"
+Name = Annotated[
+    str, Field(pattern=r"^[a-z0-9][a-z0-9_-]*$", max_length=LONGEST_NAME, json_schema_extra={"words": NAME_WORDS})
+]
 
 
 def _make_text(value: object) -> object:

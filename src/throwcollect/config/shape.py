@@ -137,8 +137,6 @@ def _describe(shape: ValueShape) -> str:
         return f"{names}, each with {shape.child('')}"
     if kind == "null":
         return "null"
-    if "pattern" in node:
-        return "lower-case letters, digits, - and _, first a letter or digit"
     bounds = _describe_bounds(node) or (shape.unit and "in")
     return " ".join(filter(None, [_NOUNS.get(kind, kind), bounds, shape.unit]))
 

@@ -383,6 +383,9 @@ def _make_array(which: Any) -> pa.Array:
     """
     if isinstance(which, pa.ChunkedArray):
         which = which.combine_chunks()
+    # Arrow would take the bytes for numbers, and an empty mapping for an empty list.
+    if isinstance(which, bytes | bytearray | Mapping):
+        raise ConfigError(f"select: {type(which).__name__}", expected=_SELECTION)
     try:
         values = which if isinstance(which, pa.Array) else pa.array(which if hasattr(which, "__len__") else list(which))
     except (pa.ArrowException, TypeError, OverflowError) as error:

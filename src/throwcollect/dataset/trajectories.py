@@ -12,6 +12,7 @@ from typing import overload
 import numpy as np
 from numpy.typing import NDArray
 
+from throwcollect.dataset.named_array import refuse_name
 from throwcollect.dataset.trajectory_columns import COLUMNS, Column, StoredThrow, empty_columns, fill, read_stored_rows
 from throwcollect.errors import ConfigError
 from throwcollect.wording import format_count
@@ -60,13 +61,17 @@ class Trajectories:
         """Return a column of all throws by its name, or all columns of one throw by its position.
 
         Raises:
-            KeyError: If the column was not read.
+            ConfigError: If the column was not read; it is also a `KeyError`.
             IndexError: If there is no throw at this position.
+            TypeError: If it is neither.
         """
         if isinstance(which, str):
-            return self.columns[which]
-        # A range takes negative positions, and raises the IndexError.
-        number = range(len(self))[which]
+            return self._find_column(which)
+        if not isinstance(which, int | np.integer):
+            raise TypeError(f"a position or the name of a column, not {type(which).__name__}")
+        if not -len(self) <= which < len(self):
+            raise IndexError(f"no throw {which} of {len(self)}")
+        number = int(which) % len(self)
         rows = slice(self.offsets[number], self.offsets[number + 1])
         return {name: column[rows] for name, column in self.columns.items()}
 
@@ -84,14 +89,19 @@ class Trajectories:
             Shape ``(n_throws, n_longest)`` or ``(n_throws, n_longest, n)``.
 
         Raises:
-            KeyError: If the column was not read.
+            ConfigError: If the column was not read; it is also a `KeyError`.
         """
-        values, lengths = self.columns[column], self.lengths
+        values, lengths = self._find_column(column), self.lengths
         longest = int(lengths.max(initial=0))
         padded = np.full((len(self), longest, *values.shape[1:]), fill)
         # The chosen places are filled row by row, and in this order the samples lie in `values`.
         padded[np.arange(longest) < lengths[:, np.newaxis]] = values
         return padded
+
+    def _find_column(self, name: str) -> Column:
+        if name not in self.columns:
+            raise refuse_name("no column", name, self.columns)
+        return self.columns[name]
 
 
 def read_trajectories(

@@ -21,7 +21,7 @@ import pyarrow as pa
 from pydantic import TypeAdapter, ValidationError
 
 from throwcollect.arguments import as_float, check_mapping, check_whole_number, read_list, refuse_argument
-from throwcollect.config.kinds import Name
+from throwcollect.config.kinds import LONGEST_NAME, NAME_WORDS, Name
 from throwcollect.dataset.expression import Expression
 from throwcollect.dataset.reader import Dataset
 from throwcollect.derive.derivation import Derived, derive
@@ -34,7 +34,6 @@ SQUARES = ("landing_x_m=0.05", "landing_y_m=0.05")
 """Squares of 5 cm on the ground."""
 _NUMBER = re.compile(r"\s*(\d*\.?\d+|\d+/\d+)\s*")
 _NAME = TypeAdapter[str](Name)
-_LONGEST_NAME = 64
 _HASHES = 2**64
 _FINEST = 10**9
 """Largest denominator of a share that is given as a float."""
@@ -210,7 +209,7 @@ def _read_shares(given: str | Mapping[str, float]) -> dict[str, Fraction]:
         try:
             _NAME.validate_python(name)
         except ValidationError:
-            problem = f"{name!r} should be lower-case letters, digits, - and _, first a letter or digit"
+            problem = f"{name!r} should be {NAME_WORDS}"
     if problem:
         raise refuse_argument("fractions", f"{problem}, got {text!r}")
     return shares
@@ -232,5 +231,5 @@ def _read_pair(text: str, argument: str, what: str) -> tuple[str, Fraction]:
 
 def _name_part(name: str, part: str) -> str:
     """Put the names of a dataset and of a part together; the first is cut, or left out, where there is no room."""
-    room = _LONGEST_NAME - len(part) - 1
+    room = LONGEST_NAME - len(part) - 1
     return f"{name[:room]}-{part}" if room > 0 else part

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 
+from throwcollect.config.kinds import NAME_WORDS
 from throwcollect.config.loader import load, load_locating_errors
 from throwcollect.errors import ConfigError, PlanError, Problem
 
@@ -65,7 +66,7 @@ JOINT_LIST = "joint names, each with a number from -6.3 to 6.3 rad"
         ("run: {trial_timeout_s: 0}", ["run.yaml:1: run.trial_timeout_s: should be a number above 0 s, got 0"]),
         (
             "name: Über",
-            ["run.yaml:1: name: should be lower-case letters, digits, - and _, first a letter or digit, got 'Über'"],
+            [f"run.yaml:1: name: should be {NAME_WORDS}, got 'Über'"],
         ),
         (
             "robot: {locked: torso_1_joint}",

@@ -163,6 +163,8 @@ def test_select_goes_by_trial_and_a_slice_by_position(loaded: Dataset) -> None:
         ([1, "a"], "select: "),
         (3, "not iterable"),
         ([2**64], "int too large"),
+        (b"1", "select: bytes\n  expected: a condition"),
+        ({}, "select: dict\n  expected: a condition"),
     ],
 )
 def test_a_selection_that_makes_no_sense_is_an_error(loaded: Dataset, which: Any, message: str) -> None:

@@ -111,10 +111,17 @@ def test_unknown_columns_joints_and_positions_of_trajectories_are_errors(loaded:
     with pytest.raises(ConfigError, match="Talos has no joint 'elbow'"):
         loaded.trajectories(joints=["elbow"])
     found = loaded.trajectories(["time_s"])
-    with pytest.raises(KeyError, match="stamps_ns"):
-        found["stamps_ns"]
-    with pytest.raises(IndexError, match="out of range"):
-        found[7]
+    for look in (found.__getitem__, found.padded):
+        with pytest.raises(KeyError) as raised:
+            look("stamps_ns")
+        assert isinstance(raised.value, ConfigError)
+        assert str(raised.value) == "no column 'stamps_ns'\n  expected: time_s"
+    for outside in (7, -8):
+        with pytest.raises(IndexError, match=f"no throw {outside} of 7"):
+            found[outside]
+    with pytest.raises(TypeError, match="a position or the name of a column, not slice"):
+        found[1:3]  # type: ignore[call-overload]
+    assert np.array_equal(found[np.int64(-1)]["time_s"], found[6]["time_s"])
 
 
 @pytest.mark.parametrize(("threads", "told"), [(-1, "-1"), (0, "0"), ("2", "'2'"), (1.5, r"1\.5")])
