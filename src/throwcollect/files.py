@@ -10,14 +10,13 @@ from __future__ import annotations
 
 import errno
 import os
-import shutil
 import stat
-import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from throwcollect.errors import ConfigError, DatasetError
+from throwcollect.own_directory import make_own_directory
 
 StrPath = str | os.PathLike[str]
 """A path, for functions that other programs call."""
@@ -182,11 +181,12 @@ def replacing(path: Path) -> Iterator[int]:
 def new_directory(path: Path) -> Iterator[Path]:
     """Make a directory that gets its name if the block ends well, and vanishes if it does not.
 
-    There must be nothing of that name, or only an empty directory. Errors of the block name its files as they would
-    have been called, because nobody else knows the hidden directory.
+    What is left of one of the same name by a process that was killed vanishes, too. There must be nothing of that name,
+    or only an empty directory. Errors of the block name its files as they would have been called, because nobody else
+    knows the hidden directory.
 
     Yields:
-        A hidden directory beside `path`, to write into meanwhile.
+        A directory in a hidden one beside `path`, to write into meanwhile.
 
     Raises:
         ConfigError: If something is in its place already.
@@ -206,35 +206,24 @@ def new_directory(path: Path) -> Iterator[Path]:
         if not path.parent.exists():
             path.parent.mkdir(parents=True)
         # The hidden directory is on the same file system, so one rename can give it its name.
-        beside = Path(tempfile.mkdtemp(prefix=f".{path.name}.", dir=path.parent))
+        with make_own_directory(f".{path.name}.unfinished-", path.parent) as hidden:
+            # One further down, as whoever writes a dataset locks its directory, and the hidden one is locked already.
+            beside = hidden / path.name
+            beside.mkdir()
+            try:
+                yield beside
+            except DatasetError as error:
+                if error.path is None or not error.path.is_relative_to(beside):
+                    raise
+                raise error.locate(path / error.path.relative_to(beside)) from error
+            if taken is not None:
+                # Whoever made the directory in its place has decided who may enter.
+                with suppress(PermissionError):
+                    os.chown(beside, -1, taken.st_gid)
+                beside.chmod(stat.S_IMODE(taken.st_mode))
+            os.rename(beside, path)
     except OSError as error:
         raise unwritable(path, error) from error
-    try:
-        yield beside
-        # `mkdtemp` lets only the owner in. If the directory exists, whoever made it has decided who may enter.
-        if taken is not None:
-            with suppress(PermissionError):
-                os.chown(beside, -1, taken.st_gid)
-        beside.chmod(stat.S_IMODE(taken.st_mode) if taken is not None else 0o777 & ~_find_umask())
-        os.rename(beside, path)
-    except OSError as error:
-        raise unwritable(path, error) from error
-    except DatasetError as error:
-        if error.path is None or not error.path.is_relative_to(beside):
-            raise
-        raise error.locate(path / error.path.relative_to(beside)) from error
-    finally:
-        # After the rename, nothing has this name any more.
-        shutil.rmtree(beside, ignore_errors=True)
-
-
-def _find_umask() -> int:
-    """Find the permissions that new files of this process lack."""
-    # `os.umask` could only read it by setting another one meanwhile, with which another thread might make a file.
-    for line in Path("/proc/self/status").read_text(encoding="ascii", errors="replace").splitlines():
-        if line.startswith("Umask:"):
-            return int(line.split()[1], 8)
-    return 0o022
 
 
 def remove(path: Path) -> None:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import stat
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -62,6 +64,26 @@ def test_a_link_to_an_empty_directory_is_refused_as_a_link(tmp_path: Path) -> No
     (tmp_path / "link").symlink_to("real")
     with pytest.raises(ConfigError, match="link: is a symbolic link"), new_directory(tmp_path / "link"):
         pytest.fail("it began")
+
+
+def test_the_rest_that_a_killed_process_left_of_a_new_directory_is_removed(tmp_path: Path) -> None:
+    killed = """
+import os, pathlib, signal, sys
+from throwcollect.files import new_directory
+with new_directory(pathlib.Path(sys.argv[1])) as place:
+    (place / "file").touch()
+    os.kill(os.getpid(), signal.SIGKILL)
+"""
+    # The name has a character that means others in a pattern.
+    path = tmp_path / "new[1]"
+    subprocess.run([sys.executable, "-c", killed, path], check=False)
+    (left,) = tmp_path.iterdir()
+    (tmp_path / ".new[1].backups").mkdir()
+    for each in tmp_path.iterdir():
+        os.utime(each, (0, 0))
+    with new_directory(path):
+        assert not left.exists()
+    assert {each.name for each in tmp_path.iterdir()} == {"new[1]", ".new[1].backups"}
 
 
 def test_an_error_in_a_new_directory_names_the_file_as_it_would_have_been_called(tmp_path: Path) -> None:

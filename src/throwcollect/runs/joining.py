@@ -13,11 +13,11 @@ from throwcollect.coordinator.onlooker import SILENT, Onlooker
 from throwcollect.coordinator.progress import Progress
 from throwcollect.errors import WorkerError
 from throwcollect.files import write_file
+from throwcollect.own_directory import make_own_directory
 from throwcollect.ros.connection import Connection
 from throwcollect.ros.middleware import Middleware
 from throwcollect.ros.router_endpoint import answers
 from throwcollect.run_key import RunKey
-from throwcollect.runs.own_directory import make_own_directory
 from throwcollect.runs.token import JoinToken
 from throwcollect.runtimes.local import LocalNodes
 from throwcollect.runtimes.nodes import LAUNCHER, simulation_name_of, simulation_nodes

@@ -13,13 +13,13 @@ from pathlib import Path
 
 import pytest
 
-from throwcollect.runs.own_directory import make_own_directory
+from throwcollect.own_directory import make_own_directory
 
 PREFIX = "throwcollect-test-"
 LATER_S = 120.0
 KILLED = f"""
 import os, signal
-from throwcollect.runs.own_directory import make_own_directory
+from throwcollect.own_directory import make_own_directory
 with make_own_directory({PREFIX!r}) as path:
     (path / "key").touch()
     os.kill(os.getpid(), signal.SIGKILL)

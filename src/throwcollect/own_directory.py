@@ -7,6 +7,7 @@ directory.
 from __future__ import annotations
 
 import fcntl
+import glob
 import os
 import shutil
 import tempfile
@@ -20,18 +21,25 @@ _YOUNG_S = 60.0
 
 
 @contextmanager
-def make_own_directory(prefix: str) -> Iterator[Path]:
+def make_own_directory(prefix: str, parent: Path | None = None) -> Iterator[Path]:
     """Make a directory that only this user can read, and remove directories of the same prefix that were abandoned.
 
+    Args:
+        prefix: How its name begins; nothing else of this user in that place may have a name that begins like this.
+        parent: Where to make it; None for the place of temporary files.
+
     Yields:
-        The directory; it is removed after the block.
+        The directory; it is removed after the block, unless it was renamed.
+
+    Raises:
+        OSError: If it cannot be made.
     """
-    path = Path(tempfile.mkdtemp(prefix=prefix))
+    path = Path(tempfile.mkdtemp(prefix=prefix, dir=parent))
     try:
         with ExitStack() as held:
             with suppress(OSError):  # without locks, other processes cannot hold this directory either, so it stays
                 held.enter_context(_hold(path))
-            for other in path.parent.glob(f"{prefix}*"):
+            for other in path.parent.glob(f"{glob.escape(prefix)}*"):
                 if other != path:
                     _remove_abandoned(other)
             yield path
