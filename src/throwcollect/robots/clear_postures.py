@@ -11,10 +11,6 @@ from throwcollect.pinocchio_library import pinocchio
 
 _DOUBT_M = 1e-4
 """How much a computed distance may exceed the true one; the solver's own tolerance is a hundredth of that."""
-_FAR_M = 0.3
-"""A lower bound suffices for the distance of links that are at least so far apart."""
-_FEW_PAIRS = 10
-"""Up to this many distances are computed faster one by one than all together."""
 _MOST_TRIES = 300
 """Most postures that are examined: with more postures, the search for a near one would take longer than it saves."""
 _LEAST_WORTH = 3
@@ -53,7 +49,6 @@ class ClearPostures:
         self._pairs, self._reaches = pairs, reaches[pairs]
         self._tries = _MOST_TRIES
         self._postures = np.empty((0, model.nq))
-        self._distances = np.empty((0, len(pairs)))
         self._steepness = np.empty((0, model.nq))
 
     def find_unknown(self, postures: NDArray[np.float64]) -> NDArray[np.bool_]:
@@ -77,13 +72,9 @@ class ClearPostures:
         """
         unknown: NDArray[np.bool_] = np.ones(len(postures), bool)
         if not self._tries:
-            # No further posture is kept. But if there are few pairs, computing their distances costs less than a check
-            # for collisions.
-            unknown[0] = len(self._pairs) > _FEW_PAIRS or self._compute_distances(postures[0]).min() <= self._needed
             return unknown
         self._tries -= 1
-        distances = self._find_least_distances(postures[0])
-        slack = distances - self._needed
+        slack = self._compute_distances(postures[0]) - self._needed
         if slack.min() <= 0:
             return unknown
         # For each joint, the steepest pair counts, so that the bound holds for all pairs at once.
@@ -91,39 +82,13 @@ class ClearPostures:
         unknown = np.greater_equal(np.abs(postures - postures[0]) @ steepness, 1)
         if np.count_nonzero(~unknown) >= _LEAST_WORTH:
             self._postures = np.vstack([self._postures, postures[0]])
-            self._distances = np.vstack([self._distances, distances])
             self._steepness = np.vstack([self._steepness, steepness])
         return unknown
 
-    def _find_least_distances(self, posture: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Find a lower bound of the distance of each pair [m]; bounds below `_FAR_M` are exact to `_DOUBT_M`."""
-        if not len(self._postures):
-            return self._compute_distances(posture)
-        away = np.abs(self._postures - posture)
-        nearest = int(np.argmin(away @ self._reaches.max(axis=0)))
-        least: NDArray[np.float64] = self._distances[nearest] - self._reaches @ away[nearest]
-        close = np.flatnonzero(least < _FAR_M)
-        # A distance that is computed alone takes three times as long as one that is computed together with all others.
-        if 3 * len(close) > len(self._geometry.collisionPairs):
-            return self._compute_distances(posture)
-        self._place(posture)
-        least[close] = self._compute_distances_of(self._pairs[close])
-        return least
-
     def _compute_distances(self, posture: NDArray[np.float64]) -> NDArray[np.float64]:
-        if len(self._pairs) <= _FEW_PAIRS:
-            self._place(posture)
-            return self._compute_distances_of(self._pairs)
         pinocchio.computeDistances(self._model, self._data, self._geometry, self._placed, posture)
         distances = np.array([result.min_distance for result in self._placed.distanceResults], np.float64)
         return distances[self._pairs]
-
-    def _compute_distances_of(self, pairs: NDArray[np.intp]) -> NDArray[np.float64]:
-        numbers = pairs.tolist()
-        return np.array([pinocchio.computeDistance(self._geometry, self._placed, n).min_distance for n in numbers])
-
-    def _place(self, posture: NDArray[np.float64]) -> None:
-        pinocchio.updateGeometryPlacements(self._model, self._data, self._geometry, self._placed, posture)
 
 
 def find_reaches(model: pinocchio.Model, geometry: pinocchio.GeometryModel) -> NDArray[np.float64]:
