@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from functools import cache
 from typing import IO, Any
 
+import numpy as np
 from mcap.writer import CompressionType, Writer
 
 from rclzenoh.interfaces import Message, get_message, serialize
@@ -15,20 +17,25 @@ from throwcollect.dataset.bag import FileSummary
 from throwcollect.dataset.mcap_file import LIBRARY, PROFILE, declarations
 from throwcollect.episode.channels import Channel, Qos
 from throwcollect.episode.frames import FrameTree, read_frames
+from throwcollect.episode.message_layout import MessageLayout
 from throwcollect.episode.record import Samples
 from throwcollect.episode.topics import (
     Recording,
+    Rows,
+    Topic,
     ball_odometry,
     joint_states,
     make_fixed_transforms,
     make_header,
+    put_stamps,
     transforms,
 )
 from throwcollect.robots.description import full_description, robot_of
+from throwcollect.robots.limits import joint_limits
+from throwcollect.robots.robot import Robot
 from throwcollect.tools.tool import tool_of
 from throwcollect.view.drawn_robot import ball_urdf, draw_robot_of
 from throwcollect.view.markers import all_markers, path_cloud, shape_markers, throw_markers
-from throwcollect.view.sampled import ball_speed, range_shares
 from throwcollect.view.shown_throws import ShownThrow
 
 FACTS_NAME = "throw"
@@ -64,8 +71,8 @@ class ViewRecording:
             transforms(_read_frames(config).moving, robot.joints),
             joint_states(robot.joints),
             ball_odometry(),
-            ball_speed(),
-            range_shares(robot, tuple(config.task.end)),
+            _ball_speed(),
+            _range_shares(robot, tuple(config.task.end)),
         ]
         declared = [(name, kind, _LATCHED) for name, kind in _LATCHED_TYPES.items()]
         declared += [(topic.name, topic.type_name, _SAMPLED) for topic in self._topics]
@@ -145,6 +152,33 @@ class ViewRecording:
         for number, stamp in enumerate(stamps.tolist()):
             for channel, messages in columns:
                 self._put_data(channel, stamp, messages[number].tobytes())
+
+
+@cache
+def _ball_speed() -> Topic:
+    """``/view/ball_speed``: std_msgs/Float64, speed of the ball's centre [m/s]."""
+    kind = "std_msgs/msg/Float64"
+
+    def fill(rows: Rows, recording: Recording) -> None:
+        rows["data"] = np.linalg.norm(recording.samples.ball_linear_velocity, axis=1)
+
+    return Topic("/view/ball_speed", kind, MessageLayout(get_message(kind)(), ["data"]), fill)
+
+
+def _range_shares(robot: Robot, joints: tuple[str, ...]) -> Topic:
+    """``/view/limits``: sensor_msgs/JointState whose positions are -1 at the lower limit and 1 at the upper one."""
+    kind = "sensor_msgs/msg/JointState"
+    columns = [robot.joints.index(joint) for joint in joints]
+    message = get_message(kind)(name=list(joints), position=np.zeros(len(joints)))
+    layout = MessageLayout(message, ["header.stamp.sec", "header.stamp.nanosec", "position"])
+
+    def fill(rows: Rows, recording: Recording) -> None:
+        samples, limits = recording.samples, joint_limits(robot)
+        lower, upper = limits.lower[columns], limits.upper[columns]
+        put_stamps(rows, "header.stamp", samples.stamps_ns)
+        rows["position"] = (2 * samples.position[:, columns] - lower - upper) / (upper - lower)
+
+    return Topic("/view/limits", kind, layout, fill)
 
 
 def _read_frames(config: Config) -> FrameTree:
