@@ -112,47 +112,15 @@ def message_definition(name: str) -> str:
     """Definition text of a message and all messages it consists of, as rosbag2 stores it (``ros2msg``).
 
     The definition of the message comes first, then those of its dependencies, each after a line of 80 ``=`` and
-    ``MSG: <name>``. Parts of services and actions, for which there is such a text as well, have their full names in it.
+    ``MSG: <name>``.
 
     Raises:
-        ValueError: If no such message is known.
+        ValueError: If no such message is known; parts of services and actions are no messages.
     """
     _require(name)
-    if not _has_parts(name):
-        return _STORE.generate_msgdef(name, ros_version=2)[0]
-    texts: dict[str, str] = {}
-    _add_texts(name, texts)
-    own = texts.pop(name)
-    return own + "".join(f"{_RULE}MSG: {_shorten_name(each)}\n{text}" for each, text in texts.items())
-
-
-_RULE = "=" * 80 + "\n"
-
-
-def _has_parts(name: str) -> bool:
-    """Whether a field of a structure is a part of a service or action, for which rosbags writes no definition."""
-    return any(field.nested and "/msg/" not in field.type for field in structure(name).fields)
-
-
-def _add_texts(name: str, texts: dict[str, str]) -> None:
-    """Add the definitions of a structure and of its parts, unless they are there already."""
-    if _has_parts(name):
-        texts[name] = "".join(f"{_write_type(field)} {field.name}\n" for field in structure(name).fields)
-    else:
-        texts[name] = message_definition(name).split(_RULE)[0]
-    for field in structure(name).fields:
-        if field.nested and field.type not in texts:
-            _add_texts(field.type, texts)
-
-
-def _write_type(field: Field) -> str:
-    """Type of a field of a derived structure; these have neither bounded strings nor fixed arrays."""
-    bound = "" if field.bound is None else f"<={field.bound}"
-    return _shorten_name(field.type) + (f"[{bound}]" if field.sequence else "")
-
-
-def _shorten_name(name: str) -> str:
-    return name.replace("/msg/", "/")
+    if "/msg/" not in name:
+        raise ValueError(f"{name!r} is no message")
+    return _STORE.generate_msgdef(name, ros_version=2)[0]
 
 
 def _make_field(name: str, description: tuple[Nodetype, Any], default: Default | None) -> Field:

@@ -42,21 +42,10 @@ def test_a_definition_lists_dependencies_once_after_lines_of_80_equal_signs():
     assert [part.splitlines()[0] for part in parts[1:]] == ["MSG: std_msgs/Header", "MSG: builtin_interfaces/Time"]
 
 
-def test_a_definition_of_a_part_names_other_parts_in_full():
-    name = "control_msgs/action/FollowJointTrajectory"
-    parts = message_definition(f"{name}_FeedbackMessage").split("=" * 80 + "\n")
-    assert parts[0] == f"unique_identifier_msgs/UUID goal_id\n{name}_Feedback feedback\n"
-    others = {part.partition("\n")[0]: part.partition("\n")[2] for part in parts[1:]}
-    whole = message_definition(f"{name}_Feedback").split("=" * 80 + "\n")
-    assert others[f"MSG: {name}_Feedback"] == whole[0]
-    assert {part.partition("\n")[0] for part in whole[1:]} | {"MSG: unique_identifier_msgs/UUID"} == {
-        each for each in others if each != f"MSG: {name}_Feedback"
-    }
-    event = message_definition("std_srvs/srv/SetBool_Event")
-    assert event.splitlines()[:2] == [
-        "service_msgs/ServiceEventInfo info",
-        "std_srvs/srv/SetBool_Request[<=1] request",
-    ]
+@pytest.mark.parametrize("part", ["action/FollowJointTrajectory_FeedbackMessage", "action/FollowJointTrajectory_Goal"])
+def test_parts_of_services_and_actions_have_no_definition(part):
+    with pytest.raises(ValueError, match=r"FollowJointTrajectory_.*' is no message"):
+        message_definition(f"control_msgs/{part}")
 
 
 def test_defaults_that_the_store_does_not_keep_are_read_from_files():
