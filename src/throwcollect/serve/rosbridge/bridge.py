@@ -18,6 +18,7 @@ from throwcollect.serve.rosbridge.bridge_client import BridgeClient
 from throwcollect.serve.rosbridge.bridge_session import BridgeSession
 from throwcollect.serve.rosbridge.codec import Frame
 from throwcollect.serve.rosbridge.offered_actions import FAREWELL_S
+from throwcollect.serve.rosbridge.peer import Peer
 
 _logger = logging.getLogger(__name__)
 
@@ -103,9 +104,9 @@ class Bridge:
                 # During a session, the thread waits in the executor, and only a task wakes it.
                 self._session.executor.create_task(self._do_next)
 
-    def forget(self, client: BridgeClient) -> None:
+    def forget(self, client: Peer) -> None:
         """Take a client off the list."""
-        self._clients.remove(client)
+        self._clients = [each for each in self._clients if each is not client]
 
     def _run(self) -> None:
         while not self._closing.is_set():

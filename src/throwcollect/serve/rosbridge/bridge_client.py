@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-import itertools
 import logging
 from collections.abc import Callable, Mapping
-from typing import Protocol
 
 from throwcollect.errors import ConfigError, ThrowcollectError
 from throwcollect.serve.rosbridge.client_goals import Goal, Goals
-from throwcollect.serve.rosbridge.codec import Frame, encode, fragments, read_frame
+from throwcollect.serve.rosbridge.codec import Frame, read_frame
 from throwcollect.serve.rosbridge.file_server import GET_FILE, give_file
 from throwcollect.serve.rosbridge.inbox import Inbox
 from throwcollect.serve.rosbridge.offered_actions import OfferedAction
 from throwcollect.serve.rosbridge.offered_services import OfferedService
 from throwcollect.serve.rosbridge.offers import Offers
-from throwcollect.serve.rosbridge.peer import Level, PeerHost
+from throwcollect.serve.rosbridge.peer import LEVELS, Peer, PeerHost
 from throwcollect.serve.rosbridge.publishers import Publishers
 from throwcollect.serve.rosbridge.questions import Questions
 from throwcollect.serve.rosbridge.reassembly import Reassembly
@@ -28,36 +26,17 @@ Operation = Callable[[BridgeRequest], None]
 
 _logger = logging.getLogger(__name__)
 
-_LEVELS = ("none", "error", "warning", "info")
 _LOSS = "too many requests wait for the router of the run; further ones are dropped until it is back"
-_numbers = itertools.count()
 
 
-class ClientHost(PeerHost, Protocol):
-    """A bridge as its clients see it."""
-
-    @property
-    def is_connected(self) -> bool:
-        """Whether the bridge has a place in the ROS graph by now."""
-
-    def submit(self, action: Callable[[], None]) -> None:
-        """Call an action soon, in the bridge's thread; may be called in any thread."""
-
-    def forget(self, client: BridgeClient) -> None:
-        """Take a client off the list."""
-
-
-class BridgeClient:
+class BridgeClient(Peer):
     """One client. Any thread may call `receive` and `close`; only the bridge's thread may call everything else."""
 
-    def __init__(self, host: ClientHost, send: Callable[[Frame], None], *, read_only: bool) -> None:
-        self.host = host
-        self._send = send
+    def __init__(self, host: PeerHost, send: Callable[[Frame], None], *, read_only: bool) -> None:
+        super().__init__(host, send)
         self._read_only = read_only
         self._inbox = Inbox()
         self._was_told_of_loss = False
-        self._level = "error"
-        self._is_closed = False
         self._questions = Questions(self)
         self._goals = Goals(self)
         subscriptions, publishers = Subscriptions(self), Publishers(self)
@@ -137,26 +116,6 @@ class BridgeClient:
         for _ in range(self.waiting):
             self.host.submit(self._handle_next)
 
-    def send(self, frame: Frame, fragment_size: int = 0) -> None:
-        """Send a frame, in parts if it is a text longer than ``fragment_size``, unless that is 0."""
-        if self._is_closed:
-            return
-        if isinstance(frame, str) and 0 < fragment_size < len(frame):
-            for part in fragments(frame, fragment_size, str(next(_numbers))):
-                self._send(part)
-        else:
-            self._send(frame)
-
-    def answer(self, fields: Mapping[str, object], form: Form) -> None:
-        """Send an operation; fields that are None are left out."""
-        filled = {name: value for name, value in fields.items() if value is not None}
-        self.send(encode(filled, form.compression), form.fragment_size)
-
-    def say(self, level: Level, text: str, request: RequestId = None) -> None:
-        """Send a status message about a request, if the client wants messages of this level."""
-        if _LEVELS.index(level) <= _LEVELS.index(self._level):
-            self.answer({"op": "status", "id": request, "level": level, "msg": text}, Form())
-
     def _close(self) -> None:
         if not self._is_closed:
             self._is_closed = True
@@ -187,7 +146,7 @@ class BridgeClient:
 
     def _set_level(self, request: BridgeRequest) -> None:
         level = request.text("level")
-        if level not in _LEVELS:
+        if level not in LEVELS:
             raise ConfigError(f"set_level: no level {level}", expected="info, warning, error or none")
         self._level = level
 
