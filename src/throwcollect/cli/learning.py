@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from throwcollect.cli.options import ConfigArgument, DatasetArgument, JsonOption, SetOption, overrides
-from throwcollect.cli.printing import print_json, tell
+from throwcollect.cli.printing import align, print_json, tell
 from throwcollect.config.default_path import DEFAULT_CONFIG
 from throwcollect.errors import ConfigError, PlanError
 from throwcollect.extras import require
@@ -339,9 +339,8 @@ def _describe_score(score: Score) -> list[str]:
     from throwcollect.learning.score import SCORE_HEAD
 
     rows = [("", *SCORE_HEAD), *(row.cells for row in score.list_rows())]
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     return [
         f"throws at {format_count(score.targets, 'target')} for each of {format_count(score.seeds, 'seed')}, medians "
         "of the seeds, in simulation:",
-        *("  ".join([f"{row[0]:{widths[0]}}", *map(str.rjust, row[1:], widths[1:])]) for row in rows),
+        *align(rows, numbers=True),
     ]

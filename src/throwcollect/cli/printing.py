@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json as jsonlib
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from typing import Any
 
@@ -49,6 +49,13 @@ def print_json_list(items: Iterable[object]) -> None:
 def format_number(number: float | None) -> str:
     """Write a number with six digits, and ``-`` where there is none."""
     return "-" if number is None else f"{number:.6g}"
+
+
+def align(rows: Sequence[Sequence[str]], *, numbers: bool = False) -> list[str]:
+    """Write rows as lines with aligned columns; numbers, which are all but the first column, end below each other."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    fill = str.rjust if numbers else str.ljust
+    return ["  ".join([row[0].ljust(widths[0]), *map(fill, row[1:], widths[1:])]).rstrip() for row in rows]
 
 
 def print_result(document: object, text: str, *, json: bool) -> None:

@@ -12,7 +12,7 @@ import typer
 
 from throwcollect.cli.interruptions import count_interruptions
 from throwcollect.cli.options import JsonOption, RunOption
-from throwcollect.cli.printing import print_json, tell
+from throwcollect.cli.printing import align, print_json, tell
 from throwcollect.cli.streams import end_with_reader, has_reader
 from throwcollect.cli.terminal import display
 from throwcollect.errors import ConfigError, Interrupted
@@ -278,18 +278,13 @@ def _handle(name: str) -> str:
 
 def _make_table(rows: Sequence[tuple[tuple[str, ...], list[tuple[str, ...]]]]) -> Iterable[str]:
     """Format runs as one table, with the nodes of each run below it, indented."""
-    runs = _align([_HEADINGS, *(run for run, _ in rows)])
-    nodes = iter(_align([line for _, lines in rows for line in lines]))
+    runs = align([_HEADINGS, *(run for run, _ in rows)])
+    nodes = iter(align([line for _, lines in rows for line in lines]))
     yield runs[0]
     for text, (_, lines) in zip(runs[1:], rows, strict=True):
         yield text
         for _ in lines:
             yield f"  {next(nodes)}"
-
-
-def _align(rows: Sequence[Sequence[str]]) -> list[str]:
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    return ["  ".join(map(str.ljust, row, widths)).rstrip() for row in rows]
 
 
 def _format_age(since: datetime) -> str:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from throwcollect.cli.options import DatasetArgument, JsonOption, OutputArgument
-from throwcollect.cli.printing import format_number, print_result, tell
+from throwcollect.cli.printing import align, format_number, print_result, tell
 from throwcollect.wording import format_count
 
 if TYPE_CHECKING:
@@ -126,7 +126,4 @@ def _make_tables(found: Statistics) -> str:
 def _make_table(title: str, rows: Mapping[str, Mapping[str, Any]], columns: Sequence[str]) -> str:
     lines = [(title, *columns)]
     lines += [(name, *(format_number(row.get(column)) for column in columns)) for name, row in rows.items()]
-    widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
-    return "".join(
-        "  ".join([first.ljust(widths[0]), *map(str.rjust, rest, widths[1:])]) + "\n" for first, *rest in lines
-    )
+    return "".join(f"{line}\n" for line in align(lines, numbers=True))
