@@ -36,6 +36,7 @@ _REASONS = {
     errno.ELOOP: "a symbolic link leads elsewhere",
     errno.ENXIO: "not a file",
     errno.EMLINK: "it has another name (hard link), under which it would change, too",
+    errno.ENOTEMPTY: "another process has filled it meanwhile",
 }
 """What these error numbers mean here; the system's own texts are about other cases."""
 
@@ -148,7 +149,8 @@ def beside(path: Path, *, mode: int = 0o666) -> Iterator[int]:
         finally:
             os.close(descriptor)
         if not is_own():
-            raise OSError(errno.EBUSY, "another process writes it, too", str(path))
+            # Without a number, so that this text is told, and not the system's own.
+            raise OSError("another process writes it, too")
         os.replace(new, path)
     # No half-written file shall stay, not even after Ctrl-C, which is no `Exception`.
     except BaseException:

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from throwcollect.errors import ConfigError, DatasetError
-from throwcollect.files import beside, new_directory, write_all
+from throwcollect.files import beside, new_directory, replacing, write_all, write_file
 
 
 def write_twice(path: Path) -> None:
@@ -27,6 +27,17 @@ def test_of_two_writers_of_one_file_the_last_succeeds_and_the_other_fails(tmp_pa
         write_twice(path)
     assert list(tmp_path.iterdir()) == [path]
     assert path.read_bytes() == b"the second one"
+
+
+def test_the_loser_of_two_writers_is_told_of_the_other_one(tmp_path: Path) -> None:
+    page, directory = tmp_path / "page.html", tmp_path / "new"
+    too_late = pytest.raises(DatasetError, match=r"page\.html: cannot be written: another process writes it, too")
+    with too_late, replacing(page):
+        write_file(page, b"the other one")
+    too_late = pytest.raises(DatasetError, match="new: cannot be written: another process has filled it meanwhile")
+    with too_late, new_directory(directory), new_directory(directory) as other:
+        (other / "file").touch()
+    assert [each.name for each in directory.iterdir()] == ["file"]
 
 
 @pytest.mark.parametrize(("umask", "mode"), [(0o022, 0o755), (0o077, 0o700), (0o002, 0o775)])
