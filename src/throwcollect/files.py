@@ -183,9 +183,9 @@ def replacing(path: Path) -> Iterator[int]:
 def new_directory(path: Path) -> Iterator[Path]:
     """Make a directory that gets its name if the block ends well, and vanishes if it does not.
 
-    What is left of one of the same name by a process that was killed vanishes, too. There must be nothing of that name,
-    or only an empty directory. Errors of the block name its files as they would have been called, because nobody else
-    knows the hidden directory.
+    If a process was killed while it made one of the same name, a minute ago or more, what it has left vanishes, too.
+    There must be nothing of that name, or only an empty directory. Errors of the block name its files as they would
+    have been called, because nobody else knows the hidden directory.
 
     Yields:
         A directory in a hidden one beside `path`, to write into meanwhile.

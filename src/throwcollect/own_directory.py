@@ -29,7 +29,7 @@ def make_own_directory(prefix: str, parent: Path | None = None) -> Iterator[Path
         parent: Where to make it; None for the place of temporary files.
 
     Yields:
-        The directory; it is removed after the block, unless it was renamed.
+        The directory; it is removed after the block.
 
     Raises:
         OSError: If it cannot be made.

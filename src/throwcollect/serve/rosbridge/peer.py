@@ -44,7 +44,7 @@ class PeerHost(Protocol):
 
 
 class Peer:
-    """A client to whom one sends something. Only the thread of the bridge calls these methods.
+    """A client, as its parts see it: they send messages to it. Only the thread of the bridge calls these methods.
 
     Args:
         host: The bridge that the client is connected to.
