@@ -9,15 +9,25 @@ from typing import Any
 
 import pytest
 
-from tests.integration.robot import CONFIG, JointTrajectory, JointTrajectoryPoint, Robot, duration, running_simulation
+from tests.integration.robot import (
+    CONFIG,
+    JointTrajectory,
+    JointTrajectoryPoint,
+    Robot,
+    duration,
+    running_simulation,
+    stamp_ns,
+)
 from throwcollect.robots.talos import TALOS
 from throwcollect.ros import Context, DurabilityPolicy, QoSProfile, get_action
+from throwcollect.units import NS_PER_S
 
 FollowJointTrajectory: Any = get_action("control_msgs/action/FollowJointTrajectory")
 JTC = "joint_trajectory_controller/JointTrajectoryController"
 APPROACH_VELOCITY = 0.5
 LATEST = QoSProfile(depth=1)
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+RECORD_HZ = 50
 JOINT_STATES = ("sensor_msgs/msg/JointState", "joint_states", LATEST)
 
 
@@ -70,9 +80,11 @@ class PlayMotion:
         }
 
     def joint_states(self) -> dict[str, tuple[float, float, float]]:
-        """Position, velocity and effort of each joint, from a message that comes after the call."""
+        """Position, velocity and effort of each joint, from the sample that is the last one now, or a later one."""
+        # Samples may arrive after the result of a goal that was reached later than they were taken.
+        first_ns = self.robot.now_ns() - NS_PER_S // RECORD_HZ + 1
         with self.robot.listening(*JOINT_STATES) as heard:
-            self.robot.wait_until(lambda: bool(heard), "joint states")
+            self.robot.wait_until(lambda: bool(heard) and stamp_ns(heard[-1].header.stamp) >= first_ns, "joint states")
         last = heard[-1]
         return {
             name: (last.position[index], last.velocity[index], last.effort[index])
@@ -117,7 +129,7 @@ def talos(endpoint: str, session: Context, tmp_path_factory: pytest.TempPathFact
 
     Its steps are coarse and its messages few, as nobody counts them: it has to move for half a minute.
     """
-    changes = {"robot": {"locked": "none"}, "sim": {"physics_hz": 250}, "record": {"rate_hz": 50}}
+    changes = {"robot": {"locked": "none"}, "sim": {"physics_hz": 250}, "record": {"rate_hz": RECORD_HZ}}
     config = CONFIG.model_copy(
         update={name: getattr(CONFIG, name).model_copy(update=changed) for name, changed in changes.items()}
     )
