@@ -5,10 +5,13 @@ If a command takes the argument by an option, its message names the option inste
 
 from __future__ import annotations
 
+import errno
 import math
+import os
 from collections.abc import Mapping
 from enum import Enum
 from numbers import Integral
+from pathlib import Path
 from typing import Any, TypeVar
 
 from throwcollect.errors import ConfigError, Problem
@@ -97,11 +100,35 @@ def check_whole_number(argument: str, given: Any, *, least: int, most: int | Non
 
 
 def as_float(given: Any) -> float:
-    """Convert a value to a number; return NaN if it is none, for callers that refuse numbers that are not finite."""
+    """Convert a value to a number; return NaN if it is none, for callers that refuse numbers that are not finite.
+
+    Texts, True and False are no numbers here.
+    """
+    # NumPy's truth values are not of Python's type.
+    if isinstance(given, bool | str | bytes) or str(getattr(given, "dtype", "")) == "bool":
+        return math.nan
     try:
         return float(given)
     except (TypeError, ValueError, OverflowError):
         return math.nan
+
+
+def read_path(argument: str, given: Any) -> Path:
+    """Read the path of a file or a directory.
+
+    Raises:
+        ConfigError: If the value is no path, or no file can have this name.
+    """
+    path = os.fspath(given) if isinstance(given, str | os.PathLike) else None
+    if not isinstance(path, str):
+        raise refuse_argument(argument, f"got {show_value(given)}", expected="a path, as text or a Path")
+    try:
+        os.lstat(path)
+    except (OSError, ValueError) as error:
+        # Python itself refuses a name with a zero byte, by a `ValueError`.
+        if not isinstance(error, OSError) or error.errno == errno.ENAMETOOLONG:
+            raise ConfigError([Problem("no file can have this name", path=Path(path))]) from error
+    return Path(path)
 
 
 def read_word(argument: str, given: str, words: type[_Word]) -> _Word:

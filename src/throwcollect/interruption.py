@@ -1,4 +1,4 @@
-"""Reasons for a process to end: signals that ask for it, and the death of its parent."""
+"""Reasons for a process to end: signals that ask for it, such as Ctrl-C, and the death of its parent."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import ctypes
 import os
 import signal
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from types import FrameType
 from typing import NoReturn
@@ -20,11 +20,11 @@ _LIBC = ctypes.CDLL(None)
 def stop_signals() -> tuple[signal.Signals, ...]:
     """List the signals that ask this process to end: SIGINT, SIGTERM, and SIGHUP, which a closed terminal sends.
 
-    SIGHUP is left out if this process ignores it, as `nohup` arranges.
+    Those that this process ignores are left out. `nohup` arranges that for SIGHUP, and shells arrange it for SIGINT if
+    a script starts a command with `&`.
     """
-    if signal.getsignal(signal.SIGHUP) is signal.SIG_IGN:
-        return (signal.SIGINT, signal.SIGTERM)
-    return (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+    asking = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+    return tuple(number for number in asking if signal.getsignal(number) is not signal.SIG_IGN)
 
 
 def leave_when_stopped() -> None:
@@ -33,13 +33,38 @@ def leave_when_stopped() -> None:
     A handler that raises an exception would not do, because a library that is being imported may ignore it.
     """
     for number in stop_signals():
-        # Ignored signals stay ignored; for example, Ctrl-C should not end commands that a script started with `&`.
-        if signal.getsignal(number) is not signal.SIG_IGN:
-            signal.signal(number, _leave)
+        signal.signal(number, _leave)
 
 
 def _leave(_number: int, _frame: FrameType | None) -> NoReturn:
     os._exit(130)
+
+
+@contextmanager
+def count_interruptions(numbers: Iterable[signal.Signals] | None = None) -> Iterator[Callable[[], int]]:
+    """Count signals instead of letting them raise or end this process, so that the block can end its nodes in order.
+
+    Only the main thread may use it.
+
+    Args:
+        numbers: The signals; None counts all that ask to stop, such as Ctrl-C.
+
+    Yields:
+        Returns the number of signals so far.
+    """
+    count = 0
+
+    def note(_number: int, _frame: FrameType | None) -> None:
+        nonlocal count
+        count += 1
+
+    counted = stop_signals() if numbers is None else numbers
+    previous = {number: signal.signal(number, note) for number in counted}
+    try:
+        yield lambda: count
+    finally:
+        for number, handler in previous.items():
+            signal.signal(number, handler)
 
 
 @contextmanager

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import os
+import pickle
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from threading import RLock
 
@@ -83,6 +85,8 @@ class Simulator:
             )
         # A throw changes the robot's model and the world. A handler of a signal may close during a throw of its thread.
         self._lock = RLock()
+        self._holder = os.getpid()
+        """Process in which the lock was last taken."""
         self._check = feasibility_check(self.config)
         self._replayer = Replayer(self.config)
 
@@ -93,8 +97,12 @@ class Simulator:
         self.close()
 
     def close(self) -> None:
-        """Free the physics engine; nothing can be simulated afterwards. Closing it once more does nothing."""
-        with self._lock:
+        """Free the physics engine; nothing can be simulated afterwards. Closing it once more does nothing.
+
+        Raises:
+            ConflictError: If this process was forked off while a thread of its parent was simulating a throw.
+        """
+        with self._alone():
             self._replayer.close()
 
     def throw(self, values: Point | None = None, *, trial: int = 0, target: Point | None = None) -> Throw:
@@ -113,7 +121,8 @@ class Simulator:
 
         Raises:
             ConfigError: If a key cannot vary, a value is out of its range, or the task has no such target.
-            ConflictError: If the simulator is closed.
+            ConflictError: If the simulator is closed, or this process was forked off while a thread of its parent was
+                simulating a throw.
             PlanError: If the plan of a collection would refuse the throw; the error gives the plan's reason.
         """
         self._require_open()
@@ -143,12 +152,13 @@ class Simulator:
 
         Raises:
             ConfigError: If a key cannot vary, or a value is out of its range.
+            ConflictError: If this process was forked off while a thread of its parent was simulating a throw.
         """
         check_mapping("values", values, _POINT)
         wrong = {key: reason for key in values if (reason := reason_not_sweepable(self.config, key)) is not None}
         if wrong:
             raise ConfigError([Problem(reason, key=key) for key, reason in wrong.items()])
-        with self._lock:
+        with self._alone():
             return refusal(with_values(self.config, values), self._check)
 
     def throw_many(self, points: Iterable[Point], *, processes: int = 1) -> Iterator[Throw]:
@@ -178,6 +188,8 @@ class Simulator:
                 yield self._throw_numbered((trial, point))
             return
         pieces = tuple(enumerate(points))
+        for index, point in pieces:
+            _check_that_it_can_be_sent(index, point)
         yield from work_side_by_side(
             pieces, _begin, (self.config, self._source), processes=processes, doing="simulates"
         )
@@ -196,6 +208,26 @@ class Simulator:
                 hint=error.hint,
             ) from error
 
+    @contextmanager
+    def _alone(self) -> Iterator[None]:
+        """Keep other threads of this process from the simulator.
+
+        Raises:
+            ConflictError: If this process was forked off while a thread of its parent was simulating a throw.
+        """
+        # That thread does not exist here, so it never releases the lock, and the world may be in the middle of a step.
+        if not self._lock.acquire(blocking=False):
+            if self._holder != os.getpid():
+                raise ConflictError(
+                    "this process was forked off while another thread simulated a throw", hint="make another Simulator"
+                )
+            self._lock.acquire()
+        try:
+            self._holder = os.getpid()
+            yield
+        finally:
+            self._lock.release()
+
     def _require_open(self) -> None:
         """Refuse to simulate after `close`.
 
@@ -206,7 +238,7 @@ class Simulator:
             raise ConflictError("this simulator is closed", hint="make another Simulator")
 
     def _throw(self, trial: Trial) -> Throw:
-        with self._lock:
+        with self._alone():
             # Another thread may have closed it since the throw was asked for.
             self._require_open()
             episode = self._replayer.run(trial)
@@ -216,6 +248,19 @@ class Simulator:
         # In a dataset, these two values come from a shard; the row was made without one.
         row |= {"samples": episode.header.samples, "digest": episode.digest}
         return Throw(table.table([row]), 0, keys, ThrowInMemory(episode), self._source)
+
+
+def _check_that_it_can_be_sent(index: int, point: object) -> None:
+    """Refuse a point of a list that cannot be sent to another process.
+
+    Raises:
+        ConfigError: If it cannot.
+    """
+    try:
+        pickle.dumps(point)
+    except Exception as error:
+        reason = f"cannot be sent to another process: {error}"
+        raise refuse_argument(f"points[{index}]", reason, expected=f"a mapping, such as {_POINT}") from error
 
 
 def _locate(problem: Problem, index: int, point: Point) -> Problem:

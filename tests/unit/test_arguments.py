@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from throwcollect.arguments import (
     check_mapping,
     check_whole_number,
     read_list,
+    read_path,
     read_word,
     refuse_argument,
 )
@@ -69,8 +71,18 @@ def test_check_list_does_not_consume_an_iterator() -> None:
 
 
 def test_as_float_returns_nan_for_a_value_that_is_no_number() -> None:
-    assert as_float(np.float32(0.5)) == as_float("0.5") == 0.5
-    assert all(math.isnan(as_float(each)) for each in ("a", None, [1], 10**400))
+    assert as_float(np.float32(0.5)) == as_float(np.array(0.5)) == 0.5
+    assert all(math.isnan(as_float(each)) for each in ("a", "0.5", True, np.True_, None, [1], 10**400))
+
+
+def test_a_path_is_a_text_or_a_path_of_text() -> None:
+    assert read_path("output", "a/b") == read_path("output", Path("a/b")) == Path("a/b")
+    for given in (None, 5, b"a", ["a"]):
+        with pytest.raises(ConfigError, match=r"^output: got .*\n  expected: a path, as text or a Path"):
+            read_path("output", given)
+    for given in ("a\0b", "a" * 300):
+        with pytest.raises(ConfigError, match=r"^a.*: no file can have this name"):
+            read_path("output", given)
 
 
 def test_a_number_that_is_not_whole_or_out_of_bounds_is_refused() -> None:

@@ -1,4 +1,4 @@
-"""The end of a process whose parent dies, and signals that are held back."""
+"""The end of a process whose parent dies, and signals that are counted or held back."""
 
 import signal
 import subprocess
@@ -7,7 +7,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
-from throwcollect.interruption import hold_stop_signals
+from throwcollect.interruption import count_interruptions, hold_stop_signals
 
 CHILD = """
 import os, sys, time
@@ -68,3 +68,24 @@ def test_signals_are_not_held_back_in_other_threads_which_they_do_not_reach() ->
 
     with ThreadPoolExecutor(1) as pool:
         pool.submit(hold).result()
+
+
+def test_signals_are_counted_and_their_handlers_restored_afterwards() -> None:
+    # `nohup` starts the tests with this signal ignored.
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)
+    before = signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)
+    with count_interruptions() as interruptions:
+        assert interruptions() == 0
+        signal.raise_signal(signal.SIGINT)
+        signal.raise_signal(signal.SIGTERM)
+        signal.raise_signal(signal.SIGHUP)
+        assert interruptions() == 3
+    assert (signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)) == before
+
+
+@pytest.mark.parametrize("number", [signal.SIGHUP, signal.SIGINT])
+def test_a_signal_that_was_ignored_stays_ignored(number: signal.Signals) -> None:
+    signal.signal(number, signal.SIG_IGN)
+    with count_interruptions() as interruptions:
+        signal.raise_signal(number)
+        assert interruptions() == 0

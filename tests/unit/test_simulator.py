@@ -1,11 +1,15 @@
 """Single throws by `Simulator`, in this process or in several."""
 
+import os
 import re
+import signal
 import subprocess
 import sys
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from pathlib import Path
+from threading import Event
 
 import numpy as np
 import pytest
@@ -169,6 +173,8 @@ def test_a_text_or_mapping_in_place_of_a_list_is_refused(simulator: Simulator) -
         ({"values": [1.1]}, r"values: got \[1\.1\]\n  expected: a mapping, such as {'task\.duration_s': 1\.1}"),
         ({"target": [1.4, 0.0]}, r"target: got \[1\.4, 0\.0\]\n  expected: a mapping, such as {'target_x_m'"),
         ({"target": {"target_x_m": "a", "target_y_m": 0.0}}, "target_x_m: should be a number from .*, got 'a'"),
+        ({"target": {"target_x_m": "1", "target_y_m": 0.0}}, "target_x_m: should be a number from .*, got '1'"),
+        ({"target": {"target_x_m": 1.0, "target_y_m": np.True_}}, "target_y_m: should be a number from .*, got True"),
     ],
 )
 def test_an_argument_of_a_wrong_type_is_named(simulator: Simulator, arguments, message: str) -> None:
@@ -181,6 +187,8 @@ def test_find_refusal_and_throw_many_check_their_arguments(simulator: Simulator)
         simulator.find_refusal([1])
     with pytest.raises(ConfigError, match=r"^processes: got 1\.5\n  expected: a whole number, 1 or more"):
         next(simulator.throw_many([{}], processes=1.5))
+    with pytest.raises(ConfigError, match=r"^points\[1\]: cannot be sent to another process: .*\n  expected: a map"):
+        next(simulator.throw_many([{}, {"task.duration_s": lambda: 1.1}], processes=2))
 
 
 def test_a_simulator_of_a_config_throws_as_that_of_its_file(simulator: Simulator) -> None:
@@ -206,6 +214,32 @@ def test_a_simulator_throws_for_several_threads_one_after_the_other(simulator: S
 
     with ThreadPoolExecutor(4) as threads:
         assert list(threads.map(throw, points)) == alone
+
+
+def test_a_process_that_was_forked_off_during_a_throw_refuses_to_throw_instead_of_waiting_for_ever(
+    simulator: Simulator,
+) -> None:
+    def throw() -> None:
+        with simulator._alone():
+            throws.set()
+            forked.wait()
+
+    throws, forked = Event(), Event()
+    with ThreadPoolExecutor(1) as threads:
+        done = threads.submit(throw)
+        throws.wait()
+        if (child := os.fork()) == 0:
+            signal.alarm(20)
+            with suppress(ConflictError):
+                simulator.throw(POINT)
+                os._exit(1)
+            os._exit(0)
+        assert os.waitpid(child, 0)[1] == 0
+        forked.set()
+        done.result()
+    if (child := os.fork()) == 0:
+        os._exit(simulator.throw(POINT).outcome != "landed")
+    assert os.waitpid(child, 0)[1] == 0
 
 
 def test_a_missing_configuration_is_an_error_that_names_it(tmp_path: Path) -> None:

@@ -13,13 +13,13 @@ from typing import Any, TypeVar
 import typer
 
 from throwcollect.cli.dataset.info import print_collected
-from throwcollect.cli.interruptions import count_interruptions
 from throwcollect.cli.printing import tell
 from throwcollect.cli.streams import has_reader
 from throwcollect.cli.terminal import display
 from throwcollect.cluster.cluster_run import ClusterRun, ProgressOfSlices, SlicesLook, find_queued, follow
 from throwcollect.dataset.inspect import info
 from throwcollect.errors import ConfigError, Interrupted, ThrowcollectError
+from throwcollect.interruption import count_interruptions
 from throwcollect.runtimes.node_logs import Tail
 from throwcollect.wording import command, format_count
 

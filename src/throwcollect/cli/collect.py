@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from throwcollect.cli.interruptions import count_interruptions
 from throwcollect.cli.options import DatasetArgument, JsonOption, SetOption, TrialsOption, overrides
 from throwcollect.cli.printing import print_json, tell
 from throwcollect.cli.streams import ensure_written, only_log
@@ -20,6 +19,7 @@ from throwcollect.cli.terminal import display
 from throwcollect.config.default_path import DEFAULT_CONFIG
 from throwcollect.errors import ConfigError
 from throwcollect.files import write_secret
+from throwcollect.interruption import count_interruptions
 from throwcollect.own_process import keep_objects
 from throwcollect.side_by_side import count_cores
 from throwcollect.wording import command

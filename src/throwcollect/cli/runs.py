@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from throwcollect.cli.interruptions import count_interruptions
 from throwcollect.cli.options import JsonOption, RunOption
 from throwcollect.cli.printing import align, print_json, tell
 from throwcollect.cli.streams import end_with_reader, has_reader
 from throwcollect.cli.terminal import display
 from throwcollect.errors import ConfigError, Interrupted
+from throwcollect.interruption import count_interruptions
 from throwcollect.wording import command, format_count
 
 if TYPE_CHECKING:
@@ -184,8 +184,13 @@ def down(
         end(submitted)
         return
     from throwcollect.runs import control
+    from throwcollect.runs.records import Records
+    from throwcollect.runs.run_selection import find_run_to_change
 
-    ended, removed = control.down(run, volumes=volumes)
+    # A run without a record may be another user's, so it is removed only if it is named.
+    command = "down -v" if volumes else "down"
+    found = find_run_to_change(Records(), None, command=command, died=True) if run is None else run
+    ended, removed = control.down(found, volumes=volumes)
     for name in removed:
         tell(f"removed {name}")
     typer.echo(f"{ended}: ended and forgotten")

@@ -14,7 +14,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from throwcollect.arguments import read_list
+from throwcollect.arguments import read_list, read_path
 from throwcollect.config.document import Document, Plain
 from throwcollect.config.problems import MOST_EXAMINED, KeyProblem, Location, findings, join_key
 from throwcollect.config.schema import Config, Range
@@ -47,7 +47,7 @@ def load(path: StrPath, overrides: Sequence[str] = ()) -> Config:
         ConfigError: If the file cannot be read or anything in it is wrong; it holds all problems, unknown keys first.
             Also if the overrides are no list of texts.
     """
-    with load_locating_errors(Path(path), overrides) as config:
+    with load_locating_errors(read_path("path", path), overrides) as config:
         return config
 
 

@@ -12,7 +12,7 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from throwcollect.arguments import check_whole_number, read_list
+from throwcollect.arguments import check_whole_number, read_list, read_path
 from throwcollect.config.schema import Config
 from throwcollect.config.sweep import Range
 from throwcollect.dataset.bag import read_bag_metadata
@@ -74,7 +74,7 @@ class Dataset(Sequence[Throw]):
             DatasetError: If the directory holds no dataset, an unfinished one, or one whose tables are damaged.
             ConfigError: If its ``config.yaml`` is wrong.
         """
-        path = Path(directory)
+        path = read_path("directory", directory)
         # Metadata and table follow from the recordings, and the plan follows from the table or the configuration.
         rebuild, repair = command("dataset", "rebuild", path), command("dataset", "repair", path, "OUTPUT")
         remedies: Mapping[Path | None, str] = {path / METADATA: rebuild, path / PLAN: repair, path / THROWS: rebuild}

@@ -6,6 +6,7 @@ import warnings
 from collections.abc import Iterator
 from pathlib import Path
 
+from throwcollect.arguments import read_path
 from throwcollect.dataset.bag import find_next_command
 from throwcollect.dataset.configuration import read_config
 from throwcollect.dataset.directory import METADATA, PLAN, list_shards, path_of_part
@@ -36,7 +37,7 @@ def load(directory: StrPath) -> Dataset:
     Warns:
         UnfinishedDatasetWarning: If it is not finished.
     """
-    path = Path(directory)
+    path = read_path("directory", directory)
     # If the directory is no dataset at all, `open` says what is wrong.
     if is_there(path / METADATA) or not is_there(path / PLAN):
         return Dataset.open(path)

@@ -7,11 +7,10 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from pathlib import Path
 
 import numpy as np
 
-from throwcollect.arguments import check_whole_number, is_whole, read_list, refuse_argument, show_value
+from throwcollect.arguments import check_whole_number, is_whole, read_list, read_path, refuse_argument, show_value
 from throwcollect.dataset.expression import Expression
 from throwcollect.dataset.reader import Dataset
 from throwcollect.derive.derivation import Derived, derive
@@ -29,7 +28,7 @@ def merge(directories: Sequence[StrPath], output: StrPath) -> Derived:
     listed = read_list("directories", directories, "directories", (str, os.PathLike))
     if not listed:
         raise refuse_argument("directories", "got none", expected="at least one dataset")
-    return derive([source(Dataset.open(Path(directory))) for directory in listed], Path(output))
+    return derive([source(Dataset.open(directory)) for directory in listed], read_path("output", output))
 
 
 def filter_trials(directory: StrPath, output: StrPath, *, where: str) -> Derived:
@@ -40,11 +39,11 @@ def filter_trials(directory: StrPath, output: StrPath, *, where: str) -> Derived
         DatasetError: If the dataset is damaged, or the new one cannot be written.
     """
     condition = Expression(where, place="where")
-    dataset = Dataset.open(Path(directory))
+    dataset = Dataset.open(directory)
     chosen = source(dataset, condition.rows(dataset.throws))
     if not chosen.trials:
         raise refuse_argument("where", f"no trial of {directory} that has an episode fulfils {where!r}")
-    return derive([chosen], Path(output))
+    return derive([chosen], read_path("output", output))
 
 
 def sample(directory: StrPath, output: StrPath, *, count: int, seed: int = 0) -> Derived:
@@ -57,11 +56,11 @@ def sample(directory: StrPath, output: StrPath, *, count: int, seed: int = 0) ->
         DatasetError: If the dataset is damaged, or the new one cannot be written.
     """
     check_whole_number("seed", seed, least=0)
-    dataset = Dataset.open(Path(directory))
+    dataset = Dataset.open(directory)
     candidates = source(dataset).trials
     if not (is_whole(count) and 1 <= count <= len(candidates)):
         bounds = f"from 1 to {len(candidates)}, the number of episodes of {directory}"
         problem = f"should be {bounds}, got {show_value(count)}"
         raise refuse_argument("count", problem)
     order = np.random.default_rng(seed).permutation(len(candidates))
-    return derive([source(dataset, [candidates[place] for place in order[:count]])], Path(output))
+    return derive([source(dataset, [candidates[place] for place in order[:count]])], read_path("output", output))

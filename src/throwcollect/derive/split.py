@@ -14,13 +14,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from fractions import Fraction
 from itertools import accumulate
-from pathlib import Path
 from typing import Any, cast
 
 import pyarrow as pa
 from pydantic import TypeAdapter, ValidationError
 
-from throwcollect.arguments import as_float, check_mapping, check_whole_number, read_list, refuse_argument
+from throwcollect.arguments import as_float, check_mapping, check_whole_number, read_list, read_path, refuse_argument
 from throwcollect.config.kinds import LONGEST_NAME, NAME_WORDS, Name
 from throwcollect.dataset.expression import Expression
 from throwcollect.dataset.reader import Dataset
@@ -102,7 +101,7 @@ def split(
     everything = source(dataset)
     members = assign(everything, fractions=fractions, cells=cells, seed=seed)
     parts = {}
-    with new_directory(Path(output)) as beside:
+    with new_directory(read_path("output", output)) as beside:
         for name, places in members.items():
             derived = derive([source(dataset, places)], beside / name, name=_name_part(dataset.config.name, name))
             held = list(places.values())

@@ -85,6 +85,8 @@ def fit_map(
     for argument, names in (("targets", targets), ("parameters", parameters), ("given", context)):
         if twice := [name for name in names if names.count(name) > 1]:
             raise ConfigError(f"{argument}: {twice[0]} is named twice", expected="each name once")
+    if both := [key for key in parameters if key in context]:
+        raise ConfigError(f"parameters and given: {both[0]} is in both", expected="each key in one of them")
     config = dataset.config
     columns = tuple(targets) or config.task.targets
     if not columns:

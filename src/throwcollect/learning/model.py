@@ -4,13 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from throwcollect.arguments import as_float, check_whole_number, read_list, read_word, refuse_argument, show_value
+from throwcollect.arguments import (
+    as_float,
+    check_whole_number,
+    read_list,
+    read_path,
+    read_word,
+    refuse_argument,
+    show_value,
+)
 from throwcollect.config.loader import dump_yaml
 from throwcollect.config.target_columns import LARGEST_TARGET
 from throwcollect.errors import ConfigError
@@ -250,7 +257,7 @@ class Model:
             DatasetError: If it cannot be written.
             MissingExtraError: If the model was distilled, and the package ``onnx`` is not installed.
         """
-        write_model(Path(directory), self.file, self.learned, self.trials, self.config)
+        write_model(read_path("directory", directory), self.file, self.learned, self.trials, self.config)
 
     def _read_inputs(self, points: Sequence[Mapping[str, float]]) -> tuple[Array, Array]:
         """Read scaled parameters and context of points.
@@ -327,7 +334,7 @@ def load_model(directory: StrPath) -> Model:
     Raises:
         DatasetError: If there is none, or it is damaged.
     """
-    return Model(*read_model(Path(directory)))
+    return Model(*read_model(read_path("directory", directory)))
 
 
 def _describe(found: Fit, dataset: Dataset, where: str | None) -> ModelFile:

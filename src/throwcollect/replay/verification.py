@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
 
-from throwcollect.arguments import check_whole_number
+from throwcollect.arguments import check_whole_number, read_path
 from throwcollect.coordinator.prepare import feasibility_check
 from throwcollect.dataset.findings import Finding
 from throwcollect.dataset.reader import Dataset
@@ -49,9 +49,10 @@ def verify_dataset(
         # If the dataset cannot be opened, `verify` below reports why.
         with suppress(DatasetError):
             require_simulating(Dataset.open(directory).config.sim.engine)
-    findings = verify(Path(directory), check_of=feasibility_check, processes=processes)
+    directory = read_path("directory", directory)
+    findings = verify(directory, check_of=feasibility_check, processes=processes)
     if replay is not None:
-        findings += _replay_findings(Path(directory), replay)
+        findings += _replay_findings(directory, replay)
     return findings
 
 

@@ -9,13 +9,15 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from typing import TYPE_CHECKING
 
+from throwcollect.arguments import check_whole_number
 from throwcollect.errors import ConfigError, ConflictError, ThrowcollectError, WorkerError
+from throwcollect.files import StrPath
 from throwcollect.ros.router_endpoint import answers
 from throwcollect.runs.records import Records, Run
 from throwcollect.runs.run_record import RunRecord
 from throwcollect.runs.run_selection import (
+    check_run,
     find_held_runs,
-    find_run_to_change,
     id_of,
     require_living,
     require_simulations,
@@ -42,9 +44,10 @@ def stop(run: Run, *, keep_on: Callable[[], bool] = lambda: True) -> Run:
     This function waits until the run ends or `keep_on` returns false, and returns the run as it is then.
 
     Raises:
-        ConfigError: If the run has ended, or its record cannot be read.
+        ConfigError: If the run has ended, its record cannot be read, or it is no `Run`.
         WorkerError: If the launcher died, or does not end.
     """
+    check_run(run)
     _signal(run.records, require_living(run), signal.SIGTERM)
     deadline = time.monotonic() + _STOP_S
     while run.records.lives(run.id) and keep_on():
@@ -57,12 +60,11 @@ def stop(run: Run, *, keep_on: Callable[[], bool] = lambda: True) -> Run:
     return run.now()
 
 
-def down(named: str | Run | None, *, volumes: bool = False) -> tuple[str, list[str]]:
+def down(named: StrPath | Run, *, volumes: bool = False) -> tuple[str, list[str]]:
     """End all nodes of a run, by force if need be, and forget the run; a dataset in a directory stays.
 
-    `named` is a run, or a name that `find_run_to_change` accepts, or the id of a run without a record whose containers
-    a runtime still holds. None takes the only run of the current directory that lives, or whose launcher died. A volume
-    that holds the dataset is removed only if `volumes` is true.
+    `named` is a run, or a name that `find` accepts, or the id of a run without a record whose containers a runtime
+    still holds. A volume that holds the dataset is removed only if `volumes` is true.
 
     Returns:
         Id of the run, and names of the containers, networks and volumes that were removed.
@@ -72,13 +74,12 @@ def down(named: str | Run | None, *, volumes: bool = False) -> tuple[str, list[s
         WorkerError: If something cannot be ended or removed.
     """
     records, held = Records(), find_held_runs()
-    # A run without a record may be another user's, so it is removed only if it is named.
-    if named is None:
-        run = find_run_to_change(records, None, command="down -v" if volumes else "down", died=True).id
-    elif isinstance(named, Run):
+    if isinstance(named, Run):
         run = named.id
+    elif isinstance(named, str) and named in held:
+        run = named
     else:
-        run = named if named in held else id_of(records, named)
+        run = id_of(records, named)
     record: RunRecord | None = None
     # A run whose record is damaged can be removed, too, but without the record its launcher's process id is unknown.
     with suppress(ConfigError):
@@ -107,9 +108,13 @@ def scale(run: Run, simulations: int) -> None:
 
     Raises:
         ConflictError: If the run has ended, is still starting, or is a container, which has no simulations.
-        ConfigError: If it cannot be scaled, or the launcher refuses that number.
+        ConfigError: If it cannot be scaled, the launcher refuses that number, or an argument is of another kind.
         WorkerError: If the launcher died, or does not answer.
     """
+    check_run(run)
+    check_whole_number("simulations", simulations, least=0)
+    # The run may have ended since it was found.
+    run = run.now()
     record = require_living(run)
     require_simulations(run)
     if record.runtime and not get_runtime(record.runtime).can_be_scaled:

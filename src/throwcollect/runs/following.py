@@ -12,7 +12,7 @@ from throwcollect.errors import ConfigError
 from throwcollect.runs.events import EVENTS, Event, parse
 from throwcollect.runs.records import Run
 from throwcollect.runs.run_record import Summary
-from throwcollect.runs.run_selection import describe_death
+from throwcollect.runs.run_selection import check_run, describe_death
 from throwcollect.runtimes.node_logs import NodeLogs, Tail
 
 _POLL_S = 0.05
@@ -42,8 +42,9 @@ def follow(run: Run, *, keep_on: Callable[[], bool] = lambda: True) -> Iterator[
         A look; the last one shows a run that has ended or died, unless `keep_on` returned false.
 
     Raises:
-        ConfigError: If the record of the run vanishes or cannot be read.
+        ConfigError: If the record of the run vanishes or cannot be read, or `run` is no `Run`.
     """
+    check_run(run)
     run.record.middleware.joining.settle()
     from throwcollect.runtimes.run_listener import RunListener
 
@@ -70,8 +71,9 @@ def wait(run: Run) -> Summary:
     Raises:
         WorkerError: If the launcher of the run died.
         ThrowcollectError: The error with which the run ended, if its dataset is not complete.
-        ConfigError: If the record of the run vanishes or cannot be read.
+        ConfigError: If the record of the run vanishes or cannot be read, or `run` is no `Run`.
     """
+    check_run(run)
     while run.status == "running":
         time.sleep(_READ_S)
         run = run.now()

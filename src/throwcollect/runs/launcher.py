@@ -98,6 +98,10 @@ def launch_host(
     except ThrowcollectError as error:
         code, failure = error.exit_code, RunFailure.of(error)
         raise
+    except KeyboardInterrupt:
+        # In a Python program, Ctrl-C raises this wherever the program is.
+        code, failure = Interrupted.exit_code, RunFailure("interrupted")
+        raise
     finally:
         if end is not None:
             end()

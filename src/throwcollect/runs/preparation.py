@@ -10,7 +10,7 @@ from datetime import datetime, timezone
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from throwcollect.arguments import check_whole_number
+from throwcollect.arguments import check_whole_number, read_path
 from throwcollect.config.loader import load_locating_errors
 from throwcollect.config.schema import Config
 from throwcollect.coordinator.onlooker import SILENT, Onlooker
@@ -91,12 +91,13 @@ def prepare(
     """
     check_whole_number("processes", processes, least=1)
     started = datetime.now(timezone.utc)
-    with load_locating_errors(Path(config), overrides) as read:
-        directory = _name_directory(read.name) if output is None else Path(output)
+    file, named = read_path("config", config), None if output is None else read_path("output", output)
+    with load_locating_errors(file, overrides) as read:
+        directory = named or _name_directory(read.name)
         records = Records()
         if (run := _take_over(records, directory, read, onlooker)) is not None:
             return run
-        request = RunRequest(read, Path(config).parent, directory, started, processes=processes, ahead=ahead)
+        request = RunRequest(read, file.parent, directory, started, processes=processes, ahead=ahead)
         return prepare_run(records, request, onlooker)
 
 
@@ -141,19 +142,20 @@ def resume(
     from throwcollect.coordinator.resume import is_begun
 
     started = datetime.now(timezone.utc)
-    directory = Path(directory)
+    directory = read_path("directory", directory)
+    file = None if config is None else read_path("config", config)
     if not is_begun(directory):
         refuse_lost_config(directory)
         raise ConfigError(f"{directory}: holds no dataset", expected="a directory that throwcollect up has made")
     with ExitStack() as places:
-        read = _read_stored(places, config, directory, overrides)
+        read = _read_stored(places, file, directory, overrides)
         records = Records()
         own = None if run is None else run.run
         if (left := _take_over(records, directory, read, onlooker, own=own)) is not None:
             return left
         request = RunRequest(
             read,
-            directory if config is None else Path(config).parent,
+            directory if file is None else file.parent,
             directory,
             started,
             processes=processes,
@@ -164,9 +166,7 @@ def resume(
         return None if planned is None else prepare_run(records, planned, onlooker, run=run)
 
 
-def _read_stored(
-    places: ExitStack, config: str | os.PathLike[str] | None, directory: Path, overrides: Sequence[str]
-) -> Config:
+def _read_stored(places: ExitStack, config: Path | None, directory: Path, overrides: Sequence[str]) -> Config:
     """Read the configuration of a dataset to continue; until `places` is closed, errors name places of its file.
 
     Raises:
@@ -174,7 +174,7 @@ def _read_stored(
         DatasetError: If the configuration in the dataset is damaged.
     """
     try:
-        return places.enter_context(load_locating_errors(Path(config or config_path(directory)), overrides))
+        return places.enter_context(load_locating_errors(config or config_path(directory), overrides))
     except ConfigError as error:
         # A problem without a place in a file is a problem of the overrides, which another file would not solve.
         if config or all(problem.path is None for problem in error.problems):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import signal
+import threading
 from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
@@ -10,6 +12,7 @@ from typing import cast
 from throwcollect.config.schema import Config
 from throwcollect.coordinator.onlooker import Onlooker
 from throwcollect.errors import ConfigError, ConflictError
+from throwcollect.interruption import count_interruptions
 from throwcollect.ros.router_endpoint import split_address
 from throwcollect.runs.records import OpenRun, Records, Run
 from throwcollect.runs.run_record import RunRecord, Summary
@@ -96,6 +99,9 @@ class PreparedRun:
     def collect(self, *, interruptions: Callable[[], int] = lambda: 0) -> Summary:
         """Launch the run in this process, and return when it has ended; see `launcher.launch`.
 
+        `runs.stop` asks a run to stop by SIGTERM, which would end this process. Therefore this method counts SIGTERM as
+        an interruption, if it is called in the main thread and the program has not set a handler of its own.
+
         Returns:
             The summary of the dataset; its outcomes tell whether trials are lost.
 
@@ -106,9 +112,14 @@ class PreparedRun:
         from throwcollect.runs.launcher import launch
 
         self._hand_over()
-        summary = launch(
-            self._run, self.config, onlooker=self._onlooker, interruptions=interruptions, runtime=self._runtime
-        )
+        with count_interruptions(_find_fatal_signals()) as terminations:
+            summary = launch(
+                self._run,
+                self.config,
+                onlooker=self._onlooker,
+                interruptions=lambda: interruptions() + terminations(),
+                runtime=self._runtime,
+            )
         # Runs without a dataset have no summary. Only `background` prepares those, and it does not use the result.
         return cast(Summary, summary)
 
@@ -142,3 +153,10 @@ class PreparedRun:
             )
         self._fate = "was launched already"
         self._undo.pop_all()
+
+
+def _find_fatal_signals() -> tuple[signal.Signals, ...]:
+    """Find whether SIGTERM would end this process, and this is the thread in which its handler may be set."""
+    in_main_thread = threading.current_thread() is threading.main_thread()
+    fatal = in_main_thread and signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
+    return (signal.SIGTERM,) if fatal else ()

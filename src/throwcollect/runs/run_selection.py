@@ -6,8 +6,10 @@ import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from throwcollect.arguments import read_path, refuse_argument, show_value
 from throwcollect.dataset.directory import config_path
 from throwcollect.errors import ConfigError, ConflictError, NotFoundError, WorkerError
+from throwcollect.files import StrPath
 from throwcollect.members import names_of
 from throwcollect.runs.records import Records, Run
 from throwcollect.runs.run_record import RunRecord
@@ -41,14 +43,24 @@ def find_run_to_change(records: Records, named: str | None, *, command: str, die
     return _require_only_run(here or candidates, runs)
 
 
-def find(named: str | os.PathLike[str]) -> Run:
+def find(named: StrPath) -> Run:
     """Find a run of this machine by its id, the beginning of its id, or the directory of its dataset; see `id_of`.
 
     Raises:
-        ConfigError: If there is no such run, or more than one.
+        ConfigError: If there is no such run, or more than one, or it is no name.
     """
     records = Records()
-    return records.get(id_of(records, os.fspath(named)))
+    return records.get(id_of(records, named))
+
+
+def check_run(run: object) -> None:
+    """Refuse a value that is no `Run`, such as the name of one.
+
+    Raises:
+        ConfigError: If it is none.
+    """
+    if not isinstance(run, Run):
+        raise refuse_argument("run", f"got {show_value(run)}", expected="a Run, as runs.find(NAME) gives it")
 
 
 def find_run_to_watch(records: Records, named: str | None, *, say: Callable[[str], object]) -> Run:
@@ -93,15 +105,16 @@ def _describe_origin(run: Run) -> str:
     return f"was begun in {begun_in}" if begun_in else f"collects into {run.place.dataset}"
 
 
-def id_of(records: Records, named: str) -> str:
+def id_of(records: Records, named: StrPath) -> str:
     """Find the id of the run that a user names by its id, the beginning of its id, or the directory of the dataset.
 
     If several ids begin alike, the user means the only run of them that lives. If none of them lives, or more than one,
     this raises an error, because choosing one would be a guess.
 
     Raises:
-        ConfigError: If there is no such run, or more than one, or the name is empty.
+        ConfigError: If there is no such run, or more than one, or the name is empty or no name at all.
     """
+    directory, named = read_path("named", named), os.fspath(named)
     # A variable of a shell that is not set is empty. It would mean the current directory, and every id begins with it.
     if not named:
         raise ConfigError(
@@ -113,7 +126,7 @@ def id_of(records: Records, named: str) -> str:
     # A whole id comes first, because it may also be the beginning of another one.
     if named in ids:
         return named
-    if into := records.into(Path(named)):
+    if into := records.into(directory):
         return into[-1].id
     matches = [run for run in ids if run.startswith(named)]
     if len(matches) == 1:

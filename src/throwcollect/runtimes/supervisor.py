@@ -144,7 +144,7 @@ class Supervisor:
         (main,) = self._list_names(NodeRole.MAIN)
         if main in self._due:
             return None
-        self.host.signal(main, signal.SIGINT)
+        self.host.signal(main, signal.SIGTERM)
         deadline = time.monotonic() + self._run.grace_s + _CLOSING_S
         while time.monotonic() < deadline and not hurry():
             for node in self.host.exits():

@@ -152,6 +152,7 @@ def test_a_score_is_stored_in_the_model_and_shown_in_its_card(model: Model, tmp_
         ({"targets": [*TARGETS, TARGETS[0]]}, "targets: landing_x_m is named twice"),
         ({"parameters": KEYS[:1] * 2}, f"parameters: {KEYS[0]} is named twice"),
         ({"given": KEYS[1:2] * 2}, f"given: {KEYS[1]} is named twice"),
+        ({"parameters": KEYS, "given": KEYS[1:2]}, f"parameters and given: {KEYS[1]} is in both"),
         ({"where": "trial < 1"}, "1 throw of 1 landed\n  expected: at least 12 for 3 parameters"),
         (
             {"where": "trial < 1", "parameters": KEYS[:2]},
@@ -281,6 +282,8 @@ def test_adapting_refuses_missing_places_and_wrong_options(model: Model) -> None
         model.adapt([point], [(1.0, 0.0)], scatter=-1.0)
     with pytest.raises(ConfigError, match="scatter: got 1e\\+200"):
         model.adapt([point], [(1.0, 0.0)], scatter=1e200)
+    with pytest.raises(ConfigError, match=r"scatter: got '0\.1'"):
+        model.adapt([point], [(1.0, 0.0)], scatter="0.1")
 
 
 def test_adapting_refuses_throws_far_outside_of_the_learned_ranges(model: Model, dataset: Dataset) -> None:

@@ -1,9 +1,10 @@
 import os
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from datetime import datetime, timezone
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -11,9 +12,9 @@ from rclzenoh.session_config import CONFIG_FILE_VARIABLE, OVERRIDE_VARIABLE
 from throwcollect.errors import ConfigError, ConflictError, WorkerError
 from throwcollect.ros import Context, Node, SingleThreadedExecutor
 from throwcollect.ros.router import router
-from throwcollect.run_key import RunKey
 from throwcollect.runs import control, records
-from throwcollect.runs.control import scale
+from throwcollect.runs.control import down, scale, stop
+from throwcollect.runs.following import follow, wait
 from throwcollect.runs.records import Records, Run
 from throwcollect.runs.run_record import RunRecord
 from throwcollect.runs.state_directory import STATE_VARIABLE
@@ -26,10 +27,13 @@ def state(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(STATE_VARIABLE, str(tmp_path / "state"))
 
 
+RECORD = RunRecord("a-0123", "a", "local", "/a", None, "/a/logs", 0, datetime.now(timezone.utc), 1, 2)
+
+
 def living(endpoint: str | None, runtime: str = "local") -> Run:
-    started = datetime.now(timezone.utc)
-    record = RunRecord("a-0123", "a", runtime, "/a", None, "/a/logs", 0, started, 1, 2, endpoint=endpoint)
-    return Run(record, lives=True, key=RunKey(Path("/a/key")), records=Records())
+    # The run lives until somebody closes what this makes, or the tests end.
+    Records().new("a", run="a-0123").write(replace(RECORD, endpoint=endpoint, runtime=runtime))
+    return Records().get("a-0123")
 
 
 @pytest.fixture
@@ -71,16 +75,24 @@ def wanted(endpoint: str, most: int, monkeypatch: pytest.MonkeyPatch) -> Iterato
 
 
 def test_scaling_asks_the_launcher_for_the_number_of_simulations(endpoint: str, wanted: list[int]) -> None:
+    run = living(endpoint)
     for simulations in (5, 0, 256):
-        scale(living(endpoint), simulations)
+        scale(run, simulations)
     assert wanted == [5, 0, 256]
 
 
-@pytest.mark.parametrize("simulations", [-1, 257])
-def test_scaling_below_zero_or_above_the_largest_number_is_refused(
-    simulations: int, endpoint: str, wanted: list[int]
+@pytest.mark.parametrize(
+    ("simulations", "reason"),
+    [
+        (257, "run a-0123: .* out of range. Min: 0, max: 256, value: 257"),
+        (-1, "simulations: got -1\n  expected: 0 or more"),
+        ("two", "simulations: got 'two'\n  expected: a whole number, 0 or more"),
+    ],
+)
+def test_scaling_to_a_number_that_cannot_be_is_refused(
+    simulations: int, reason: str, endpoint: str, wanted: list[int]
 ) -> None:
-    with pytest.raises(ConfigError, match=f"run a-0123: .* out of range. Min: 0, max: 256, value: {simulations}"):
+    with pytest.raises(ConfigError, match=reason):
         scale(living(endpoint), simulations)
     assert wanted == []
 
@@ -92,9 +104,10 @@ def test_scaling_a_run_that_has_no_router_yet_says_that_it_is_starting() -> None
 
 @pytest.mark.parametrize("most", [1])
 def test_scaling_above_the_limit_of_the_launcher_is_refused(endpoint: str, wanted: list[int]) -> None:
+    run = living(endpoint)
     with pytest.raises(ConfigError, match=r"out of range. Min: 0, max: 1, value: 2"):
-        scale(living(endpoint), 2)
-    scale(living(endpoint), 0)
+        scale(run, 2)
+    scale(run, 0)
     assert wanted == [0]
 
 
@@ -108,6 +121,23 @@ def test_scaling_without_a_router_is_an_error(monkeypatch: pytest.MonkeyPatch) -
     monkeypatch.setattr(control, "_ANSWER_S", 0.2)
     with pytest.raises(WorkerError, match="run a-0123: its launcher does not answer"):
         scale(living("tcp/127.0.0.1:1"), 3)
+
+
+def test_scaling_a_run_that_has_ended_since_it_was_found_says_so() -> None:
+    opened = Records().new("a", run="a-0123")
+    opened.write(replace(RECORD, endpoint="tcp/127.0.0.1:1"))
+    run = Records().get("a-0123")
+    opened.update(ended=datetime.now(timezone.utc), exit_code=0)
+    opened.close()
+    with pytest.raises(ConflictError, match="run a-0123 has ended"):
+        scale(run, 2)
+
+
+@pytest.mark.parametrize("change", [stop, wait, down, lambda run: scale(run, 2), lambda run: next(follow(run))])
+@pytest.mark.parametrize("given", [None, 5])
+def test_a_value_that_is_no_run_is_refused(change: Callable[[Any], object], given: object) -> None:
+    with pytest.raises(ConfigError, match=rf"^(run|named): got {given}\n  expected: a (Run|path), "):
+        change(given)
 
 
 def test_a_run_in_one_process_cannot_be_scaled() -> None:

@@ -1,13 +1,17 @@
-"""A prepared run can be launched only once."""
+"""A prepared run can be launched only once, and stopped wherever it was launched."""
 
 from __future__ import annotations
 
+import signal
+import threading
+import time
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from throwcollect import runs
-from throwcollect.errors import ConflictError
+from throwcollect.errors import ConflictError, Interrupted
 from throwcollect.runs.prepared_run import PreparedRun
 from throwcollect.runs.state_directory import STATE_VARIABLE
 
@@ -46,3 +50,62 @@ def test_launching_a_prepared_run_after_its_block_is_refused(prepared: PreparedR
     with pytest.raises(ConflictError, match=f"run {run.record.run}: was given up when its block was left"):
         launch(run)
     assert not (tmp_path / "data").exists()
+
+
+def call_later(act: Callable[[], object]) -> Callable[[], int]:
+    """Count no interruptions, but call `act` in another thread, once the run collects."""
+    thread = threading.Thread(target=act)
+
+    def interruptions() -> int:
+        if thread.ident is None:
+            thread.start()
+        # The run must not end before the other thread acts.
+        time.sleep(0.02)
+        return 0
+
+    return interruptions
+
+
+@pytest.fixture
+def many(prepared: PreparedRun, tmp_path: Path) -> PreparedRun:
+    """A run that lasts until somebody stops it."""
+    return runs.prepare(tmp_path / "small.yaml", output=tmp_path / "many", overrides=["trials=300"])
+
+
+def test_stopping_a_run_that_a_program_collects_drains_it_and_leaves_the_program_alive(
+    many: PreparedRun, tmp_path: Path
+) -> None:
+    def stop() -> None:
+        stopped.append(runs.stop(runs.find(tmp_path / "many")))
+
+    stopped: list[runs.Run] = []
+    with many as run, pytest.raises(Interrupted, match="interrupted"):
+        run.collect(interruptions=call_later(stop))
+    while not stopped:
+        time.sleep(0.01)
+    assert stopped[0].record.exit_code == Interrupted.exit_code
+    assert signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
+
+
+def test_stopping_a_run_leaves_the_answer_to_the_programs_own_handler(many: PreparedRun) -> None:
+    def handle(*_: object) -> None:
+        raise SystemExit("the program decides")
+
+    signal.signal(signal.SIGTERM, handle)
+    with many as run, pytest.raises(SystemExit, match="the program decides"):
+        run.collect(interruptions=call_later(lambda: signal.raise_signal(signal.SIGTERM)))
+
+
+def test_a_run_that_ctrl_c_ends_in_a_program_was_interrupted(many: PreparedRun, tmp_path: Path) -> None:
+    with many as run, pytest.raises(KeyboardInterrupt):
+        run.collect(interruptions=call_later(lambda: signal.raise_signal(signal.SIGINT)))
+    record = runs.find(tmp_path / "many").record
+    assert (record.exit_code, record.failure and record.failure.message) == (Interrupted.exit_code, "interrupted")
+
+
+def test_a_run_in_another_thread_handles_no_signals(prepared: PreparedRun) -> None:
+    with prepared as run:
+        thread = threading.Thread(target=run.collect)
+        thread.start()
+        thread.join()
+    assert runs.wait(runs.find(run.record.run)).outcomes

@@ -410,7 +410,7 @@ def test_draining_asks_the_coordinator_and_waits_for_its_end(runtime: FakeRuntim
 
     clock.on_sleep = end_at_last
     assert supervisor.drain() == NodeExit(COORDINATOR, 130, "exit code 130", "")
-    assert runtime.signals == [(COORDINATOR, signal.SIGINT)]
+    assert runtime.signals == [(COORDINATOR, signal.SIGTERM)]
     assert runtime.stopped == []
 
 
