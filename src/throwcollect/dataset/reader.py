@@ -22,6 +22,7 @@ from throwcollect.dataset.directory import METADATA, PLAN, THROWS
 from throwcollect.dataset.guesses import DATASET, refuse_attribute
 from throwcollect.dataset.mcap_reader import open_mcap
 from throwcollect.dataset.named_array import Bounds, NamedArray, read_column, refuse_name
+from throwcollect.dataset.selected_throws import select_throws
 from throwcollect.dataset.throw import Throw
 from throwcollect.dataset.throws_table import name_alias, read_throws
 from throwcollect.dataset.trajectories import Trajectories, read_trajectories
@@ -40,7 +41,6 @@ if TYPE_CHECKING:
 
 pd = lazily("pandas")
 
-_SELECTION = "a condition, an Arrow expression, a mask, or numbers of trials"
 _LANDING = ("landing_x_m", "landing_y_m", "landing_z_m")
 
 
@@ -115,13 +115,16 @@ class Dataset(Sequence[Throw]):
                 raise refuse_name("no column", which, self.throws.column_names)
             return read_column(self.throws[which])
         if isinstance(which, slice):
-            return self._take(range(len(self))[which])
+            return replace(self, throws=self.throws.take(pa.array(range(len(self))[which], pa.int64())))
         if not isinstance(which, int | np.integer):
             raise TypeError(f"a position, a slice or the name of a column, not {type(which).__name__}; see select(...)")
         if not -len(self) <= which < len(self):
             raise IndexError(f"{self.directory}: no throw {which} of {len(self)}")
         position = int(which) % len(self)
         return Throw(self.throws, position, self.plan.keys, self._stored[position], str(self.directory))
+
+    def __contains__(self, column: object) -> bool:
+        return column in self.throws.column_names
 
     def __iter__(self) -> Iterator[Throw]:
         return (self[position] for position in range(len(self)))
@@ -297,31 +300,7 @@ class Dataset(Sequence[Throw]):
             ConfigError: If it is none of these.
             DatasetError: If a trial is not among the throws.
         """
-        # These imports take long, and most programs that open a dataset select nothing.
-        import pyarrow.compute as pc
-
-        from throwcollect.dataset.expression import Expression
-
-        if isinstance(which, str):
-            return self._take(Expression(which, place="select", is_argument=False).rows(self.throws))
-        if isinstance(which, pc.Expression):
-            try:
-                return replace(self, throws=self.throws.filter(which))
-            except pa.ArrowException as error:
-                raise ConfigError(f"select: {str(error).splitlines()[0]}") from error
-        values = _make_array(which)
-        if pa.types.is_boolean(values.type):
-            if len(values) != len(self):
-                raise ConfigError(
-                    f"select: a mask of {len(values)}", expected=f"one boolean for each of {len(self)} throws"
-                )
-            return replace(self, throws=self.throws.filter(values))
-        # A number above the largest int64 becomes a negative one, which no trial has.
-        rows = pc.index_in(values.cast(pa.int64(), safe=False), value_set=self.throws["trial"].combine_chunks())
-        if rows.null_count:
-            missing = values.filter(pc.is_null(rows))[0]
-            raise DatasetError(f"no trial {missing} among the {len(self)} throws", path=self.directory)
-        return replace(self, throws=self.throws.take(rows))
+        return replace(self, throws=select_throws(self.throws, which, self.directory))
 
     def trajectories(
         self, columns: Iterable[str] = COLUMNS, *, joints: Iterable[str] | None = None, threads: int | None = None
@@ -370,29 +349,3 @@ class Dataset(Sequence[Throw]):
             None if shard is None else StoredThrow(trial, start_ns(trial), paths[shard], offset, samples, joints)
             for trial, shard, offset, samples in rows
         ]
-
-    def _take(self, rows: Iterable[int]) -> Dataset:
-        return replace(self, throws=self.throws.take(pa.array(rows, pa.int64())))
-
-
-def _make_array(which: Any) -> pa.Array:
-    """Make an Arrow array of booleans or integers, from whatever holds them.
-
-    Raises:
-        ConfigError: If it holds anything else.
-    """
-    if isinstance(which, pa.ChunkedArray):
-        which = which.combine_chunks()
-    # Arrow would take the bytes for numbers, and an empty mapping for an empty list.
-    if isinstance(which, bytes | bytearray | Mapping):
-        raise ConfigError(f"select: {type(which).__name__}", expected=_SELECTION)
-    try:
-        values = which if isinstance(which, pa.Array) else pa.array(which if hasattr(which, "__len__") else list(which))
-    except (pa.ArrowException, TypeError, OverflowError) as error:
-        raise ConfigError(f"select: {error}", expected=_SELECTION) from error
-    # An empty list becomes an array of the type null, which is neither boolean nor integer.
-    if not len(values):
-        return pa.array([], pa.int64())
-    if not (pa.types.is_boolean(values.type) or pa.types.is_integer(values.type)):
-        raise ConfigError(f"select: values of type {values.type}", expected=_SELECTION)
-    return values

@@ -75,6 +75,9 @@ class Trajectories:
         rows = slice(self.offsets[number], self.offsets[number + 1])
         return {name: column[rows] for name, column in self.columns.items()}
 
+    def __contains__(self, column: object) -> bool:
+        return column in self.columns
+
     @property
     def lengths(self) -> NDArray[np.int64]:
         """Number of samples of each throw, shape ``(n_throws,)``."""
@@ -99,7 +102,8 @@ class Trajectories:
         return padded
 
     def _find_column(self, name: str) -> Column:
-        if name not in self.columns:
+        # A list can be looked for in a tuple, but not in a mapping.
+        if name not in tuple(self.columns):
             raise refuse_name("no column", name, self.columns)
         return self.columns[name]
 

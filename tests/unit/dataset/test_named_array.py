@@ -90,6 +90,8 @@ def test_a_joint_is_found_by_its_name(loaded: Dataset) -> None:
     which = joints.names.index("torso_1_joint")
     assert np.array_equal(joints["torso_1_joint"].velocity, joints.velocity[:, which])
     assert [joint.name for joint in joints] == list(joints.names)
+    assert "torso_1_joint" in joints
+    assert "arm_right_4" not in joints
     with pytest.raises(KeyError, match=r"^no joint 'arm_right_4'\n  expected: arm_right_4_joint, "):
         joints["arm_right_4"]
 

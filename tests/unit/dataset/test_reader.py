@@ -67,6 +67,12 @@ def test_a_position_beyond_the_last_throw_is_an_error(loaded: Dataset) -> None:
             loaded[index]
 
 
+def test_a_dataset_and_its_throws_tell_whether_they_have_a_column(loaded: Dataset) -> None:
+    for having in (loaded, loaded[0]):
+        assert "landing_x_m" in having
+        assert "landing_x" not in having
+
+
 class Unsearchable:
     """A column in which nothing can be searched for."""
 
@@ -165,6 +171,7 @@ def test_select_goes_by_trial_and_a_slice_by_position(loaded: Dataset) -> None:
         ([2**64], "int too large"),
         (b"1", "select: bytes\n  expected: a condition"),
         ({}, "select: dict\n  expected: a condition"),
+        (pd.DataFrame({"trial": [1]}), "select: .*\n  expected: a condition"),
     ],
 )
 def test_a_selection_that_makes_no_sense_is_an_error(loaded: Dataset, which: Any, message: str) -> None:

@@ -116,6 +116,10 @@ def test_unknown_columns_joints_and_positions_of_trajectories_are_errors(loaded:
             look("stamps_ns")
         assert isinstance(raised.value, ConfigError)
         assert str(raised.value) == "no column 'stamps_ns'\n  expected: time_s"
+    with pytest.raises(ConfigError, match=r"^no column \['time_s'\]\n  expected: time_s"):
+        found.padded(["time_s"])
+    assert "time_s" in found
+    assert "stamps_ns" not in found
     for outside in (7, -8):
         with pytest.raises(IndexError, match=f"no throw {outside} of 7"):
             found[outside]
