@@ -17,6 +17,7 @@ from throwcollect.dataset.bag import refuse_other_directory
 from throwcollect.dataset.configuration import unfitting_plan
 from throwcollect.dataset.creation import create
 from throwcollect.dataset.directory import CONFIG, PLAN, SHARD_SUFFIX, THROWS, TRIALS, config_path
+from throwcollect.dataset.lock import hold_lock
 from throwcollect.dataset.misses import read_targets
 from throwcollect.dataset.rebuild import read_earlier_rows, reason_lost
 from throwcollect.dataset.scan import FoundEpisode, scan_whole
@@ -87,14 +88,16 @@ def repair(directory: Path, output: Path, *, remake: Remake) -> Repaired:
 
     Raises:
         ConfigError: If `output` holds something already.
-        DatasetError: If configuration or plan cannot be read or made again, or files cannot be read or written.
+        DatasetError: If configuration or plan cannot be read or made again, files cannot be read or written, or the
+            dataset is being collected.
     """
     refuse_other_directory(directory)
-    config = _read_configuration(directory)
-    remarks: list[str] = []
-    plan = _read_or_remake_plan(directory, config, remake, remarks)
-    earlier = read_earlier_rows(directory, plan)
-    with new_directory(output) as beside:
+    # The lock is refused while the dataset is being collected: trials that have not run yet would be taken for lost.
+    with hold_lock(directory, needed=False), new_directory(output) as beside:
+        config = _read_configuration(directory)
+        remarks: list[str] = []
+        plan = _read_or_remake_plan(directory, config, remake, remarks)
+        earlier = read_earlier_rows(directory, plan)
         create(beside, plan, listed=_find_list(directory, plan, remarks))
         with closing(DatasetWriter(beside, plan)) as writer:
             digests = {trial: row["digest"] for trial, row in earlier.items() if row["digest"] is not None}

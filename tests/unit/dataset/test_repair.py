@@ -15,6 +15,7 @@ from tests.unit.dataset.damage import flip
 from tests.unit.sweep.own_plan import make_plan
 
 from throwcollect.config.schema import Config
+from throwcollect.dataset import lock
 from throwcollect.dataset.mcap_reader import open_mcap
 from throwcollect.dataset.repair import DifferingEpisode, LostTrial, _find_again, repair
 from throwcollect.dataset.scan import scan_whole
@@ -136,6 +137,18 @@ def test_repair_finishes_an_unfinished_dataset(collection: Any, tmp_path: Path, 
     assert [lost.trial for lost in repaired.lost] == [4, 6]
     assert repaired.episodes == 5
     assert verify(output) == []
+
+
+def test_repair_refuses_a_dataset_that_is_being_collected(
+    dataset: Path, output: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(lock, "PATIENCE_S", 0.0)
+    with (
+        lock.hold_lock(dataset, alone=False),
+        pytest.raises(DatasetError, match="another process collects into it, or changes it"),
+    ):
+        repair(dataset, output, remake=never)
+    assert not output.exists()
 
 
 def test_repair_takes_the_first_of_several_episodes_of_a_trial_and_says_so(dataset: Path, output: Path) -> None:

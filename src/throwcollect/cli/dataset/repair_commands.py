@@ -49,8 +49,10 @@ def repair_dataset(directory: DatasetArgument, output: OutputArgument, json: Jso
     else:
         for remark in repaired.remarks:
             typer.echo(remark)
-        for lost in repaired.lost:
+        for lost in repaired.lost[:_MOST_NAMED]:
             typer.echo(f"trial {lost.trial}: lost: {lost.reason}")
+        if more := len(repaired.lost[_MOST_NAMED:]):
+            typer.echo(f"{format_count(more, 'more trial')} lost, which --json lists")
         typer.echo(
             f"{output}: {format_count(repaired.episodes, 'episode')} of {format_count(repaired.trials, 'trial')}"
         )

@@ -11,6 +11,7 @@ import pytest
 from tests.unit.dataset.conftest import Collection
 from tests.unit.dataset.damage import flip
 
+from throwcollect.cli.dataset import repair_commands
 from throwcollect.cli.main import main
 from throwcollect.episode.record import EpisodeHeader, Samples
 
@@ -139,6 +140,18 @@ def test_repair_lists_what_is_lost_and_ends_with_5(
     assert found["lost"] == [{"trial": 0, "reason": "no whole episode of it was left"}]
     assert (found["trials"], found["episodes"], found["differing"], found["remarks"]) == (3, 2, [], [])
     assert run("dataset", "verify", output) == 0
+
+
+def test_repair_names_the_first_of_many_lost_trials_and_counts_the_others(
+    run: Run, source: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(repair_commands, "_MOST_NAMED", 1)
+    (source / "quick_00000.mcap").unlink()
+    output = tmp_path / "output"
+    assert run("dataset", "repair", source, output) == 5
+    lost, rest, result = capsys.readouterr().out.splitlines()
+    assert lost == "trial 0: lost: no whole episode of it was left"
+    assert (rest, result) == ("2 more trials lost, which --json lists", f"{output}: 0 episodes of 3 trials")
 
 
 def test_repair_ends_with_5_if_a_kept_episode_differs_from_the_table(
