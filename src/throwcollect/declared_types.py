@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import reprlib
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, get_type_hints
 
 if TYPE_CHECKING:
     from pydantic import TypeAdapter
@@ -33,6 +33,17 @@ def check_type(name: str, value: object, declared: Any) -> None:
         place = ".".join(map(str, (*([name] if name else ()), *first["loc"][1:])))
         should = first["msg"].removeprefix("Value error, ").removeprefix("Input ")
         raise TypeError(f"{place}: {should}, is {reprlib.repr(first['input'])}") from error
+
+
+def check_properties(value: object, kind: type) -> None:
+    """Make sure that the properties that a kind of parts declares are of their types in a value of that kind.
+
+    Raises:
+        TypeError: If one is of another type.
+    """
+    for name, described in vars(kind).items():
+        if isinstance(described, property):
+            check_type(name, getattr(value, name), get_type_hints(described.fget, include_extras=True)["return"])
 
 
 @lru_cache

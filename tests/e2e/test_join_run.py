@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import os
 import re
 import secrets
@@ -269,7 +270,13 @@ def test_joining_with_other_sources_is_refused_with_the_reason(tmp_path: Path) -
     assert "run many-1234: this machine has other sources, another build of the engine bullet" in done.stderr
 
 
-@pytest.mark.parametrize("word", ["", "tc2.", "tc2.e30", "x" * 50, "tc2.!!!"])
+NO_PORT = "tc2." + base64.urlsafe_b64encode(
+    b'{"run": "a-1234", "endpoint": "tls/127.0.0.1", "secret": "11", "domain_id": 0, "engine": "bullet", "build": "b"}'
+).decode().rstrip("=")
+"""A token whose endpoint has lost its port."""
+
+
+@pytest.mark.parametrize("word", ["", "tc2.", "tc2.e30", "x" * 50, "tc2.!!!", NO_PORT])
 def test_a_malformed_token_is_refused(word: str) -> None:
     done = call_here("join-run", word)
     assert done.returncode == 2
@@ -314,15 +321,18 @@ def test_only_the_owner_can_read_the_file_of_the_token(tmp_path: Path) -> None:
     assert "other machines cannot join the run" in done.stderr
 
 
-def test_a_run_that_is_over_cannot_be_joined() -> None:
+def test_a_run_that_is_over_cannot_be_joined_even_if_its_port_is_used_again(monkeypatch: pytest.MonkeyPatch) -> None:
     from throwcollect.build import build_digest
+    from throwcollect.runs import joining
     from throwcollect.runs.token import JoinToken
 
-    with socket.create_server(("127.0.0.1", 0)) as free:
-        port = free.getsockname()[1]
-    done = call_here(
-        "join-run",
-        JoinToken("many-1234", f"tls/127.0.0.1:{port}", "11" * 32, 0, "bullet", build_digest("bullet")).encode(),
-    )
+    monkeypatch.setattr(joining, "_ANSWER_S", 0.5)
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        endpoint = f"tls/127.0.0.1:{server.getsockname()[1]}"
+        token = JoinToken("many-1234", endpoint, "11" * 32, 0, "bullet", build_digest("bullet")).encode()
+        done = call_here("join-run", token)
+        assert done.returncode == 3
+        assert f"run many-1234: the router at {endpoint} does not let this machine in" in done.stderr
+    done = call_here("join-run", token)
     assert done.returncode == 3
-    assert f"no router answers at tls/127.0.0.1:{port}" in done.stderr
+    assert f"run many-1234: no router answers at {endpoint}" in done.stderr

@@ -213,10 +213,12 @@ def test_a_broken_member_is_an_error_that_names_its_package(
         ),
         ("robots", "robot(controllers={'a': ('b', 'b')})", ".controllers: should name each joint once, not b twice"),
         ("robots", "robot(share='/tmp')", ".share: should be callable, is '/tmp'"),
+        ("robots", "robot(goal_time_s=-1.0)", ".goal_time_s: should be greater than or equal to 0, is -1.0"),
         ("robots", "robot(hand=None)", ".hand: should be a valid string, is None"),
         ("robots", "robot(name='other')", " should have the name of its entry point, 'mine', has 'other'"),
         ("tools", "section(name='other')", " should have the name of its entry point, 'mine', has 'other'"),
         ("tools", "section(implementation=3)", ".implementation: should be a valid string, is 3"),
+        ("tasks", "task(until=UntilConfig)", ".until: should be derived from UntilConfig, with the outcome "),
         ("tasks", "task(until=dict)", ".until: should be a subclass of UntilConfig, is <class 'dict'>"),
         ("tasks", "task(targets='end_m')", ".targets: should be a valid tuple, is 'end_m'"),
         (

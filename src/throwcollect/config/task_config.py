@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator
 from typing import Annotated, ClassVar
 
-from pydantic import Field
+from pydantic import AfterValidator, Field
 
 from throwcollect.config.key import Effect, Key
 from throwcollect.config.kinds import Angle, Joint
@@ -14,6 +14,17 @@ from throwcollect.config.section import Section
 from throwcollect.config.target_columns import TargetColumn
 from throwcollect.config.until import UntilConfig
 from throwcollect.wording import join_names
+
+
+def _refuse_base(until: type[UntilConfig]) -> type[UntilConfig]:
+    """Make sure that a section `until` has a key.
+
+    Raises:
+        ValueError: If it is the base of all such sections, which has none.
+    """
+    if until is UntilConfig:
+        raise ValueError("should be derived from UntilConfig, with the outcome that is counted as its key")
+    return until
 
 
 class TaskConfig(Section):
@@ -33,7 +44,7 @@ class TaskConfig(Section):
     """
 
     implementation: ClassVar[str]
-    until: ClassVar[type[UntilConfig]]
+    until: ClassVar[Annotated[type[UntilConfig], AfterValidator(_refuse_base)]]
     throws: ClassVar[bool] = False
     targets: ClassVar[tuple[str, ...]] = ()
     given: ClassVar[tuple[str, ...]] = ()

@@ -33,6 +33,7 @@ def _refuse_repeated(controllers: Mapping[str, tuple[str, ...]]) -> Mapping[str,
 
 ControllerName = Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$")]
 """Controllers are nodes of ROS, so their names are such as ROS allows for nodes."""
+NotNegative = Annotated[float, Field(ge=0)]
 Controllers = Annotated[Mapping[ControllerName, tuple[str, ...]], Field(min_length=1), AfterValidator(_refuse_repeated)]
 
 
@@ -79,9 +80,9 @@ class Robot:
     holding: tuple[str, ...] = ()
     rigid: tuple[str, ...] = ()
     ros1_names: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
-    goal_tolerance_rad: float = 0.0
-    goal_time_s: float = 0.0
-    stopped_velocity_radps: float = 0.01
+    goal_tolerance_rad: NotNegative = 0.0
+    goal_time_s: NotNegative = 0.0
+    stopped_velocity_radps: NotNegative = 0.01
 
     @cached_property
     def joints(self) -> tuple[str, ...]:

@@ -6,12 +6,13 @@ import os
 import socket
 import time
 from collections.abc import Callable
+from contextlib import ExitStack
 
 from throwcollect.config.loader import load
 from throwcollect.config.schema import Config
 from throwcollect.coordinator.onlooker import SILENT, Onlooker
 from throwcollect.coordinator.progress import Progress
-from throwcollect.errors import WorkerError
+from throwcollect.errors import UnreachableError, WorkerError
 from throwcollect.files import write_file
 from throwcollect.own_directory import make_own_directory
 from throwcollect.ros.connection import Connection
@@ -128,7 +129,15 @@ def _read_configuration(connection: Connection, token: JoinToken) -> str:
     from throwcollect.runtimes.node_collection import CONFIGURATION
     from throwcollect.runtimes.run_listener import take_part
 
-    with take_part(connection) as (node, executor):
+    with ExitStack() as leave:
+        try:
+            node, executor = leave.enter_context(take_part(connection))
+        except UnreachableError as error:
+            # Something accepts connections there, but not with the key of the token.
+            raise WorkerError(
+                f"run {token.run}: the router at {connection.endpoint} does not let this machine in",
+                hint="is that run over, and does another one listen there now? its token is another one",
+            ) from error
         client = node.create_client(GetParameters, f"/{LAUNCHER}/get_parameters")
         if not client.wait_for_service(_ANSWER_S):
             raise WorkerError(f"run {token.run}: its launcher cannot be found at {connection.endpoint}")

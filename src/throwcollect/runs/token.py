@@ -11,6 +11,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from throwcollect.build import build_digest
 from throwcollect.errors import ConfigError
+from throwcollect.ros.router_endpoint import split_address
 
 _START = "tc2."
 """Beginning of every token; the number is the version of the format."""
@@ -53,6 +54,7 @@ class JoinToken:
             text = base64.b64decode(data + "=" * (-len(data) % 4), altchars=b"-_", validate=True)
             token = _JSON.validate_json(text)
             bytes.fromhex(token.secret)
+            split_address(token.endpoint)
         except (ValueError, binascii.Error, ValidationError) as error:
             raise ConfigError("this is no token of a run, or only a part of one", expected=f"{_START}...") from error
         return token

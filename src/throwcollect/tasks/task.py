@@ -9,7 +9,8 @@ from typing import Any, ClassVar, Generic
 
 from throwcollect.config.motion import MinimumJerk
 from throwcollect.config.schema import Config
-from throwcollect.declared_types import check_type
+from throwcollect.config.task_config import TaskConfig
+from throwcollect.declared_types import check_properties, check_type
 from throwcollect.episode.record import EpisodeHeader, Samples
 from throwcollect.members import explain_failure, is_own, load_part
 from throwcollect.robots.description import robot_of
@@ -21,6 +22,8 @@ from throwcollect.tasks.result import LIMIT_VIOLATED, LOST, TRACKING_FAILED, Any
 
 _WHOLE = range(-(2**63), 2**63)
 """Whole numbers that a column of the table of throws can hold."""
+_KINDS = {"number": float, "count": int, "text": str}
+"""Type of the values of a column of each kind."""
 
 
 @dataclass(frozen=True)
@@ -136,16 +139,20 @@ class Task(ABC, Generic[AnyResult]):
 
 
 def _check_storable(columns: ResultColumns[Any], result: Result) -> None:
-    """Make sure that the table of throws can hold the whole numbers and the reason of a result.
+    """Make sure that the table of throws can hold the values and the reason of a result.
 
     Raises:
-        ValueError: If it cannot.
+        TypeError: If a value is of another kind than its column.
+        ValueError: If a whole number is too large, or the reason is no text that can be encoded.
     """
     # Texts with surrogates cannot be encoded; type checkers let them pass.
     (result.reason or "").encode()
     values = columns.write(result)
     for column in columns.columns:
-        if column.kind == "count" and (value := values[column.name]) is not None and value not in _WHOLE:
+        if (value := values[column.name]) is None:
+            continue
+        check_type(f"its result.{column.name}", value, _KINDS[column.kind])
+        if column.kind == "count" and value not in _WHOLE:
             raise ValueError(f"its result.{column.name}: should be from -2^63 to 2^63 - 1, is {value}")
 
 
@@ -162,6 +169,7 @@ def task_of(config: Config) -> Task[Any]:
         task: Task[Any] = kind(config)
         if not is_own("tasks", name):
             check_type("results", getattr(task, "results", None), type[Result])
+            check_properties(config.task, TaskConfig)
     return task
 
 

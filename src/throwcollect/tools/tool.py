@@ -5,19 +5,22 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import Annotated, get_type_hints
+from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
 from throwcollect.config.schema import Config
-from throwcollect.declared_types import check_type
+from throwcollect.declared_types import check_properties, check_type
 from throwcollect.errors import ConfigError
 from throwcollect.members import explain_failure, is_own, load_part
 from throwcollect.pinocchio_library import pinocchio
 
 Positive = Annotated[float, Field(gt=0)]
+_Numbers = tuple[float, ...]
+_ORTHOGONAL = 1e-6
+"""Largest difference between the identity matrix and a rotation matrix times its transpose."""
 
 
 @dataclass(frozen=True)
@@ -37,7 +40,8 @@ class Tool(ABC):
     """A tool; in the frame of its link, the cup must open along +x, and all else is up to the tool.
 
     Attributes:
-        name: Name by which contacts with the tool are recorded, such as ``spoon``; its link is ``<name>_link``.
+        name: Name of the tool, as of its entry point, such as ``spoon``, by which contacts with it are recorded; its
+            link is ``<name>_link``.
     """
 
     name: str
@@ -108,6 +112,8 @@ def tool_of(config: Config) -> Tool:
     with explain_failure("tools", name, "be made"):
         tool: Tool = kind(config.tool)
         if not is_own("tools", name):
+            # Contacts are recorded by the tool's own name, and judged by that in the configuration.
+            check_type("name", getattr(tool, "name", None), Literal[name])
             _check(tool, config.ball.radius_m)
     return tool
 
@@ -118,12 +124,17 @@ def _check(tool: Tool, radius: float) -> None:
     Raises:
         TypeError: If something is missing or wrong.
     """
-    check_type("name", getattr(tool, "name", None), str)
-    for name, described in vars(Tool).items():
-        if isinstance(described, property):
-            check_type(name, getattr(tool, name), get_type_hints(described.fget, include_extras=True)["return"])
+    check_properties(tool, Tool)
     check_type("inertia.mass", tool.inertia.mass, Positive)
+    check_type("inertia.lever", tuple(tool.inertia.lever.tolist()), _Numbers)
+    check_type("inertia.inertia", tuple(tool.inertia.inertia.ravel().tolist()), _Numbers)
+    poses = {"mount": tool.mount, **{f"boxes.{index}.placement": box.placement for index, box in enumerate(tool.boxes)}}
+    for name, pose in poses.items():
+        check_type(f"{name}.translation", tuple(pose.translation.tolist()), _Numbers)
+        if not np.allclose(pose.rotation @ pose.rotation.T, np.eye(3), rtol=0.0, atol=_ORTHOGONAL):
+            raise TypeError(f"{name}.rotation: should be a rotation matrix, is {pose.rotation.tolist()}")
     # A tool refuses balls that it cannot hold; whoever asks for the seat reports that.
     with suppress(ConfigError):
         check_type("ball_seat", tool.ball_seat(radius), tuple[float, float, float])
-        check_type("way_out", tool.way_out(radius, np.array([1.0, 0.0, 0.0])), float)
+        for up in (*np.eye(3), *-np.eye(3)):
+            check_type("way_out", tool.way_out(radius, up), float)

@@ -33,6 +33,21 @@ NUMBERS = list(PLAN.trials.numbers_to_run)
 CHOSEN = choose_trials(NUMBERS, count=2, seed=PLAN.config.seed)
 
 
+TALKATIVE = """
+import os
+from throwcollect.engines.ballistic.ballistic_engine import BallisticEngine
+
+run = BallisticEngine.run
+
+def talk(*arguments):
+    print("I run", flush=True)
+    os.write(1, b"and a library of mine, too")
+    return run(*arguments)
+
+BallisticEngine.run = talk
+"""
+
+
 @pytest.fixture(scope="module")
 def digests() -> dict[int, str]:
     replayer = Replayer(PLAN.config)
@@ -77,6 +92,13 @@ def test_a_replay_check_uses_the_trials_that_were_begun_early(check, digests, st
     check.begin(NUMBERS)
     assert compare(check, digests) == "2 trials simulated again in a fresh process: the same bit for bit"
     assert started == [words(CHOSEN)]
+
+
+def test_a_replay_check_overlooks_what_parts_of_other_packages_print(check, digests, tmp_path, monkeypatch) -> None:
+    # Python imports this module when it starts, and with it the engine that prints.
+    (tmp_path / "sitecustomize.py").write_text(TALKATIVE)
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path), prepend=os.pathsep)
+    assert compare(check, digests) == "2 trials simulated again in a fresh process: the same bit for bit"
 
 
 def test_a_replay_check_compares_the_chosen_trials_even_if_others_were_begun(check, digests, started) -> None:

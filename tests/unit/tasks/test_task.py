@@ -11,8 +11,9 @@ from throwcollect.errors import ConfigError
 from throwcollect.replay.replayer import Replayer
 from throwcollect.robots.talos import TALOS
 from throwcollect.sweep.trials import Trial
-from throwcollect.tasks.result_columns import Count, measured
+from throwcollect.tasks.result_columns import Count, Number, measured
 from throwcollect.tasks.task import task_of
+from throwcollect.tasks.throw.throw_config import ThrowConfig
 from throwcollect.tasks.throw.throw_result import ThrowResult
 from throwcollect.tasks.throw.throw_task import ThrowTask
 
@@ -47,6 +48,7 @@ def test_motion_that_cannot_be_computed_is_refused():
 @dataclass(frozen=True)
 class _CountedResult(ThrowResult):
     bounces: int | None = measured(Count("How often the ball bounced."))
+    surface: str | None = measured(Number("Declared as a number by mistake."))
 
 
 def _judge_of_another_package(monkeypatch: pytest.MonkeyPatch, **values: Any) -> _CountedResult:
@@ -71,5 +73,15 @@ def test_a_result_of_another_package_that_the_table_cannot_hold_is_an_error(
     assert _judge_of_another_package(monkeypatch, bounces=2**63 - 1).bounces == 2**63 - 1
     with pytest.raises(ValueError, match=f"result.bounces: should be from -2\\^63 to 2\\^63 - 1, is {2**63}"):
         _judge_of_another_package(monkeypatch, bounces=2**63)
+    with pytest.raises(TypeError, match=r"^its result\.surface: should be a valid number, is 'sand'$"):
+        _judge_of_another_package(monkeypatch, surface="sand")
     with pytest.raises(ValueError, match="surrogates not allowed"):
         _judge_of_another_package(monkeypatch, reason="\ud800")
+
+
+def test_a_section_of_another_package_with_a_wrong_noun_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("throwcollect.tasks.task.is_own", lambda *_: False)
+    assert task_of(Config()).config == Config()
+    monkeypatch.setattr(ThrowConfig, "noun", property(lambda _: None))
+    with pytest.raises(TypeError, match=r"^noun: should be a valid string, is None$"):
+        task_of(Config())

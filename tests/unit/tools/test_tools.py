@@ -64,9 +64,12 @@ def test_a_right_tool_of_another_package_passes(monkeypatch: pytest.MonkeyPatch)
 @pytest.mark.parametrize(
     ("name", "value", "said"),
     [
-        ("name", 3, "name: should be a valid string, is 3"),
+        ("name", 3, "name: should be 'spoon', is 3"),
+        ("name", "scoop", "name: should be 'spoon', is 'scoop'"),
         ("mount", None, "mount: should be an instance of SE3, is None"),
         ("mount", property(fail), "ValueError: boom"),
+        ("mount", pinocchio.SE3(2 * np.eye(3), np.zeros(3)), "mount.rotation: should be a rotation matrix, is"),
+        ("mount", pinocchio.SE3(np.eye(3), np.full(3, math.nan)), "mount.translation.0: should be a finite number"),
         ("boxes", (), "boxes: Tuple should have at least 1 item"),
         (
             "boxes",
@@ -74,11 +77,20 @@ def test_a_right_tool_of_another_package_passes(monkeypatch: pytest.MonkeyPatch)
             "boxes.0.size.1: should be greater than 0, is -0.1",
         ),
         ("inertia", pinocchio.Inertia.Zero(), "inertia.mass: should be greater than 0, is 0.0"),
+        (
+            "inertia",
+            pinocchio.Inertia(1.0, np.full(3, math.nan), np.eye(3)),
+            "inertia.lever.0: should be a finite number, is nan",
+        ),
         ("rim_radius_m", "wide", "rim_radius_m: should be a valid number, is 'wide'"),
         ("depth_m", math.nan, "depth_m: should be a finite number, is nan"),
         ("ball_seat", lambda *_: (0.0, math.nan, 0.0), "ball_seat.1: should be a finite number, is nan"),
         ("ball_seat", fail, "ValueError: boom"),
-        ("way_out", lambda *_: None, "way_out: should be a valid number, is None"),
+        (
+            "way_out",
+            lambda _tool, _radius, up: 1.0 if up[0] > 0 else None,
+            "way_out: should be a valid number, is None",
+        ),
     ],
 )
 def test_a_wrong_tool_of_another_package_is_an_error_that_says_what_would_be_right(
