@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import json
-import os
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from throwcollect.cli.options import ConfigArgument, DatasetArgument
-from throwcollect.cli.streams import only_log, write_utf_8
+from throwcollect.cli.streams import keep_output, only_log, write_utf_8
 from throwcollect.config.default_path import DEFAULT_CONFIG
 from throwcollect.errors import LossError, NotFoundError
 from throwcollect.files import write_all
@@ -97,17 +96,16 @@ def simulate(directory: DatasetArgument, trials: list[int]) -> None:
     from throwcollect.sweep.plan import Plan
 
     write_utf_8()
-    # The coordinator reads standard output, so whatever engine, robot and task print there goes to standard error.
-    results = os.dup(1)
-    os.dup2(2, 1)
-    plan = Plan.read(directory / PLAN, load(directory / CONFIG))
-    known = plan.trials.numbers
-    if unknown := [trial for trial in trials if trial not in known]:
-        raise NotFoundError(f"{directory / PLAN}: no trial {unknown[0]}", expected=f"{known[0]} to {known[-1]}")
-    replayer = Replayer(plan.config)
-    for trial in trials:
-        line = json.dumps({"trial": trial, "digest": replayer.run(plan.trial(trial)).digest})
-        write_all(results, f"{line}\n".encode())
+    # The coordinator reads standard output, so whatever engine, robot and task print must go elsewhere.
+    with keep_output() as results:
+        plan = Plan.read(directory / PLAN, load(directory / CONFIG))
+        known = plan.trials.numbers
+        if unknown := [trial for trial in trials if trial not in known]:
+            raise NotFoundError(f"{directory / PLAN}: no trial {unknown[0]}", expected=f"{known[0]} to {known[-1]}")
+        replayer = Replayer(plan.config)
+        for trial in trials:
+            line = json.dumps({"trial": trial, "digest": replayer.run(plan.trial(trial)).digest})
+            write_all(results, f"{line}\n".encode())
 
 
 def health(

@@ -11,6 +11,8 @@ import io
 import os
 import select
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Literal, TextIO
 
 from throwcollect.errors import OutputError
@@ -103,6 +105,23 @@ def write_utf_8() -> None:
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(encoding="utf-8", errors=_ERRORS)
+
+
+@contextmanager
+def keep_output() -> Iterator[int]:
+    """Keep standard output for what the block writes into the descriptor that this yields.
+
+    Everything else that is printed meanwhile, even by libraries of other languages, goes to standard error.
+    """
+    sys.stdout.flush()
+    kept = os.dup(1)
+    os.dup2(2, 1)
+    try:
+        yield kept
+    finally:
+        sys.stdout.flush()
+        os.dup2(kept, 1)
+        os.close(kept)
 
 
 def ensure_written(*, reader_may_leave: bool = False, hint: str | None = None) -> None:
