@@ -132,6 +132,12 @@ def test_resume_submits_only_the_missing_slices(
     assert "digest" in call(slurm, "wait", "--run", data)
     assert fingerprints(data) == whole
     assert "nothing is left to submit" in call(slurm, "resume", data)
+    said = call(slurm, "resume", data, "--trials", "700", expect=2)
+    assert f"trials: the plan in {data} has 24, got 700" in said
+    said = call(slurm, "resume", data, "--set", "ball.mass_kg=0.1", expect=2)
+    assert f"ball.mass_kg: {data} was begun with 0.045, got 0.1" in said
+    said = call(slurm, "up", config, "--resume", data, expect=2)
+    assert f"--resume {data}: was submitted, so tasks of a cluster collect it" in said
 
 
 def test_a_node_that_does_not_see_the_directory_is_named(

@@ -132,6 +132,8 @@ def submit_missing(directory: Path, *, overrides: Sequence[str] = (), onlooker: 
     """
     directory = directory.absolute()
     submission = read_submission(directory)
+    # Wrong changes are refused even if nothing is left to submit.
+    config = read_changed_config(directory, overrides)
     look = ClusterRun(directory, submission).look()
     if look.complete or (submission.live and look.lives):
         return None
@@ -139,7 +141,6 @@ def submit_missing(directory: Path, *, overrides: Sequence[str] = (), onlooker: 
     missing = tuple(each.index for each in submission.slices if each not in look.finished and each.index not in living)
     if not missing and look.lives:
         return None
-    config = read_changed_config(directory, overrides)
     scripts = replace(
         _make_scripts(config, directory),
         # All slices go on with the installation and the image of the first submission; this one may be another.

@@ -144,6 +144,12 @@ def read_changed_config(directory: Path, overrides: Sequence[str] = ()) -> Confi
     kept = read_config(directory)
     with load_locating_errors(config_path(directory), overrides) as config:
         refuse_changes(directory, kept, config)
+        if config.trials != kept.trials:
+            raise ConfigError(
+                [Problem(f"the plan in {directory} has {kept.trials}, got {config.trials}", key="trials")],
+                expected="the same number, as tasks share the plan that lies there",
+                hint="a dataset with another seed can be merged with it (throwcollect dataset merge)",
+            )
         return config
 
 
