@@ -199,9 +199,13 @@ try:
     throwcollect.Simulator
 except ImportError as error:
     print(type(error).__name__, error.extra)
+try:
+    throwcollect.runs.find("first")
+except throwcollect.MissingExtraError as error:
+    print(type(error).__name__, error.extra)
 """
     said = run(environment, "python", "-c", script, dataset, QUICKSTART)
-    assert said.stdout.splitlines() == ["6 3 quickstart", "[]", "MissingExtraError collect"], said.stderr
+    assert said.stdout.splitlines() == ["6 3 quickstart", "[]", *["MissingExtraError collect"] * 2], said.stderr
 
 
 @pytest.mark.parametrize(

@@ -21,7 +21,7 @@ from throwcollect.dataset.lock import hold_lock
 from throwcollect.dataset.misses import read_targets
 from throwcollect.dataset.rebuild import read_earlier_rows, reason_lost
 from throwcollect.dataset.scan import FoundEpisode, scan_whole
-from throwcollect.dataset.throws_table import REFUSED, Row, ThrowsTable
+from throwcollect.dataset.throws_table import Row, ThrowsTable
 from throwcollect.dataset.verify_episode import EpisodeCheck
 from throwcollect.dataset.verify_tables import find_wrong_trials, read_list
 from throwcollect.dataset.writer import DatasetWriter
@@ -33,6 +33,7 @@ from throwcollect.robots.description import full_description
 from throwcollect.sweep.parquet_file import read_parquet
 from throwcollect.sweep.plan import Plan, make_trials
 from throwcollect.sweep.points import Points
+from throwcollect.tasks.result import REFUSED
 
 Remake = Callable[[Config], Plan]
 """Draws the plan of a configuration."""

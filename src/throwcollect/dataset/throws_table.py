@@ -23,13 +23,10 @@ from throwcollect.sweep.parquet_file import read_parquet
 from throwcollect.sweep.plan import Plan
 from throwcollect.sweep.trials import Trial
 from throwcollect.tasks.measures import BallState
-from throwcollect.tasks.result import LIMIT_VIOLATED, LOST, TRACKING_FAILED, Result
+from throwcollect.tasks.result import LIMIT_VIOLATED, LOST, REFUSED, TRACKING_FAILED, Result
 from throwcollect.tasks.result_columns import ball_columns, join_ball
 from throwcollect.tasks.task import Task, task_of
 from throwcollect.units import unit_of_name
-
-REFUSED = "refused"
-"""Outcome of a trial that the plan refused; all others are those of the task."""
 
 Row = dict[str, Any]
 """A row of the table, by column; what is null there is None."""

@@ -12,14 +12,14 @@ from numpy.typing import NDArray
 from throwcollect.config.schema import Config
 from throwcollect.dataset.directory import PLAN
 from throwcollect.dataset.findings import Finding
-from throwcollect.dataset.throws_table import REFUSED, Row, ThrowsTable
+from throwcollect.dataset.throws_table import Row, ThrowsTable
 from throwcollect.errors import ConfigError
 from throwcollect.extras import is_installed
 from throwcollect.sweep.plan import ROUND_TRIALS, Check, Plan, make_trials, refusal
 from throwcollect.sweep.points import Points
 from throwcollect.sweep.rounds import Rounds, find_same
 from throwcollect.sweep.samplers import draw_points
-from throwcollect.tasks.result import LOST
+from throwcollect.tasks.result import LOST, REFUSED
 from throwcollect.wording import blank_numbers, format_count
 
 CHECKED_AGAIN = 100

@@ -15,13 +15,13 @@ from throwcollect.config.shape import unit_of_key
 from throwcollect.dataset.directory import CONFIG, PLAN, THROWS, TRIALS, config_path, shard_of
 from throwcollect.dataset.findings import Finding
 from throwcollect.dataset.recorded_trial import shorten
-from throwcollect.dataset.throws_table import REFUSED, Row, RowsByTrial, read_throws_table
+from throwcollect.dataset.throws_table import Row, RowsByTrial, read_throws_table
 from throwcollect.errors import ConfigError, DatasetError, ForeignPlanError
 from throwcollect.sweep.digest import trial_digests
 from throwcollect.sweep.plan import Plan
 from throwcollect.sweep.point_file import read_points
 from throwcollect.sweep.points import Points
-from throwcollect.tasks.result import LOST
+from throwcollect.tasks.result import LOST, REFUSED
 
 
 @dataclass

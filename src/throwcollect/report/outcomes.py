@@ -8,8 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from throwcollect.dataset.throws_table import REFUSED
-from throwcollect.tasks.result import LIMIT_VIOLATED, LOST, TRACKING_FAILED
+from throwcollect.tasks.result import LIMIT_VIOLATED, LOST, REFUSED, TRACKING_FAILED
 from throwcollect.tasks.throw.throw_result import ThrowOutcome
 
 

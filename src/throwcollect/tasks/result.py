@@ -15,6 +15,8 @@ from throwcollect.tasks.result_columns import Columns, JointColumns, Number, Pea
 LIMIT_VIOLATED, TRACKING_FAILED, LOST = "limit_violated", "tracking_failed", "lost"
 """Outcomes that every task has: the trial succeeded, but a joint violated a limit; a controller did not carry out its
 trajectory, or the simulation diverged; no simulation returned an episode."""
+REFUSED = "refused"
+"""Outcome of a trial that the plan refused, which no task judges."""
 
 
 class Outcome(str, Enum):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar, Generic
+from typing import Any, ClassVar, Generic, cast
 
 from throwcollect.config.motion import MinimumJerk
 from throwcollect.config.schema import Config
@@ -18,7 +18,16 @@ from throwcollect.robots.trajectory import JointTrajectory
 from throwcollect.tasks.dmp import dmp_trajectory
 from throwcollect.tasks.joint_measures import explain_failed_goal, explain_violation, measure_joints
 from throwcollect.tasks.minimum_jerk import minimum_jerk_trajectory
-from throwcollect.tasks.result import LIMIT_VIOLATED, LOST, TRACKING_FAILED, AnyResult, Outcome, Result, ResultColumns
+from throwcollect.tasks.result import (
+    LIMIT_VIOLATED,
+    LOST,
+    REFUSED,
+    TRACKING_FAILED,
+    AnyResult,
+    Outcome,
+    Result,
+    ResultColumns,
+)
 
 _WHOLE = range(-(2**63), 2**63)
 """Whole numbers that a column of the table of throws can hold."""
@@ -107,9 +116,7 @@ class Task(ABC, Generic[AnyResult]):
             return self.results(self.outcomes(TRACKING_FAILED), reason=reason)
         result, failure = assessed = self.assess(measured, samples, header)
         if not is_own("tasks", self.config.task.name):
-            check_type("what assess returns", assessed, tuple[Result, Failure | None])
-            check_type("its result", result, self.results)
-            check_type("its outcome", (failure or result).outcome, self.outcomes)
+            self._check_assessed(assessed)
         if refusal := explain_failed_goal(header):
             failure = Failure(self.outcomes(TRACKING_FAILED), refusal)
         elif failure is None and (violation := explain_violation(result)):
@@ -132,6 +139,19 @@ class Task(ABC, Generic[AnyResult]):
         Returns:
             The result with the measures of this task, and the failure that this task finds, if there is one.
         """
+
+    def _check_assessed(self, assessed: object) -> None:
+        """Make sure that `assess` of another package returned what it should.
+
+        Raises:
+            TypeError: If it did not.
+        """
+        check_type("what assess returns", assessed, tuple[Result, Failure | None])
+        result, failure = cast(tuple[Result, Failure | None], assessed)
+        check_type("its result", result, self.results)
+        check_type("its outcome", outcome := (failure or result).outcome, self.outcomes)
+        if outcome == LOST:
+            raise TypeError(f"its outcome: should be another than {LOST}, which is for trials without an episode")
 
     def lose(self, reason: str) -> AnyResult:
         """Make the result of a trial of which no simulation returned an episode."""
@@ -168,9 +188,20 @@ def task_of(config: Config) -> Task[Any]:
     with explain_failure("tasks", name, "be made"):
         task: Task[Any] = kind(config)
         if not is_own("tasks", name):
-            check_type("results", getattr(task, "results", None), type[Result])
-            check_properties(config.task, TaskConfig)
+            _check_declared(task)
     return task
+
+
+def _check_declared(task: Task[Any]) -> None:
+    """Make sure that a task of another package declares what it should.
+
+    Raises:
+        TypeError: If it does not.
+    """
+    check_type("results", getattr(task, "results", None), type[Result])
+    check_properties(task.config.task, TaskConfig)
+    if REFUSED in {each.value for each in task.outcomes}:
+        raise TypeError(f"outcomes: should not have {REFUSED}, which is for trials that the plan refuses")
 
 
 def trajectory_of(config: Config) -> JointTrajectory:

@@ -1,7 +1,7 @@
 from __future__ import annotations
 
-from throwcollect.dataset.throws_table import REFUSED
 from throwcollect.report.outcomes import Outcomes, style_of
+from throwcollect.tasks.result import REFUSED
 from throwcollect.tasks.throw.throw_result import ThrowOutcome
 
 

@@ -7,10 +7,10 @@ import numpy as np
 import plotly.graph_objects as go
 import pytest
 
-from throwcollect.dataset.throws_table import REFUSED
 from throwcollect.report.contents import Panel
 from throwcollect.report.outcomes import style_of
 from throwcollect.report.painter import MARKERS, paint
+from throwcollect.tasks.result import REFUSED
 from throwcollect.tasks.throw.throw_result import ThrowOutcome
 
 RED = (1.0, 0.0, 0.0)

@@ -11,10 +11,11 @@ from throwcollect.errors import ConfigError
 from throwcollect.replay.replayer import Replayer
 from throwcollect.robots.talos import TALOS
 from throwcollect.sweep.trials import Trial
+from throwcollect.tasks.result import Outcome
 from throwcollect.tasks.result_columns import Count, Number, measured
 from throwcollect.tasks.task import task_of
 from throwcollect.tasks.throw.throw_config import ThrowConfig
-from throwcollect.tasks.throw.throw_result import ThrowResult
+from throwcollect.tasks.throw.throw_result import ThrowOutcome, ThrowResult
 from throwcollect.tasks.throw.throw_task import ThrowTask
 
 
@@ -84,4 +85,15 @@ def test_a_section_of_another_package_with_a_wrong_noun_is_an_error(monkeypatch:
     assert task_of(Config()).config == Config()
     monkeypatch.setattr(ThrowConfig, "noun", property(lambda _: None))
     with pytest.raises(TypeError, match=r"^noun: should be a valid string, is None$"):
+        task_of(Config())
+
+
+def test_outcomes_of_trials_without_an_episode_are_not_for_tasks(monkeypatch: pytest.MonkeyPatch) -> None:
+    with pytest.raises(TypeError, match=r"^its outcome: should be another than lost, which is for trials without"):
+        _judge_of_another_package(monkeypatch, outcome=ThrowOutcome.LOST)
+    own = {each.name: each.value for each in ThrowOutcome}
+    monkeypatch.setattr(ThrowTask, "outcomes", Outcome("Outcomes", {**own, "REFUSED": "refused"}))
+    with pytest.raises(
+        TypeError, match=r"^outcomes: should not have refused, which is for trials that the plan refuses$"
+    ):
         task_of(Config())
