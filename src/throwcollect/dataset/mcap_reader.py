@@ -108,7 +108,8 @@ class StoredEpisode:
                 chunks are not looked at.
         """
         hashes = [stated.get("records_sha256", ""), *stated.get(SENSORS_SHA256, "").split()]
-        episode = make_episode(stated.get("header", ""), hashes, [Chunk.parse(each.record.data) for each in chunks])
+        parsed = [Chunk.parse(memoryview(each.record.data)) for each in chunks]
+        episode = make_episode(stated.get("header", ""), hashes, parsed)
         return cls(episode, tuple(chunks), facts, stated.get("digest"))
 
     @cached_property
@@ -228,21 +229,21 @@ class McapContents:
             record = self.record(record.end)
         return indexes, record
 
-    def episode(self, offset: int) -> StoredEpisode:
-        """Read the episode whose first chunk begins at an offset.
+    def episode(self, first: McapRecord) -> StoredEpisode:
+        """Read the episode whose first chunk a record is.
 
         Raises:
-            DatasetError: If none does, or its records are damaged; the contents of the chunk are not looked at.
+            DatasetError: If it is none, or later records are damaged; the contents of the chunk are not looked at.
         """
         chunks: list[StoredChunk] = []
-        record = self.record(offset)
+        record = first
         # Bounded, as a damaged file may have chunk after chunk and no metadata.
         while record.opcode == Opcode.CHUNK and len(chunks) < MOST_CHUNKS:
             indexes, following = self.message_indexes(record.end)
             chunks.append(StoredChunk(record, indexes))
             record = following
         if not chunks:
-            raise DatasetError(f"a {record.kind} where the chunk of an episode should be", place=f"byte {offset}")
+            raise DatasetError(f"a {record.kind} where the chunk of an episode should be", place=f"byte {first.offset}")
         metadata = record.parse(records.Metadata) if record.opcode == Opcode.METADATA else None
         if metadata is None or metadata.name != EPISODE:
             place = f"byte {record.offset}"
@@ -250,7 +251,7 @@ class McapContents:
         try:
             return StoredEpisode.of(chunks, record, metadata.metadata)
         except DatasetError as error:
-            raise error.locate(place=f"byte {offset}") from error
+            raise error.locate(place=f"byte {first.offset}") from error
 
 
 def read_latched_table(record: McapRecord) -> MessageTable:

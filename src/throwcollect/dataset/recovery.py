@@ -156,7 +156,7 @@ def recover_shard(shard: OpenShard, left: LeftOfShard) -> list[RecoveredEpisode]
     if only_final:
         with map_file(shard.path) as contents:
             for found in only_final.values():
-                shard.append(contents.episode(found.place.chunk_offset).episode)
+                shard.append(contents.episode(contents.record(found.place.chunk_offset)).episode)
     # The final file goes last: if this process is killed before, the next one finds these episodes in it again.
     remove(shard.path)
     episodes = {**begun, **only_final}

@@ -96,7 +96,7 @@ def _find(contents: McapContents, first: McapRecord, facts: int) -> FoundEpisode
     `facts` is where the next metadata of an episode begin [bytes]; negative if there are none.
     """
     try:
-        stored, readable = contents.episode(first.offset), True
+        stored, readable = contents.episode(first), True
     except DatasetError:
         try:
             # The records around the chunk may be damaged, while the chunk and the metadata behind it are not.

@@ -81,7 +81,7 @@ class StoredThrow:
         """
         with open_mcap(self.path) as contents:
             try:
-                episode = contents.episode(self.offset).episode
+                episode = contents.episode(contents.record(self.offset)).episode
             except DatasetError as error:
                 raise error.locate(self.path) from error
         if (found := episode.header.trial) != self.trial:

@@ -7,7 +7,7 @@ once more, as the writer of the file does, and compared record by record.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from isal.isal_zlib import crc32
@@ -101,7 +101,7 @@ class _ShardCheck:
     find_problems: FindProblems
     result: ShardReport
     damaged: bool = False
-    expected: bytearray = field(default_factory=bytearray)
+    expected: list[bytes] = field(default_factory=list)
     model: McapFile | None = None
     places: dict[int, int] = field(default_factory=dict)
     latest: int = -1
@@ -142,7 +142,7 @@ class _ShardCheck:
                 # From here on, the model writes what follows the last episode.
                 self.expected.clear()
                 summary = self.model.finish(self.name)
-                self._compare(end, bytes(self.expected[: -len(MAGIC)]))
+                self._compare(end, b"".join(self.expected)[: -len(MAGIC)])
                 self._check_magic()
                 if len(contents) != self.model.size:
                     self._report("", f"has {len(contents)} bytes, its records have {self.model.size}")
@@ -162,8 +162,8 @@ class _ShardCheck:
                 raise DatasetError("latched topics: missing, an episode is here", place=f"byte {latched}")
             if self.result.channels is not None and first is not None:
                 start_ns = first.episode.chunk.start_ns
-                self.model = McapFile(self.expected.extend, self.result.channels, start_ns=start_ns)
-                return self._compare(len(MAGIC), bytes(self.expected[len(MAGIC) :]))
+                self.model = McapFile(self.expected.append, self.result.channels, start_ns=start_ns)
+                return self._compare(len(MAGIC), b"".join(self.expected)[len(MAGIC) :])
             if latched >= 0:
                 return contents.message_indexes(contents.record(latched).end)[1].offset
             for record in contents.records():
@@ -244,8 +244,7 @@ class _ShardCheck:
                 self._report_gap(expected, resumed=stored.offset)
             if self.model is not None:
                 # The model gets the bytes as they are in the file, whose indexes and CRC are compared with the model's.
-                run = stored.intact_run if found.intact else stored.run()
-                self.model.append(replace(run, data=contents.slice(stored.offset, stored.end)))
+                self.model.append(stored.intact_run if found.intact else stored.run())
                 # The bytes of episodes are checked elsewhere, so here only those before and behind them are kept.
                 self.expected.clear()
             self._check_place(stored)
@@ -265,7 +264,7 @@ class _ShardCheck:
         """Report that no episode can be read from `start` on; the next one begins at `resumed` [bytes], -1 if none."""
         reason = DatasetError("so much is damaged that the rest is not looked at", place=f"byte {start}")
         try:
-            self.contents.episode(start)
+            self.contents.episode(self.contents.record(start))
         except DatasetError as error:
             reason = error
         self._report_damage(reason, start=start, resumed=resumed)

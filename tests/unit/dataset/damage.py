@@ -20,7 +20,7 @@ FIRST = 3
 def find_stored(path: Path, trial: int) -> StoredEpisode:
     offset = pq.read_table(path.parent / "throws.parquet")["chunk_offset"].to_pylist()[trial]
     with open_mcap(path) as contents:
-        return contents.episode(offset)
+        return contents.episode(contents.record(offset))
 
 
 def record_of(path: Path, opcode: Opcode, *, holding: bytes = b"", last: bool = False) -> McapRecord:

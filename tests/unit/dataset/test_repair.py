@@ -63,7 +63,7 @@ def cut_summary(directory: Path) -> None:
 
 def damage_index(directory: Path) -> None:
     with open_mcap(directory / SHARD) as contents:
-        index = contents.episode(chunk_of(directory, 4)).chunks[0].indexes[4]
+        index = contents.episode(contents.record(chunk_of(directory, 4))).chunks[0].indexes[4]
     flip(directory / SHARD, index.offset + 100)
 
 

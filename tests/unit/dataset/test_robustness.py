@@ -77,7 +77,7 @@ def test_a_recording_with_any_damage_is_read_or_refused(small: Path, sound: Data
         def read() -> None:
             with open_mcap(path) as contents:
                 for record in contents.records():
-                    harmless(lambda offset=record.offset: contents.episode(offset).episode.samples())
+                    harmless(lambda offset=record.offset: contents.episode(contents.record(offset)).episode.samples())
 
         harmless(read)
 
@@ -171,7 +171,7 @@ def _chunk_announcing(directory: Path, size: int, data: bytes) -> None:
     path = directory / RECORDING
     with open_mcap(path) as contents:
         offset = pq.read_table(directory / "throws.parquet")["chunk_offset"].to_pylist()[0]
-        stored = contents.episode(offset)
+        stored = contents.episode(contents.record(offset))
         whole = contents.slice(0, len(contents))
     bomb = Chunk(data, size, 0, stored.episode.chunk.start_ns, stored.episode.chunk.end_ns).record()
     path.write_bytes(whole[:offset] + bomb + whole[stored.chunks[0].record.end :])

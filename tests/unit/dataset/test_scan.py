@@ -48,7 +48,7 @@ def test_a_scan_finds_all_episodes_of_a_sound_recording_at_their_offsets(
     assert [each.stored.offset for each in runs[1:]] == [each.stored.end for each in runs[:-1]]
     with open_mcap(collected / SHARD) as contents:
         for each in runs:
-            stored = contents.episode(each.stored.offset)
+            stored = contents.episode(contents.record(each.stored.offset))
             assert (stored.chunks, stored.facts) == (each.stored.chunks, each.stored.facts)
 
 
