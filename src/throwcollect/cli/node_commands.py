@@ -89,7 +89,7 @@ def coordinator(
 
 
 def simulate(directory: DatasetArgument, trials: list[int]) -> None:
-    """Simulate trials of a plan and print the digests of their episodes; the coordinator starts this command."""
+    """Simulate trials of a plan and print digests and results; the coordinator starts this command."""
     from throwcollect.config.loader import load
     from throwcollect.dataset.directory import CONFIG, PLAN
     from throwcollect.replay.replayer import Replayer
@@ -104,7 +104,9 @@ def simulate(directory: DatasetArgument, trials: list[int]) -> None:
             raise NotFoundError(f"{directory / PLAN}: no trial {unknown[0]}", expected=f"{known[0]} to {known[-1]}")
         replayer = Replayer(plan.config)
         for trial in trials:
-            line = json.dumps({"trial": trial, "digest": replayer.run(plan.trial(trial)).digest})
+            delivery = replayer.delivery(plan.trial(trial))
+            columns = {"trial": trial, "digest": delivery.episode.digest, **json.loads(delivery.result)}
+            line = json.dumps(columns)
             write_all(results, f"{line}\n".encode())
 
 

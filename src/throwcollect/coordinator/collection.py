@@ -314,7 +314,7 @@ class TrialCollection:
                 hint=command("resume", known) if known else None,
             )
         # The comparison comes first, because what is written next makes the dataset count as finished.
-        if (sentence := self._replay.compare(self.writer.digests(), meanwhile=meanwhile)) is not None:
+        if (sentence := self._replay.compare(self.writer.episode_rows(), meanwhile=meanwhile)) is not None:
             say(sentence)
         outcomes = self.writer.finish(simulations=len(self._took_part) or None)
         lost = explain_loss(outcomes, hint=f"{command('resume', known)} runs them again" if known else None)

@@ -11,6 +11,7 @@ from pathlib import Path
 from tempfile import TemporaryFile
 from typing import IO
 
+from throwcollect.dataset.throws_table import Row
 from throwcollect.errors import DatasetError, WorkerError
 from throwcollect.interruption import die_with_parent
 from throwcollect.own_process import make_command
@@ -19,7 +20,7 @@ from throwcollect.wording import format_count
 
 
 class ReplayCheck:
-    """Compares episodes with those that a fresh process makes, which knows nothing but configuration and plan.
+    """Compares trials with those that a fresh process simulates, which knows nothing but configuration and plan.
 
     Such a process takes a second before its first trial. So it may start while simulations still run the last trials,
     with a guess at which trials will be chosen. Which trials are compared in the end does not depend on that guess.
@@ -49,37 +50,37 @@ class ReplayCheck:
         if chosen := choose_trials(trials, count=self._count, seed=self._seed):
             self._early = _Process(self._directory, chosen)
 
-    def compare(self, digests: Mapping[int, str], *, meanwhile: Callable[[], None]) -> str | None:
-        """Compare some of the episodes, and return a sentence on that; None if there was nothing to compare.
+    def compare(self, rows: Mapping[int, Row], *, meanwhile: Callable[[], None]) -> str | None:
+        """Compare episodes and results of some trials, and return a sentence on that; None if there are no trials.
 
-        `digests` has the digest of each episode, by trial; `meanwhile` is called again and again while a process works.
+        Args:
+            rows: Row of each trial that has an episode, in order of trials.
+            meanwhile: Is called again and again while a process works.
 
         Raises:
-            DatasetError: If an episode came out otherwise.
+            DatasetError: If a trial came out otherwise.
             WorkerError: If the process failed.
         """
         # The choice is made by place in the list, so the order must not depend on which episode came first.
-        trials = choose_trials(sorted(digests), count=self._count, seed=self._seed)
-        again: dict[int, str] = {}
+        trials = choose_trials(list(rows), count=self._count, seed=self._seed)
+        again: dict[int, Row] = {}
         if self._early is not None:
             # If the guess was wrong, do not wait for the process: a trial that was lost may never end there, either.
             if self._early.trials == trials:
                 self._early.wait(meanwhile)
             self._early.end()
-            again = dict(self._early.digests)
+            again = dict(self._early.results)
         if missing := [trial for trial in trials if trial not in again]:
             again |= _simulate(self._directory, missing, meanwhile)
-        wrong = [trial for trial in trials if again.get(trial) != digests[trial]]
+        wrong = {trial: sentence for trial in trials if (sentence := _find_difference(rows[trial], again[trial]))}
         if wrong:
             counted = f"{len(wrong)} of {format_count(len(trials), 'trial')}"
             raise DatasetError(
                 f"{self._directory}: {counted} came out differently in a fresh process: "
                 f"trial {', '.join(map(str, wrong))}",
-                evidence="\n".join(
-                    f"trial {trial}: {digests[trial]} in the dataset, {again.get(trial)}" for trial in wrong
-                ),
-                hint="this machine, or a package that adds an engine, does not compute the same each time, or "
-                "something has changed what was simulated",
+                evidence="\n".join(f"trial {trial}: {sentence}" for trial, sentence in wrong.items()),
+                hint="this machine, or a package that adds an engine or a task, does not compute the same each time, "
+                "or something has changed what was simulated",
             )
         if not trials:
             return None
@@ -92,17 +93,17 @@ class ReplayCheck:
 
 
 class _Process:
-    """A process that simulates trials and prints their digests.
+    """A process that simulates trials and prints for each the columns of its row that follow from the simulation.
 
     Attributes:
-        digests: The digests that it has printed, by trial; empty until `end`.
+        results: Values of these columns, by trial and column; empty until `end`.
         errors: Text of its standard error; empty until `end`.
         exit_code: Its exit code; None until `end`.
     """
 
     def __init__(self, directory: Path, trials: Sequence[int]) -> None:
         self.trials = trials
-        self.digests: dict[int, str] = {}
+        self.results: dict[int, Row] = {}
         self.errors = ""
         self.exit_code: int | None = None
         # Files instead of pipes, because nobody reads while it works, and a full pipe would stop it.
@@ -133,11 +134,11 @@ class _Process:
                 self.errors = _read_contents(self._stderr).strip()
             # The kill may have cut off the last line.
             whole = (json.loads(line) for line in lines if line[-1] == "\n")
-            self.digests = {printed["trial"]: printed["digest"] for printed in whole}
+            self.results = {printed["trial"]: printed for printed in whole}
 
 
-def _simulate(directory: Path, trials: Sequence[int], meanwhile: Callable[[], None]) -> Mapping[int, str]:
-    """Simulate trials in a fresh process, and return the digests of their episodes, by number.
+def _simulate(directory: Path, trials: Sequence[int], meanwhile: Callable[[], None]) -> Mapping[int, Row]:
+    """Simulate trials in a fresh process, and return the columns that follow from the simulation, by trial.
 
     Raises:
         WorkerError: If the process failed.
@@ -147,12 +148,20 @@ def _simulate(directory: Path, trials: Sequence[int], meanwhile: Callable[[], No
         process.wait(meanwhile)
     finally:
         process.end()
-    if len(process.digests) < len(trials):
+    if len(process.results) < len(trials):
         counted = format_count(len(trials), "trial")
         raise WorkerError(
             f"{counted} could not be simulated again (exit code {process.exit_code})", evidence=process.errors or None
         )
-    return process.digests
+    return process.results
+
+
+def _find_difference(row: Row, again: Row) -> str | None:
+    """Say which column of a row came out otherwise, beginning with the episode's digest; None if none did."""
+    for column in sorted(again, key=lambda column: column != "digest"):
+        if again[column] != row[column]:
+            return f"{column} is {row[column]} in the dataset, {again[column]} in the fresh process"
+    return None
 
 
 def _read_contents(file: IO[bytes]) -> str:

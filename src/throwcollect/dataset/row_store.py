@@ -14,6 +14,7 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from throwcollect.dataset.directory import THROWS
+from throwcollect.dataset.throws_table import Row
 from throwcollect.files import unwritable, write_all
 from throwcollect.sweep.arrow_column import read_numbers, read_validity
 
@@ -164,26 +165,26 @@ class RowStore:
         self._by_columns.close()
 
 
-class Digests(Mapping[int, str]):
-    """The digest of each episode by trial, in order of trials, read from the table of throws one at a time."""
+class EpisodeRows(Mapping[int, Row]):
+    """The row of each trial that has an episode, in order of trials, read from the table of throws one at a time."""
 
     def __init__(self, throws: pa.Table) -> None:
-        self._rows = np.flatnonzero(np.concatenate([read_validity(chunk) for chunk in throws["digest"].chunks]))
-        self._trials = np.concatenate([read_numbers(chunk) for chunk in throws["trial"].chunks])[self._rows]
-        self._digests = throws["digest"]
+        self._places = np.flatnonzero(np.concatenate([read_validity(chunk) for chunk in throws["digest"].chunks]))
+        self._trials = np.concatenate([read_numbers(chunk) for chunk in throws["trial"].chunks])[self._places]
+        self._throws = throws
 
-    def __getitem__(self, trial: int) -> str:
-        """Return the digest of a trial's episode.
+    def __getitem__(self, trial: int) -> Row:
+        """Return the row of a trial.
 
         Raises:
-            KeyError: If it has none.
+            KeyError: If it has no episode.
         """
         # Trials are in order, so this needs no table of places in memory.
         place = int(np.searchsorted(self._trials, trial))
         if place == len(self) or self._trials[place] != trial:
             raise KeyError(trial)
-        digest: str = self._digests[int(self._rows[place])].as_py()
-        return digest
+        row: Row = self._throws.slice(int(self._places[place]), 1).to_pylist()[0]
+        return row
 
     def __iter__(self) -> Iterator[int]:
         return map(int, self._trials)

@@ -24,7 +24,7 @@ from throwcollect.dataset.journal import Event, Journal, was_open
 from throwcollect.dataset.lock import hold_lock
 from throwcollect.dataset.provenance import Provenance, write_provenance
 from throwcollect.dataset.recovery import LeftOfShard, RecoveredEpisode, find_left, recover_shard, remove_unfinished
-from throwcollect.dataset.row_store import Digests, RowStore
+from throwcollect.dataset.row_store import EpisodeRows, RowStore
 from throwcollect.dataset.shard import FinishedShard, OpenShard, Recording
 from throwcollect.dataset.shard_layout import ShardLayout
 from throwcollect.dataset.summary_files import write_description
@@ -253,13 +253,13 @@ class DatasetWriter:
         for shard in self._shards.values():
             shard.sync()
 
-    def digests(self) -> Digests:
-        """Return the digest of each episode, by trial; all shards must be finished.
+    def episode_rows(self) -> EpisodeRows:
+        """Return the row of each trial that has an episode; all shards must be finished.
 
         Raises:
             DatasetError: If the disk fails.
         """
-        return Digests(self._finished_rows.table)
+        return EpisodeRows(self._finished_rows.table)
 
     def finish(self, *, wall_s: float | None = None, simulations: int | None = None) -> dict[str, int]:
         """Write the files that describe the dataset as a whole.

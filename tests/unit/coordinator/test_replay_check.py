@@ -14,6 +14,7 @@ from throwcollect.config.schema import Config
 from throwcollect.coordinator import replay_check
 from throwcollect.coordinator.replay_check import ReplayCheck
 from throwcollect.dataset.creation import create
+from throwcollect.dataset.throws_table import Row
 from throwcollect.errors import DatasetError, WorkerError
 from throwcollect.replay.replayer import Replayer
 from throwcollect.sweep.plan import Plan
@@ -49,9 +50,17 @@ BallisticEngine.run = talk
 
 
 @pytest.fixture(scope="module")
-def digests() -> dict[int, str]:
+def rows() -> dict[int, Row]:
     replayer = Replayer(PLAN.config)
-    found = {trial.number: replayer.run(trial).digest for trial in PLAN.trials}
+    found = {}
+    for trial in PLAN.trials:
+        delivery = replayer.delivery(trial)
+        found[trial.number] = {
+            "trial": trial.number,
+            "digest": delivery.episode.digest,
+            **json.loads(delivery.result),
+            **trial.values,
+        }
     replayer.close()
     return found
 
@@ -82,50 +91,60 @@ def words(trials: list[int]) -> list[str]:
     return [str(trial) for trial in trials]
 
 
-def compare(check: ReplayCheck, digests: dict[int, str]) -> str | None:
-    return check.compare(digests, meanwhile=lambda: time.sleep(0.01))
+def compare(check: ReplayCheck, rows: dict[int, Row]) -> str | None:
+    return check.compare(rows, meanwhile=lambda: time.sleep(0.01))
 
 
-def test_a_replay_check_uses_the_trials_that_were_begun_early(check, digests, started, monkeypatch) -> None:
+def test_a_replay_check_uses_the_trials_that_were_begun_early(check, rows, started, monkeypatch) -> None:
     # The process writes for this one, so it does not matter how the user wants to read output.
     monkeypatch.setenv("PYTHONIOENCODING", "utf-16")
     check.begin(NUMBERS)
-    assert compare(check, digests) == "2 trials simulated again in a fresh process: the same bit for bit"
+    assert compare(check, rows) == "2 trials simulated again in a fresh process: the same bit for bit"
     assert started == [words(CHOSEN)]
 
 
-def test_a_replay_check_overlooks_what_parts_of_other_packages_print(check, digests, tmp_path, monkeypatch) -> None:
+def test_a_replay_check_overlooks_what_parts_of_other_packages_print(check, rows, tmp_path, monkeypatch) -> None:
     # Python imports this module when it starts, and with it the engine that prints.
     (tmp_path / "sitecustomize.py").write_text(TALKATIVE)
     monkeypatch.setenv("PYTHONPATH", str(tmp_path), prepend=os.pathsep)
-    assert compare(check, digests) == "2 trials simulated again in a fresh process: the same bit for bit"
+    assert compare(check, rows) == "2 trials simulated again in a fresh process: the same bit for bit"
 
 
-def test_a_replay_check_compares_the_chosen_trials_even_if_others_were_begun(check, digests, started) -> None:
+def test_a_replay_check_compares_the_chosen_trials_even_if_others_were_begun(check, rows, started) -> None:
     check.begin(NUMBERS)
-    kept = {trial: digest for trial, digest in digests.items() if trial not in CHOSEN}
+    kept = {trial: row for trial, row in rows.items() if trial not in CHOSEN}
     compare(check, kept)
     assert started == [words(CHOSEN), words(choose_trials(sorted(kept), count=2, seed=PLAN.config.seed))]
 
 
-def test_a_replay_process_begun_early_that_fails_is_replaced(check, digests, started) -> None:
+def test_a_replay_process_begun_early_that_fails_is_replaced(check, rows, started) -> None:
     check.begin([10**6, 10**6 + 1])
-    assert compare(check, digests) is not None
+    assert compare(check, rows) is not None
     assert started == [words([10**6, 10**6 + 1]), words(CHOSEN)]
 
 
 @pytest.mark.parametrize("early", [False, True])
-def test_a_trial_that_replays_differently_is_an_error(check, digests, early) -> None:
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"digest": "0" * 64, "landing_x_m": 1.0}, f"digest is {'0' * 64} in the dataset, "),
+        ({"landing_x_m": 1.0}, "landing_x_m is 1.0 in the dataset, "),
+    ],
+    ids=["the episode", "a measure"],
+)
+def test_a_trial_that_replays_differently_is_an_error(check, rows, early, change, said) -> None:
     if early:
         check.begin(NUMBERS)
-    with pytest.raises(DatasetError, match=f"1 of 2 trials came out differently in a fresh process: trial {CHOSEN[1]}"):
-        compare(check, {**digests, CHOSEN[1]: "0" * 64})
+    error = f"1 of 2 trials came out differently in a fresh process: trial {CHOSEN[1]}"
+    with pytest.raises(DatasetError, match=error) as caught:
+        compare(check, {**rows, CHOSEN[1]: {**rows[CHOSEN[1]], **change}})
+    assert f"trial {CHOSEN[1]}: {said}" in str(caught.value.evidence)
 
 
-def test_a_replay_process_that_fails_is_an_error(check, digests, tmp_path) -> None:
+def test_a_replay_process_that_fails_is_an_error(check, rows, tmp_path) -> None:
     (tmp_path / "data" / "plan.parquet").unlink()
     with pytest.raises(WorkerError, match="2 trials could not be simulated again \\(exit code") as caught:
-        compare(check, digests)
+        compare(check, rows)
     assert "plan.parquet" in (caught.value.evidence or "")
 
 

@@ -16,7 +16,7 @@ from tests.unit.dataset.conftest import create_and_open
 from throwcollect.dataset import writer
 from throwcollect.dataset.bag import FileSummary
 from throwcollect.dataset.manifest import FileEntry
-from throwcollect.dataset.row_store import Digests, RowStore
+from throwcollect.dataset.row_store import EpisodeRows, RowStore
 from throwcollect.dataset.shard import FinishedShard
 from throwcollect.errors import DatasetError
 from throwcollect.sweep.parquet_file import encode_pieces, encode_table
@@ -117,13 +117,12 @@ def test_a_table_is_encoded_in_small_pieces() -> None:
     assert max(sizes) < sum(sizes) / 5
 
 
-def test_digests_hold_only_trials_with_an_episode(tmp_path: Path) -> None:
+def test_rows_of_episodes_are_only_of_trials_with_an_episode(tmp_path: Path) -> None:
     store = RowStore(tmp_path, SCHEMA)
     for number, first in enumerate((0, 500)):
         store.put(number, rows(first, 500))
-    pairs = zip(store.table["trial"].to_pylist(), store.table["digest"].to_pylist(), strict=True)
-    expected = {trial: digest for trial, digest in pairs if digest is not None}
-    found = Digests(store.table)
+    expected = {row["trial"]: row for row in store.table.to_pylist() if row["digest"] is not None}
+    found = EpisodeRows(store.table)
     assert dict(found) == expected
     assert list(found) == sorted(expected)
     missing = next(trial for trial in itertools.count() if trial not in expected)
