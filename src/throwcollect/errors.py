@@ -28,6 +28,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 _MOST_PROBLEMS = 20
 """Number of problems of a configuration that a message lists; the others are counted."""
@@ -53,6 +54,11 @@ class ThrowcollectError(Exception):
         self.evidence = evidence
         self.hint = hint
         super().__init__(message)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        # Python would call `__init__` with the message alone, which is not what each of these classes takes; then an
+        # error of another process would not arrive.
+        return type(self).__new__, (type(self), *self.args), self.__dict__
 
     @property
     def one_line(self) -> str:

@@ -1,9 +1,14 @@
 from __future__ import annotations
 
+import pickle
 from pathlib import Path
 
+import pytest
+
 from throwcollect.dataset.findings import Finding
-from throwcollect.errors import ConfigError, DatasetError, ForeignPlanError
+from throwcollect.dataset.named_array import refuse_name
+from throwcollect.errors import ConfigError, DatasetError, ForeignPlanError, Problem, RequestError, ThrowcollectError
+from throwcollect.extras import MissingExtraError, MissingLibraryError
 
 
 def test_a_dataset_error_has_its_facts_as_fields_and_in_its_message() -> None:
@@ -26,3 +31,20 @@ def test_locate_adds_the_place_to_an_error_and_keeps_its_type_and_facts() -> Non
 def test_an_error_has_its_message_and_its_hint_in_one_line() -> None:
     assert ConfigError("is missing", expected="a file", hint="write it").one_line == "is missing; try: write it"
     assert ConfigError("is missing").one_line == "is missing"
+
+
+@pytest.mark.parametrize(
+    "error",
+    [
+        MissingExtraError("pinocchio"),
+        MissingLibraryError("pinocchio"),
+        RequestError("NAME_INVALID", "no such name", expected="another", hint="try it"),
+        refuse_name("no joint", "elbow", ["elbow_1"]),
+        ForeignPlanError("differs", path=Path("a"), place="trial 3", evidence="6"),
+        ConfigError([Problem("is missing", "a.b")], expected="a number", more=3),
+    ],
+    ids=lambda error: type(error).__name__,
+)
+def test_an_error_of_another_process_arrives_with_all_its_facts(error: ThrowcollectError) -> None:
+    arrived = pickle.loads(pickle.dumps(error))  # noqa: S301
+    assert (type(arrived), str(arrived), vars(arrived)) == (type(error), str(error), vars(error))
