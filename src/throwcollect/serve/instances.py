@@ -319,7 +319,7 @@ def _write_overrides(origin: Origin) -> list[str]:
     ]
     if problems:
         raise ConfigError(problems)
-    overrides = [f"{key}={json.dumps(value)}" for key, value in origin.changes.items()]
+    overrides = [f"{key}={json.dumps(value, ensure_ascii=False)}" for key, value in origin.changes.items()]
     if origin.simulations is not None:
         overrides.append(f"run.simulations={origin.simulations}")
     return overrides

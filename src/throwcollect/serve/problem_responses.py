@@ -11,7 +11,7 @@ from fastapi.responses import JSONResponse
 from fastapi.routing import APIRoute
 from pydantic import BaseModel, ValidationError, create_model
 from starlette.exceptions import HTTPException
-from starlette.routing import Match
+from starlette.routing import Match, Mount
 
 from throwcollect.config.problems import findings
 from throwcollect.config.shape import ValueShape
@@ -34,6 +34,8 @@ _STATUS: tuple[tuple[type[ThrowcollectError], int], ...] = (
     (WorkerError, 503),
 )
 """Status of each kind of error, the first that fits; that of any other is 500."""
+
+_METHODS = ("DELETE", "GET", "HEAD", "PATCH", "POST", "PUT")
 
 _SCHEMA = {
     "type": "object",
@@ -170,5 +172,8 @@ def _find_model_of_body(request: Request) -> type[BaseModel] | None:
 
 
 def _list_methods_at(request: Request) -> set[str]:
-    routes = [route for route in request.app.routes if route.matches(request.scope)[0] is not Match.NONE]
-    return {method for route in routes for method in getattr(route, "methods", None) or ()}
+    # A router that is included in another one does not list its methods, but it says whether a request would match.
+    # The mounted files of the page would match any request.
+    routes = [route for route in request.app.routes if not isinstance(route, Mount)]
+    scopes = [{**request.scope, "method": method} for method in _METHODS]
+    return {scope["method"] for scope in scopes if any(each.matches(scope)[0] is Match.FULL for each in routes)}

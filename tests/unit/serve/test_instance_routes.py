@@ -79,6 +79,12 @@ def test_a_body_that_is_no_json_begins_nothing_and_gets_one_sentence(
     assert not begun
 
 
+def test_a_wrong_method_gets_the_right_ones(client: TestClient) -> None:
+    for path, methods in (("/api/v1/state", "GET"), (f"{URL}/a", "DELETE, GET, PATCH, PUT"), (URL, "DELETE, GET, POST")):
+        answer = client.options(path)
+        assert (answer.status_code, answer.headers["allow"]) == (405, methods)
+
+
 @pytest.mark.parametrize("name", ["-rf", "A", "a.b", "a b", "ä", 64 * "a", "a%0A", "%00", "..%2fa", ".."])
 def test_a_malformed_id_begins_no_instance(client: TestClient, begun: list[dict[str, Any]], name: str) -> None:
     assert client.put(f"{URL}/{name}", json={"component": "throws"}).status_code in (404, 405, 422)

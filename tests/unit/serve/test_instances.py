@@ -38,6 +38,8 @@ def test_a_repeated_request_begins_no_second_instance(
     (order,) = begun
     assert order["overrides"] == ["task.duration_s=1.1", 'sim.engine="ballistic"', "run.simulations=3"]
     assert (order["output"], order["kind"]) == (tmp_path / "datasets" / "a", "collection")
+    put(client, "b", set={"name": "\U0001f600"})
+    assert begun.pop()["overrides"] == ['name="\U0001f600"']
     other = put(client, "a", simulations=2)
     assert (other.status_code, other.json()["title"]) == (409, "there is an instance a already, of another request")
     assert len(begun) == 1
