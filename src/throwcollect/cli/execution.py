@@ -57,6 +57,9 @@ def execute(command: Callable[..., Any]) -> NoReturn:
             typer.echo(f"throwcollect: {printable(message)}", err=True)
     with suppress(ReaderGone):
         sys.stdout.flush()
+    # The result is told. While Python ends, which takes a while, a signal would only make the exit code contradict it.
+    for number in stop_signals():
+        signal.signal(number, signal.SIG_IGN)
     sys.exit(code)
 
 
@@ -109,6 +112,9 @@ def _explain_commas(context: typer.Context, message: str) -> str:
 
 def _describe(error: Exception) -> tuple[str, int]:
     """Find the message and the exit code of an error."""
+    if isinstance(error.__cause__, KeyboardInterrupt):
+        # Python wraps what is raised in some functions of classes, such as `__set_name__`.
+        error = Interrupted("interrupted")
     if isinstance(error, ConfigError):
         error = _name_options(error)
     if isinstance(error, ThrowcollectError):

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import signal
+import subprocess
 import sys
 import tempfile
 from pathlib import Path
@@ -106,3 +108,19 @@ def test_a_wrong_option_of_a_command_with_targets_is_not_taken_for_a_number(
     with pytest.raises(SystemExit):
         execute(assemble_command("aim"))
     assert "commas" not in capsys.readouterr().err
+
+
+def test_an_interruption_that_python_has_wrapped_is_none_of_our_errors(capsys: pytest.CaptureFixture[str]) -> None:
+    error = RuntimeError("Error calling __set_name__ on 'Field' instance")
+    error.__cause__ = KeyboardInterrupt()
+    assert describe(error, capsys, code=130) == "throwcollect: interrupted\n"
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_after_the_end_of_a_command_changes_nothing(number: signal.Signals) -> None:
+    program = (
+        "import atexit, signal; from throwcollect.cli.execution import execute; "
+        f"atexit.register(signal.raise_signal, {int(number)}); execute(lambda **_: print('done') or 0)"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "done\n", "")

@@ -80,7 +80,11 @@ def test_a_body_that_is_no_json_begins_nothing_and_gets_one_sentence(
 
 
 def test_a_wrong_method_gets_the_right_ones(client: TestClient) -> None:
-    for path, methods in (("/api/v1/state", "GET"), (f"{URL}/a", "DELETE, GET, PATCH, PUT"), (URL, "DELETE, GET, POST")):
+    for path, methods in (
+        ("/api/v1/state", "GET"),
+        (f"{URL}/a", "DELETE, GET, PATCH, PUT"),
+        (URL, "DELETE, GET, POST"),
+    ):
         answer = client.options(path)
         assert (answer.status_code, answer.headers["allow"]) == (405, methods)
 

@@ -35,6 +35,7 @@ from rclzenoh.api import (
 from rclzenoh.interfaces import get_action, get_message, get_service, type_hash
 from rclzenoh.session_config import OVERRIDE_VARIABLE
 from throwcollect.cli.main import main
+from throwcollect.interruption import stop_signals
 from throwcollect.ros.connection import Connection
 from throwcollect.ros.middleware import Middleware
 from throwcollect.ros.router import router
@@ -127,10 +128,14 @@ class Said(NamedTuple):
 def say(endpoint: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Callable[..., Said]:
     def run(*arguments: str) -> Said:
         monkeypatch.setattr(sys, "argv", ["throwcollect", "ros", *arguments])
+        before = [(number, signal.getsignal(number)) for number in stop_signals()]
         try:
             main()
         except SystemExit as end:
             return Said(end.code, *capsys.readouterr())
+        finally:
+            for number, handler in before:
+                signal.signal(number, handler)
         raise AssertionError("the command did not exit")
 
     return run
