@@ -203,7 +203,7 @@ def check_name_of_tool(robot: Robot, tool: Tool) -> None:
         raise ConfigError(
             f"tool.name: the tool is recorded as {tool.name}, with the link {tool.link}; the ground or a link of "
             f"{robot.title} has the name {', '.join(sorted(taken))}, too",
-            hint="give the tool another `Tool.name`",
+            hint="give the tool another name, and the same one to its entry point",
         )
 
 
