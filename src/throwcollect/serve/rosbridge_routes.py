@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable
-from contextlib import AsyncExitStack
+from contextlib import AsyncExitStack, suppress
 
 from fastapi import APIRouter, WebSocket
 
-from throwcollect.errors import ConflictError, NotFoundError, ThrowcollectError
+from throwcollect.errors import ConflictError, ThrowcollectError
 from throwcollect.runs.records import Records, Run
 from throwcollect.serve.bridges import Bridges, FullError
 from throwcollect.serve.instances import Instances
 from throwcollect.serve.rosbridge import attend
-from throwcollect.serve.sockets import FULL, NOT_FOUND, refuse
+from throwcollect.serve.run_end import refuse_ended, wait_for_end
+from throwcollect.serve.sockets import FULL, NOT_FOUND, close, refuse
 
 
 def make_rosbridge_routes(instances: Instances, bridges: Bridges) -> APIRouter:
@@ -39,18 +40,28 @@ async def _attend(socket: WebSocket, bridges: Bridges, find_run: Callable[[], Ru
         except ThrowcollectError as error:
             await refuse(socket, FULL if isinstance(error, FullError) else NOT_FOUND, error.message)
             return
+        ending = asyncio.create_task(_close_at_end(socket, run))
+        stack.callback(ending.cancel)
         await attend(socket, bridge, read_only=not socket.scope["state"]["may_change"])
+
+
+async def _close_at_end(socket: WebSocket, run: Run) -> None:
+    try:
+        await wait_for_end(run)
+    except ThrowcollectError as error:
+        # If the client has left meanwhile, the socket is closed already.
+        with suppress(RuntimeError):
+            await close(socket, NOT_FOUND, error.message)
 
 
 def _find(instances: Instances, instance: str) -> Run:
     """The run of an id.
 
     Raises:
-        NotFoundError: If there is none, or it has ended, so that nobody would ever answer.
+        NotFoundError: If there is none, or it has ended.
     """
     run = instances.get(instance)
-    if run.status == "ended":
-        raise NotFoundError(f"run {instance} has ended")
+    refuse_ended(run)
     return run
 
 

@@ -9,7 +9,7 @@ from typing import Any
 
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
-from throwcollect.errors import ThrowcollectError
+from throwcollect.errors import ConfigError, ThrowcollectError
 
 NOT_FOUND = 4404
 """Close code of a socket to something that does not exist."""
@@ -29,11 +29,13 @@ _logger = logging.getLogger(__name__)
 
 
 async def refuse(socket: WebSocket, code: int, reason: str) -> None:
-    """Accept a socket and close it at once, because a page learns nothing about a socket that was not accepted.
-
-    The frame that closes the socket holds the first line of the reason, cut to the size that fits.
-    """
+    """Accept a socket and close it at once, because a page learns nothing about a socket that was not accepted."""
     await socket.accept()
+    await close(socket, code, reason)
+
+
+async def close(socket: WebSocket, code: int, reason: str) -> None:
+    """Close a socket with the first line of a reason, cut to the size that fits into a frame."""
     await socket.close(code, _cut(reason))
 
 
@@ -43,10 +45,10 @@ def _cut(reason: str) -> str:
     return first.encode()[:_MOST_REASON].decode(errors="ignore")
 
 
-async def keep_telling(socket: WebSocket, telling: Coroutine[Any, Any, object]) -> None:
-    """Let ``telling`` send to a client until the client has left, or there is nothing more to send.
+async def keep_telling(socket: WebSocket, *telling: Coroutine[Any, Any, object]) -> None:
+    """Let ``telling`` send to a client until the client has left, or one of them has nothing more to send.
 
-    If ``telling`` fails, the socket is closed with a code; an unexpected error gets into the log, too.
+    If one of ``telling`` fails, the socket is closed with a code; an unexpected error gets into the log, too.
     """
 
     async def wait_until_gone() -> None:
@@ -54,7 +56,7 @@ async def keep_telling(socket: WebSocket, telling: Coroutine[Any, Any, object]) 
         while (await socket.receive())["type"] != "websocket.disconnect":
             pass
 
-    tasks = [asyncio.create_task(wait_until_gone()), asyncio.create_task(telling)]
+    tasks = [asyncio.create_task(each) for each in (wait_until_gone(), *telling)]
     try:
         await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
     finally:
@@ -70,9 +72,12 @@ async def keep_telling(socket: WebSocket, telling: Coroutine[Any, Any, object]) 
 async def _end(socket: WebSocket, error: BaseException) -> None:
     """Close a socket because of an error, and log the error if it is unexpected."""
     is_expected = isinstance(error, ThrowcollectError)
-    code, reason = (FAILED, error.message) if isinstance(error, ThrowcollectError) else (BROKEN, "internal error")
+    code, reason = BROKEN, "internal error"
+    if isinstance(error, ThrowcollectError):
+        # A record that is damaged, too, describes no run any more.
+        code, reason = NOT_FOUND if isinstance(error, ConfigError) else FAILED, error.message
     try:
-        await socket.close(code, _cut(reason))
+        await close(socket, code, reason)
     except (RuntimeError, WebSocketDisconnect):
         # The socket was closed before, and sending to a closed socket fails with a RuntimeError.
         is_expected = is_expected or isinstance(error, RuntimeError)

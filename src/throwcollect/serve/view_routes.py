@@ -22,6 +22,7 @@ from throwcollect.serve.robot_files import (
     list_meshes,
     scene_of,
 )
+from throwcollect.serve.run_end import wait_for_end
 from throwcollect.serve.sockets import FAILED, MAY_NOT, NOT_FOUND, keep_telling, refuse
 from throwcollect.serve.throws import ThrowWatch
 
@@ -88,7 +89,7 @@ def make_view_routes(instances: Instances) -> APIRouter:
         watch = watches.setdefault(instance, ThrowWatch(run))
         try:
             async with watch.throws() as next_throw:
-                await keep_telling(socket, _send_throws(socket, next_throw))
+                await keep_telling(socket, _send_throws(socket, next_throw), wait_for_end(run))
         finally:
             # A later run of the same id must not get the throws of this run.
             if watch.is_idle and watches.get(instance) is watch:
@@ -100,14 +101,15 @@ def make_view_routes(instances: Instances) -> APIRouter:
             await refuse(socket, MAY_NOT, MAY_ONLY_LOOK[1])
             return
         try:
-            hold = await asyncio.to_thread(lambda: slow_down(instances.get(instance), simulation))
+            run = await asyncio.to_thread(instances.get, instance)
+            hold = await asyncio.to_thread(slow_down, run, simulation)
         except ThrowcollectError as error:
             await refuse(socket, NOT_FOUND if isinstance(error, NotFoundError) else FAILED, error.message)
             return
         try:
             await socket.accept()
             # Nothing is ever sent: the simulation stays slow as long as the client is connected.
-            await keep_telling(socket, asyncio.Event().wait())
+            await keep_telling(socket, wait_for_end(run))
         finally:
             await asyncio.to_thread(hold.restore_speed)
 

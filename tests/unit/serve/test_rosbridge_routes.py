@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from datetime import datetime, timezone
 from typing import NoReturn
 
 import pytest
@@ -9,7 +10,7 @@ from starlette.websockets import WebSocketDisconnect
 from tests.unit.serve.conftest import Remember, Served, make_end_fields
 
 from throwcollect.errors import ConflictError
-from throwcollect.serve import bridges, rosbridge_routes
+from throwcollect.serve import bridges, rosbridge_routes, run_end
 
 
 def end_of(served: Served, path: str) -> tuple[int, str]:
@@ -27,6 +28,25 @@ def test_a_client_without_a_living_run_is_turned_away_with_the_reason(served: Se
 def test_a_client_of_an_ended_run_is_turned_away_for_good(served: Served, remember: Remember) -> None:
     remember("over", **make_end_fields())
     assert end_of(served, "/rosbridge/over") == (4404, "run over has ended")
+
+
+@pytest.mark.parametrize("path", ["/rosbridge/small", "/", "/api/v1/instances/small/shown"])
+def test_a_client_is_told_when_its_run_ends_or_is_forgotten(
+    path: str, served: Served, remember: Remember, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(run_end, "_LOOK_S", 0.05)
+    run = remember("small")
+    with served.socket(path, served.keys.full) as socket:
+        run.update(ended=datetime.now(timezone.utc), exit_code=0)
+        with pytest.raises(WebSocketDisconnect) as end:
+            socket.receive_text()
+    assert (end.value.code, end.value.reason) == (4404, "run small has ended")
+    run.update(ended=None, exit_code=None)
+    with served.socket(path, served.keys.full) as socket:
+        run.forget()
+        with pytest.raises(WebSocketDisconnect) as end:
+            socket.receive_text()
+    assert (end.value.code, end.value.reason) == (4404, "no run small")
 
 
 def test_a_client_beyond_the_limit_is_told_to_try_later(
