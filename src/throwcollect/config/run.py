@@ -64,7 +64,7 @@ class RunConfig(Section):
     """Real time that running trials have left after Ctrl-C or SIGTERM; `throwcollect resume` runs those that did not
     end."""
     retries: Annotated[int, Field(ge=0, le=100)] = 3
-    """How often a trial is given to another simulation before it is recorded as `lost`."""
+    """How often a trial is tried again, by another simulation if there is one, before it is recorded as `lost`."""
     replay: Annotated[int, Field(ge=0)] = 3
     """How many trials, chosen by the seed, a fresh process simulates again at the end, to be compared bit for bit."""
     restarts: Annotated[int, Field(ge=0, le=1000)] = 10

@@ -366,8 +366,9 @@ class TrialCollection:
         self._set_aside = aside
 
     def _give_back(self, simulation: str, trial: int, reason: str, given_up: list[str] | None) -> None:
-        """Report a trial that goes to another simulation, or record it as lost, with all reasons."""
-        self.warn(f"{simulation}: trial {trial} is given to another simulation: {reason}")
+        """Report a trial that is tried again, by another simulation if there is one, or record it as lost."""
+        fate = "is tried again" if given_up is None else "is lost"
+        self.warn(f"{simulation}: trial {trial} {fate}: {reason}")
         self.writer.note("fail", trial=trial, simulation=self.name_of(simulation), reason=reason)
         if given_up is not None:
             self.writer.append_lost(trial, "; ".join(given_up))

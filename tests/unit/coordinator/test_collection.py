@@ -101,7 +101,7 @@ def test_draining_leaves_each_simulation_only_the_trial_that_runs(
     assert collection.finished
 
 
-def test_a_trial_whose_episode_is_refused_goes_to_another_simulation(
+def test_a_trial_without_retries_whose_episode_is_refused_is_lost(
     collection: TrialCollection, deliveries: list[Delivery]
 ) -> None:
     said: list[str] = []
@@ -109,6 +109,6 @@ def test_a_trial_whose_episode_is_refused_goes_to_another_simulation(
     collection.lease("/sim_0")
     assert not collection.take_in("/sim_0", deliveries[0]._replace(conditions=deliveries[1].conditions))
     assert not collection.take_in("/sim_0", deliveries[1]._replace(result="{}"))
-    assert "trial 0 is given to another simulation: its episode is refused: ball.mass_kg was" in said[0]
-    assert "trial 1 is given to another simulation: its episode is refused: result of a trial: " in said[1]
+    assert "trial 0 is lost: its episode is refused: ball.mass_kg was" in said[0]
+    assert "trial 1 is lost: its episode is refused: result of a trial: " in said[1]
     assert not collection.backlog
