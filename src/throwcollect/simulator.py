@@ -44,6 +44,8 @@ require("pinocchio")
 
 Point = Mapping[str, float]
 """Values that replace those of the configuration, by dotted key, in the key's unit."""
+_FORKED_S = 1.0
+"""Time that a forked process waits for the first throw of another thread of its own [s]."""
 _POINT = "{'task.duration_s': 1.1}"
 _TARGET = "{'target_x_m': 1.4, 'target_y_m': -0.2}"
 
@@ -216,12 +218,10 @@ class Simulator:
             ConflictError: If this process was forked off while a thread of its parent was simulating a throw.
         """
         # That thread does not exist here, so it never releases the lock, and the world may be in the middle of a step.
-        if not self._lock.acquire(blocking=False):
-            if self._holder != os.getpid():
-                raise ConflictError(
-                    "this process was forked off while another thread simulated a throw", hint="make another Simulator"
-                )
-            self._lock.acquire()
+        if not self._lock.acquire(timeout=-1 if self._holder == os.getpid() else _FORKED_S):
+            raise ConflictError(
+                "this process was forked off while another thread simulated a throw", hint="make another Simulator"
+            )
         try:
             self._holder = os.getpid()
             yield

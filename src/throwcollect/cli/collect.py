@@ -95,7 +95,6 @@ def up(
             raise ConfigError(f"--slice {slice}: needs --output DIR, in which the plan lies")
         _collect_slice(output, slice, changes, json=json)
         return
-    from throwcollect.cluster.submission import is_submitted, read_submission
     from throwcollect.runs.preparation import prepare
     from throwcollect.runs.preparation import resume as go_on
 
@@ -105,15 +104,26 @@ def up(
         prepare_run = partial(prepare, config, overrides=changes, output=output, processes=count_cores())
     elif output is not None:
         raise ConfigError(f"--output {output}: should be left out with --resume, which names the directory")
-    elif is_submitted(resume) and not read_submission(resume).live:
-        # A job that is one run on several nodes goes on by this very command; slices are collected by tasks.
-        raise ConfigError(
-            f"--resume {resume}: was submitted, so tasks of a cluster collect it",
-            hint=f"{command('resume', resume)} submits what is missing",
-        )
     else:
+        _refuse_submitted(resume)
         prepare_run = partial(go_on, resume, config=config, overrides=changes, processes=count_cores())
     _collect(prepare_run, directory=resume, detach=detach, json=json, token_file=token_file, view=view)
+
+
+def _refuse_submitted(directory: Path) -> None:
+    """Refuse a dataset whose slices tasks of a cluster collect.
+
+    Raises:
+        ConfigError: If it is one.
+    """
+    from throwcollect.cluster.submission import is_submitted, read_submission
+
+    # A submission that is one run on several nodes goes on by the same command.
+    if is_submitted(directory) and not read_submission(directory).live:
+        raise ConfigError(
+            f"--resume {directory}: was submitted, so tasks of a cluster collect it",
+            hint=f"{command('resume', directory)} submits what is missing",
+        )
 
 
 def resume(
