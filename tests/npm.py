@@ -5,7 +5,9 @@ from __future__ import annotations
 import shutil
 import subprocess
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import pytest
 
@@ -23,10 +25,15 @@ def install(name: str, packages: Mapping[str, str]) -> Path:
     place = _BUILD / "-".join([name, *packages.values()])
     if shutil.which("npm") is None:
         pytest.skip("there is no npm")
-    if not all((place / "node_modules" / package).is_dir() for package in packages):
-        place.mkdir(parents=True, exist_ok=True)
-        command = ["npm", "install", "--no-audit", "--no-fund", "--prefix", str(place), *words]
-        found = subprocess.run(command, capture_output=True, text=True, check=False, timeout=120)
-        if found.returncode:
-            pytest.skip(f"{name} cannot be installed: {found.stderr.strip().splitlines()[-1:]}")
+    if not place.is_dir():
+        _BUILD.mkdir(exist_ok=True)
+        # The directory gets its name when it is whole, as several processes of the tests may install at the same time.
+        with TemporaryDirectory(dir=_BUILD, ignore_cleanup_errors=True) as beside:
+            command = ["npm", "install", "--no-audit", "--no-fund", "--prefix", beside, *words]
+            found = subprocess.run(command, capture_output=True, text=True, check=False, timeout=120)
+            if found.returncode:
+                pytest.skip(f"{name} cannot be installed: {found.stderr.strip().splitlines()[-1:]}")
+            # Another process may have been faster, and then its directory stays.
+            with suppress(OSError):
+                Path(beside).rename(place)
     return place
