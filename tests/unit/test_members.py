@@ -294,7 +294,7 @@ def test_a_broken_engine_is_an_error_before_a_run_begins(tmp_path: Path) -> None
 def test_broken_members_stop_only_configurations_that_name_them(tmp_path: Path) -> None:
     for family in ("robots", "tools", "tasks"):
         install(tmp_path, f"broken_{family}", family, "not_there:Member")
-    named = "trials: 3\ntask:\n  name: mine\ntool: {name: mine}\n"
+    named = "trials: 3\ntask:\n  name: mine\n  speed: 1\ntool: {name: mine, size: 1}\nuntil: {waved: 3}\n"
     (tmp_path / "named.yaml").write_text(named)
     commands = [["config", "named.yaml"], ["init", "--task", "mine"], ["init"], ["config", "throwcollect.yaml"]]
     path = os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")])
@@ -311,7 +311,7 @@ def test_broken_members_stop_only_configurations_that_name_them(tmp_path: Path) 
     ]
     assert [each.returncode for each in done] == [2, 2, 0, 0], done
     lines = sorted(done[0].stderr.removeprefix("throwcollect: ").splitlines())
-    for line, (number, key) in zip(lines, [(3, "task"), (4, "tool")], strict=True):
+    for line, (number, key) in zip(lines, [(3, "task"), (5, "tool")], strict=True):
         said = f"named.yaml:{number}: {key}.name: the {key} mine of broken_{key}s 1.0 cannot be loaded: ModuleNotFound"
         assert line.startswith(said)
     assert done[1].stderr.startswith("throwcollect: the task mine of broken_tasks 1.0 cannot be loaded: ModuleNotFound")

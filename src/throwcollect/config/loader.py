@@ -21,7 +21,7 @@ from throwcollect.config.schema import Config, Range
 from throwcollect.config.values import reason_not_sweepable, with_values
 from throwcollect.errors import ConfigError
 from throwcollect.files import StrPath
-from throwcollect.members import names_of
+from throwcollect.members import names_of, usable_names
 
 _PARAMETERS = ("sweep", "parameters")
 _SIMULATIONS = ("run", "simulations")
@@ -156,10 +156,10 @@ def _find_robot(values: dict[str, Any]) -> str | None:
 
 
 def _find_misnamed(values: dict[str, Any]) -> set[str]:
-    """Find the sections whose keys cannot be known, as no installed package has the task or tool that they name."""
+    """Find the sections whose keys cannot be known, as no working package has the task or tool that they name."""
     misnamed = set()
     for section in ("task", "tool"):
-        name, known = _read_name(values, section), names_of(f"{section}s")
+        name, known = _read_name(values, section), usable_names(f"{section}s")
         if isinstance(name, str) and name not in known:
             misnamed.add(section)
             # The section `until` is the task's, too. If the name is only misspelt, both may be wrong.
