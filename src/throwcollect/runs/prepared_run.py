@@ -99,8 +99,9 @@ class PreparedRun:
     def collect(self, *, interruptions: Callable[[], int] = lambda: 0) -> Summary:
         """Launch the run in this process, and return when it has ended; see `launcher.launch`.
 
-        `runs.stop` asks a run to stop by SIGTERM, which would end this process. Therefore this method counts SIGTERM as
-        an interruption, if it is called in the main thread and the program has not set a handler of its own.
+        `runs.stop` sends SIGTERM to the launcher of a run, which is this process. So that it does not end the program,
+        this method counts SIGTERM as an interruption, if it is called in the main thread and the program has set no
+        handler of its own.
 
         Returns:
             The summary of the dataset; its outcomes tell whether trials are lost.
@@ -156,7 +157,7 @@ class PreparedRun:
 
 
 def _find_fatal_signals() -> tuple[signal.Signals, ...]:
-    """Find whether SIGTERM would end this process, and this is the thread in which its handler may be set."""
+    """Return SIGTERM if it would end this process and this thread may set a handler for it; nothing otherwise."""
     in_main_thread = threading.current_thread() is threading.main_thread()
     fatal = in_main_thread and signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
     return (signal.SIGTERM,) if fatal else ()

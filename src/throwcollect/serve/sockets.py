@@ -46,9 +46,9 @@ def _cut(reason: str) -> str:
 
 
 async def keep_telling(socket: WebSocket, *telling: Coroutine[Any, Any, object]) -> None:
-    """Let ``telling`` send to a client until the client has left, or one of them has nothing more to send.
+    """Let coroutines send to a client until the client has left, or one of them has nothing more to send.
 
-    If one of ``telling`` fails, the socket is closed with a code; an unexpected error gets into the log, too.
+    If one of them fails, the socket is closed with a code; an unexpected error gets into the log, too.
     """
 
     async def wait_until_gone() -> None:

@@ -81,7 +81,8 @@ def test_stopping_a_run_that_a_program_collects_drains_it_and_leaves_the_program
     stopped: list[runs.Run] = []
     with many as run, pytest.raises(Interrupted, match="interrupted"):
         run.collect(interruptions=call_later(stop))
-    while not stopped:
+    deadline = time.monotonic() + 30
+    while not stopped and time.monotonic() < deadline:
         time.sleep(0.01)
     assert stopped[0].record.exit_code == Interrupted.exit_code
     assert signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
