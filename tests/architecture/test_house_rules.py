@@ -189,8 +189,13 @@ OF_THE_PROCESSOR = re.compile(
     r"cosh|tanh|hypot|geomspace|logspace|dot|vdot|inner|matmul|tensordot|einsum|linalg\.\w+)"
 )
 HARMLESS = {
+    "engines/as_described.py": {"np.sin", "np.cos", "np.linalg.norm", "np.linalg.eigvalsh", "@"},  # with tolerances
+    "engines/bullet/scenery.py": {"@"},  # what is compared there
+    "engines/mesh.py": {"np.linalg.svd"},  # whether a mesh is flat
+    "engines/mujoco/scenery.py": {"@"},  # what is compared there
     "robots/clear_postures.py": {"np.linalg.norm", "@"},  # bounds, compared with room to spare
-    "sim/urdf.py": {"np.linalg.norm", "np.linalg.eigh", "@"},  # whether a model can be spawned
+    "robots/description.py": {"np.linalg.eigvalsh"},  # whether an inertia is possible
+    "sim/spawnable.py": {"np.linalg.eigh", "@"},  # whether a model can be spawned
     "tasks/dmp.py": {"np.linalg.lstsq"},  # weights for a YAML file
 }
 

@@ -35,12 +35,12 @@ def test_a_robot_of_another_mass_is_refused(robot: Robot) -> None:
     result = robot.set({"robot_description": OWN.replace('<mass value="', '<mass value="1', 1)})
     assert not result.successful
     assert "may differ only in what is seen" in result.reason
-    assert "should be a URDF" in robot.set({"robot_description": "<robot"}).reason
+    assert "cannot be read as robot description" in robot.set({"robot_description": "<robot"}).reason
 
 
 def test_a_description_that_is_nested_too_deeply_is_refused(robot: Robot) -> None:
-    deep = "<robot><link>" + 20000 * "<a>" + 20000 * "</a>" + "</link></robot>"
+    deep = "<robot><link name='a'>" + 20000 * "<a>" + 20000 * "</a>" + "</link></robot>"
     result = robot.set({"robot_description": deep})
     assert not result.successful
-    assert result.reason == "robot_description: a link should not be nested so deeply"
+    assert "may differ only in what is seen" in result.reason
     assert robot.set({"robot_description": OWN}).successful

@@ -114,10 +114,14 @@ def test_a_taken_name_is_refused_unless_renaming_is_allowed(robot: Robot) -> Non
         ({"uri": "file:///nowhere/table.urdf"}, Result.RESULT_NOT_FOUND, "/nowhere/table.urdf"),
         ({"uri": "file:///etc/passwd"}, Spawn.UNSUPPORTED_FORMAT, "*.urdf"),
         ({"uri": "package://nothing/table.urdf"}, Result.RESULT_NOT_FOUND, "no such package"),
-        ({"uri": "https://example.com/table.urdf"}, Spawn.UNSUPPORTED_FORMAT, "unknown kind of URI"),
+        ({"uri": "https://example.com/table.urdf"}, Spawn.UNSUPPORTED_FORMAT, "unknown kind of URL"),
         ({"resource_string": "<sdf version='1.7'/>"}, Spawn.UNSUPPORTED_FORMAT, "SDFormat"),
         ({"resource_string": "<robot>\n<link name='a'>\n</robot>"}, Spawn.RESOURCE_PARSE_ERROR, "line 3"),
-        ({"resource_string": box("0.1 nan 0.1")}, Spawn.RESOURCE_PARSE_ERROR, "box size should be 3 numbers"),
+        (
+            {"resource_string": box("0.1 nan 0.1")},
+            Spawn.RESOURCE_PARSE_ERROR,
+            "size of <box> should be 3 finite numbers",
+        ),
         (
             {"resource_string": box().replace("<box", '<mesh filename="file:///nowhere/cup.stl"/><box')},
             Spawn.MISSING_ASSETS,
@@ -126,7 +130,7 @@ def test_a_taken_name_is_refused_unless_renaming_is_allowed(robot: Robot) -> Non
         (
             {"resource_string": box().replace("<box", '<mesh filename="file:///etc/passwd"/><box')},
             Spawn.UNSUPPORTED_ASSETS,
-            "stl or obj",
+            ".stl or .obj or .dae",
         ),
     ],
 )
@@ -145,7 +149,7 @@ def test_an_entity_bomb_and_huge_descriptions_are_refused(robot: Robot) -> None:
     bomb = f'<!DOCTYPE robot [<!ENTITY e0 "boom">{entity}]><robot name="&e9;"/>'
     deep = "<robot>" + "<link>" * 200_000 + "</link>" * 200_000 + "</robot>"
     long = "<robot>" + " " * 5_000_000 + "</robot>"
-    for text, words in ((bomb, "document type"), (deep, "a link is called ''"), (long, "5000015 characters")):
+    for text, words in ((bomb, "document type"), (deep, "a link has the name ''"), (long, "5000015 characters")):
         refused = spawn(robot, resource_string=text).result
         assert refused.result == Spawn.RESOURCE_PARSE_ERROR
         assert words in refused.error_message
@@ -172,7 +176,7 @@ def test_get_spawnables_searches_the_requested_sources(robot: Robot, tmp_path: P
     response = robot.call("get_spawnables", sources=sources)
     assert response.result.result == Result.RESULT_OK
     assert "'file:///nowhere': no such directory" in response.result.error_message
-    assert "'magic': unknown kind of URI" in response.result.error_message
+    assert "'magic': unknown kind of URL" in response.result.error_message
     own = [each for each in response.spawnables if each.uri.startswith(tmp_path.as_uri())]
     assert [(each.uri, each.description) for each in own] == [((tmp_path / "good.urdf").as_uri(), "a crate")]
     assert spawn_successfully(robot, uri=own[0].uri) == "crate"

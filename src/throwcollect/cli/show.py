@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -15,6 +15,9 @@ from throwcollect.config.default_path import DEFAULT_CONFIG
 from throwcollect.errors import ConfigError
 from throwcollect.side_by_side import count_cores
 from throwcollect.wording import command, format_count
+
+if TYPE_CHECKING:
+    from throwcollect.sweep.plan import Plan
 
 
 def init(
@@ -77,6 +80,7 @@ def plan(
             found = draw_plan(config, directory=path.parent, processes=count_cores(), onlooker=shown)
         else:
             found = prepare(config, output, sweep_directory=path.parent, processes=count_cores(), onlooker=shown)
+    _load_world(found)
     if json:
         print_json_list(
             {
@@ -101,6 +105,18 @@ def plan(
         typer.echo("  ".join([str(trial.number).rjust(len("trial")), *numbers]) + note)
     planned, refused = format_count(len(found.trials), "trial"), len(found.trials.refused)
     tell(f"{planned}, {refused} refused{more_trials(found)}")
+
+
+def _load_world(plan: Plan) -> None:
+    """Load the world of the first trial that is not refused, because an engine may not take what a plan allows."""
+    from throwcollect.extras import MissingExtraError
+    from throwcollect.sim.world import World
+
+    first = next(trial for trial in plan.trials if not trial.refused)
+    try:
+        World(plan.config_of(first)).close()
+    except MissingExtraError as error:
+        tell(f"whether the engine takes the robot is not known: {error.one_line}")
 
 
 def doctor(json: JsonOption = False) -> None:

@@ -16,7 +16,8 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-Vector = tuple[float, float, float]
+from throwcollect.engines.body import BodyModel, Vector
+
 Quaternion = tuple[float, float, float, float]
 
 Box = tuple[Vector, Vector]
@@ -32,9 +33,6 @@ BALL_NUMBERS = 13
 
 GROUND = "ground"
 """Name of the ground in contacts of the ball."""
-
-STL = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
-"""A triangle in a binary STL file, which has a title of 80 bytes and the number of triangles before them."""
 
 
 @dataclass(frozen=True)
@@ -74,8 +72,7 @@ class Scene:
     """The parts of a world; another scene needs another world.
 
     Attributes:
-        urdf: The robot's description. All its movable joints are in `moving`, mesh paths are absolute, and its files
-            can be trusted.
+        robot: The robot with its tool; all joints that move are in `moving`.
         moving: The joints that are commanded, in the order of every command and sample.
         base_height_m: Height of its fixed base above the ground.
         tool: The tool.
@@ -83,7 +80,7 @@ class Scene:
         ball_radius_m: Radius of the ball.
     """
 
-    urdf: str
+    robot: BodyModel
     moving: tuple[str, ...]
     base_height_m: float
     tool: ToolLink
@@ -175,36 +172,28 @@ class Observer:
 
 
 @dataclass(frozen=True)
-class BodyModel:
-    """A body that can be added to a world.
+class LoadedLink:
+    """A link as an engine has it, with all joints at 0.
 
     Attributes:
-        name: Its name in its description.
-        urdf: Its description, checked and rewritten; its meshes are called ``0.stl``, ``1.stl`` and so on.
-        meshes: Corners of the triangles of these meshes, each of shape ``(n_triangles, 3, 3)``.
-        joints: Number of joints that can move.
-        is_fixed: The body is attached to the world.
+        name: Its name.
+        mass_kg: Its mass.
+        centre: Its centre of mass in world [m], shape ``(3,)``.
+        inertia: Its inertia about that centre, along the axes of the world [kg m²], shape ``(3, 3)``.
+        shapes: Number of its collision shapes.
+        box: The box around them, along the axes of the world; None without shapes.
+        axis: Direction in world of the joint that moves it; None if none does.
+        range: Lowest and highest position of that joint [rad]; None likewise.
     """
 
     name: str
-    urdf: str
-    meshes: tuple[NDArray[np.float32], ...]
-    joints: int
-    is_fixed: bool
-
-    def encode_meshes(self) -> dict[str, bytes]:
-        """Encode the meshes as binary STL, by the names that the description has for them."""
-        files = {}
-        for number, triangles in enumerate(self.meshes):
-            records = np.zeros(len(triangles), STL)
-            records["corners"] = triangles
-            files[f"{number}.stl"] = bytes(80) + len(triangles).to_bytes(4, "little") + records.tobytes()
-        return files
-
-    @property
-    def is_static(self) -> bool:
-        """Say whether no part of it ever moves on its own."""
-        return self.is_fixed and not self.joints
+    mass_kg: float
+    centre: NDArray[np.float64]
+    inertia: NDArray[np.float64]
+    shapes: int
+    box: Box | None
+    axis: NDArray[np.float64] | None
+    range: tuple[float, float] | None
 
 
 class Bodies(ABC):
@@ -272,6 +261,14 @@ class Engine(ABC):
     @abstractmethod
     def is_as_loaded(self) -> bool:
         """Say whether no body was added since the world was loaded; otherwise the next trial needs a new world."""
+
+    def describe_robot(self) -> Sequence[LoadedLink] | None:
+        """Describe the robot's links as the engine has them, with all joints at 0, right after `load`.
+
+        Returns:
+            Each link with its joint; None if the engine computes with the values of the scene themselves.
+        """
+        return None
 
     @abstractmethod
     def configure(self, physics: Physics) -> None:

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import math
-import xml.etree.ElementTree as ElementTree
 from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
+from throwcollect.engines.body import BodyJoint
 from throwcollect.errors import ConfigError
 from throwcollect.reproducible_math import cos, sin
+from throwcollect.robots.urdf import parse_xml, read_urdf
 
 WORLD = "world"
 """Name of the fixed frame: x forward, y left, z up, on the ground."""
@@ -81,57 +82,31 @@ def read_frames(urdf: str, *, base_height: float) -> FrameTree:
     Raises:
         ConfigError: If the text is not a URDF, or a joint of it is neither fixed nor revolute.
     """
-    try:
-        robot = ElementTree.fromstring(urdf)  # noqa: S314 - the robot's own description
-    except ElementTree.ParseError as error:
-        raise ConfigError(f"robot description: not a URDF: {error}") from error
-    frames = [_read_joint(joint) for joint in robot.findall("joint")]
-    children = {frame.child for frame in frames}
-    roots = [name for link in robot.findall("link") if (name := link.get("name", "")) not in children]
-    if len(roots) != 1:
-        raise ConfigError(f"robot description: {len(roots)} root links {roots}", expected="one")
-    root = Frame(WORLD, roots[0], (0.0, 0.0, base_height), (0.0, 0.0, 0.0, 1.0))
+    model = read_urdf(parse_xml(urdf, "robot description"), "robot description").model
+    frames = [_frame_of(joint) for joint in model.joints]
+    root = Frame(WORLD, model.links[0].name, (0.0, 0.0, base_height), (0.0, 0.0, 0.0, 1.0))
     return FrameTree(
         fixed=(root, *(frame for frame in frames if not isinstance(frame, MovingFrame))),
         moving=tuple(frame for frame in frames if isinstance(frame, MovingFrame)),
     )
 
 
-def _read_joint(joint: ElementTree.Element) -> Frame:
-    name, kind = joint.get("name", ""), joint.get("type", "")
-    if kind not in ("fixed", "revolute", "continuous"):
-        raise ConfigError(f"robot description: joint {name} is {kind!r}", expected="fixed, revolute or continuous")
-    try:
-        parent, child = (joint.find(end).attrib["link"] for end in ("parent", "child"))  # type: ignore[union-attr]
-        translation, rotation = read_origin(joint)
-        if kind == "fixed":
-            return Frame(parent, child, translation, rotation)
-        # The default is that of the URDF specification.
-        x, y, z = _read_vector(joint, "axis", "xyz", "1 0 0")
-        length = math.hypot(x, y, z)
-        return MovingFrame(parent, child, translation, rotation, name, (x / length, y / length, z / length))
-    except (AttributeError, KeyError, ValueError, ZeroDivisionError) as error:
-        raise ConfigError(f"robot description: joint {name} is not readable: {error}") from error
+def _frame_of(joint: BodyJoint) -> Frame:
+    if joint.kind not in ("fixed", "revolute", "continuous"):
+        raise ConfigError(
+            f"robot description: joint {joint.name} is {joint.kind}", expected="fixed, revolute or continuous"
+        )
+    translation, rotation = joint.placement.xyz, quaternion_of(*joint.placement.rpy)
+    if not joint.moves:
+        return Frame(joint.parent, joint.child, translation, rotation)
+    x, y, z = joint.axis
+    length = math.hypot(x, y, z)
+    return MovingFrame(
+        joint.parent, joint.child, translation, rotation, joint.name, (x / length, y / length, z / length)
+    )
 
 
-def read_origin(owner: ElementTree.Element) -> tuple[tuple[float, float, float], tuple[float, float, float, float]]:
-    """Read the origin of a joint or a shape in URDF: translation [m], and unit quaternion (x, y, z, w).
-
-    Raises:
-        ValueError: If it is not made of numbers.
-    """
-    # The defaults are those of the URDF specification.
-    roll, pitch, yaw = _read_vector(owner, "origin", "rpy", "0 0 0")
-    return _read_vector(owner, "origin", "xyz", "0 0 0"), _make_quaternion(roll, pitch, yaw)
-
-
-def _read_vector(owner: ElementTree.Element, tag: str, key: str, default: str) -> tuple[float, float, float]:
-    element = owner.find(tag)
-    x, y, z = map(float, (default if element is None else element.get(key, default)).split())
-    return x, y, z
-
-
-def _make_quaternion(roll: float, pitch: float, yaw: float) -> tuple[float, float, float, float]:
+def quaternion_of(roll: float, pitch: float, yaw: float) -> tuple[float, float, float, float]:
     """Make the unit quaternion (x, y, z, w) of rotations about the fixed axes x, y, z in this order, as in URDF."""
     (sr, cr), (sp, cp), (sy, cy) = ((math.sin(angle / 2), math.cos(angle / 2)) for angle in (roll, pitch, yaw))
     return (

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import xml.etree.ElementTree as ElementTree
-from functools import lru_cache
 from pathlib import Path
 
+from throwcollect.engines.body import BodyJoint, BodyLink
 from throwcollect.errors import ConfigError, ConflictError
+from throwcollect.robots.urdf import parse_xml, read_urdf
 
-_SEEN = ("visual", "material")
-"""Elements of links that can only be seen, and that the physics ignores."""
+_NAME = "robot_description"
 
 
 def check_appearance(description: str, drawn: str) -> None:
@@ -19,15 +18,15 @@ def check_appearance(description: str, drawn: str) -> None:
         ConfigError: If the text for viewers is no URDF.
         ConflictError: If it has other joints, masses or collision shapes.
     """
-    if differing := _read_physics(description) ^ _read_physics(drawn):
-        first = min(text.split(">", 1)[0].removeprefix("<") for text in differing)
+    own, other = _read_physics(description), _read_physics(drawn)
+    if differing := sorted(name for name in own.keys() | other.keys() if own.get(name) != other.get(name)):
         raise ConflictError(
-            f"robot_description: may differ only in what is seen, but {first} is another one",
+            f"robot_description: may differ only in what is seen, but {differing[0]} is another one",
             hint="other joints, masses or collision shapes are another configuration",
         )
 
 
-def read_urdf(path: Path) -> str:
+def read_urdf_text(path: Path) -> str:
     """Read the URDF text of a file.
 
     Raises:
@@ -39,38 +38,13 @@ def read_urdf(path: Path) -> str:
         raise ConfigError(f"{path}: cannot be read: {error.strerror}") from error
     except UnicodeDecodeError as error:
         raise ConfigError(f"{path}: should be a URDF, in UTF-8") from error
-    _parse(text, str(path))
+    if (root := parse_xml(text, str(path))).tag != "robot":
+        raise ConfigError(f"{path}: should be a URDF, with robot as its root, got {root.tag}")
     return text
 
 
-def _parse(text: str, name: str) -> ElementTree.Element:
-    try:
-        root = ElementTree.fromstring(text)  # noqa: S314 - expat expands nothing external, and little else
-    except ElementTree.ParseError as error:
-        raise ConfigError(f"{name}: should be a URDF: {error}") from error
-    if root.tag != "robot":
-        raise ConfigError(f"{name}: should be a URDF, with robot as its root, got {root.tag}")
-    return root
-
-
-@lru_cache(maxsize=4)
-def _read_physics(description: str) -> frozenset[str]:
-    """Read links and joints without their appearance, each in the canonical form of XML.
-
-    All other elements are left out, because they are no part of the physics, such as the tooltips of links to which
-    viewers bind plots.
-
-    Raises:
-        ConfigError: If the text is no URDF, or its elements are nested too deeply to be compared.
-    """
-    texts = []
-    for element in _parse(description, "robot_description"):
-        if element.tag not in ("link", "joint"):
-            continue
-        for visible in [child for child in element if child.tag in _SEEN]:
-            element.remove(visible)
-        try:
-            texts.append(ElementTree.canonicalize(ElementTree.tostring(element, encoding="unicode"), strip_text=True))
-        except RecursionError as error:
-            raise ConfigError(f"robot_description: a {element.tag} should not be nested so deeply") from error
-    return frozenset(texts)
+def _read_physics(text: str) -> dict[str, BodyLink | BodyJoint]:
+    """Read links and joints, by kind and name."""
+    urdf = read_urdf(parse_xml(text, _NAME), _NAME)
+    links = {f'link name="{name}"': link for name, link in urdf.links.items()}
+    return links | {f'joint name="{name}"': joint for name, joint in urdf.joints.items()}

@@ -8,10 +8,11 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from throwcollect.engines.body import LinkShape
 from throwcollect.errors import ConfigError
 from throwcollect.pinocchio_library import pinocchio
 from throwcollect.robots.clear_postures import ClearPostures, find_reaches
-from throwcollect.robots.description import joint_model
+from throwcollect.robots.description import joint_model, pose_of
 from throwcollect.robots.robot import Robot
 from throwcollect.tools.tool import Tool
 
@@ -147,20 +148,39 @@ def _read_shapes(robot: Robot) -> pinocchio.GeometryModel:
     Raises:
         ConfigError: If the robot's meshes cannot be read.
     """
-    model, kind = joint_model(robot), pinocchio.GeometryType.COLLISION
-    # Only the vertices of meshes are used. Bounding boxes are built with them; boxes of this kind are built fastest.
-    loader = pinocchio.coal.MeshLoader(pinocchio.coal.BV_OBB)
-    try:
-        geometry = pinocchio.buildGeomFromUrdf(
-            model, str(robot.urdf_path), kind, package_dirs=[str(robot.directory)], mesh_loader=loader
-        )
-    except (ValueError, RuntimeError) as error:
-        raise ConfigError(f"{robot.urdf_path}: its meshes cannot be read: {error}") from error
-    for shape in geometry.geometryObjects:
-        if isinstance(shape.geometry, pinocchio.coal.BVHModelBase):
-            # Bullet simulates collisions of the convex hulls of meshes, so it is the hulls that must stay apart.
-            shape.geometry.buildConvexHull(True, "Qt")
-            shape.geometry = shape.geometry.convex
+    model, geometry = joint_model(robot), pinocchio.GeometryModel()
+    frames = {model.getFrameId(link.name, pinocchio.BODY): link for link in robot.description.model.links}
+    for frame, link in sorted(frames.items()):
+        link_pose = model.frames[frame].placement
+        for number, shape in enumerate(link.shapes):
+            pose = link_pose * pose_of(shape.placement)
+            solid = _make_solid(f"{robot.urdf_path}: link {link.name}", shape)
+            joint = model.frames[frame].parentJoint
+            geometry.addGeometryObject(pinocchio.GeometryObject(f"{link.name}_{number}", joint, frame, pose, solid))
     geometry.addAllCollisionPairs()
     pinocchio.removeCollisionPairs(model, geometry, str(robot.srdf_path), False)
     return geometry
+
+
+def _make_solid(where: str, shape: LinkShape) -> pinocchio.coal.CollisionGeometry:
+    """Make a shape for computing distances; that of a mesh is its convex hull, as in the physics.
+
+    Raises:
+        ConfigError: If a mesh cannot be read, or has no hull.
+    """
+    coal = pinocchio.coal
+    if shape.mesh is None:
+        kinds = {"box": coal.Box, "sphere": coal.Sphere, "cylinder": coal.Cylinder, "capsule": coal.Capsule}
+        return kinds[shape.kind](*shape.size)
+    try:
+        if shape.mesh.is_flat:
+            raise ConfigError(f"{shape.mesh.path}: the mesh is flat, so nothing can collide with it")
+        corners = shape.mesh.triangles.reshape(-1, 3).astype(np.float64) * shape.size
+        points = coal.StdVec_Vec3s()
+        points.extend(list(np.unique(corners, axis=0)))
+        return coal.Convex.convexHull(points, True, "Qt")
+    except ConfigError as error:
+        raise ConfigError(f"{where}: {error.message}") from error
+    except RuntimeError as error:
+        reason = str(error).splitlines()[-1]
+        raise ConfigError(f"{where}: {shape.mesh.path}: has no usable convex hull: {reason}") from error

@@ -3,40 +3,36 @@
 from __future__ import annotations
 
 import copy
-import xml.etree.ElementTree as ElementTree
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
-from pathlib import Path
 from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
 
 from throwcollect.config.schema import Config
+from throwcollect.engines.body import (
+    INERTIA,
+    BodyJoint,
+    BodyLink,
+    BodyModel,
+    LinkInertia,
+    LinkShape,
+    Placement,
+    to_text,
+)
 from throwcollect.errors import ConfigError, MemberError
 from throwcollect.extras import MissingExtraError, is_installed
 from throwcollect.members import load_member
+from throwcollect.native_output import failing_on_output
 from throwcollect.pinocchio_library import pinocchio
-from throwcollect.robots.limits import joint_limits
-from throwcollect.robots.robot import Robot, read_xml
+from throwcollect.robots.robot import Robot
 from throwcollect.tools.tool import Tool, tool_of
 
-PACKAGE = "package://"
-"""Beginning of the URLs of meshes in a description, which the name of a package follows."""
-_NUMBERS: Mapping[str, Mapping[str, int]] = MappingProxyType(
-    {
-        "origin": {"xyz": 3, "rpy": 3},
-        "axis": {"xyz": 3},
-        "mass": {"value": 1},
-        "inertia": dict.fromkeys(("ixx", "ixy", "ixz", "iyy", "iyz", "izz"), 1),
-        "box": {"size": 3},
-        "mesh": {"scale": 3},
-        "sphere": {"radius": 1},
-        "cylinder": {"radius": 1, "length": 1},
-    }
-)
-"""Attributes of elements of a URDF, with how many numbers each has; `joint_limits` reads those of `<limit>`."""
+_ROUNDING = 1e-6
+"""Share by which the largest moment of inertia may exceed the sum of the others, as numbers in files are rounded."""
+
 _written: dict[tuple[Robot, str], str] = {}
 """The latest full descriptions, by robot and configuration of the tool. They are kept, because everything that looks at
 a dataset needs the same description, and writing it takes 20 ms."""
@@ -48,12 +44,12 @@ class Description:
     """The robot as the physics loads it.
 
     Attributes:
-        urdf: URDF text; mesh paths are absolute, and every movable joint in the text is in `moving`.
+        model: Links and joints; every joint that moves is in `moving`.
         moving: Joints that are simulated, in the order of `Robot.joints`.
         locked: Angle [rad] at which each of the other joints is fixed.
     """
 
-    urdf: str
+    model: BodyModel
     moving: tuple[str, ...]
     locked: Mapping[str, float]
 
@@ -124,10 +120,18 @@ def full_description(config: Config) -> str:
 
 
 def _write_full(robot: Robot, tool: Tool) -> str:
-    description = _read_description(robot)
-    description.append(_make_tool_link(tool, visual=True))
-    description.append(_make_tool_joint(tool, robot.hand, tool.mount))
-    return _write_text(description)
+    _ = robot.description
+    # The tree is copied, because writing the text indents each element, perhaps in another thread.
+    description = copy.deepcopy(robot.xml)
+    link, joint = _hold(tool, robot.hand, tool.mount)
+    held, *_ = made = list(BodyModel("", (link,), (joint,)).to_xml())
+    visuals = copy.deepcopy(held.findall("collision"))
+    for visual in visuals:
+        visual.tag = "visual"
+    # The inertia comes first.
+    held[1:1] = visuals
+    description.extend(made)
+    return to_text(description)
 
 
 def touchable_bodies(config: Config) -> frozenset[str]:
@@ -136,33 +140,66 @@ def touchable_bodies(config: Config) -> frozenset[str]:
     Raises:
         ConfigError: If the robot's files cannot be read.
     """
-    return frozenset({tool_of(config).name, "ground", *_list_links(robot_of(config))})
-
-
-@lru_cache(maxsize=4)
-def _list_links(robot: Robot) -> tuple[str, ...]:
-    return tuple(link.get("name", "") for link in _read_description(robot).iter("link"))
+    return frozenset({tool_of(config).name, "ground", *robot_of(config).description.links})
 
 
 @lru_cache(maxsize=4)
 def joint_model(robot: Robot) -> pinocchio.Model:
     """Build a model of all joints of a robot, without a tool; callers must not change it.
 
+    It is cached, because each trial with other locked joints or another tool needs it.
+
     Raises:
-        ConfigError: If the robot's files cannot be read, or lack something.
+        ConfigError: If the robot's files cannot be read, lack something, or describe bodies that there cannot be.
     """
-    # These raise our own errors if the files lack something; Pinocchio's parser would print its errors to the terminal.
-    joint_limits(robot)
+    source = robot.description.model
     _ = robot.rest_posture
-    return _read_whole(robot)[1]
+    # Pinocchio gets the links and joints alone: it would take other things from the file than the strict reader.
+    bare = replace(source, links=tuple(replace(link, shapes=()) for link in source.links))
+    with failing_on_output(str(robot.urdf_path)):
+        try:
+            model = pinocchio.buildModelFromXML(bare.write_urdf())
+        except (ValueError, RuntimeError) as error:
+            raise ConfigError(f"{robot.urdf_path}: cannot be read as robot description: {error}") from error
+    _check_inertias(robot, model)
+    return model
+
+
+def _check_inertias(robot: Robot, model: pinocchio.Model) -> None:
+    """Make sure that there can be the bodies that joints move: engines would change others, or drop them.
+
+    Raises:
+        ConfigError: If one has no mass, or moments of inertia that no body has.
+    """
+    bodies = {
+        link.name: model.frames[model.getFrameId(link.name, pinocchio.BODY)] for link in robot.description.model.links
+    }
+    for name, frame in bodies.items():
+        if frame.parentJoint and (inertia := frame.inertia).mass > 0:
+            _check_moments(f"{robot.urdf_path}: link {name}", inertia)
+    # Pinocchio's first joint is the universe.
+    for joint, body in zip(model.names[1:], model.inertias[1:], strict=True):
+        where = f"{robot.urdf_path}: link {robot.description.joints[joint].child}, which {joint} moves,"
+        if body.mass <= 0:
+            raise ConfigError(f"{where} has no mass", hint="give it an <inertial> with <mass> and <inertia> in a copy")
+        _check_moments(where, body)
+
+
+def _check_moments(where: str, body: pinocchio.Inertia) -> None:
+    least, middle, most = np.linalg.eigvalsh(body.inertia)
+    if least <= 0 or least + middle < most * (1 - _ROUNDING):
+        raise ConfigError(
+            f"{where} has principal moments of inertia of {least:.4g}, {middle:.4g} and {most:.4g} kg m², "
+            "which no body can have: they are above 0, and none is larger than the sum of the others",
+            hint="correct its <inertia> in a copy of the URDF",
+        )
 
 
 def physics_description(config: Config) -> Description:
-    """Write a URDF of the robot with its tool, without fixed or locked joints, except the one that holds the tool.
+    """Describe the robot with its tool, without fixed or locked joints, except the one that holds the tool.
 
     Links that such a joint connects become one link. It has the name of the link that the moving joint before it moves
-    in the robot's URDF, and mass, inertia and collision shapes of all of these links. There are no visual shapes. Equal
-    configurations give equal bytes.
+    in the robot's URDF, and mass, inertia and collision shapes of all of these links.
 
     Raises:
         ConfigError: If the robot's files cannot be read.
@@ -170,27 +207,23 @@ def physics_description(config: Config) -> Description:
     robot, tool = robot_of(config), tool_of(config)
     check_name_of_tool(robot, tool)
     locked = find_locked_joints(config)
-    source, whole = _read_whole(robot)
-    model = lock_joints(whole, locked)
-    joints = {joint.get("name"): joint for joint in source.iter("joint")}
-    names = [_find_root_link(source), *(_find_child(joints[name]) for name in model.names[1:])]
-
-    description = ElementTree.Element("robot", name=source.get("name", robot.name))
-    for number, name in enumerate(names):
-        description.append(_make_link(name, model.inertias[number], _collect_shapes(robot, source, model, number)))
-    for number in range(1, model.njoints):
-        joint = ElementTree.SubElement(description, "joint", name=model.names[number], type="revolute")
-        ElementTree.SubElement(joint, "parent", link=names[model.parents[number]])
-        ElementTree.SubElement(joint, "child", link=names[number])
-        joint.append(_make_origin(model.jointPlacements[number]))
-        for tag in ("axis", "limit", "dynamics"):
-            # The elements are copied, because writing the text indents each element, perhaps in another thread.
-            joint.extend(copy.deepcopy(joints[model.names[number]].findall(tag)))
+    source = robot.description
+    model = lock_joints(joint_model(robot), locked)
+    joints = [source.joints[name] for name in model.names[1:]]
+    names = [source.model.links[0].name, *(joint.child for joint in joints)]
+    links = [
+        BodyLink(name, _inertia_of(model.inertias[number]), _collect_shapes(robot, model, number))
+        for number, name in enumerate(names)
+    ]
+    merged = [
+        replace(joint, parent=names[model.parents[number]], placement=_placement_of(model.jointPlacements[number]))
+        for number, joint in enumerate(joints, start=1)
+    ]
     hand = model.frames[model.getFrameId(robot.hand, pinocchio.BODY)]
-    description.append(_make_tool_link(tool, visual=False))
-    description.append(_make_tool_joint(tool, names[hand.parentJoint], hand.placement * tool.mount))
+    held, mount = _hold(tool, names[hand.parentJoint], hand.placement * tool.mount)
+    whole = BodyModel(source.model.name or robot.name, links=(*links, held), joints=(*merged, mount))
     moving = tuple(joint for joint in robot.joints if joint not in locked)
-    return Description(urdf=_write_text(description), moving=moving, locked=locked)
+    return Description(model=whole, moving=moving, locked=locked)
 
 
 def check_name_of_tool(robot: Robot, tool: Tool) -> None:
@@ -199,88 +232,12 @@ def check_name_of_tool(robot: Robot, tool: Tool) -> None:
     Raises:
         ConfigError: If one of these has the name of the tool or of its link.
     """
-    if taken := {tool.name, tool.link} & {"ground", *_list_links(robot)}:
+    if taken := {tool.name, tool.link} & {"ground", *robot.description.links}:
         raise ConfigError(
             f"tool.name: the tool is recorded as {tool.name}, with the link {tool.link}; the ground or a link of "
             f"{robot.title} has the name {', '.join(sorted(taken))}, too",
             hint="give the tool another name, and the same one to its entry point",
         )
-
-
-def _check_numbers(path: Path, description: ElementTree.Element) -> None:
-    """Make sure that numbers of links and joints can be read, because Pinocchio takes 0 for a mass that cannot.
-
-    Raises:
-        ConfigError: If a number cannot be read or is not finite, or a mass is below 0.
-    """
-    for element in (each for kind in ("link", "joint") for part in description.iter(kind) for each in part.iter()):
-        for key, count in _NUMBERS.get(element.tag, {}).items():
-            if (text := element.get(key)) is None:
-                continue
-            try:
-                numbers = [float(each) for each in text.split()]
-            except ValueError:
-                numbers = []
-            if len(numbers) != count or not np.isfinite(numbers).all() or (element.tag == "mass" and numbers[0] < 0):
-                numeral = "a finite number" if count == 1 else f"{count} finite numbers"
-                wanted = "a mass of at least 0" if element.tag == "mass" else numeral
-                raise ConfigError(f"{path}: {key} of <{element.tag}> should be {wanted}, is {text!r}")
-
-
-def _read_description(robot: Robot) -> ElementTree.Element:
-    """Read the links and joints of the robot's URDF, without the collision shapes of the hand that holds the tool.
-
-    Raises:
-        ConfigError: If it or a number in it cannot be read, or it has no link of the hand's name.
-    """
-    path = robot.urdf_path
-    source = read_xml(path)
-    description = ElementTree.Element("robot", name=source.get("name", robot.name))
-    for kind in ("material", "link", "joint"):
-        description.extend(source.findall(kind))
-    for link in description.iter("link"):
-        if robot.open_hand and link.get("name", "").startswith(robot.open_hand):
-            for shape in link.findall("collision"):
-                link.remove(shape)
-    if description.find(f"link[@name='{robot.hand}']") is None:
-        raise ConfigError(f"{path}: link {robot.hand} is missing")
-    _check_numbers(path, description)
-    links, joints = ({element.get("name", "") for element in description.findall(kind)} for kind in ("link", "joint"))
-    if shared := links & joints:
-        # Pinocchio has a frame for the joint and one for the link, and cannot tell which one is meant.
-        raise ConfigError(
-            f"{path}: a joint has the name of a link: {', '.join(sorted(shared))}", hint="rename the joint in a copy"
-        )
-    return description
-
-
-@lru_cache(maxsize=4)
-def _read_whole(robot: Robot) -> tuple[ElementTree.Element, pinocchio.Model]:
-    """Read a robot's URDF, and build a model of all of its joints; callers must not change either.
-
-    Both are cached, because each trial with other locked joints or another tool needs them, and reading takes 7 ms.
-
-    Raises:
-        ConfigError: If the robot's files cannot be read, or lack something.
-    """
-    source = _read_description(robot)
-    return source, _build_model(robot, source)
-
-
-def _build_model(robot: Robot, source: ElementTree.Element) -> pinocchio.Model:
-    try:
-        model = pinocchio.buildModelFromXML(ElementTree.tostring(source, encoding="unicode"))
-    except (ValueError, RuntimeError) as error:
-        raise ConfigError(f"{robot.urdf_path}: cannot be read as robot description: {error}") from error
-    # Pinocchio's first joint is the universe.
-    if missing := set(robot.joints) ^ set(model.names[1:]):
-        raise ConfigError(
-            f"{robot.urdf_path}: has other movable joints than {robot.title}: {', '.join(sorted(missing))}"
-        )
-    types = {joint.get("name"): joint.get("type") for joint in source.iter("joint")}
-    if others := [f"{joint} is {types[joint]}" for joint in robot.joints if types[joint] != "revolute"]:
-        raise ConfigError(f"{robot.urdf_path}: joints should be revolute or fixed; {', '.join(others)}")
-    return model
 
 
 def lock_joints(model: pinocchio.Model, locked: Mapping[str, float]) -> pinocchio.Model:
@@ -292,89 +249,35 @@ def lock_joints(model: pinocchio.Model, locked: Mapping[str, float]) -> pinocchi
     return pinocchio.buildReducedModel(model, numbers, configuration)
 
 
-def _collect_shapes(
-    robot: Robot, source: ElementTree.Element, model: pinocchio.Model, joint: int
-) -> list[ElementTree.Element]:
+def _collect_shapes(robot: Robot, model: pinocchio.Model, joint: int) -> tuple[LinkShape, ...]:
     """Collect the collision shapes of all links that move with a joint, placed in the frame of the joint."""
     shapes = []
-    for link in source.iter("link"):
-        frame = model.frames[model.getFrameId(link.get("name"), pinocchio.BODY)]
-        if frame.parentJoint != joint:
-            continue
-        for original in link.findall("collision"):
-            shape = ElementTree.Element("collision")
-            shape.append(_make_origin(frame.placement * _read_origin(original)))
-            geometry = ElementTree.SubElement(shape, "geometry")
-            geometry.extend(copy.deepcopy(list(original.iterfind("geometry/*"))))
-            for mesh in geometry.iter("mesh"):
-                relative = mesh.get("filename", "").removeprefix(PACKAGE)
-                mesh.set("filename", str(robot.directory / relative))
-            shapes.append(shape)
-    return shapes
+    for link in robot.description.model.links:
+        frame = model.frames[model.getFrameId(link.name, pinocchio.BODY)]
+        if frame.parentJoint == joint:
+            shapes += [
+                replace(shape, placement=_placement_of(frame.placement * pose_of(shape.placement)))
+                for shape in link.shapes
+            ]
+    return tuple(shapes)
 
 
-def _make_link(name: str, body: pinocchio.Inertia, shapes: list[ElementTree.Element]) -> ElementTree.Element:
-    link = ElementTree.Element("link", name=name)
-    inertial = ElementTree.SubElement(link, "inertial")
-    inertial.append(_make_origin(pinocchio.SE3(np.eye(3), body.lever)))
-    ElementTree.SubElement(inertial, "mass", value=_format_number(body.mass))
-    keys = {"ixx": (0, 0), "ixy": (0, 1), "ixz": (0, 2), "iyy": (1, 1), "iyz": (1, 2), "izz": (2, 2)}
-    ElementTree.SubElement(
-        inertial, "inertia", {key: _format_number(body.inertia[place]) for key, place in keys.items()}
-    )
-    link.extend(shapes)
-    return link
+def _hold(tool: Tool, hand: str, mount: pinocchio.SE3) -> tuple[BodyLink, BodyJoint]:
+    """Describe a tool, and the joint that fixes it to a link."""
+    boxes = tuple(LinkShape("box", box.size, _placement_of(box.placement)) for box in tool.boxes)
+    joint = BodyJoint(f"{tool.name}_joint", "fixed", hand, tool.link, _placement_of(mount))
+    return BodyLink(tool.link, _inertia_of(tool.inertia), boxes), joint
 
 
-def _make_tool_link(tool: Tool, *, visual: bool) -> ElementTree.Element:
-    shapes = []
-    for kind in ("visual", "collision") if visual else ("collision",):
-        for box in tool.boxes:
-            shape = ElementTree.Element(kind)
-            shape.append(_make_origin(box.placement))
-            geometry = ElementTree.SubElement(shape, "geometry")
-            ElementTree.SubElement(geometry, "box", size=" ".join(map(_format_number, box.size)))
-            shapes.append(shape)
-    return _make_link(tool.link, tool.inertia, shapes)
+def _inertia_of(body: pinocchio.Inertia) -> LinkInertia:
+    moments = tuple(float(body.inertia[place]) for place in INERTIA.values())
+    return LinkInertia(float(body.mass), _placement_of(pinocchio.SE3(np.eye(3), body.lever)), moments)
 
 
-def _make_tool_joint(tool: Tool, parent: str, placement: pinocchio.SE3) -> ElementTree.Element:
-    joint = ElementTree.Element("joint", name=f"{tool.name}_joint", type="fixed")
-    ElementTree.SubElement(joint, "parent", link=parent)
-    ElementTree.SubElement(joint, "child", link=tool.link)
-    joint.append(_make_origin(placement))
-    return joint
+def pose_of(placement: Placement) -> pinocchio.SE3:
+    """Convert a placement of a URDF."""
+    return pinocchio.SE3(pinocchio.rpy.rpyToMatrix(*placement.rpy), np.array(placement.xyz))
 
 
-def _find_child(joint: ElementTree.Element) -> str:
-    child = joint.find("child")
-    return child.get("link", "") if child is not None else ""
-
-
-def _find_root_link(source: ElementTree.Element) -> str:
-    children = {_find_child(joint) for joint in source.iter("joint")}
-    return next(name for link in source.iter("link") if (name := link.get("name", "")) not in children)
-
-
-def _read_origin(element: ElementTree.Element) -> pinocchio.SE3:
-    origin = element.find("origin")
-    if origin is None:
-        return pinocchio.SE3.Identity()
-    xyz, rpy = ([float(number) for number in origin.get(key, "0 0 0").split()] for key in ("xyz", "rpy"))
-    return pinocchio.SE3(pinocchio.rpy.rpyToMatrix(*rpy), np.array(xyz))
-
-
-def _make_origin(placement: pinocchio.SE3) -> ElementTree.Element:
-    angles = pinocchio.rpy.matrixToRpy(placement.rotation)
-    return ElementTree.Element(
-        "origin", xyz=" ".join(map(_format_number, placement.translation)), rpy=" ".join(map(_format_number, angles))
-    )
-
-
-def _format_number(value: float) -> str:
-    return repr(float(value))
-
-
-def _write_text(robot: ElementTree.Element) -> str:
-    ElementTree.indent(robot)
-    return ElementTree.tostring(robot, encoding="unicode", xml_declaration=True) + "\n"
+def _placement_of(pose: pinocchio.SE3) -> Placement:
+    return Placement(tuple(pose.translation.tolist()), tuple(pinocchio.rpy.matrixToRpy(pose.rotation).tolist()))

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
 
-from throwcollect.errors import ConfigError
-from throwcollect.robots.robot import Robot, read_xml
+from throwcollect.robots.robot import Robot
 
 
 @dataclass(frozen=True)
@@ -37,33 +35,10 @@ def joint_limits(robot: Robot) -> JointLimits:
     """Read the limits of the joints of a robot.
 
     Raises:
-        ConfigError: If the URDF cannot be read or lacks a joint or its limits.
+        ConfigError: If the URDF cannot be read.
     """
-    path = robot.urdf_path
-    elements = {
-        joint.get("name"): (limit, joint.find("dynamics"))
-        for joint in read_xml(path).iter("joint")
-        if (limit := joint.find("limit")) is not None
-    }
-    rows = []
-    for name in robot.joints:
-        if name not in elements:
-            raise ConfigError(f"{path}: joint {name} is missing or has no limit")
-        limit, dynamics = elements[name]
-        damping = dynamics.get("damping", "0") if dynamics is not None else "0"
-        try:
-            numbers = [float(limit.attrib[key]) for key in ("lower", "upper", "velocity", "effort")]
-            rows.append([*numbers, float(damping)])
-        except (KeyError, ValueError) as error:
-            raise ConfigError(f"{path}: joint {name}: limit is not readable: {error}") from error
-        lower, upper, velocity, effort, *_ = rows[-1]
-        # A comparison with NaN is false, so this refuses NaN, too.
-        if not (-math.inf < lower <= upper < math.inf and velocity >= 0 and effort >= 0):
-            found = ", ".join(f"{key} {limit.get(key)}" for key in ("lower", "upper", "velocity", "effort"))
-            raise ConfigError(
-                f"{path}: joint {name}: lower should be at most upper, and velocity and effort not below 0: {found}"
-            )
-    table = np.array(rows)
+    joints = [robot.description.joints[name] for name in robot.joints]
+    table = np.array([(*joint.limits, joint.damping) for joint in joints if joint.limits is not None])
     # The result is cached, so all callers have the same arrays, and none may write to them.
     table.flags.writeable = False
     return JointLimits(*table.T)

@@ -17,6 +17,7 @@ from pydantic import AfterValidator, Field
 from throwcollect.declared_types import check_type
 from throwcollect.errors import ConfigError
 from throwcollect.members import explain_failure
+from throwcollect.robots.urdf import Urdf, locate_mesh, read_urdf, read_xml
 
 
 def _refuse_repeated(controllers: Mapping[str, tuple[str, ...]]) -> Mapping[str, tuple[str, ...]]:
@@ -140,6 +141,59 @@ class Robot:
         return self.directory / self.srdf
 
     @cached_property
+    def xml(self) -> ElementTree.Element:
+        """Materials, links and joints of the URDF, without the collision shapes of the hand that holds the tool.
+
+        Callers must not change it.
+
+        Raises:
+            ConfigError: If it cannot be read.
+        """
+        source = read_xml(self.urdf_path)
+        description = ElementTree.Element(source.tag, name=source.get("name", self.name))
+        for kind in ("material", "link", "joint"):
+            description.extend(source.findall(kind))
+        for link in description.iter("link"):
+            if self.open_hand and link.get("name", "").startswith(self.open_hand):
+                for shape in link.findall("collision"):
+                    link.remove(shape)
+        return description
+
+    @cached_property
+    def description(self) -> Urdf:
+        """The URDF, without the collision shapes of the hand that holds the tool.
+
+        Raises:
+            ConfigError: If it is not a URDF of this robot, or contradicts itself.
+        """
+        path = self.urdf_path
+        urdf = read_urdf(self.xml, str(path), find_mesh=lambda name: locate_mesh(name, path.parent, self.directory))
+        if missing := [name for name in self.joints if name not in urdf.joints]:
+            raise ConfigError(f"{path}: joint {missing[0]} is missing")
+        if self.hand not in urdf.links:
+            raise ConfigError(f"{path}: link {self.hand} is missing")
+        moving = {joint.name: joint for joint in urdf.model.joints if joint.moves}
+        if more := [
+            f"{joint.name} ({f'mimics {joint.mimics}' if joint.mimics else joint.kind})"
+            for name, joint in moving.items()
+            if name not in self.joints
+        ]:
+            raise ConfigError(
+                f"{path}: joints that move, but have no controller of {self.title}: {', '.join(more)}",
+                hint='make them type="fixed" in a copy of the URDF, or add them to a controller if they are revolute',
+            )
+        if others := [
+            f"{name} is {urdf.joints[name].kind}"
+            for name in self.joints
+            if name not in moving or moving[name].kind != "revolute"
+        ]:
+            raise ConfigError(
+                f"{path}: joints of controllers should be revolute; {', '.join(others)}",
+                hint='a continuous joint becomes type="revolute" with a <limit> that has lower and upper',
+            )
+        return urdf
+
+    @cached_property
     def rest_posture(self) -> Mapping[str, float]:
         """Angle [rad] of each joint in the posture at rest, in the order of `joints`; 0 for joints that the SRDF omits.
 
@@ -158,15 +212,3 @@ class Robot:
         if wrong := [name for name, angle in posture.items() if not math.isfinite(angle)]:
             raise ConfigError(f"{path}: group_state {self.rest}: the angle of {wrong[0]} is not finite")
         return MappingProxyType(posture)
-
-
-def read_xml(path: Path) -> ElementTree.Element:
-    """Read a file of a robot's description.
-
-    Raises:
-        ConfigError: If it cannot be read.
-    """
-    try:
-        return ElementTree.parse(path).getroot()  # noqa: S314 - a file of an installed package
-    except (OSError, ElementTree.ParseError) as error:
-        raise ConfigError(f"{path}: cannot be read as robot description: {error}") from error

@@ -28,7 +28,7 @@ from throwcollect.config.problems import findings
 from throwcollect.config.section import Section
 from throwcollect.config.shape import ValueShape
 from throwcollect.errors import ConfigError, NotFoundError, Problem
-from throwcollect.robots.appearance import read_urdf
+from throwcollect.robots.appearance import read_urdf_text
 from throwcollect.runs.run_record import Kind
 
 LONGEST_NAME = 63
@@ -187,7 +187,7 @@ def _read_component(name: str, section: ComponentSection, document: Document, di
         urdf = None if section.urdf is None else directory / section.urdf
         if urdf is not None:
             try:
-                read_urdf(urdf)
+                read_urdf_text(urdf)
             except ConfigError as error:
                 raise ConfigError([document.problem(("components", name, "urdf"), error.message)]) from error
         general = section.model_dump(include={"environment", "networks", "ports", "cpus", "memory", "options"})

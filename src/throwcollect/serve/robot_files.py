@@ -14,7 +14,7 @@ from throwcollect.config.loader import load
 from throwcollect.dataset.directory import config_path
 from throwcollect.errors import ConfigError, MemberError, NotFoundError
 from throwcollect.members import is_own, load_member, usable_names
-from throwcollect.robots.appearance import read_urdf
+from throwcollect.robots.appearance import read_urdf_text
 from throwcollect.robots.description import full_description
 from throwcollect.robots.robot import Robot
 from throwcollect.runs.component_container import DESCRIPTION
@@ -35,7 +35,7 @@ def description_of(run: Run) -> str:
         path = run.place.directory / DESCRIPTION
         if not path.is_file():
             raise NotFoundError(f"run {run.id}: its component has no urdf")
-        return read_urdf(path)
+        return read_urdf_text(path)
     path = _find_config(run)
     return _describe(path, path.stat().st_mtime_ns)
 
@@ -185,21 +185,9 @@ def _read_descriptions() -> Sequence[tuple[str, Robot]]:
     for name in usable_names("robots"):
         robot: Robot = load_member("robots", name)
         try:
-            descriptions.append((_read_description(robot), robot))
+            descriptions.append((read_urdf_text(robot.urdf_path), robot))
         except (ConfigError, MemberError):
             # A run with a broken robot says so itself, and the meshes of all other robots must still be found.
             if is_own("robots", name):
                 raise
     return descriptions
-
-
-def _read_description(robot: Robot) -> str:
-    """Read the description of a robot.
-
-    Raises:
-        ConfigError: If it cannot be read.
-    """
-    try:
-        return robot.urdf_path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise ConfigError(f"{robot.urdf_path}: cannot be read: {error}") from error

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import xml.etree.ElementTree as ElementTree
 from collections.abc import Callable
 from functools import cache, partial
 from types import NoneType
@@ -109,9 +108,7 @@ class _CheckedEngine(_Checked):
     def load(self, scene: Scene) -> None:
         """Make the world of a scene, which says what states and samples have."""
         self._call("load", scene)
-        # `Scene` says that its description can be trusted.
-        links = ElementTree.fromstring(scene.urdf.encode()).iter("link")  # noqa: S314
-        self._known = frozenset({GROUND, scene.tool.name, *(link.get("name", "") for link in links)})
+        self._known = frozenset({GROUND, scene.tool.name, *(link.name for link in scene.robot.links)})
         self._numbers = 3 * len(scene.moving) + BALL_NUMBERS
 
     @property

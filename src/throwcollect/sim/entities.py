@@ -8,7 +8,8 @@ from enum import IntEnum
 
 import numpy as np
 
-from throwcollect.engines.engine import BodyModel, BodyState, Box, Vector
+from throwcollect.engines.body import BodyModel, Vector
+from throwcollect.engines.engine import BodyState, Box
 from throwcollect.errors import RequestError
 from throwcollect.pinocchio_library import pinocchio
 from throwcollect.sim.world import World
@@ -194,7 +195,7 @@ class Entities:
         if len(self._world.spawned) >= _MOST_SPAWNED:
             raise RequestError("RESULT_OPERATION_FAILED", f"{_MOST_SPAWNED} entities were spawned; there is no room")
         self._world.spawned.add(name, model, start)
-        kind = Category.ROBOT if model.joints else Category.STATIC_OBJECT if model.is_fixed else Category.DYNAMIC_OBJECT
+        kind = Category.ROBOT if model.moving else Category.STATIC_OBJECT if model.is_fixed else Category.DYNAMIC_OBJECT
         self._infos[name] = EntityInfo(kind, description)
 
     def remove(self, name: str) -> None:

@@ -6,15 +6,13 @@ import os
 from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from pathlib import Path
-from urllib.parse import quote, unquote, urlsplit
+from urllib.parse import quote
 
-import numpy as np
-
-from throwcollect.engines.engine import BodyModel
-from throwcollect.errors import RequestError
+from throwcollect.engines.body import BodyModel
+from throwcollect.errors import ConfigError, RequestError
 from throwcollect.robots.robot import Robot
-from throwcollect.sim.mesh import Triangles, check_mesh, read_mesh
-from throwcollect.sim.urdf import read_model
+from throwcollect.robots.urdf import PACKAGE, locate_file
+from throwcollect.sim.spawnable import read_model
 
 _LARGEST_FILE = 4 * 2**20
 _MOST_ENTRIES = 20_000
@@ -35,7 +33,7 @@ def load_model(uri: str, text: str, robot: Robot) -> BodyModel:
     if not uri:
         if not text:
             raise RequestError("NO_RESOURCE", "neither a URI nor a description was given")
-        return read_model(text, lambda filename: read_mesh(_locate(filename, None, robot)))
+        return read_model(text, lambda filename: _locate(filename, None, robot))
     path = _resolve(uri, robot, missing="RESULT_NOT_FOUND")
     if path.suffix.lower() != ".urdf":
         raise RequestError("UNSUPPORTED_FORMAT", f"{uri:.255}: a file of type {path.suffix!r:.20}", expected="*.urdf")
@@ -47,7 +45,7 @@ def load_model(uri: str, text: str, robot: Robot) -> BodyModel:
         content = path.read_bytes()
     except (OSError, ValueError) as error:
         raise RequestError("RESULT_NOT_FOUND", f"{path!s:.255}: cannot be read: {error}") from error
-    return read_model(content, lambda filename: read_mesh(_locate(filename, path.parent, robot)))
+    return read_model(content, lambda filename: _locate(filename, path.parent, robot))
 
 
 def find_resources(sources: Sequence[str], robot: Robot) -> tuple[dict[str, str], list[str]]:
@@ -121,12 +119,8 @@ def _read_name(path: Path, robot: Robot) -> str:
         RequestError: If it cannot be spawned.
         OSError: If it cannot be read.
     """
-
-    def check(filename: str) -> Triangles:
-        check_mesh(_locate(filename, path.parent, robot))
-        return np.empty((0, 3, 3), np.float32)
-
-    return read_model(path.read_bytes(), check).name or path.stem
+    model = read_model(path.read_bytes(), lambda name: _locate(name, path.parent, robot), load_meshes=False)
+    return model.name or path.stem
 
 
 def _locate(filename: str, directory: Path | None, robot: Robot) -> Path:
@@ -136,12 +130,21 @@ def _locate(filename: str, directory: Path | None, robot: Robot) -> Path:
         RequestError: ``MISSING_ASSETS`` if the path is relative, but the description lies in no directory; otherwise as
             `_resolve` does.
     """
-    if "://" in filename:
-        return _resolve(filename, robot, missing="MISSING_ASSETS")
-    if directory is None and not filename.startswith("/"):
+    if directory is None and "://" not in filename and not filename.startswith("/"):
         message = f"mesh {filename!r:.255}: a relative path means nothing in a description without a file"
         raise RequestError("MISSING_ASSETS", message, expected="package:// or file://")
-    return (directory or Path("/")) / filename
+    is_url = "://" in filename
+    path = _resolve(filename, robot, missing="MISSING_ASSETS") if is_url else (directory or Path("/")) / filename
+    if not _is_file(path):
+        raise RequestError("MISSING_ASSETS", f"{path!s:.255}: no such file")
+    return path
+
+
+def _is_file(path: Path) -> bool:
+    try:
+        return path.is_file()
+    except (OSError, ValueError):
+        return False
 
 
 def _resolve(uri: str, robot: Robot, *, missing: str) -> Path:
@@ -152,20 +155,13 @@ def _resolve(uri: str, robot: Robot, *, missing: str) -> Path:
             it is no URI or there is no such package.
     """
     try:
-        parts = urlsplit(uri)
-    except ValueError as error:
-        raise RequestError(missing, f"{uri!r:.255}: not a URI: {error}") from error
-    if parts.scheme == "file" and parts.netloc in ("", "localhost"):
-        return Path(unquote(parts.path))
-    if parts.scheme == "package":
-        # With three slashes the package is the first part of the path.
-        package, *rest = unquote(parts.netloc + parts.path).lstrip("/").split("/")
-        share = robot.share()
-        if not package or not (share / package).is_dir():
-            raise RequestError(
-                missing, f"{uri!r:.255}: no such package", expected=f"package://{_package_of(robot)}/..."
-            )
-        return share.joinpath(package, *rest)
-    raise RequestError(
-        "UNSUPPORTED_FORMAT", f"{uri!r:.255}: unknown kind of URI", expected="file:///... or package://..."
-    )
+        path = locate_file(uri, robot.share())
+    except ConfigError as error:
+        raise RequestError("UNSUPPORTED_FORMAT", error.message, expected=error.expected) from error
+    if uri.startswith(PACKAGE) and not (
+        path.is_relative_to(share := robot.share())
+        and path != share
+        and (share / path.relative_to(share).parts[0]).is_dir()
+    ):
+        raise RequestError(missing, f"{uri!r:.255}: no such package", expected=f"{PACKAGE}{_package_of(robot)}/...")
+    return path

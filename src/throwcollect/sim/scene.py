@@ -18,7 +18,7 @@ def scene_of(config: Config, description: Description) -> Scene:
     """Describe the world of a trial, with the robot of a description."""
     tool = tool_of(config)
     return Scene(
-        urdf=description.urdf,
+        robot=description.model,
         moving=description.moving,
         base_height_m=config.robot.base_height_m,
         tool=ToolLink(tool.link, tool.name, _OPENING),

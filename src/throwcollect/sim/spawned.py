@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from throwcollect.engines.engine import Bodies, BodyModel, BodyState, Engine
+from throwcollect.engines.body import BodyModel
+from throwcollect.engines.engine import Bodies, BodyState, Engine
 from throwcollect.errors import RequestError
 
 

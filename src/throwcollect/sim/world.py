@@ -9,7 +9,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from throwcollect.config.schema import Config
-from throwcollect.engines.engine import BALL_NUMBERS, BodyState, Engine, Observer, Sample, State, Steps, ball_of
+from throwcollect.engines.as_described import check_loaded
+from throwcollect.engines.body import BodyModel
+from throwcollect.engines.engine import (
+    BALL_NUMBERS,
+    BodyState,
+    Engine,
+    Observer,
+    Sample,
+    Scene,
+    State,
+    Steps,
+    ball_of,
+)
 from throwcollect.episode.record import REST_S, REST_SPEED_MPS, Contact, EndReason, Samples
 from throwcollect.robots.description import (
     Description,
@@ -76,6 +88,7 @@ class World(Observer):
         self._joints = robot_of(config).joints
         self._described: tuple[object, Description] | None = None
         self._start_key: object = None
+        self._compared: BodyModel | None = None
         try:
             self.reset(config)
         except BaseException:
@@ -238,7 +251,7 @@ class World(Observer):
         """Let the ball come to rest in the tool of the still robot, and keep that state."""
         description = self._describe(trial)
         try:
-            self.engine.load(scene_of(trial, description))
+            self._load(scene_of(trial, description), trial.sim.engine)
             self.moving, self._locked = description.moving, description.locked
             posture = start_posture(trial)
             offsets = dict(zip(self._joints, joint_offsets(trial).tolist(), strict=True))
@@ -258,6 +271,13 @@ class World(Observer):
         finally:
             # This happens after an error, too: spawned bodies belong in the world, and loading may have removed them.
             self.spawned.load()
+
+    def _load(self, scene: Scene, engine: str) -> None:
+        self.engine.load(scene)
+        # The robot as it was loaded stays, while only the ball is another one.
+        if scene.robot is not self._compared:
+            check_loaded(self.engine, engine, scene)
+            self._compared = scene.robot
 
     def _describe(self, trial: Config) -> Description:
         """Describe the robot for a trial; the description of the previous trial is kept while it is the same."""

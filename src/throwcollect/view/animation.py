@@ -19,7 +19,7 @@ from throwcollect.episode.record import Samples
 from throwcollect.errors import ConfigError
 from throwcollect.extras import lazily, require
 from throwcollect.files import write_file
-from throwcollect.robots.description import PACKAGE
+from throwcollect.robots.urdf import PACKAGE
 from throwcollect.view.camera import Camera, camera_on
 from throwcollect.view.drawn_robot import BALL_RGBA, draw_robot_of
 from throwcollect.view.shown_throws import choose_throws

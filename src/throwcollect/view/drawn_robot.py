@@ -9,10 +9,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from throwcollect.config.schema import BallConfig, Config
-from throwcollect.episode.frames import read_origin
+from throwcollect.episode.frames import quaternion_of
 from throwcollect.episode.topics import BALL
-from throwcollect.errors import DatasetError
-from throwcollect.robots.description import PACKAGE, full_description, robot_of
+from throwcollect.errors import ConfigError, DatasetError
+from throwcollect.robots.description import full_description, robot_of
+from throwcollect.robots.urdf import PACKAGE, parse_xml, read_visual
 from throwcollect.tools.tool import tool_of
 
 Rgba = tuple[float, float, float, float]
@@ -102,7 +103,7 @@ def read_drawn_robot(description: str, tool: str, share: Path) -> DrawnRobot:
         DatasetError: If the text is not a URDF that can be drawn.
     """
     try:
-        robot = ElementTree.fromstring(description)  # noqa: S314 - the dataset's own description
+        robot = parse_xml(description, "robot description")
         for link in robot.iter("link"):
             for shape in link.findall("collision"):
                 link.remove(shape)
@@ -114,11 +115,9 @@ def read_drawn_robot(description: str, tool: str, share: Path) -> DrawnRobot:
         # A material may be defined at one place of a URDF, and only named at others.
         colors = {name: rgba for each in robot.iter("material") for name, rgba in _read_color(each).items() if name}
         shapes = tuple(
-            _read_shape(link.attrib["name"], visual, colors)
-            for link in robot.iter("link")
-            for visual in link.iter("visual")
+            _read_shape(link, visual, colors) for link in robot.iter("link") for visual in link.iter("visual")
         )
-    except (ElementTree.ParseError, AttributeError, KeyError, ValueError) as error:
+    except (ConfigError, KeyError, ValueError) as error:
         raise DatasetError(f"robot description: cannot be drawn: {error}") from error
     return DrawnRobot(ElementTree.tostring(robot, encoding="unicode"), shapes, share)
 
@@ -148,27 +147,21 @@ def _read_color(material: ElementTree.Element) -> dict[str, Rgba]:
     return {material.get("name", ""): (r, g, b, a)}
 
 
-def _read_shape(link: str, visual: ElementTree.Element, colors: dict[str, Rgba]) -> DrawnShape:
-    material = visual.find("material")
-    position, rotation = read_origin(visual)
-    (geometry,) = visual.findall("geometry/*")
-    mesh = ""
-    if geometry.tag == "mesh":
-        size = _read_numbers(geometry.get("scale", "1 1 1"))
-        mesh = geometry.attrib["filename"].removeprefix(PACKAGE)
-    elif geometry.tag == "box":
-        size = _read_numbers(geometry.attrib["size"])
-    elif geometry.tag == "sphere":
-        size = (2 * float(geometry.attrib["radius"]),) * 3
-    elif geometry.tag == "cylinder":
-        diameter = 2 * float(geometry.attrib["radius"])
-        size = (diameter, diameter, float(geometry.attrib["length"]))
-    else:
-        raise ValueError(f"link {link} has a {geometry.tag}")
+def _read_shape(link: ElementTree.Element, visual: ElementTree.Element, colors: dict[str, Rgba]) -> DrawnShape:
+    shape, material = read_visual(link, visual), visual.find("material")
+    mesh, size = "", shape.size
+    if shape.kind == "mesh":
+        mesh = visual.find("geometry/mesh").attrib["filename"].removeprefix(PACKAGE)  # type: ignore[union-attr]
+    elif shape.kind == "capsule":
+        raise ValueError(f"link {link.get('name')} has a capsule")
+    elif shape.kind != "box":
+        radius, *length = shape.size
+        size = (2 * radius, 2 * radius, *(length or [2 * radius]))
     # A material need not have a name, so the colour that the shape itself defines comes first.
     found = {} if material is None else colors | _read_color(material)
     rgba = _DEFAULT_RGBA if material is None else found.get(material.get("name", ""), _DEFAULT_RGBA)
-    return DrawnShape(link, position, rotation, size, geometry.tag, mesh, rgba)
+    place, turn = shape.placement
+    return DrawnShape(link.attrib["name"], place, quaternion_of(*turn), size, shape.kind, mesh, rgba)
 
 
 def _read_numbers(text: str) -> tuple[float, ...]:

@@ -15,15 +15,18 @@ from throwcollect.engines.engine import Scene, ToolLink
 from throwcollect.errors import ConfigError
 from throwcollect.robots.description import start_posture
 from throwcollect.robots.tool_motion import ToolMotion
+from throwcollect.robots.urdf import parse_xml, read_urdf
 from throwcollect.sim.world import World
 
 PLANAR = """<robot name="planar">
   <link name="base"/><link name="upper"/><link name="lower"/><link name="tip"/>
   <joint name="shoulder" type="revolute">
     <parent link="base"/><child link="upper"/><origin xyz="0 0 0.2"/><axis xyz="0 0 2"/>
+    <limit lower="-2" upper="2" velocity="1" effort="1"/>
   </joint>
   <joint name="elbow" type="{kind}">
     <parent link="upper"/><child link="lower"/><origin xyz="1 0 0" rpy="0 0 0.5"/><axis xyz="0 0 1"/>
+    <limit lower="-2" upper="2" velocity="1" effort="1"/>
   </joint>
   <joint name="end" type="fixed"><parent link="lower"/><child link="tip"/><origin xyz="0.5 0 0"/></joint>
 </robot>"""
@@ -31,7 +34,8 @@ PLANAR = """<robot name="planar">
 
 def planar(kind: str = "revolute") -> Scene:
     tool = ToolLink("tip", "tip", (1.0, 0.0, 0.0))
-    return Scene(PLANAR.format(kind=kind), ("elbow", "shoulder"), 1.0, tool, ground_is_solid=False, ball_radius_m=0.02)
+    robot = read_urdf(parse_xml(PLANAR.format(kind=kind), "planar"), "planar").model
+    return Scene(robot, ("elbow", "shoulder"), 1.0, tool, ground_is_solid=False, ball_radius_m=0.02)
 
 
 def test_the_path_of_the_tool_of_a_planar_arm_agrees_with_trigonometry() -> None:

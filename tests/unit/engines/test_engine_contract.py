@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import os
-import re
 import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
@@ -20,7 +19,7 @@ from throwcollect.engines.engine import GROUND, BodyState, Engine, Observer, Sam
 from throwcollect.members import load_member, names_of
 from throwcollect.robots.description import physics_description, start_posture
 from throwcollect.sim.scene import physics_of, scene_of
-from throwcollect.sim.urdf import read_model
+from throwcollect.sim.spawnable import read_model
 from throwcollect.tools.tool import tool_of
 
 CONFIG = Config.model_validate({"scene": {"landing_height_m": 0.5}})
@@ -129,10 +128,8 @@ def test_a_forked_world_and_its_parent_simulate_the_same_throw(engine: Engine) -
 
 def test_renaming_the_root_link_does_not_change_a_throw(engine: Engine) -> None:
     usual = watch_throw(engine)
-    root = re.search(r'<link name="([^"]+)"', SCENE.urdf)
-    assert root is not None
     # Most arms of example-robot-data stand on a link of this name.
-    engine.load(replace(SCENE, urdf=SCENE.urdf.replace(f'"{root[1]}"', '"world"')))
+    engine.load(replace(SCENE, robot=SCENE.robot.rename_links({SCENE.robot.links[0].name: "world"})))
     engine.configure(PHYSICS)
     engine.rest(START.tolist(), SEAT)
     engine.run(still(engine, 25), Observer())

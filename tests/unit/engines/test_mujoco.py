@@ -21,13 +21,13 @@ from tests.unit.engines.test_engine_contract import (
     still,
     swing,
 )
-from tests.unit.sim.bodies import box
+from tests.unit.sim.bodies import box, write_mesh
 
 from throwcollect.engines.engine import BodyState, Observer, Physics, Scene, ball_of
 from throwcollect.engines.mujoco.mujoco_engine import MujocoEngine
 from throwcollect.engines.mujoco.scenery import make_spec, resize_ball
 from throwcollect.errors import ConfigError, RequestError
-from throwcollect.sim.urdf import read_model
+from throwcollect.sim.spawnable import read_model
 
 TRIALS: list[tuple[Scene, Physics]] = [
     (SCENE, PHYSICS),
@@ -172,9 +172,9 @@ def test_a_diverging_world_has_numbers_that_are_not_finite_and_can_begin_again(
 
 
 def test_a_body_that_mujoco_cannot_load_is_refused_without_harm_to_the_world(
-    engine: MujocoEngine,
+    engine: MujocoEngine, tmp_path: Path
 ) -> None:
-    flat = np.zeros((4, 3, 3), np.float32)
+    flat = write_mesh(tmp_path / "flat.stl", np.zeros((4, 3, 3)))
     mesh = box().replace('<box size="0.2 0.2 0.2"/>', '<mesh filename="flat.stl"/>')
     before = engine.state
     with pytest.raises(RequestError, match="the physics engine cannot load it"):
@@ -185,9 +185,9 @@ def test_a_body_that_mujoco_cannot_load_is_refused_without_harm_to_the_world(
     assert engine.state.touching == before.touching
 
 
-def test_a_body_without_mass_that_has_a_mesh_is_refused(engine: MujocoEngine) -> None:
+def test_a_body_without_mass_that_has_a_mesh_is_refused(engine: MujocoEngine, tmp_path: Path) -> None:
     mesh = box(mass=0).replace('<box size="0.2 0.2 0.2"/>', '<mesh filename="bucket.stl"/>')
-    bucket = read_model(mesh, lambda _: np.zeros((4, 3, 3), np.float32))
+    bucket = read_model(mesh, lambda _: write_mesh(tmp_path / "bucket.stl", np.zeros((4, 3, 3))))
     with pytest.raises(RequestError, match="fill in the mesh of a body that is attached to the world"):
         engine.bodies.add("bucket", bucket, BodyState((3.0, 0.0, 1.0)))
 
@@ -234,12 +234,14 @@ def test_a_body_stays_where_it_is_while_others_are_added_and_removed(engine: Muj
 
 def test_a_robot_description_that_mujoco_cannot_load_is_refused() -> None:
     broken = MujocoEngine()
+    joint, *others = SCENE.robot.joints
+    elastic = replace(SCENE.robot, joints=(replace(joint, kind="elastic"), *others))
     with pytest.raises(ConfigError, match="MuJoCo cannot"):
-        broken.load(replace(SCENE, urdf=SCENE.urdf.replace('type="revolute"', 'type="elastic"')))
+        broken.load(replace(SCENE, robot=elastic))
     begin(broken)
     assert broken.state.sample[: len(MOVING)] != END.tolist()
     broken.close()
 
 
-def _no_mesh(filename: str) -> np.ndarray:
+def _no_mesh(filename: str) -> Path:
     raise AssertionError(filename)

@@ -50,5 +50,5 @@ def test_the_text_of_a_qos_is_its_profile_in_yaml() -> None:
 
 
 def test_a_text_that_is_no_urdf_is_refused() -> None:
-    with pytest.raises(ConfigError, match="not a URDF"):
+    with pytest.raises(ConfigError, match="cannot be read as robot description"):
         Channels(Config(), "nothing")

@@ -4,13 +4,16 @@ from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from throwcollect.config.schema import Config
 from throwcollect.errors import ConfigError, MemberError
 from throwcollect.robots import description
+from throwcollect.robots.clearance import Clearance
 from throwcollect.robots.description import joint_model, physics_description
 from throwcollect.robots.robot import Robot
+from throwcollect.tools.tool import tool_of
 
 FILES = Path(__file__).parents[2] / "plugins" / "planar_arm"
 
@@ -40,8 +43,8 @@ def test_the_unchanged_description_is_accepted(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("kind", "old", "new", "said"),
     [
-        ("urdf", '<mass value="2"/>', '<mass value="x"/>', "value of <mass> should be a mass of at least 0, is 'x'"),
-        ("urdf", '<mass value="2"/>', '<mass value="-2"/>', "value of <mass> should be a mass of at least 0, is '-2'"),
+        ("urdf", '<mass value="2"/>', '<mass value="x"/>', "value of <mass> should be a finite number, is 'x'"),
+        ("urdf", '<mass value="2"/>', '<mass value="-2"/>', "value of <mass> should be a mass of at least 0, is -2"),
         ("urdf", 'ixx="0.000833"', 'ixx="nan"', "ixx of <inertia> should be a finite number, is 'nan'"),
         ("urdf", 'size="0.3 0.04 0.04"', 'size="0.3 0.04"', "size of <box> should be 3 finite numbers, is '0.3 0.04'"),
         ("urdf", 'xyz="-0.5 0 0"', 'xyz="-0.5 0"', "xyz of <origin> should be 3 finite numbers, is '-0.5 0'"),
@@ -57,8 +60,21 @@ def test_the_unchanged_description_is_accepted(tmp_path: Path) -> None:
             'velocity="-20"',
             "velocity and effort not below 0: lower -2.5, upper 2.5, velocity -",
         ),
-        ("urdf", 'effort="200"', 'effort="nan"', "velocity and effort not below 0: .* effort nan"),
+        (
+            "urdf",
+            'effort="200"',
+            'effort="nan"',
+            "joint shoulder_joint: effort of <limit> should be a finite number, is 'nan'",
+        ),
         ("srdf", 'value="0.0"', 'value="nan"', "group_state rest: the angle of shoulder_joint is not finite"),
+        ("urdf", 'ixy="0"', "", "link base_link: ixy of <inertia> should be a finite number, is missing"),
+        ("urdf", 'name="forearm_link"', 'name="upper_arm_link"', "link upper_arm_link is there twice"),
+        ("urdf", '<axis xyz="0 1 0"/>', '<axis xyz="0 0 0"/>', "joint shoulder_joint: its axis 0 0 0 has no direction"),
+        ("urdf", '<parent link="base_link"/>', "", "joint shoulder_joint: <joint> without <parent>"),
+        ("urdf", "<robot", "<sdf", "mismatched tag"),
+        ("urdf", '<mass value="2"/>', '<mass value="0"/>', "upper_arm_link, which shoulder_joint moves, has no mass"),
+        ("urdf", "<robot", "<!DOCTYPE robot [<!ENTITY a 'b'>]><robot", "document type 'robot' is declared"),
+        ("urdf", "</robot>", "<xacro:if/></robot>", "not well-formed XML: unbound prefix"),
     ],
 )
 def test_a_number_that_cannot_be_right_is_named_and_refused(
@@ -82,3 +98,105 @@ def test_a_function_that_does_not_find_the_files_is_named(tmp_path: Path) -> Non
     for share, said in ((lambda: 1 / 0, "ZeroDivisionError"), (lambda: str(tmp_path), "should be an instance of Path")):
         with pytest.raises(MemberError, match=f"the robot arm of .* cannot find its files: .*{said}"):
             _ = replace(make_arm(tmp_path), share=share).urdf_path
+
+
+INERTIA = '<mass value="2"/><inertia ixx="{}" ixy="0" ixz="0" iyy="{}" iyz="0" izz="{}"/>'
+
+
+def change_upper_arm(directory: Path, inertial: str, shape: str = "") -> Robot:
+    """The planar arm with another inertia of its upper arm, and perhaps one more collision shape."""
+    arm = make_arm(directory)
+    text = arm.urdf_path.read_text()
+    begin = text.index('<link name="upper_arm_link">')
+    first, last = text.index("<inertial>", begin), text.index("</inertial>", begin) + len("</inertial>")
+    arm.urdf_path.write_text(text[:first] + inertial + shape + text[last:])
+    return arm
+
+
+@pytest.mark.parametrize(
+    ("inertial", "said"),
+    [
+        ("", "upper_arm_link, which shoulder_joint moves, has no mass"),
+        ("<inertial><mass value='2'/></inertial>", "link upper_arm_link: <inertial> without <inertia>"),
+        (f"<inertial>{INERTIA.format(-0.1, 0.02, 0.02)}</inertial>", "of -0.1, 0.02 and 0.02 kg m², which no body"),
+        (f"<inertial>{INERTIA.format(0.01, 0.01, 0.03)}</inertial>", "of 0.01, 0.01 and 0.03 kg m², which no body"),
+        (f"<inertial>{INERTIA.format(0, 0, 0)}</inertial>", "of 0, 0 and 0 kg m², which no body"),
+    ],
+)
+def test_a_moving_link_without_a_possible_inertia_is_refused(inertial: str, said: str, tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match=said):
+        joint_model(change_upper_arm(tmp_path, inertial))
+
+
+def test_a_flat_body_has_the_largest_moment_that_there_can_be(tmp_path: Path) -> None:
+    joint_model(change_upper_arm(tmp_path, f"<inertial>{INERTIA.format(0.01, 0.02, 0.03)}</inertial>"))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ('name="elbow_joint" type="revolute"', 'name="elbow_joint" type="continuous"', "elbow_joint is continuous"),
+        ('name="elbow_joint" type="revolute"', 'name="elbow_joint" type="hinge"', "unknown type 'hinge'"),
+        ('name="hand_joint" type="fixed"', 'name="hand_joint" type="continuous"', r"hand_joint \(continuous\)"),
+        (
+            'name="hand_joint" type="fixed">',
+            'name="hand_joint" type="continuous"><mimic joint="elbow_joint"/>',
+            r"no controller of the arm: hand_joint \(mimics elbow_joint\)",
+        ),
+    ],
+)
+def test_a_joint_that_cannot_be_commanded_is_refused_with_its_kind(
+    old: str, new: str, said: str, tmp_path: Path
+) -> None:
+    with pytest.raises(ConfigError, match=said):
+        joint_model(make_arm(tmp_path, "urdf", old, new))
+
+
+CORNERS = np.array([(x, y, z) for x in (-0.2, 0.2) for y in (-0.02, 0.02) for z in (-0.02, 0.02)])
+HULL = CORNERS[np.array([(0, 1, 2), (3, 2, 1), (4, 5, 6), (7, 6, 5), (0, 4, 1), (5, 1, 4), (2, 3, 6), (7, 6, 3)])]
+
+
+def write_text_stl(path: Path, triangles: np.ndarray) -> None:
+    vertices = ("".join(f"vertex {x} {y} {z}\n" for x, y, z in each) for each in triangles)
+    facets = "".join(f"facet normal 0 0 1\nouter loop\n{each}endloop\nendfacet\n" for each in vertices)
+    path.write_text(f"solid x\n{facets}endsolid x\n")
+
+
+def add_mesh(directory: Path, url: str, scale: str = "1 1 1") -> Robot:
+    inertial = f"<inertial>{INERTIA.format(0.01, 0.02, 0.02)}</inertial>"
+    mesh = f'<collision><geometry><mesh filename="{url}" scale="{scale}"/></geometry></collision>'
+    return change_upper_arm(directory, inertial, mesh)
+
+
+@pytest.mark.parametrize(
+    "url", ["file://{}/arm.stl", "package://arm.stl", "package:///arm.stl", "arm.stl", "{}/arm.stl"]
+)
+def test_a_mesh_is_found_by_every_kind_of_url_and_read_as_text(url: str, tmp_path: Path) -> None:
+    write_text_stl(tmp_path / "arm.stl", HULL)
+    arm = add_mesh(tmp_path, url.format(tmp_path))
+    clearance = Clearance(arm, joint_model(arm), tool_of(Config()))
+    assert arm.description.model.meshes[0].triangles.tolist() == HULL.astype(np.float32).tolist()
+    assert "upper_arm_link_0" in [shape.name for shape in clearance.geometry.geometryObjects]
+
+
+@pytest.mark.parametrize(
+    ("url", "said"),
+    [
+        ("arm.ply", r"link upper_arm_link: .*arm.ply: collision meshes of this format cannot be read"),
+        ("none.stl", r"link upper_arm_link: .*none.stl: no such file"),
+        ("http://x/arm.stl", "link upper_arm_link: 'http://x/arm.stl': unknown kind of URL"),
+        ("flat.stl", "link upper_arm_link: .*flat.stl: the mesh is flat"),
+        ("broken.dae", "link upper_arm_link: .*broken.dae: cannot be read as a mesh"),
+        ("", "link upper_arm_link: a mesh should have a filename"),
+    ],
+)
+def test_a_mesh_that_cannot_be_used_is_refused_with_its_link(
+    url: str, said: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    write_text_stl(tmp_path / "flat.stl", HULL * (1, 1, 0))
+    (tmp_path / "arm.ply").write_text("ply")
+    (tmp_path / "broken.dae").write_text("<COLLADA/>")
+    arm = add_mesh(tmp_path, url)
+    with pytest.raises(ConfigError, match=said):
+        Clearance(arm, joint_model(arm), tool_of(Config()))
+    assert capfd.readouterr() == ("", "")

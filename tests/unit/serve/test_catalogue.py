@@ -84,7 +84,7 @@ def test_without_a_catalogue_every_component_is_unknown(directory: Path) -> None
             "components:\n  a:\n    image: x\n    urdf: none.urdf\n",
             ":4: components.a.urdf: DIRECTORY/none.urdf: cannot be read: No such file or directory",
         ),
-        ("components:\n  a:\n    image: x\n    urdf: small.yaml\n", "should be a URDF"),
+        ("components:\n  a:\n    image: x\n    urdf: small.yaml\n", "cannot be read as robot description"),
         ("components:\n  a:\n    config: small.yaml\n    max_instance: 2\n", "did you mean 'max_instances'"),
         ("components:\n  a:\n    config: small.yaml\n    max_instances: 0\n", ":4: components.a.max_instances: should"),
         (

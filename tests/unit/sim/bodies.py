@@ -1,5 +1,9 @@
 """Descriptions that tests spawn."""
 
+import numpy as np
+
+from throwcollect.engines.mesh import STL
+
 UNIT_INERTIA = '<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/>'
 
 
@@ -30,3 +34,11 @@ def pendulum(*, kind="revolute", limit='<limit lower="-1" upper="1" effort="0" v
     <parent link="block"/><child link="bar"/><axis xyz="{axis}"/>{limit}
   </joint>
 </robot>"""
+
+
+def write_mesh(path, triangles):
+    """Write triangles, shape ``(n, 3, 3)``, as binary STL; return the path."""
+    records = np.zeros(len(triangles), STL)
+    records["corners"] = triangles
+    path.write_bytes(bytes(80) + len(records).to_bytes(4, "little") + records.tobytes())
+    return path

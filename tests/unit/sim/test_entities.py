@@ -11,7 +11,7 @@ from throwcollect.robots.description import start_posture
 from throwcollect.ros.msg import Bounds, EntityFilters, Vector3
 from throwcollect.sim.entities import Category, Entities, EntityInfo
 from throwcollect.sim.entity_filter import select
-from throwcollect.sim.urdf import read_model
+from throwcollect.sim.spawnable import read_model
 from throwcollect.sim.world import World
 
 CONFIG = Config()

@@ -8,6 +8,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from throwcollect.engines.ballistic.tool_path import Array, ToolPath
+from throwcollect.engines.body import Vector
 from throwcollect.engines.engine import (
     GROUND,
     BodyState,
@@ -19,7 +20,6 @@ from throwcollect.engines.engine import (
     Scene,
     State,
     Steps,
-    Vector,
     ball_of,
 )
 from throwcollect.reproducible_math import matmul

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-import xml.etree.ElementTree as ElementTree
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from throwcollect.engines.engine import Scene, Vector
+from throwcollect.engines.body import BodyJoint
+from throwcollect.engines.engine import Scene
 from throwcollect.errors import ConfigError
 from throwcollect.reproducible_math import cos, matmul, sin
 
@@ -42,14 +42,12 @@ class ToolPath:
     """
 
     def __init__(self, scene: Scene) -> None:
-        # `Scene` says that its description can be trusted.
-        joints = ElementTree.fromstring(scene.urdf.encode()).findall("joint")  # noqa: S314
-        above = {_find_link(joint, "child"): joint for joint in joints}
+        above = {joint.child: joint for joint in scene.robot.joints}
         chain = []
         link = scene.tool.link
         while (joint := above.get(link)) is not None:
             chain.append(_read_joint(joint, scene.moving))
-            link = _find_link(joint, "parent")
+            link = joint.parent
         self._chain = chain[::-1]
         self._base = np.array([[0.0], [0.0], [scene.base_height_m]])
 
@@ -72,32 +70,21 @@ class ToolPath:
         return place, turn
 
 
-def _read_joint(joint: ElementTree.Element, moving: Sequence[str]) -> _Joint:
-    name, kind = joint.get("name", ""), joint.get("type")
-    if kind not in ("fixed", "revolute", "continuous"):
-        raise ConfigError(f"joint {name}: the engine ballistic knows no {kind} joints between base and tool")
-    place = _read_numbers(joint, "origin", "xyz", (0.0, 0.0, 0.0))
-    angles = _read_numbers(joint, "origin", "rpy", (0.0, 0.0, 0.0))
+def _read_joint(joint: BodyJoint, moving: Sequence[str]) -> _Joint:
+    if joint.kind not in ("fixed", "revolute", "continuous"):
+        raise ConfigError(
+            f"joint {joint.name}: the engine ballistic knows no {joint.kind} joints between base and tool"
+        )
+    place, angles = joint.placement
     turn = np.eye(3)
     # URDF's roll, pitch and yaw turn about the axes of the link before, roll first: the matrix of yaw times that of
     # pitch times that of roll.
     for axis, angle in zip(((0, 0, 1), (0, 1, 0), (1, 0, 0)), angles[::-1], strict=True):
         turn = matmul(turn, _make_rotations(axis, np.array([angle]))[0])
-    x, y, z = _read_numbers(joint, "axis", "xyz", (1.0, 0.0, 0.0))
+    x, y, z = joint.axis
     length = math.hypot(x, y, z)
-    column = None if kind == "fixed" else moving.index(name)
+    column = moving.index(joint.name) if joint.moves else None
     return _Joint(turn, np.array(place).reshape(3, 1), (x / length, y / length, z / length), column)
-
-
-def _find_link(joint: ElementTree.Element, end: str) -> str:
-    element = joint.find(end)
-    return "" if element is None else element.get("link", "")
-
-
-def _read_numbers(joint: ElementTree.Element, tag: str, key: str, default: Vector) -> Sequence[float]:
-    element = joint.find(tag)
-    text = None if element is None else element.get(key)
-    return default if text is None else [float(word) for word in text.split()]
 
 
 def _make_rotations(axis: Sequence[float], angles: Array) -> Array:

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Sequence
-from pathlib import Path
 
 import pybullet
 
-from throwcollect.engines.bullet.scenery import BASE, Surface, boxes, collide_with_everything, connect, links
-from throwcollect.engines.engine import Bodies, BodyModel, BodyState, Box, Quaternion, Vector
-from throwcollect.errors import RequestError
+from throwcollect.engines.body import BodyModel, Vector
+from throwcollect.engines.bullet.scenery import BASE, Surface, boxes, collide_with_everything, connect, links, load_body
+from throwcollect.engines.engine import Bodies, BodyState, Box, Quaternion
+from throwcollect.errors import ConfigError, RequestError
 
 # These are places in what `getJointInfo` and `getDynamicsInfo` return (PyBullet Quickstart Guide).
 _JOINT_TYPE, _LARGEST_EFFORT, _LINK_NAME = 2, 10, 12
@@ -43,11 +42,18 @@ class BulletBodies(Bodies):
         self.leave_traces = False
 
     def add(self, name: str, model: BodyModel, start: BodyState) -> None:
-        """Put a body into the world; see `Bodies.add`."""
+        """Put a body into the world; see `Bodies.add`.
+
+        Raises:
+            RequestError: ``RESOURCE_PARSE_ERROR`` if Bullet does not take it.
+        """
         client = self._client
         # This is set before the body is loaded, because a body that Bullet refuses may leave traces, too.
         self.leave_traces = True
-        body = _load(client, model, start)
+        try:
+            body = load_body(client, model, start.position, start.orientation_xyzw)
+        except ConfigError as error:
+            raise RequestError("RESOURCE_PARSE_ERROR", error.message) from error
         self._bodies[name] = body, model
         collide_with_everything(client, body)
         root = pybullet.getBodyInfo(body, physicsClientId=client)[0].decode()
@@ -111,7 +117,7 @@ class BulletBodies(Bodies):
         aside = connect()
         try:
             # Bullet measures along its own axes of a link; those are the link's axes unless an inertia is given.
-            copy = _load(aside, model, BodyState((0.0, 0.0, 0.0)), flags=0)
+            copy = load_body(aside, model, (0.0, 0.0, 0.0), flags=0)
             for joint, angle in enumerate(angles):
                 pybullet.resetJointState(copy, joint, angle, physicsClientId=aside)
             return boxes(aside, copy)
@@ -124,28 +130,6 @@ class BulletBodies(Bodies):
         position: Vector = tuple(info[_INERTIAL_POSITION])  # type: ignore[assignment]
         orientation: Quaternion = tuple(info[_INERTIAL_ORIENTATION])  # type: ignore[assignment]
         return position, orientation
-
-
-def _load(client: int, model: BodyModel, start: BodyState, *, flags: int = pybullet.URDF_USE_INERTIA_FROM_FILE) -> int:
-    # Bullet reads descriptions and meshes from files alone. Meshes are named relative to the description.
-    with tempfile.TemporaryDirectory(prefix="throwcollect-") as directory:
-        path = Path(directory, "entity.urdf")
-        path.write_text(model.urdf, encoding="utf-8")
-        for name, content in model.encode_meshes().items():
-            path.with_name(name).write_bytes(content)
-        try:
-            return int(
-                pybullet.loadURDF(
-                    str(path),
-                    basePosition=start.position,
-                    baseOrientation=start.orientation_xyzw,
-                    useFixedBase=model.is_fixed,
-                    flags=flags,
-                    physicsClientId=client,
-                )
-            )
-        except pybullet.error as error:
-            raise RequestError("RESOURCE_PARSE_ERROR", f"the physics engine cannot load it: {error}") from error
 
 
 def _find_velocity_at(linear: Vector, angular: Vector, origin: Vector, other: Vector) -> Vector:

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 
 import pybullet
 
+from throwcollect.engines.body import Vector
 from throwcollect.engines.bullet.bodies import BulletBodies
 from throwcollect.engines.bullet.scenery import (
     BASE,
@@ -15,6 +16,7 @@ from throwcollect.engines.bullet.scenery import (
     Surface,
     boxes,
     connect,
+    describe_links,
     load_ball,
     load_scenery,
     renew_pairs,
@@ -24,13 +26,13 @@ from throwcollect.engines.engine import (
     BodyState,
     Box,
     Engine,
+    LoadedLink,
     Observer,
     Physics,
     Sample,
     Scene,
     State,
     Steps,
-    Vector,
     ball_of,
 )
 
@@ -88,6 +90,10 @@ class BulletEngine(Engine):
             pybullet.removeBody(self._ball, physicsClientId=self._client)
             self._ball = load_ball(self._client, scene.ball_radius_m)
         self._scene = scene
+
+    def describe_robot(self) -> list[LoadedLink]:
+        """Describe the robot's links as Bullet has them."""
+        return describe_links(self._client, self._scenery.robot)
 
     def configure(self, physics: Physics) -> None:
         """Set all numbers of the physics."""

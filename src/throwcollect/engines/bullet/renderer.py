@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import tempfile
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 
 import numpy as np
 import pybullet
 from numpy.typing import NDArray
 
-from throwcollect.engines.bullet.scenery import BASE, connect, links, load_robot
-from throwcollect.engines.engine import Vector
+from throwcollect.engines.body import Vector
+from throwcollect.engines.bullet.scenery import BASE, connect, links, load_urdf
 from throwcollect.errors import ConfigError
 
 _BACKGROUND = -1
@@ -37,7 +39,9 @@ class Renderer:
         heavy = _add_masses(urdf)
         self._client = connect()
         try:
-            self._robot = load_robot(self._client, heavy, base_height_m)
+            with tempfile.TemporaryDirectory(prefix="throwcollect-") as directory:
+                place = (0.0, 0.0, base_height_m)
+                self._robot = load_urdf(self._client, heavy, Path(directory), place, _UPRIGHT)
         except ConfigError:
             pybullet.disconnect(self._client)
             raise

@@ -8,11 +8,16 @@ from __future__ import annotations
 
 import tempfile
 from dataclasses import dataclass
+from pathlib import Path
 
+import numpy as np
 import pybullet
+from numpy.typing import NDArray
 
-from throwcollect.engines.engine import GROUND, Box, Physics, Scene
+from throwcollect.engines.body import BodyModel, Vector
+from throwcollect.engines.engine import GROUND, Box, LoadedLink, Physics, Quaternion, Scene
 from throwcollect.errors import ConfigError, WorkerError
+from throwcollect.native_output import failing_on_output
 
 Surface = tuple[int, int]
 """Body and link number in Bullet."""
@@ -64,7 +69,7 @@ def load_scenery(client: int, scene: Scene) -> Scenery:
     plane = pybullet.createCollisionShape(pybullet.GEOM_PLANE, planeNormal=[0, 0, 1], physicsClientId=client)
     ground = pybullet.createMultiBody(0, plane, physicsClientId=client)
     # By default Bullet computes inertias from the collision shapes.
-    robot = load_robot(client, scene.urdf, scene.base_height_m, flags=pybullet.URDF_USE_INERTIA_FROM_FILE)
+    robot = load_body(client, scene.robot, (0.0, 0.0, scene.base_height_m))
     root = pybullet.getBodyInfo(robot, physicsClientId=client)[0].decode()
     joints = {}
     names = {(ground, BASE): GROUND, (robot, BASE): root}
@@ -83,20 +88,81 @@ def load_scenery(client: int, scene: Scene) -> Scenery:
     return Scenery(robot=robot, joints=[joints[joint] for joint in scene.moving], tool=tool, names=names)
 
 
-def load_robot(client: int, urdf: str, base_height_m: float, *, flags: int = 0) -> int:
-    """Load a robot with its base fixed at a height [m], and return its body number.
+def load_body(
+    client: int,
+    model: BodyModel,
+    position: Vector,
+    turn: Quaternion = (0.0, 0.0, 0.0, 1.0),
+    *,
+    flags: int = pybullet.URDF_USE_INERTIA_FROM_FILE,
+) -> int:
+    """Load a body into a world at a pose in it, and return its number.
 
     Raises:
-        ConfigError: If Bullet cannot load the description.
+        ConfigError: If Bullet cannot load it, or only a part of it.
     """
-    with tempfile.NamedTemporaryFile("w", prefix="throwcollect-", suffix=".urdf", encoding="utf-8") as file:
-        file.write(urdf)
-        file.flush()
+    # Bullet reads descriptions and meshes from files alone. Meshes are named relative to the description.
+    with tempfile.TemporaryDirectory(prefix="throwcollect-") as directory:
+        for name, content in model.encode_meshes().items():
+            Path(directory, name).write_bytes(content)
+        return load_urdf(client, model.write_urdf(), Path(directory), position, turn, fixed=model.is_fixed, flags=flags)
+
+
+def load_urdf(
+    client: int, urdf: str, directory: Path, position: Vector, turn: Quaternion, *, fixed: bool = True, flags: int = 0
+) -> int:
+    """Load URDF text, whose paths are relative to a directory, and return the number of the body.
+
+    Raises:
+        ConfigError: If Bullet cannot load it, or only a part of it.
+    """
+    path = directory / "body.urdf"
+    path.write_text(urdf, encoding="utf-8")
+    with failing_on_output("Bullet cannot load the description"):
         try:
-            place = [0, 0, base_height_m]
-            return int(pybullet.loadURDF(file.name, place, useFixedBase=True, flags=flags, physicsClientId=client))
+            return int(
+                pybullet.loadURDF(str(path), position, turn, useFixedBase=fixed, flags=flags, physicsClientId=client)
+            )
         except pybullet.error as error:
-            raise ConfigError(f"Bullet cannot load the robot's description: {error}") from error
+            raise ConfigError(f"Bullet cannot load the description: {error}") from error
+
+
+def describe_links(client: int, robot: int) -> list[LoadedLink]:
+    """Describe the links of a robot whose joints are at 0 (see `Engine.describe_robot`)."""
+    found = []
+    for link in links(client, robot):
+        mass, _, moments, *_ = pybullet.getDynamicsInfo(robot, link, physicsClientId=client)
+        axis, ends, name = None, None, pybullet.getBodyInfo(robot, physicsClientId=client)[0]
+        if link == BASE:
+            origin, frame = pybullet.getBasePositionAndOrientation(robot, physicsClientId=client)
+        else:
+            # The pose of the centre of mass, with the principal axes.
+            origin, frame, *_ = pybullet.getLinkState(
+                robot, link, computeForwardKinematics=True, physicsClientId=client
+            )
+            joint = pybullet.getJointInfo(robot, link, physicsClientId=client)
+            name = joint[12]
+            if joint[2] != pybullet.JOINT_FIXED:
+                axis, ends = _turn(frame) @ joint[13], (joint[8], joint[9])
+        rotation = _turn(frame)
+        shapes = len(pybullet.getCollisionShapeData(robot, link, physicsClientId=client))
+        found.append(
+            LoadedLink(
+                name=name.decode(),
+                mass_kg=mass,
+                centre=np.array(origin),
+                inertia=rotation * moments @ rotation.T,
+                shapes=shapes,
+                box=pybullet.getAABB(robot, link, physicsClientId=client) if shapes else None,
+                axis=axis,
+                range=ends,
+            )
+        )
+    return found
+
+
+def _turn(quaternion: Quaternion) -> NDArray[np.float64]:
+    return np.array(pybullet.getMatrixFromQuaternion(quaternion)).reshape(3, 3)
 
 
 def load_ball(client: int, radius: float) -> int:

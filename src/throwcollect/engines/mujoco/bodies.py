@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import xml.etree.ElementTree as ElementTree
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import mujoco
 
-from throwcollect.engines.engine import Bodies, BodyModel, BodyState, Box
+from throwcollect.engines.body import BodyModel
+from throwcollect.engines.engine import Bodies, BodyState, Box
 from throwcollect.engines.mujoco.rotations import rotation, turn, turn_back
-from throwcollect.engines.mujoco.scenery import Surface, boxes, collide_with_everything, read_urdf, rename_links, watch
+from throwcollect.engines.mujoco.scenery import Surface, boxes, collide_with_everything, read_body, watch
 from throwcollect.errors import RequestError
 
 _FREE_JOINT = "free"
@@ -66,7 +66,7 @@ class MujocoBodies(Bodies):
         Raises:
             RequestError: ``RESOURCE_PARSE_ERROR`` if MuJoCo does not take it, or would fill in its meshes.
         """
-        if model.meshes and 'concave="yes"' in model.urdf:
+        if any(shape.is_concave for link in model.links for shape in link.shapes):
             raise RequestError(
                 "RESOURCE_PARSE_ERROR",
                 "MuJoCo would fill in the mesh of a body that is attached to the world",
@@ -96,8 +96,9 @@ class MujocoBodies(Bodies):
             ValueError: If MuJoCo cannot read a description.
         """
         for name, body in self._bodies.items():
-            text, body.links = _number_links(body.model.urdf)
-            child = read_urdf(text, body.model.encode_meshes())
+            # MuJoCo gives names such as `world` a meaning, so links have their numbers for names.
+            body.links = [link.name for link in body.model.links]
+            child = read_body(body.model.rename_links({name: str(index) for index, name in enumerate(body.links)}))
             for joint in child.joints:
                 # MuJoCo reads the effort limit of a URDF as a range of motor torques. Set as dry friction instead, it
                 # brakes the joint.
@@ -163,12 +164,3 @@ class MujocoBodies(Bodies):
         """List MuJoCo's body number of each link of a body."""
         model, _ = self._world()
         return [model.body(f"{name}/{number}").id for number in range(len(self._bodies[name].links))]
-
-
-def _number_links(urdf: str) -> tuple[str, list[str]]:
-    """Name the links of a description by numbers, the root 0: MuJoCo gives names such as ``world`` a meaning."""
-    robot = ElementTree.fromstring(urdf.encode())  # noqa: S314 - `BodyModel` has a checked and rewritten description
-    children = {child.get("link") for child in robot.findall("joint/child")}
-    links = sorted((link.get("name", "") for link in robot.findall("link")), key=lambda name: name in children)
-    rename_links(robot, {name: str(number) for number, name in enumerate(links)})
-    return ElementTree.tostring(robot, encoding="unicode"), links

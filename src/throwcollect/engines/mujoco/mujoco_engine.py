@@ -12,17 +12,18 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from throwcollect.engines.body import Vector
 from throwcollect.engines.engine import (
     BodyState,
     Box,
     Engine,
+    LoadedLink,
     Observer,
     Physics,
     Sample,
     Scene,
     State,
     Steps,
-    Vector,
     ball_of,
 )
 from throwcollect.engines.mujoco.bodies import MujocoBodies
@@ -32,6 +33,7 @@ from throwcollect.engines.mujoco.scenery import (
     BALL,
     Surface,
     boxes,
+    describe_links,
     keep_motion,
     make_spec,
     resize_ball,
@@ -121,6 +123,10 @@ class MujocoEngine(Engine):
         self.configure(self._physics)
         self.bodies.place_fixed()
         keep_motion(model, data, self._model, self._data)
+
+    def describe_robot(self) -> list[LoadedLink]:
+        """Describe the robot's links as MuJoCo has them."""
+        return describe_links(self._model, self._scene.robot)
 
     def configure(self, physics: Physics) -> None:
         """Set all numbers of the physics."""

@@ -8,7 +8,8 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from throwcollect.engines.engine import Quaternion, Vector
+from throwcollect.engines.body import Vector
+from throwcollect.engines.engine import Quaternion
 
 
 def turn(orientation_xyzw: Sequence[float], vector: Sequence[float]) -> Vector:

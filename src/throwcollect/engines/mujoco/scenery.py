@@ -5,15 +5,15 @@ As in Bullet, nothing but the ball collides with other things as long as no body
 
 from __future__ import annotations
 
-import xml.etree.ElementTree as ElementTree
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from throwcollect.engines.engine import GROUND, Box, Physics, Scene
+from throwcollect.engines.body import BodyModel
+from throwcollect.engines.engine import GROUND, Box, LoadedLink, Physics, Scene
 from throwcollect.engines.mujoco.contact_targets import HARDNESS
 from throwcollect.errors import ConfigError
 from throwcollect.reproducible_math import matmul
@@ -54,15 +54,16 @@ class Surface:
     name: str
 
 
-def read_urdf(text: str, meshes: dict[str, bytes] | None = None) -> mujoco.MjSpec:
-    """Read a description, whose links all become bodies; `meshes` are its mesh files unless these are on disk.
+def read_body(model: BodyModel) -> mujoco.MjSpec:
+    """Read a body, whose links all become bodies of MuJoCo.
 
     Raises:
-        ValueError: If MuJoCo cannot read it.
+        ValueError: If MuJoCo does not take it.
     """
+    text = model.write_urdf()
     begin = text.index("<robot")
     at = text.index(_ROOT_TAG_END, begin) + 1
-    spec = mujoco.MjSpec.from_string(text[:at] + _COMPILER + text[at:], assets=meshes)
+    spec = mujoco.MjSpec.from_string(text[:at] + _COMPILER + text[at:], assets=model.encode_meshes())
     for joint in spec.joints:
         # A motor overcomes the friction of its joint, as in Bullet.
         joint.frictionloss = 0.0
@@ -79,7 +80,7 @@ def make_spec(scene: Scene) -> tuple[mujoco.MjSpec, list[Surface]]:
         ConfigError: If MuJoCo cannot read the robot's description.
     """
     try:
-        spec = read_urdf(_rename_world(scene.urdf))
+        spec = read_body(scene.robot.rename_links({_WORLD_LINK: _STAND_IN}))
     except ValueError as error:
         raise ConfigError(f"MuJoCo cannot read the robot's description: {error}") from error
     world = spec.worldbody
@@ -108,23 +109,6 @@ def make_spec(scene: Scene) -> tuple[mujoco.MjSpec, list[Surface]]:
     # MuJoCo would reset a world that diverges. Without that, its numbers are not finite, and the trial is refused.
     option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
     return spec, surfaces
-
-
-def _rename_world(urdf: str) -> str:
-    """Rename the link `_WORLD_LINK`; a description without one stays as it is."""
-    robot = ElementTree.fromstring(urdf)  # noqa: S314 - a scene's files can be trusted
-    if robot.find(f"link[@name='{_WORLD_LINK}']") is None:
-        return urdf
-    rename_links(robot, {_WORLD_LINK: _STAND_IN})
-    return ElementTree.tostring(robot, encoding="unicode")
-
-
-def rename_links(robot: ElementTree.Element, names: Mapping[str, str]) -> None:
-    """Give links of a description new names, by the old ones; the others keep theirs."""
-    for key, elements in (("name", robot.findall("link")), ("link", robot.findall("joint/*[@link]"))):
-        for element in elements:
-            name = element.get(key, "")
-            element.set(key, names.get(name, name))
 
 
 def _add_ball(spec: mujoco.MjSpec, radius: float) -> None:
@@ -249,3 +233,29 @@ def _find_extent(
     centre = matmul(axes.T, (data.geom_xpos[geom] - origin).reshape(3, 1)) + matmul(turned, box[0])
     half = matmul(np.abs(turned), box[1])
     return (centre - half).ravel(), (centre + half).ravel()
+
+
+def describe_links(model: mujoco.MjModel, robot: BodyModel) -> list[LoadedLink]:
+    """Describe the links of a robot with all joints at 0 (see `Engine.describe_robot`)."""
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    mujoco.mj_comPos(model, data)
+    found = []
+    for link in robot.links:
+        body = model.body(_STAND_IN if link.name == _WORLD_LINK else link.name).id
+        joint = int(model.body_jntadr[body])
+        frame = data.ximat[body].reshape(3, 3)
+        around = boxes(model, data, [body])
+        found.append(
+            LoadedLink(
+                name=link.name,
+                mass_kg=float(model.body_mass[body]),
+                centre=data.xipos[body].copy(),
+                inertia=frame * model.body_inertia[body] @ frame.T,
+                shapes=int(model.body_geomnum[body]),
+                box=around[0] if around else None,
+                axis=data.xaxis[joint].copy() if joint >= 0 else None,
+                range=tuple(model.jnt_range[joint].tolist()) if joint >= 0 else None,
+            )
+        )
+    return found

@@ -5,7 +5,7 @@ from __future__ import annotations
 import base64
 
 from throwcollect.errors import ConfigError
-from throwcollect.robots.description import PACKAGE
+from throwcollect.robots.urdf import PACKAGE
 from throwcollect.serve.robot_files import find_mesh
 from throwcollect.serve.rosbridge.service_calls import Call
 

@@ -1,0 +1,135 @@
+"""Triangle meshes of collision shapes, read in one way for every engine: STL and OBJ here, COLLADA by assimp."""
+
+from __future__ import annotations
+
+import itertools
+import re
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from throwcollect.errors import ConfigError
+from throwcollect.pinocchio_library import pinocchio
+
+Triangles = NDArray[np.float32]
+"""Corners of triangles, shape ``(n_triangles, 3, 3)``, in the units of the file."""
+
+STL = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+"""A triangle in a binary STL file, which has a title of 80 bytes and the number of triangles before them."""
+
+FORMATS = (".stl", ".obj", ".dae")
+_LARGEST_FILE = 32 * 2**20
+_LARGEST_COORDINATE = 1e6
+_LEAST_THICKNESS = 1e-6
+"""Least extent of a solid in its thinnest direction, as a share of its extent in the longest."""
+
+_HEADER, _RECORD = 84, 50
+_VERTEX = re.compile(rb"\bvertex\s+(\S+)\s+(\S+)\s+(\S+)")
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """The mesh in a file, which is read when its triangles are first needed."""
+
+    path: Path
+
+    @cached_property
+    def triangles(self) -> Triangles:
+        """The triangles of the file, at least one; all numbers are finite.
+
+        Raises:
+            ConfigError: If there is no such file, or it has another format, is too large or is broken.
+        """
+        path = self.path
+        self.check()
+        read = {".stl": _read_stl, ".obj": _read_obj, ".dae": _read_collada}[path.suffix.lower()]
+        try:
+            triangles = read(path)
+        except (OSError, RuntimeError, ValueError, IndexError) as error:
+            raise ConfigError(f"{path}: cannot be read as a mesh: {error}") from error
+        if not len(triangles):
+            raise ConfigError(f"{path}: a mesh without triangles")
+        if not (np.abs(triangles) <= _LARGEST_COORDINATE).all():
+            raise ConfigError(f"{path}: coordinates beyond {_LARGEST_COORDINATE:g}")
+        return triangles
+
+    def check(self) -> None:
+        """Check the file as far as that is possible without reading it.
+
+        Raises:
+            ConfigError: If there is no such file, or it has another format or is too large.
+        """
+        path = self.path
+        try:
+            size = path.stat().st_size if path.is_file() else None
+        except (OSError, ValueError) as error:
+            raise ConfigError(f"{path!s:.255}: cannot be read: {error}") from error
+        if size is None:
+            raise ConfigError(f"{path!s:.255}: no such file")
+        if path.suffix.lower() not in FORMATS:
+            raise ConfigError(f"{path}: collision meshes of this format cannot be read", expected=" or ".join(FORMATS))
+        if size > _LARGEST_FILE:
+            raise ConfigError(f"{path}: {size} bytes; at most {_LARGEST_FILE}")
+
+    @property
+    def is_flat(self) -> bool:
+        """Whether all corners lie in one plane, so that the mesh has no inside."""
+        corners = self.triangles.reshape(-1, 3).astype(np.float64)
+        extents = np.linalg.svd(np.unique(corners - corners.mean(axis=0), axis=0), compute_uv=False)
+        return bool(len(extents) < 3 or extents[2] <= _LEAST_THICKNESS * extents[0])
+
+    def encode(self) -> bytes:
+        """Encode the triangles as binary STL."""
+        records = np.zeros(len(self.triangles), STL)
+        records["corners"] = self.triangles
+        return bytes(80) + len(records).to_bytes(4, "little") + records.tobytes()
+
+
+def _read_stl(path: Path) -> Triangles:
+    content = path.read_bytes()
+    count = int.from_bytes(content[_HEADER - 4 : _HEADER], "little")
+    # The length tells a binary file, because some of them begin with `solid`, as all text files do.
+    if len(content) >= _HEADER and len(content) == _HEADER + count * _RECORD:
+        corners: Triangles = np.frombuffer(content, STL, count, _HEADER)["corners"]
+        return corners
+    if not content.lstrip().startswith(b"solid"):
+        raise ValueError(f"{len(content)} bytes are no STL of {count} triangles")
+    return np.array(_VERTEX.findall(content)).astype(np.float32).reshape(-1, 3, 3)
+
+
+def _read_obj(path: Path) -> Triangles:
+    vertices: list[list[float]] = []
+    faces: list[tuple[int, int, int]] = []
+    for line in path.read_bytes().splitlines():
+        kind, *words = line.split() or [b""]
+        if kind == b"v":
+            x, y, z = words[:3]
+            vertices.append([float(x), float(y), float(z)])
+        elif kind == b"f":
+            corners = [_find_index(int(word.partition(b"/")[0]), len(vertices)) for word in words]
+            faces += [(corners[0], *pair) for pair in itertools.pairwise(corners[1:])]
+    return np.array(vertices, np.float32).reshape(-1, 3)[np.array(faces, np.int64).reshape(-1, 3)]
+
+
+def _find_index(number: int, vertices: int) -> int:
+    """Find the index of a vertex: OBJ counts vertices from 1, or backwards from -1 for the last vertex so far.
+
+    Raises:
+        ValueError: If there is no such vertex.
+    """
+    index = number - 1 if number > 0 else vertices + number
+    if not (number and 0 <= index < vertices):
+        raise ValueError(f"a face uses vertex {number} of {vertices}")
+    return index
+
+
+def _read_collada(path: Path) -> Triangles:
+    """Read COLLADA with its units and its upward axis, as viewers of ROS do."""
+    model = pinocchio.coal.MeshLoader(pinocchio.coal.BV_OBB).load(str(path), np.ones(3))
+    triangles = (model.tri_indices(index) for index in range(model.num_tris))
+    numbers = [[triangle[corner] for corner in range(3)] for triangle in triangles]
+    corners: Triangles = np.asarray(model.vertices(), np.float32)[numbers]
+    return corners

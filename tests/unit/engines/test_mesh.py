@@ -1,0 +1,75 @@
+import numpy as np
+import pytest
+
+from throwcollect.engines.mesh import Mesh
+from throwcollect.errors import ConfigError
+
+CORNERS = np.array([[[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 0, 1], [1, 0, 1], [0, 1, 2.5]]], np.float32)
+ASCII = "solid x\n" + "".join(
+    "facet normal 0 0 1\nouter loop\n" + "".join(f"vertex {x} {y} {z}\n" for x, y, z in each) + "endloop\nendfacet\n"
+    for each in CORNERS
+)
+
+
+def test_binary_stl_is_read(tmp_path):
+    facets = b"".join(bytes(12) + corners.tobytes() + bytes(2) for corners in CORNERS)
+    (tmp_path / "mesh.STL").write_bytes(bytes(80) + len(CORNERS).to_bytes(4, "little") + facets)
+    assert Mesh(tmp_path / "mesh.STL").triangles.tolist() == CORNERS.tolist()
+
+
+def test_stl_as_text_is_read(tmp_path):
+    (tmp_path / "mesh.stl").write_text(ASCII + "endsolid x\n")
+    assert Mesh(tmp_path / "mesh.stl").triangles.tolist() == CORNERS.tolist()
+
+
+def test_faces_of_obj_are_split_into_triangles(tmp_path):
+    square = "# a square\nv 0 0 0\nv 1 0 0 1.0\nvn 0 0 1\nv 1 1 0\nv 0 1 0\n\nf 1/1/1 2//1 -2 -1\n"
+    (tmp_path / "mesh.obj").write_text(square)
+    assert Mesh(tmp_path / "mesh.obj").triangles.tolist() == [
+        [[0, 0, 0], [1, 0, 0], [1, 1, 0]],
+        [[0, 0, 0], [1, 1, 0], [0, 1, 0]],
+    ]
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "words"),
+    [
+        ("mesh.dae", b"<COLLADA/>", "cannot be read as a mesh"),
+        ("mesh.ply", b"ply", ".stl or .obj or .dae"),
+        ("mesh.stl", b"", "0 bytes are no STL"),
+        ("mesh.stl", bytes(84), "without triangles"),
+        (
+            "mesh.stl",
+            bytes(80) + b"\xff\xff\xff\xff" + bytes(50),
+            "no STL of 4294967295 triangles",
+        ),
+        ("mesh.stl", b"solid x\nvertex 0 0 0\n", "cannot be read as a mesh"),
+        ("mesh.stl", b"solid x\nvertex a b c\n", "cannot be read as a mesh"),
+        ("mesh.stl", ASCII.replace("2.5", "nan").encode(), "coordinates beyond 1e\\+06"),
+        ("mesh.stl", ASCII.replace("2.5", "1e30").encode(), "coordinates beyond 1e\\+06"),
+        ("mesh.obj", b"v 0 0 0\nf 1 2 9\n", "a face uses vertex 2 of 1"),
+        ("mesh.obj", b"v 0 0 0\nf 0 0 0\n", "a face uses vertex 0 of 1"),
+        ("mesh.obj", b"v 0 0 0\nf -1 -2 -1\n", "a face uses vertex -2 of 1"),
+        ("mesh.obj", b"v 0 0\nf 1 1 1\n", "cannot be read as a mesh"),
+        ("mesh.obj", bytes(range(256)), "without triangles"),
+        ("mesh.obj", None, "no such file"),
+    ],
+)
+def test_meshes_that_cannot_be_used_are_refused_by_their_names(name, content, words, tmp_path):
+    if content is not None:
+        (tmp_path / name).write_bytes(content)
+    with pytest.raises(ConfigError, match=f"{name}: .*({words})|{words}") as refused:
+        _ = Mesh(tmp_path / name).triangles
+    assert name in str(refused.value)
+
+
+def test_a_missing_or_too_large_mesh_file_is_refused(tmp_path):
+    (tmp_path / "directory.stl").mkdir()
+    with pytest.raises(ConfigError, match="no such file"):
+        _ = Mesh(tmp_path / "directory.stl").triangles
+    with open(tmp_path / "huge.stl", "wb") as file:
+        file.truncate(2**40)
+    with pytest.raises(ConfigError, match="1099511627776 bytes"):
+        _ = Mesh(tmp_path / "huge.stl").triangles
+    with pytest.raises(ConfigError, match=r"cannot be read|no such file"):
+        _ = Mesh(tmp_path / ("x" * 5000 + ".stl")).triangles
