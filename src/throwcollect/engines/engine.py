@@ -76,7 +76,7 @@ class Scene:
         moving: The joints that are commanded, in the order of every command and sample.
         base_height_m: Height of its fixed base above the ground.
         tool: The tool.
-        ground_is_solid: Whether the ground stops the ball; it stops other bodies in any case.
+        ground_is_solid: Whether the ground stops the ball in all steps; it stops other bodies in any case.
         ball_radius_m: Radius of the ball.
     """
 
@@ -141,6 +141,7 @@ class Steps:
         first_sample: Number of the first step after which a sample is due; the first step is number 1.
         stride: Steps from one sample to the next.
         drag_kgpm: Force of the air on the ball over the square of the ball's speed.
+        ground_is_solid: Whether the ground stops the ball in these steps, even if that of the scene does not.
     """
 
     targets: NDArray[np.float64]
@@ -148,6 +149,7 @@ class Steps:
     first_sample: int
     stride: int
     drag_kgpm: float = 0.0
+    ground_is_solid: bool = False
 
 
 class Observer:

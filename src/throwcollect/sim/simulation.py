@@ -1,7 +1,7 @@
 """One simulation without its ROS interface: the world, the limbs' controllers, the clock, and the present run.
 
-A *run* begins when goals have been accepted and ends with the trial, or, when no trial was set up, when all limbs are
-at rest again. The clock stands still outside of runs, so that no step is wasted.
+A *run* begins when goals have been accepted and ends with the trial, or, when no trial was set up, when limbs and
+ball are at rest again. The clock stands still outside of runs, so that no step is wasted.
 """
 
 from __future__ import annotations
@@ -20,16 +20,10 @@ from throwcollect.errors import RequestError, ThrowcollectError
 from throwcollect.robots.description import robot_of, start_posture
 from throwcollect.sim.entities import Entities
 from throwcollect.sim.limb_controller import LimbController
-from throwcollect.sim.pace import Pace, long_stretch_steps, longest_steps, stretch_steps
+from throwcollect.sim.pace import STRETCH_S, WATCHED_STRETCH_S, Pace, long_stretch_steps, longest_steps, stretch_steps
 from throwcollect.sim.present_trial import PresentTrial, TrialSetup
 from throwcollect.sim.world import World
 from throwcollect.units import NS_PER_S
-
-_STRETCH_S = 0.5
-"""Simulated time between two looks at messages in a trial or in many steps: about 20 ms of real time."""
-
-_WATCHED_STRETCH_S = 0.05
-"""Such a time while a client watches, and outside of trials: the period of feedback in ros2_controllers."""
 
 
 class StateCode(IntEnum):
@@ -97,6 +91,8 @@ class Simulation:
         self._pace = Pace()
         self.real_time_factor = config.sim.real_time_factor
         self._results: list[tuple[str, GoalResult]] = []
+        self._driven_until_ns = 0
+        """Time at which a client last moved a limb [ns], or gave it something to do."""
         self._has_start = False
         """Whether the world has a start state to go on from, which it lacks after a reset of its state has failed."""
         self.reset()
@@ -203,7 +199,7 @@ class Simulation:
         self._collect_results()
         if refusal is None:
             self.trial.note_goal(controller)
-            self._running |= self.trial.has_all_goals
+            self._begin_motion()
         return refusal
 
     def cancel(self, controller: str, goal_id: Hashable) -> bool:
@@ -222,7 +218,7 @@ class Simulation:
         refusal = limb.refuse_locked(trajectory) or limb.controller.replace(trajectory, self.now_ns)
         self._collect_results()
         if refusal is None:
-            self._running |= self.trial.has_all_goals
+            self._begin_motion()
         return refusal
 
     def advance(self, *, watched: bool) -> None:
@@ -232,7 +228,7 @@ class Simulation:
         """
         began_s, since_ns, factor = time.monotonic(), self.now_ns, self.real_time_factor
         # Long stretches cost the least. Short ones let messages be sent in between, which only watching clients need.
-        stretch_s = _STRETCH_S if (self._in_trial or self._steps) and not (watched or factor) else _WATCHED_STRETCH_S
+        stretch_s = STRETCH_S if (self._in_trial or self._steps) and not (watched or factor) else WATCHED_STRETCH_S
         steps = max(1, round(stretch_s * self.config.sim.physics_hz))
         if (request := self._steps) is not None:
             request.taken += self.step(min(steps, request.wanted - request.taken))
@@ -241,16 +237,17 @@ class Simulation:
             return
         if factor and self.trial.leased and not watched:
             # Every stretch costs time besides physics, so stretches are as long as requests can wait.
-            steps = long_stretch_steps(factor, self.config.sim.physics_hz, _STRETCH_S)
+            steps = long_stretch_steps(factor, self.config.sim.physics_hz, STRETCH_S)
         elif factor:
             steps = stretch_steps(factor, self.config.sim.physics_hz, self._stride, self.world.steps % self._stride)
         self.step(steps)
-        # A trial ends when its rules say so; a motion by hand, when all joints have come to rest.
-        if self._in_trial and self.world.end_reason is not None:
-            self._running = False
-        elif not self._in_trial and not any(limb.is_driven for limb in self.limbs.values()):
-            # The ball may still be on its way then, so the clock runs on until it has landed or rests.
+        # A trial ends when its rules say so; a motion by hand, when limbs and ball rest, or it rolls for too long.
+        if self._in_trial:
             self._running = self.world.end_reason is None
+        elif any(limb.is_driven for limb in self.limbs.values()):
+            self._driven_until_ns = self.now_ns
+        elif self.world.rests or self.now_ns - self._driven_until_ns >= self.config.sim.max_trial_s * NS_PER_S:
+            self._running = False
         if factor:
             self._pace.wait(factor, began_s=began_s, since_ns=since_ns, until_ns=self.now_ns)
 
@@ -350,6 +347,10 @@ class Simulation:
             if not limb.watched:
                 # A client that watches this limb later must not get states from before that.
                 limb.pop_states()
+
+    def _begin_motion(self) -> None:
+        self._driven_until_ns = self.now_ns
+        self._running |= self.trial.has_all_goals
 
     def _interrupt_steps(self, reason: str) -> None:
         if self._steps is not None:

@@ -154,7 +154,7 @@ class World(Observer):
         Args:
             commands: For each step, the position of each moving joint wanted at its end [rad], shape
                 ``(n_steps, n_moving)``.
-            stop_at_end: Whether to take no more steps once the trial has ended.
+            stop_at_end: Whether to take no more steps once the trial has ended. Otherwise the ground stops the ball.
 
         Returns:
             Number of steps taken.
@@ -171,6 +171,7 @@ class World(Observer):
             first_sample=self._stride - first % self._stride,
             stride=self._stride,
             drag_kgpm=self._drag,
+            ground_is_solid=not stop_at_end,
         )
         taken = self.engine.run(steps, self)
         self.steps = first + taken
@@ -187,7 +188,8 @@ class World(Observer):
         self.steps = self._first_step + step
         before = self._log.last
         self._log.append(sample)
-        self.end_reason = self.end_reason or self._judge(before, sample, self._targets[step].tolist())
+        reason = self._judge(before, sample, self._targets[step].tolist())
+        self.end_reason = self.end_reason or reason
         return self._stops_at_end and self.end_reason is not None
 
     def samples(self, first: int = 0) -> Samples:
@@ -221,6 +223,11 @@ class World(Observer):
     def robot_base(self) -> BodyState:
         """The base of the robot, which never moves."""
         return BodyState((0.0, 0.0, self._base_height))
+
+    @property
+    def rests(self) -> bool:
+        """Whether the arm has been standing still, and the ball lying on something, for half a second."""
+        return self.steps - self._resting_since >= REST_S * self._hz
 
     @property
     def ball(self) -> BodyState:
@@ -299,14 +306,14 @@ class World(Observer):
 
     def _judge(self, before: Sample, now: Sample, target: Sequence[float]) -> EndReason | None:
         """Find the reason for which the trial ends with a sample, by the one before; None if the trial goes on."""
-        if now[BALL_HEIGHT] < self._landing_height <= before[BALL_HEIGHT] and self._tool not in self._contacts.bodies:
-            return "landed"
         stands_still = target == self._sampled_target
         self._sampled_target = target
         self._has_moved |= not stands_still
-        lies = stands_still and self._touching and self._has_moved
+        lies = stands_still and self._touching
         if not (lies and math.hypot(*now[BALL_LINEAR_VELOCITY]) < REST_SPEED_MPS):
             self._resting_since = self.steps
-        elif self.steps - self._resting_since >= REST_S * self._hz:
+        if now[BALL_HEIGHT] < self._landing_height <= before[BALL_HEIGHT] and self._tool not in self._contacts.bodies:
+            return "landed"
+        if self._has_moved and self.rests:
             return "rest"
         return "timeout" if self.steps >= self._last_step else None

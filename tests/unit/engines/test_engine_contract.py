@@ -244,6 +244,26 @@ def test_only_solid_ground_stops_the_ball(engine: Engine) -> None:
     assert ball_of(engine.state.sample).position[2] < -0.2
 
 
+def test_ground_can_be_solid_for_some_steps_alone_and_leaves_no_trace(engine: Engine) -> None:
+    engine.load(replace(SCENE, ground_is_solid=False))
+    engine.configure(PHYSICS)
+    engine.rest(START.tolist(), SEAT)
+    engine.run(still(engine, 25), Observer())
+    settled = engine.state
+    engine.reset(settled)
+    first = watch_throw(engine)
+    for _ in range(2):
+        engine.place_ball(BodyState((2.0, 0.0, 0.2), linear_velocity=(0.0, 0.0, -2.0)))
+        engine.run(replace(still(engine, 100), ground_is_solid=True), Observer())
+        assert engine.state.touching == {GROUND}
+        assert ball_of(engine.state.sample).position[2] == pytest.approx(SCENE.ball_radius_m, abs=2e-3)
+    engine.place_ball(BodyState((2.0, 0.0, 0.2)))
+    engine.run(still(engine, 200), Observer())
+    assert ball_of(engine.state.sample).position[2] < -0.2
+    engine.reset(settled)
+    assert watch_throw(engine) == first
+
+
 def test_a_placed_ball_has_exactly_the_given_state(engine: Engine) -> None:
     put = BodyState((1.0, 2.0, 3.0), (0.0, 0.6, 0.0, 0.8), (0.1, 0.2, 0.3))
     engine.place_ball(put)

@@ -7,6 +7,7 @@ import pytest
 from throwcollect.config.schema import Config
 from throwcollect.config.values import with_values
 from throwcollect.control import GoalStatus, Trajectory, TrajectoryGoal, TrajectoryPoint
+from throwcollect.engines.engine import BodyState
 from throwcollect.errors import ConfigError, RequestError
 from throwcollect.robots.description import start_posture
 from throwcollect.robots.talos import TALOS
@@ -152,6 +153,56 @@ def test_without_a_trial_the_run_ends_when_limbs_and_ball_are_at_rest(simulation
     run(simulation)
     assert simulation.now_ns - ended > 1e9
     assert [result.status for _, result in simulation.pop_results()] == [GoalStatus.SUCCEEDED] * 2
+
+
+@pytest.mark.parametrize("engine", ["bullet", "mujoco", "ballistic"])
+def test_without_a_trial_the_ground_stops_the_ball_and_the_clock_runs_until_then(engine: str) -> None:
+    config = Config.model_validate({"sim": {"engine": engine}, "ball": {"restitution": 0.5}})
+    simulation = Simulation(config)
+    # The second fall begins after the longest duration of a trial.
+    for number, duration_s in enumerate((7.0, 0.02)):
+        simulation.world.ball = BodyState((2.0, 0.0, 1.0))
+        assert simulation.submit(ARM, number, goal(ARM, duration_s)) is None
+        run(simulation)
+        ball = simulation.world.ball
+        assert ball.position == pytest.approx((2.0, 0.0, config.ball.radius_m), abs=2e-3)
+        assert np.hypot(*ball.linear_velocity[:2]) + abs(ball.linear_velocity[2]) < 0.01
+    simulation.world.close()
+
+
+def test_a_ball_that_rolls_for_ever_keeps_the_clock_running_for_as_long_as_a_trial(simulation: Simulation) -> None:
+    assert simulation.submit(ARM, 1, swing()) is None
+    run(simulation)
+    rolling = simulation.world.ball
+    assert rolling.position[2] == pytest.approx(CONFIG.ball.radius_m, abs=1e-3)
+    assert rolling.linear_velocity[0] > 1.0
+    assert simulation.now_ns / 1e9 == pytest.approx(1.0 + CONFIG.sim.max_trial_s, abs=0.1)
+
+
+def test_after_a_trial_the_ground_stops_the_ball(simulation: Simulation) -> None:
+    trial(simulation)
+    run(simulation)
+    assert simulation.episode() is not None
+    assert simulation.submit(ARM, 3, swing()) is None
+    run(simulation)
+    assert simulation.world.ball.position[2] == pytest.approx(CONFIG.ball.radius_m, abs=1e-3)
+
+
+def test_a_motion_by_hand_leaves_no_trace_in_a_later_trial(simulation: Simulation) -> None:
+    trial(simulation)
+    run(simulation)
+    fresh = simulation.episode()
+    simulation.trial.setup = TrialSetup(-1, (), CONFIG)
+    simulation.reset()
+    assert simulation.submit(ARM, 1, swing()) is None
+    run(simulation)
+    trial(simulation)
+    run(simulation)
+    later = simulation.episode()
+    assert fresh is not None
+    assert later is not None
+    assert later[0] == fresh[0]
+    assert np.array_equal(later[1].ball_position, fresh[1].ball_position)
 
 
 def test_a_run_of_a_trajectory_without_a_goal_ends(simulation: Simulation) -> None:

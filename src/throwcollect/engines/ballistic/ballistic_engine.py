@@ -148,7 +148,7 @@ class BallisticEngine(Engine):
                 yield moment
         for _ in range(steps_left):
             if moment[2] != _ON_GROUND:
-                moment = self._fly(moment[0], moment[1], steps.drag_kgpm / self._physics.ball_mass_kg)
+                moment = self._fly(moment[0], moment[1], steps)
             yield moment
 
     def _carry(self, steps: Steps) -> Iterator[_Moment]:
@@ -168,17 +168,17 @@ class BallisticEngine(Engine):
         for position, velocity in zip(path[1 : last + 1].tolist(), velocities[1 : last + 1].tolist(), strict=True):
             yield tuple(position), tuple(velocity), self._carried_by
 
-    def _fly(self, position: Vector, velocity: Vector, drag_per_m: float) -> _Moment:
+    def _fly(self, position: Vector, velocity: Vector, steps: Steps) -> _Moment:
         """Compute the ball one step of free flight later, or on the ground if that stops it."""
         dt = 1 / self._physics.hz
         (x, y, z), (vx, vy, vz) = position, velocity
-        braking = drag_per_m * math.sqrt(vx * vx + vy * vy + vz * vz)
+        braking = steps.drag_kgpm / self._physics.ball_mass_kg * math.sqrt(vx * vx + vy * vy + vz * vz)
         # Bullet takes these operations in this order, and so does `tasks.free_flight`, with which flights are compared.
         vx -= braking * vx * dt
         vy -= braking * vy * dt
         vz -= (self._physics.gravity_mps2 + braking * vz) * dt
         x, y, z = x + vx * dt, y + vy * dt, z + vz * dt
         radius = self._scene.ball_radius_m
-        if self._scene.ground_is_solid and z < radius:
+        if (self._scene.ground_is_solid or steps.ground_is_solid) and z < radius:
             return (x, y, radius), (0.0, 0.0, 0.0), _ON_GROUND
         return (x, y, z), (vx, vy, vz), _FREE

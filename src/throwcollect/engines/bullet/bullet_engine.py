@@ -50,6 +50,7 @@ class BulletEngine(Engine):
     can_be_forked = True
     _scenery: Scenery
     _ball: int
+    _has_floor: bool
     _forces: list[float]
     _position_gains: list[float]
     _velocity_gains: list[float]
@@ -127,6 +128,7 @@ class BulletEngine(Engine):
         for joint, position, velocity in zip(joints, positions, velocities, strict=False):
             pybullet.resetJointState(self._scenery.robot, joint, position, velocity, physicsClientId=client)
         renew_pairs(client, self._ball)
+        self._has_floor = False
         self.place_ball(ball_of(state.sample))
         self._touching, self._pressing = state.touching, None
 
@@ -141,6 +143,9 @@ class BulletEngine(Engine):
 
     def run(self, steps: Steps, observer: Observer) -> int:
         """Take steps until the observer stops them."""
+        if steps.ground_is_solid != self._has_floor:
+            self._has_floor = steps.ground_is_solid
+            renew_pairs(self._client, self._ball, floor=self._has_floor)
         # Local names, arguments by position and a single loop, because every operation here costs time in every step.
         client, ball, robot, joints = self._client, self._ball, self._scenery.robot, self._scenery.joints
         forces, position_gains, velocity_gains = self._forces, self._position_gains, self._velocity_gains

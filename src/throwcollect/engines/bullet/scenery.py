@@ -27,7 +27,7 @@ BASE = -1
 
 _GROUND_GROUP, _ROBOT_GROUP, _BALL_GROUP, _ADDED_GROUP, _FLOOR_GROUP = 1, 2, 4, 8, 16
 """Bullet lets a pair collide if the mask of either one has the group of the other: added bodies collide with all, and
-the floor with them alone."""
+the floor, a ground that is not solid, with them alone."""
 
 
 @dataclass(frozen=True)
@@ -176,9 +176,10 @@ def load_ball(client: int, radius: float) -> int:
     return ball
 
 
-def renew_pairs(client: int, ball: int) -> None:
-    """Let the ball collide with everything; setting its filter makes Bullet forget all contacts that it had."""
-    pybullet.setCollisionFilterGroupMask(ball, BASE, _BALL_GROUP, _GROUND_GROUP | _ROBOT_GROUP, physicsClientId=client)
+def renew_pairs(client: int, ball: int, *, floor: bool = False) -> None:
+    """Let the ball collide with everything, or also with a floor; Bullet then forgets all contacts that it had."""
+    mask = _GROUND_GROUP | _ROBOT_GROUP | (_FLOOR_GROUP if floor else 0)
+    pybullet.setCollisionFilterGroupMask(ball, BASE, _BALL_GROUP, mask, physicsClientId=client)
 
 
 def collide_with_everything(client: int, body: int) -> None:

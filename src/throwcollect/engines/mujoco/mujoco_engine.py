@@ -35,6 +35,7 @@ from throwcollect.engines.mujoco.scenery import (
     boxes,
     describe_links,
     keep_motion,
+    let_ball_hit_floor,
     make_spec,
     resize_ball,
     restitutions_of,
@@ -150,6 +151,7 @@ class MujocoEngine(Engine):
         count, data = len(self._columns), self._data
         # Bodies that were added stay where they are.
         added = data.qpos[count + 7 :].copy(), data.qvel[count + 6 :].copy()
+        let_ball_hit_floor(self._model, floor=False)
         mujoco.mj_resetData(self._model, data)
         data.qpos[count + 7 :], data.qvel[count + 6 :] = added
         positions, velocities = np.array(state.sample[: 2 * count]).reshape(2, count)
@@ -172,6 +174,7 @@ class MujocoEngine(Engine):
         present state give the torque for that, with the contact forces of the step before and within the efforts. So
         the solver finds contacts for the motion that the tool really has.
         """
+        let_ball_hit_floor(self._model, floor=steps.ground_is_solid)
         # Local names, arithmetic in place and a single loop, because every operation here costs time in every step.
         model, data, physics = self._model, self._data, self._physics
         count, hz = len(self._columns), float(physics.hz)

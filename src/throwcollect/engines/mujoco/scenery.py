@@ -25,6 +25,7 @@ _GROUND_BIT, _ROBOT_BIT, _FLOOR_BIT, _ADDED_BIT = 1, 2, 4, 8
 """Bits of ``contype`` and ``conaffinity``: a pair collides if the one's type is among those that the other collides
 with."""
 
+_BALL_HITS = _GROUND_BIT | _ROBOT_BIT | _ADDED_BIT
 _EVERYTHING = _GROUND_BIT | _ROBOT_BIT | _FLOOR_BIT | _ADDED_BIT
 _REACH_M = 0.02
 """MuJoCo makes a contact of shapes at this distance, so that a fast ball does not get inside of a shape in one step."""
@@ -121,7 +122,7 @@ def _add_ball(spec: mujoco.MjSpec, radius: float) -> None:
         size=(radius, 0.0, 0.0),
         mass=1.0,
         contype=0,
-        conaffinity=_GROUND_BIT | _ROBOT_BIT | _ADDED_BIT,
+        conaffinity=_BALL_HITS,
         priority=_BALL_PRIORITY,
     )
 
@@ -159,6 +160,13 @@ def resize_ball(model: mujoco.MjModel, radius: float) -> None:
     model.bvh_aabb[model.body_bvhadr[body], 3:] = radius
     first = model.body_dofadr[body]
     model.dof_length[first + 3 : first + 6] = radius
+
+
+def let_ball_hit_floor(model: mujoco.MjModel, *, floor: bool) -> None:
+    """Let the ball collide with a ground that is not solid, too, or not."""
+    hits = _BALL_HITS | (_FLOOR_BIT if floor else 0)
+    # MuJoCo looks at the bits of bodies before those of their shapes.
+    model.geom_conaffinity[model.geom(BALL).id] = model.body_conaffinity[model.body(BALL).id] = hits
 
 
 def set_physics(model: mujoco.MjModel, physics: Physics) -> None:
