@@ -27,6 +27,8 @@ from tests.commands import start_command
 from tests.e2e.collection import FAST, call_here, collect_here, fingerprints, write_config
 from tests.e2e.page import wait_for
 from throwcollect import ros
+from throwcollect.config.schema import Config
+from throwcollect.robots.description import robot_of, start_posture
 from throwcollect.ros.srv import GetParameters
 from throwcollect.run_key import RunKey
 from throwcollect.runs.records import Records
@@ -274,18 +276,46 @@ def read_factor(name: str) -> float:
         ros.shutdown(context=context)
 
 
+def test_a_session_has_real_time_and_a_floor(server: Server) -> None:
+    assert server.ask("PUT", "/instances/floor", {"component": "talos", "simulations": 1})[0] == 202
+    server.wait_until("floor", "running")
+    assert read_factor("floor") == 1.0
+    joints = robot_of(Config()).controllers["arm_right_controller"]
+    ends = {**start_posture(Config()), **Config().task.end}
+    point = {"positions": [ends[joint] for joint in joints], "time_from_start": {"sec": 1}}
+    goal = {
+        "op": "send_action_goal",
+        "action": "/sim_0/arm_right_controller/follow_joint_trajectory",
+        "action_type": "control_msgs/action/FollowJointTrajectory",
+        "args": {"trajectory": {"joint_names": joints, "points": [point]}},
+    }
+    began = time.monotonic()
+    with server.open_rosbridge("floor") as client:
+        client.send(json.dumps(goal))
+        assert json.loads(client.recv(60))["values"]["error_code"] == 0
+        assert time.monotonic() - began > 0.9
+        heights = [1.0]
+        client.send(json.dumps({"op": "subscribe", "topic": "/sim_0/ball/odometry", "type": "nav_msgs/msg/Odometry"}))
+        while len(heights) < 100 or heights[-1] != heights[-2]:
+            heights.append(json.loads(client.recv(60))["msg"]["pose"]["pose"]["position"]["z"])
+    assert heights[-1] == min(heights) == Config().ball.radius_m
+    assert server.ask("DELETE", "/instances/floor")[0] == 202
+    assert server.wait_until("floor", "ended")["exit_code"] == 0
+
+
 def test_a_session_runs_in_real_time_as_long_as_a_client_watches(place: Place, server: Server) -> None:
-    assert server.ask("PUT", "/instances/talos", {"component": "talos", "simulations": 1})[0] == 202
+    faster = {"component": "talos", "simulations": 1, "set": {"sim.real_time_factor": 4}}
+    assert server.ask("PUT", "/instances/talos", faster)[0] == 202
     assert server.ask("PUT", "/instances/other", {"component": "talos"})[0] == 409
     begun = server.wait_until("talos", "running")
     assert (begun["kind"], begun["robots"], begun["dataset"]) == ("session", ["sim_0"], None)
-    assert read_factor("talos") == 0.0
+    assert read_factor("talos") == 4.0
     with server.open("/instances/talos/live/sim_0"):
         with server.open("/instances/talos/live/sim_0"):
             assert read_factor("talos") == 1.0
         time.sleep(1.0)
         assert read_factor("talos") == 1.0
-    wait_for(lambda: read_factor("talos") == 0.0)
+    wait_for(lambda: read_factor("talos") == 4.0)
     with server.open("/instances/talos/live/sim_1") as nobody, pytest.raises(ConnectionClosed) as end:
         nobody.recv()
     assert (end.value.rcvd and end.value.rcvd.code) == 4404
@@ -303,7 +333,7 @@ def test_a_session_runs_in_real_time_as_long_as_a_client_watches(place: Place, s
         # The next server restores the speed that a killed one has slowed down.
         assert read_factor("talos") == 1.0
         again = place.serve()
-        wait_for(lambda: read_factor("talos") == 0.0)
+        wait_for(lambda: read_factor("talos") == 4.0)
     assert again.ask("DELETE", "/instances/talos")[0] == 202
     assert again.wait_until("talos", "ended")["exit_code"] == 0
     again.kill()

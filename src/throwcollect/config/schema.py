@@ -163,7 +163,8 @@ class SimConfig(Section):
     command_delay_s: Annotated[float, Field(ge=0, le=0.2), Key(swept=True)] = 0.0
     """Time between a controller's command and the motor acting on it."""
     real_time_factor: Annotated[Annotated[float, Field(ge=SLOWEST, le=FASTEST)] | None, Key(Effect.APPEARANCE)] = None
-    """Upper bound of simulated over real time, for people who watch; null: as fast as possible."""
+    """Upper bound of simulated over real time, for people who watch; null: 1 in a session (docs/serve.md), otherwise as
+    fast as possible."""
     max_trial_s: Annotated[float, Field(gt=0, le=60)] = 6.0
     """Simulated time after which a trial is ended as `timeout`."""
 

@@ -21,6 +21,7 @@ from pydantic import TypeAdapter
 
 from throwcollect.config.loader import dump_yaml, load, load_locating_errors
 from throwcollect.config.schema import Config
+from throwcollect.config.values import with_values
 from throwcollect.coordinator.onlooker import Onlooker
 from throwcollect.coordinator.progress import Progress
 from throwcollect.dataset.directory import config_path
@@ -308,8 +309,10 @@ def _prepare_collection(records: Records, run: OpenRun, order: Order, onlooker: 
 
 
 def _prepare_session(records: Records, run: OpenRun, order: Order, onlooker: Onlooker) -> PreparedRun:
-    with load_locating_errors(order.config, order.overrides) as config:
-        _check_session(config)
+    with load_locating_errors(order.config, order.overrides) as read:
+        _check_session(read)
+        # Clients of a session act in real time. The file has the factor, as nodes and watchers take it from there.
+        config = with_values(read, {"sim.real_time_factor": read.sim.real_time_factor or 1.0})
         directory = run.directory / "data"
         directory.mkdir(exist_ok=True)
         write_file(config_path(directory), dump_yaml(config).encode())
