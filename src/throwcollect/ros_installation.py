@@ -9,6 +9,7 @@ import os
 import platform
 import re
 import shlex
+import subprocess
 import sys
 from importlib.metadata import PackageNotFoundError, version
 from importlib.util import find_spec
@@ -60,14 +61,25 @@ def missing() -> list[str]:
     return lacking
 
 
-def rmws() -> list[str]:
-    """List the names of the RMW implementations that are installed, in alphabetical order."""
+def rmws(python: str = sys.prefix) -> list[str]:
+    """List the names of the RMW implementations that are installed, in alphabetical order; `python` is its prefix."""
     # Setup scripts of ROS set AMENT_PREFIX_PATH; wheels install below the prefix of Python, and set no variable.
-    prefixes = [*filter(None, os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep)), sys.prefix]
+    prefixes = filter(None, [*os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep), python])
     index = Path("share", "ament_index", "resource_index", "rmw_typesupport")
     names = {path.name for prefix in prefixes for path in (Path(prefix) / index).glob("rmw_*")}
     # The package `rmw_implementation` only loads one of the others.
     return sorted(names - {"rmw_implementation"})
+
+
+def shell_rmws() -> list[str]:
+    """List the RMW implementations of the ROS 2 that this process' shell finds; none if it finds no ROS 2."""
+    # Its Python may be another than this one, and a shim of another place, so it is asked.
+    ask = ["python3", "-c", "import sys; print(sys.prefix)"]
+    try:
+        said = subprocess.run(ask, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=10, check=False)
+    except (OSError, subprocess.TimeoutExpired):
+        return rmws("")
+    return rmws(said.stdout.strip())
 
 
 def rclpy_version() -> str | None:

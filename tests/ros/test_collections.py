@@ -197,9 +197,11 @@ def test_only_a_shell_that_evaluates_ros_env_sees_the_run(going_on: Running, mon
         assert json.loads(python(LOOK, {**plain, "ROS_DOMAIN_ID": DOMAIN, **way})) == [], way
     # As docs/ros.md says it.
     script = f'eval "$({sys.executable} -m throwcollect ros env)"; exec {sys.executable} -c "$PROGRAM"'
+    # The `python3` of the shell is that of the wheels, whose RMW `ros env` compares with that of the run.
+    path = os.pathsep.join([str(Path(sys.prefix, "bin")), os.environ["PATH"]])
     said = subprocess.run(
         ["bash", "-c", script],
-        env={**os.environ, "PROGRAM": JOIN},
+        env={**os.environ, "PROGRAM": JOIN, "PATH": path},
         capture_output=True,
         text=True,
         timeout=90,

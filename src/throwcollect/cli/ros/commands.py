@@ -27,11 +27,12 @@ _PROFILE = "fast_dds.xml"
 @ros_app.command("env")
 def env(run: RunOption = None) -> None:
     """Print the line that lets a shell's ROS 2 nodes join a run: eval "$(throwcollect ros env)"."""
-    from throwcollect.cli.ros.joined_run import find_run_and_connection
+    from throwcollect.cli.ros.joined_run import find_run_and_connection, require_rmw_of_shell
     from throwcollect.ros.fast_dds import PLAIN_DISCOVERY, PROFILE_VARIABLE, client_profile
     from throwcollect.ros.middleware import RMW_VARIABLE
 
     found, connection = find_run_and_connection(run)
+    require_rmw_of_shell(found)
     middleware = found.record.middleware
     # The variables name files and hold no secret, because others may read the environment of a process.
     variables = {**connection.environment(), RMW_VARIABLE: middleware.rmw}

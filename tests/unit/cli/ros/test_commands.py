@@ -11,6 +11,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import suppress
+from dataclasses import replace
 from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -40,7 +41,7 @@ from throwcollect.ros.connection import Connection
 from throwcollect.ros.middleware import Middleware
 from throwcollect.ros.router import router
 from throwcollect.run_key import RunKey
-from throwcollect.runs.records import Records
+from throwcollect.runs.records import OpenRun, Records
 from throwcollect.runs.run_record import RunRecord
 
 String: Any = get_message("std_msgs/msg/String")
@@ -309,20 +310,14 @@ def test_without_a_router_commands_say_that_there_is_no_session(
     assert "--run RUN" in said.err
 
 
-def test_commands_join_a_run_by_its_name_or_directory(
-    endpoint: str, say: Callable[..., Said], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    monkeypatch.setenv("THROWCOLLECT_STATE", str(tmp_path))
-    for variable in Connection(endpoint, RunKey(tmp_path)).environment():
-        monkeypatch.setenv(variable, "nonsense")
-    run = Records().new("throws")
+def write_record(run: OpenRun, directory: Path, endpoint: str, **fields: Any) -> None:
     record = RunRecord(
         run=run.run,
         name="throws",
         runtime="local",
-        directory=str(tmp_path / "data"),
+        directory=str(directory / "data"),
         volume=None,
-        logs=str(tmp_path),
+        logs=str(directory),
         domain_id=0,
         started=datetime.now(timezone.utc),
         launcher=os.getpid(),
@@ -330,7 +325,17 @@ def test_commands_join_a_run_by_its_name_or_directory(
         endpoint=endpoint,
         begun_in=os.getcwd(),
     )
-    run.write(record)
+    run.write(replace(record, **fields))
+
+
+def test_commands_join_a_run_by_its_name_or_directory(
+    endpoint: str, say: Callable[..., Said], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setenv("THROWCOLLECT_STATE", str(tmp_path))
+    for variable in Connection(endpoint, RunKey(tmp_path)).environment():
+        monkeypatch.setenv(variable, "nonsense")
+    run = Records().new("throws")
+    write_record(run, tmp_path, endpoint)
     override = f'mode="client";connect/endpoints=["{endpoint}"];listen/endpoints=[]'
     line = (
         f"export THROWCOLLECT_ROS=embedded ZENOH_CONFIG_OVERRIDE='{override}' ROS_DOMAIN_ID=0 "
@@ -355,22 +360,7 @@ def test_env_for_a_run_on_fast_dds_writes_a_profile_that_only_its_owner_can_read
     monkeypatch.setenv("THROWCOLLECT_STATE", str(tmp_path))
     run = Records().new("throws")
     run.key.create()
-    record = RunRecord(
-        run=run.run,
-        name="throws",
-        runtime="local",
-        directory=str(tmp_path / "data"),
-        volume=None,
-        logs=str(tmp_path),
-        domain_id=5,
-        started=datetime.now(timezone.utc),
-        launcher=os.getpid(),
-        simulations=1,
-        endpoint="udp/127.0.0.1:9",
-        begun_in=os.getcwd(),
-        middleware=Middleware("rclpy", "rmw_fastrtps_cpp"),
-    )
-    run.write(record)
+    write_record(run, tmp_path, "udp/127.0.0.1:9", domain_id=5, middleware=Middleware("rclpy", "rmw_fastrtps_cpp"))
     for _ in range(2):
         said = say("env")
         assert (said.code, said.err) == (0, "")
@@ -383,6 +373,43 @@ def test_env_for_a_run_on_fast_dds_writes_a_profile_that_only_its_owner_can_read
     assert profile.stat().st_mode & 0o777 == 0o600
     assert "<udpv4><address>127.0.0.1</address><port>9</port></udpv4>" in profile.read_text(encoding="utf-8")
     assert run.key.private_key.read_text().splitlines()[1] not in said.out + profile.read_text(encoding="utf-8")
+    run.close()
+
+
+def test_env_refuses_a_run_on_an_rmw_that_the_ros_of_the_shell_does_not_have(
+    say: Callable[..., Said], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setenv("THROWCOLLECT_STATE", str(tmp_path))
+    run = Records().new("throws")
+    run.key.create()
+    write_record(run, tmp_path, "tls/127.0.0.1:9")
+    (tmp_path / "bin").mkdir()
+    monkeypatch.setenv("PATH", str(tmp_path / "bin"))
+    monkeypatch.delenv("AMENT_PREFIX_PATH", raising=False)
+    # Without a ROS 2 to compare with, there is nothing to refuse.
+    assert say("env").code == 0
+    # A shim of a version manager lies elsewhere than the Python that it starts.
+    python = tmp_path / "bin" / "python3"
+    python.write_text(f"#!/bin/sh\necho {tmp_path / 'there'}\n")
+    python.chmod(0o755)
+    assert say("env").code == 0
+    index = tmp_path / "there" / "share" / "ament_index" / "resource_index" / "rmw_typesupport"
+    index.mkdir(parents=True)
+    for name in ("rmw_implementation", "rmw_fastrtps_cpp"):
+        (index / name).touch()
+    said = say("env")
+    assert (said.code, said.out) == (2, "")
+    assert f"run {run.run} is on rmw_zenoh_cpp, and the ROS 2 of this shell has rmw_fastrtps_cpp alone\n" in said.err
+    assert "docs/ros.md, 'With another RMW than the run'" in said.err
+    run.update(middleware=Middleware("rclpy", "rmw_fastrtps_cpp"), endpoint="udp/127.0.0.1:9")
+    assert say("env").code == 0
+    run.update(middleware=Middleware(), endpoint="tls/127.0.0.1:9")
+    # The setup script of a ROS 2 that has both sets this variable.
+    other = tmp_path / "opt" / "share" / "ament_index" / "resource_index" / "rmw_typesupport"
+    other.mkdir(parents=True)
+    (other / "rmw_zenoh_cpp").touch()
+    monkeypatch.setenv("AMENT_PREFIX_PATH", str(tmp_path / "opt"))
+    assert say("env").code == 0
     run.close()
 
 
