@@ -25,7 +25,7 @@ from throwcollect.engines.body import (
 from throwcollect.errors import ConfigError, MemberError
 from throwcollect.extras import MissingExtraError, is_installed
 from throwcollect.members import load_member
-from throwcollect.native_output import failing_on_output
+from throwcollect.native_reading import reading_natively
 from throwcollect.pinocchio_library import pinocchio
 from throwcollect.robots.robot import Robot
 from throwcollect.tools.tool import Tool, tool_of
@@ -156,7 +156,7 @@ def joint_model(robot: Robot) -> pinocchio.Model:
     _ = robot.rest_posture
     # Pinocchio gets the links and joints alone: it would take other things from the file than the strict reader.
     bare = replace(source, links=tuple(replace(link, shapes=()) for link in source.links))
-    with failing_on_output(str(robot.urdf_path)):
+    with reading_natively(str(robot.urdf_path)):
         try:
             model = pinocchio.buildModelFromXML(bare.write_urdf())
         except (ValueError, RuntimeError) as error:

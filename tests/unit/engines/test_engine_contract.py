@@ -5,17 +5,17 @@ from __future__ import annotations
 import hashlib
 import os
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 import numpy as np
 import pytest
-from tests.unit.sim.bodies import box
+from tests.unit.sim.bodies import box, pendulum
 
 from throwcollect.config.schema import Config
 from throwcollect.engine_packages import PACKAGES
-from throwcollect.engines.engine import GROUND, BodyState, Engine, Observer, Sample, State, Steps, ball_of
+from throwcollect.engines.engine import GROUND, BodyState, Box, Engine, Observer, Sample, State, Steps, ball_of
 from throwcollect.members import load_member, names_of
 from throwcollect.robots.description import physics_description, start_posture
 from throwcollect.sim.scene import physics_of, scene_of
@@ -124,6 +124,25 @@ def test_a_forked_world_and_its_parent_simulate_the_same_throw(engine: Engine) -
         found = there.read()
     os.waitpid(forked, 0)
     assert found == hashlib.sha256(repr(watch_throw(engine)).encode()).digest()
+
+
+def test_a_decimal_comma_of_the_process_changes_no_throw_and_no_body(
+    name: str, use_decimal_comma: Callable[[], str]
+) -> None:
+    def simulate() -> tuple[Watcher, list[Box]]:
+        made = load_member("engines", name)()
+        begin(made)
+        seen, boxes = watch_throw(made), list[Box]()
+        if made.bodies is not None:
+            model = read_model(pendulum(), lambda _: pytest.fail("there is no mesh"))
+            made.bodies.add("pendulum", model, BodyState((3.0, 0.0, 0.5)))
+            boxes = [*made.bodies.boxes("pendulum"), *made.bodies.bounds("pendulum")]
+        made.close()
+        return seen, boxes
+
+    usual = simulate()
+    use_decimal_comma()
+    assert simulate() == usual
 
 
 def test_renaming_the_root_link_does_not_change_a_throw(engine: Engine) -> None:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from throwcollect.engines.body import BodyModel, Vector
 from throwcollect.engines.engine import GROUND, Box, LoadedLink, Physics, Quaternion, Scene
 from throwcollect.errors import ConfigError, WorkerError
-from throwcollect.native_output import failing_on_output
+from throwcollect.native_reading import reading_natively
 
 Surface = tuple[int, int]
 """Body and link number in Bullet."""
@@ -118,7 +118,7 @@ def load_urdf(
     """
     path = directory / "body.urdf"
     path.write_text(urdf, encoding="utf-8")
-    with failing_on_output("Bullet cannot load the description"):
+    with reading_natively("Bullet cannot load the description"):
         try:
             return int(
                 pybullet.loadURDF(str(path), position, turn, useFixedBase=fixed, flags=flags, physicsClientId=client)

@@ -1,0 +1,51 @@
+import ctypes
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+
+import pytest
+from tests.unit.sim.bodies import pendulum
+
+from throwcollect import Simulator
+from throwcollect.engines.body import Vector
+from throwcollect.engines.bullet.renderer import Renderer
+from throwcollect.native_reading import reading_natively
+
+
+def read_in_c(text: bytes) -> float:
+    atof = ctypes.CDLL(None).atof
+    atof.restype = ctypes.c_double
+    return float(atof(text))
+
+
+def test_a_block_changes_how_c_reads_numbers_for_its_own_thread_alone(use_decimal_comma: Callable[[], str]) -> None:
+    assert read_in_c(b"0.5") == 0.5
+    use_decimal_comma()
+    assert (read_in_c(b"0.5"), read_in_c(b"0,5")) == (0.0, 0.5)
+    with ThreadPoolExecutor(1) as pool, reading_natively("nothing"):
+        assert read_in_c(b"0.5") == 0.5
+        assert pool.submit(read_in_c, b"0,5").result() == 0.5
+    assert read_in_c(b"0,5") == 0.5
+
+
+def test_the_renderer_draws_the_same_robot_with_a_decimal_comma(use_decimal_comma: Callable[[], str]) -> None:
+    def load() -> list[Vector]:
+        with Renderer(pendulum(), 1.0, 0.025, (1.0, 0.5, 0.0, 1.0)) as renderer:
+            return renderer.find_frames()
+
+    usual = load()
+    use_decimal_comma()
+    assert load() == usual
+
+
+@pytest.mark.parametrize("name", ["bullet", "mujoco"])
+def test_a_throw_in_a_thread_has_the_same_bits_with_a_decimal_comma(
+    name: str, use_decimal_comma: Callable[[], str]
+) -> None:
+    def throw() -> str:
+        with Simulator("configs/quickstart.yaml", overrides=[f"sim.engine={name}"]) as simulator:
+            return str(simulator.throw().row)
+
+    usual = throw()
+    use_decimal_comma()
+    with ThreadPoolExecutor(1) as pool:
+        assert pool.submit(throw).result() == usual
