@@ -26,7 +26,7 @@ import psutil
 from throwcollect.dataset.inspect import info
 from throwcollect.dataset.journal import read_journal
 from throwcollect.dataset.verify import verify
-from throwcollect.runs.state_directory import STATE_VARIABLE
+from throwcollect.state_directory import STATE_VARIABLE
 from throwcollect.side_by_side import count_cores
 
 CONFIG = Path(__file__).parents[1] / "configs" / "quickstart.yaml"

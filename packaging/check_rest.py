@@ -20,7 +20,7 @@ import uvicorn
 
 from throwcollect.errors import WorkerError
 from throwcollect.runs.records import Records
-from throwcollect.runs.state_directory import STATE_VARIABLE
+from throwcollect.state_directory import STATE_VARIABLE
 from throwcollect.serve import instances as instances_module
 from throwcollect.serve.access import Access, Keys
 from throwcollect.serve.app import make_app

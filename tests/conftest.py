@@ -9,7 +9,7 @@ import pytest
 from hypothesis import settings
 
 from tests.commands import command_server
-from throwcollect.runs.state_directory import STATE_VARIABLE
+from throwcollect.state_directory import STATE_VARIABLE
 
 # A shell may start tests in the background with SIGINT ignored, which all their processes would inherit.
 signal.signal(signal.SIGINT, signal.default_int_handler)

@@ -22,11 +22,11 @@ from tests.cluster.conftest import BUILD, SHARED, USER
 from tests.e2e.collection import CONFIG, FAST, fingerprints, write_config
 from throwcollect import runs
 from throwcollect.errors import ConfigError
-from throwcollect.runs.state_directory import STATE_VARIABLE
 from throwcollect.runtimes.apptainer.sif import make_sif
 from throwcollect.runtimes.apptainer.sif_contents import check_sif, read_labels
 from throwcollect.runtimes.docker.image import save_image
 from throwcollect.runtimes.image_sources import SOURCES_LABEL, VERSION_LABEL
+from throwcollect.state_directory import STATE_VARIABLE
 
 pytestmark = pytest.mark.cluster
 ROOT = Path(__file__).parents[2]

@@ -19,7 +19,7 @@ from tests.cluster.slurm import Slurm
 from tests.e2e.collection import CONFIG, FAST, call_here, fingerprints, write_config
 from throwcollect import runs
 from throwcollect.cluster.submission import read_submission
-from throwcollect.runs.state_directory import STATE_VARIABLE
+from throwcollect.state_directory import STATE_VARIABLE
 
 pytestmark = pytest.mark.cluster
 SLICED = CONFIG + "record: {{trials_per_shard: {per_shard}}}\n"

@@ -15,9 +15,9 @@ from throwcollect.runs.background import begin_container, begin_run
 from throwcollect.runs.component_container import ContainerOrder
 from throwcollect.runs.records import Run
 from throwcollect.runs.run_record import Origin
-from throwcollect.runs.state_directory import STATE_VARIABLE
 from throwcollect.runtimes.docker.container_options import RUN_LABEL
 from throwcollect.runtimes.docker.image import default_tag
+from throwcollect.state_directory import STATE_VARIABLE
 
 pytestmark = pytest.mark.docker
 

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from throwcollect.runs.state_directory import STATE_VARIABLE
+from throwcollect.state_directory import STATE_VARIABLE
 
 
 @pytest.fixture(scope="session", autouse=True)

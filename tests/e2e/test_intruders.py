@@ -26,7 +26,7 @@ from throwcollect.errors import UnreachableError
 from throwcollect.run_key import RunKey
 from throwcollect.runs.records import Records
 from throwcollect.runs.run_record import RunRecord
-from throwcollect.runs.state_directory import STATE_VARIABLE
+from throwcollect.state_directory import STATE_VARIABLE
 
 pytestmark = [
     pytest.mark.e2e,

@@ -28,7 +28,7 @@ from tests.e2e.collection import (
 )
 from throwcollect.runs.records import Records
 from throwcollect.runs.run_record import Planning, RunRecord
-from throwcollect.runs.state_directory import STATE_VARIABLE
+from throwcollect.state_directory import STATE_VARIABLE
 
 pytestmark = pytest.mark.e2e
 TRIALS = 40

@@ -10,7 +10,7 @@ import pytest
 
 from tests.e2e.collection import FAST
 from throwcollect.dataset.inspect import digest
-from throwcollect.runs.state_directory import STATE_VARIABLE
+from throwcollect.state_directory import STATE_VARIABLE
 
 pytestmark = pytest.mark.e2e
 

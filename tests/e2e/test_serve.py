@@ -32,9 +32,9 @@ from throwcollect.robots.description import robot_of, start_posture
 from throwcollect.ros.srv import GetParameters
 from throwcollect.run_key import RunKey
 from throwcollect.runs.records import Records
-from throwcollect.runs.state_directory import STATE_VARIABLE
 from throwcollect.serve.finding import find_server, make_page_address
 from throwcollect.serve.rosbridge.reassembly import LONGEST_FRAME
+from throwcollect.state_directory import STATE_VARIABLE
 
 pytestmark = pytest.mark.e2e
 TRIALS, MANY = 10, 24

@@ -28,7 +28,7 @@ from tests.e2e.collection import (
 )
 from throwcollect.errors import WorkerError
 from throwcollect.runs.records import Records
-from throwcollect.runs.state_directory import STATE_VARIABLE
+from throwcollect.state_directory import STATE_VARIABLE
 
 TRIALS = 8
 DOMAIN = "83"

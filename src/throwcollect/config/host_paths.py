@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from pathlib import PurePosixPath
 
 _SYSTEM = (
-    *("/bin", "/boot", "/dev", "/etc", "/lib", "/lib32", "/lib64", "/libx32", "/lost+found", "/proc", "/root/.ssh"),
+    *("/bin", "/boot", "/dev", "/etc", "/lib", "/lib32", "/lib64", "/libx32", "/lost+found", "/proc"),
     *("/run", "/sbin", "/sys", "/usr", "/var/backups", "/var/cache", "/var/lib", "/var/lock", "/var/log", "/var/mail"),
     *("/var/run", "/var/spool"),
 )
@@ -17,8 +17,8 @@ _SYSTEM = (
 _SHARED = ("/home", "/tmp", "/var/tmp")  # noqa: S108
 """Directories that all users and programs share; directories in them may be data."""
 
-SECRETS = (".aws", ".azure", ".docker", ".gnupg", ".kube", ".netrc", ".password-store", ".ssh")
-"""Names of files and directories with secrets in home directories."""
+_HOME = re.compile("/root|/home/[^/]+")
+"""Home directories. What begins with a dot in them belongs to programs, and is full of keys and passwords."""
 
 _DEVICE = re.compile(r"/dev/(dri(/.+)?|nvidia[^/]*|nvidia-caps(/.+)?|kfd|dxg)")
 """Device files of graphics processors, with which a simulation may compute."""
@@ -44,8 +44,10 @@ def refusal(path: str, *, more: Iterable[str] = ()) -> str | None:
     for place in (*_SYSTEM, *more):
         if os.path.commonpath([plain, place]) in (plain, place):
             return f"is refused, as {place} belongs to the system; mounts are for data"
-    secret = next((part for part in PurePosixPath(plain).parts if part in SECRETS), None)
-    return None if secret is None else f"is refused, as {secret} holds secrets; mounts are for data"
+    if _HOME.fullmatch(plain):
+        return "is refused, as a home directory holds secrets; mounts are for data"
+    hidden = next((part for part in PurePosixPath(plain).parts if part.startswith(".")), None)
+    return None if hidden is None else f"is refused, as {hidden} may hold secrets of programs; mounts are for data"
 
 
 def is_allowed_device(path: str) -> bool:

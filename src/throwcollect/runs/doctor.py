@@ -30,10 +30,10 @@ from throwcollect.robots.description import joint_model
 from throwcollect.robots.robot import Robot
 from throwcollect.robots.talos import TALOS
 from throwcollect.ros.middleware import VARIABLE, uses_rclpy
-from throwcollect.runs.state_directory import state_directory
 from throwcollect.runtimes.ports import check_loopback
 from throwcollect.runtimes.registry import get_runtime
 from throwcollect.runtimes.runtime import Check
+from throwcollect.state_directory import state_directory
 from throwcollect.wording import format_count, join_names
 
 _GIB = 1024**3

@@ -35,11 +35,11 @@ from throwcollect.own_process import make_command
 from throwcollect.ros.connection import Connection
 from throwcollect.run_key import RunKey
 from throwcollect.runs.run_record import VERSION, RunRecord
-from throwcollect.runs.state_directory import is_locked, state_directory, unusable
 from throwcollect.runtimes.node_logs import NodeLogs
 from throwcollect.runtimes.nodes import LAUNCHER
 from throwcollect.runtimes.registry import find_runtime
 from throwcollect.runtimes.runtime import NodeState, Place
+from throwcollect.state_directory import is_locked, state_directory, unusable
 from throwcollect.units import NS_PER_S
 from throwcollect.wording import command
 

@@ -22,7 +22,7 @@ from pydantic import TypeAdapter
 from throwcollect.errors import DatasetError, WorkerError
 from throwcollect.files import open_log, write_secret
 from throwcollect.own_process import make_command
-from throwcollect.runs.state_directory import is_locked, state_directory
+from throwcollect.state_directory import is_locked, state_directory
 
 _FILE = "serve.json"
 _LOCK = "serve.lock"

@@ -27,12 +27,12 @@ from throwcollect.runs.component_container import ContainerOrder
 from throwcollect.runs.records import Records, Run
 from throwcollect.runs.run_record import Origin, RunRecord
 from throwcollect.runs.run_selection import require_living, require_simulations
-from throwcollect.runs.state_directory import state_directory
 from throwcollect.serve.catalogue import ENTRY, NAME, Catalogue, Component
 from throwcollect.serve.live import name_node
 from throwcollect.serve.resumption import check_resumption
 from throwcollect.serve.robot_files import description_of
 from throwcollect.serve.state import simulations_of
+from throwcollect.state_directory import state_directory
 
 _KEY = r"[A-Za-z0-9_-]+(\.[A-Za-z0-9_-]+)*"
 _LOCK = "instances.lock"

@@ -96,10 +96,13 @@ def test_a_single_core_needs_no_quotes(tmp_path: Path) -> None:
         ("sim: {mounts: [/proc/1:/b]}", f"sim.mounts.0: /proc/1 {SYSTEM.format('/proc')}"),
         ("sim: {mounts: [/var/lib/docker/x:/b]}", f"sim.mounts.0: /var/lib/docker/x {SYSTEM.format('/var/lib')}"),
         ("sim: {mounts: [/var:/b]}", f"sim.mounts.0: /var {SYSTEM.format('/var/backups')}"),
-        ("sim: {mounts: [/root:/b:ro]}", f"sim.mounts.0: /root {SYSTEM.format('/root/.ssh')}"),
+        (
+            "sim: {mounts: [/root:/b:ro]}",
+            "sim.mounts.0: /root is refused, as a home directory holds secrets; mounts are for data",
+        ),
         (
             "sim: {mounts: [/home/me/.ssh/id:/b:ro]}",
-            "sim.mounts.0: /home/me/.ssh/id is refused, as .ssh holds secrets; mounts are for data",
+            "sim.mounts.0: /home/me/.ssh/id is refused, as .ssh may hold secrets of programs; mounts are for data",
         ),
         (
             "sim: {mounts: [/tmp/:/b]}",

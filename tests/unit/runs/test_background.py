@@ -17,7 +17,7 @@ from throwcollect.runs import background
 from throwcollect.runs.background import begin_run, carry_out
 from throwcollect.runs.records import OpenRun, Records
 from throwcollect.runs.run_record import Origin, Planning
-from throwcollect.runs.state_directory import STATE_VARIABLE
+from throwcollect.state_directory import STATE_VARIABLE
 
 ORIGIN = Origin("throws", 1, {"trials": 2})
 

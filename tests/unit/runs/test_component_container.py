@@ -22,11 +22,11 @@ from throwcollect.runs.component_container import ContainerOrder, check_order, l
 from throwcollect.runs.control import down
 from throwcollect.runs.records import OpenRun, Records
 from throwcollect.runs.run_record import Kind, Origin, RunRecord
-from throwcollect.runs.state_directory import STATE_VARIABLE
 from throwcollect.runtimes.docker import component, docker_engine
 from throwcollect.runtimes.docker import watch as docker_watch
 from throwcollect.runtimes.docker.component import find_join_options
 from throwcollect.runtimes.docker.container_options import JOINED_LABEL, NODE_LABEL, RUN_LABEL
+from throwcollect.state_directory import STATE_VARIABLE
 
 SPEC = ContainerSpec("nodes", ("listen",), NodeContainerConfig())
 ORDER = ContainerOrder("ear", SPEC)

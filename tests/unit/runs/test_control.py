@@ -17,9 +17,9 @@ from throwcollect.runs.control import down, scale, stop
 from throwcollect.runs.following import follow, wait
 from throwcollect.runs.records import Records, Run
 from throwcollect.runs.run_record import RunRecord
-from throwcollect.runs.state_directory import STATE_VARIABLE
 from throwcollect.runtimes.node_collection import MOST_SIMULATIONS, offer_scaling
 from throwcollect.runtimes.nodes import LAUNCHER
+from throwcollect.state_directory import STATE_VARIABLE
 
 
 @pytest.fixture(autouse=True)

@@ -16,10 +16,10 @@ from throwcollect.members import names_of
 from throwcollect.robots.talos import TALOS
 from throwcollect.ros.middleware import VARIABLE, _choose_installed
 from throwcollect.runs.doctor import examine
-from throwcollect.runs.state_directory import STATE_VARIABLE
 from throwcollect.runtimes import ports
 from throwcollect.runtimes.docker import docker_engine
 from throwcollect.runtimes.docker.image import SOURCES_LABEL, default_tag
+from throwcollect.state_directory import STATE_VARIABLE
 
 PLUGINS = Path(__file__).parents[2] / "plugins"
 

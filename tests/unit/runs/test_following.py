@@ -11,7 +11,7 @@ from throwcollect.runs.events import EventLog
 from throwcollect.runs.following import follow, read_events, read_logs
 from throwcollect.runs.records import Records, Run
 from throwcollect.runs.run_record import RunRecord
-from throwcollect.runs.state_directory import STATE_VARIABLE
+from throwcollect.state_directory import STATE_VARIABLE
 
 
 @pytest.mark.parametrize("words", [("events",), ("logs", "-f")], ids=" ".join)

@@ -18,11 +18,11 @@ from throwcollect.errors import DatasetError, WorkerError
 from throwcollect.runs.launcher import launch
 from throwcollect.runs.records import OpenRun, Records
 from throwcollect.runs.run_record import RunRecord
-from throwcollect.runs.state_directory import STATE_VARIABLE
 from throwcollect.runtimes.docker import engine_clock as docker_clock
 from throwcollect.runtimes.docker import watch as docker_watch
 from throwcollect.runtimes.docker.container_options import NODE_LABEL, RUN_LABEL
 from throwcollect.runtimes.nodes import COORDINATOR
+from throwcollect.state_directory import STATE_VARIABLE
 
 CONFIG = Config.model_validate({"containers": {"image": "image"}, "run": {"simulations": 1}})
 

@@ -8,8 +8,8 @@ from tests.e2e.collection import FAST, collect_here, write_config
 
 from throwcollect.errors import ConfigError, DatasetError, ThrowcollectError
 from throwcollect.runs.preparation import _name_directory, prepare, resume
-from throwcollect.runs.state_directory import STATE_VARIABLE
 from throwcollect.runtimes.in_process import InProcessRuntime
+from throwcollect.state_directory import STATE_VARIABLE
 
 
 def test_the_default_directory_gets_a_time_if_the_plain_name_is_taken(

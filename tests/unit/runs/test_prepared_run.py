@@ -13,7 +13,7 @@ import pytest
 from throwcollect import runs
 from throwcollect.errors import ConflictError, Interrupted
 from throwcollect.runs.prepared_run import PreparedRun
-from throwcollect.runs.state_directory import STATE_VARIABLE
+from throwcollect.state_directory import STATE_VARIABLE
 
 YAML = """\
 trials: 1

@@ -17,8 +17,8 @@ from throwcollect.errors import ConfigError
 from throwcollect.run_key import RunKey
 from throwcollect.runs.records import OpenRun, Records
 from throwcollect.runs.run_record import RunFailure, RunRecord, Summary
-from throwcollect.runs.state_directory import STATE_VARIABLE
 from throwcollect.runtimes.runtime import NodeState
+from throwcollect.state_directory import STATE_VARIABLE
 
 NOW = datetime.now(timezone.utc)
 SUMMARY = Summary(

@@ -23,10 +23,10 @@ from throwcollect.runs.run_selection import (
     has_complete_dataset,
     require_living,
 )
-from throwcollect.runs.state_directory import STATE_VARIABLE
 from throwcollect.runtimes.docker import docker_engine as docker_engine
 from throwcollect.runtimes.docker.container_options import NODE_LABEL, RUN_LABEL
 from throwcollect.runtimes.runtime import NodeState
+from throwcollect.state_directory import STATE_VARIABLE
 
 NOW = datetime.now(timezone.utc)
 Make = Callable[..., RunRecord]

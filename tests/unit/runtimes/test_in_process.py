@@ -17,8 +17,8 @@ from throwcollect.dataset.inspect import digest, info
 from throwcollect.errors import ConfigError, Interrupted, WorkerError
 from throwcollect.replay.replayer import Replayer
 from throwcollect.runs.records import Records
-from throwcollect.runs.state_directory import STATE_VARIABLE
 from throwcollect.simulator import Simulator
+from throwcollect.state_directory import STATE_VARIABLE
 
 YAML = """\
 name: small

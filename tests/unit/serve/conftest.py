@@ -14,13 +14,13 @@ from tests.e2e.collection import FAST, collect_here, write_config
 
 from throwcollect.runs.records import OpenRun, Records, Run
 from throwcollect.runs.run_record import RunRecord
-from throwcollect.runs.state_directory import STATE_VARIABLE
 from throwcollect.serve import instances as instances_module
 from throwcollect.serve.access import Access, Keys
 from throwcollect.serve.app import make_app
 from throwcollect.serve.catalogue import Catalogue
 from throwcollect.serve.instances import Instances
 from throwcollect.serve.models import Models
+from throwcollect.state_directory import STATE_VARIABLE
 
 HOST = "127.0.0.1:8080"
 CONFIG = "name: small\ntrials: 3\ntask: {name: throw}\n"

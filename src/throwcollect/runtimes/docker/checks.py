@@ -10,7 +10,7 @@ from docker.client import DockerClient
 from docker.errors import ImageNotFound
 
 from throwcollect.config.containers import ContainerSpec, NodeContainerConfig
-from throwcollect.config.host_paths import DEVICES, SECRETS, is_allowed_device, refusal
+from throwcollect.config.host_paths import DEVICES, is_allowed_device, refusal
 from throwcollect.config.schema import Config
 from throwcollect.errors import ConfigError, Problem, WorkerError
 from throwcollect.runtimes.docker.address import engine_address
@@ -26,6 +26,7 @@ from throwcollect.runtimes.docker.docker_engine import engine_errors
 from throwcollect.runtimes.docker.image import default_tag
 from throwcollect.runtimes.nodes import COORDINATOR, ROUTER
 from throwcollect.runtimes.ports import reserve_port
+from throwcollect.state_directory import state_directory
 
 _NODES = {"router": ROUTER, "sim": "sim_0", "coordinator": COORDINATOR}
 
@@ -106,10 +107,11 @@ def _wrong_mount(source: Path, root: str) -> str | None:
         return f"{source} does not exist on this machine"
     real = source.resolve()
     kind, _, address = engine_address().partition("://")
-    engine = [root, os.path.realpath(address)] if kind == "unix" else [root]
-    if (reason := refusal(str(real), more=engine)) is None:
-        secret = next((name for name in SECRETS if (real / name).exists()), None)
-        reason = None if secret is None else f"is refused, as {secret} in it holds secrets; mounts are for data"
+    # The keys of all runs lie in the directory of the state.
+    more = [root, str(state_directory().resolve()), *([os.path.realpath(address)] if kind == "unix" else [])]
+    reason = refusal(str(real), more=more)
+    if reason is None and Path.home().resolve().is_relative_to(real):
+        reason = "is refused, as a home directory holds secrets; mounts are for data"
     if reason is None:
         return None
     return f"{source} {reason}" if real == source else f"{source}, which is {real}, {reason}"

@@ -57,10 +57,15 @@ def test_mounting_a_link_to_a_part_of_the_system_is_refused(problems: Check, tmp
     assert found[0].startswith(f"mounts.0: {tmp_path}/link, which is {(tmp_path / 'link').resolve()}, is refused, as /")
 
 
-def test_mounting_the_engine_secrets_or_missing_directories_is_refused(problems: Check, tmp_path: Path) -> None:
-    for name in ("engine/volumes", "keys/.ssh", "other"):
+def test_mounting_the_engine_secrets_or_missing_directories_is_refused(
+    problems: Check, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("engine/volumes", "homes/me/data", "state/runs", "other"):
         (tmp_path / name).mkdir(parents=True)
-    wanted = ["none", "engine", "engine/volumes", "run", "", "keys", "other"]
+    monkeypatch.setenv("HOME", str(tmp_path / "homes" / "me"))
+    monkeypatch.setenv("THROWCOLLECT_STATE", str(tmp_path / "state"))
+    homes = ["homes", "homes/me", "homes/me/data"]
+    wanted = ["none", "engine", "engine/volumes", "run", "", *homes, "state/runs", "other"]
     system = f"is refused, as {tmp_path}/{{}} belongs to the system; mounts are for data"
     assert problems(mounts=[f"{tmp_path}/{name}:/x{index}" for index, name in enumerate(wanted)]) == [
         f"mounts.0: {tmp_path}/none does not exist on this machine",
@@ -68,7 +73,9 @@ def test_mounting_the_engine_secrets_or_missing_directories_is_refused(problems:
         f"mounts.2: {tmp_path}/engine/volumes {system.format('engine')}",
         f"mounts.3: {tmp_path}/run {system.format('run/engine.sock')}",
         f"mounts.4: {tmp_path} {system.format('engine')}",
-        f"mounts.5: {tmp_path}/keys is refused, as .ssh in it holds secrets; mounts are for data",
+        f"mounts.5: {tmp_path}/homes is refused, as a home directory holds secrets; mounts are for data",
+        f"mounts.6: {tmp_path}/homes/me is refused, as a home directory holds secrets; mounts are for data",
+        f"mounts.8: {tmp_path}/state/runs {system.format('state')}",
     ]
 
 

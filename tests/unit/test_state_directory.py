@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from throwcollect.errors import ConfigError
-from throwcollect.runs.state_directory import STATE_VARIABLE, state_directory
+from throwcollect.state_directory import STATE_VARIABLE, state_directory
 
 
 @pytest.fixture
