@@ -102,7 +102,7 @@ dataset = LeRobotDataset("me/throws", root=".")
             "| `observation.effort` | N m | torques of their motors |",
             "| `observation.environment_state` | m, m/s | position and velocity of the ball's centre, in world"
             f"{_describe_goal(source)} |",
-            "| `action` | rad | their commanded positions, on the trajectory that controllers were sent |",
+            "| `action` | rad | their commanded positions one frame later, on the trajectory sent to controllers |",
             f"| `next.reward` | 1 | 1 in the last frame of a throw that {success}, 0 in all others |",
             f"| `next.success` | | true in the last frame of a throw that {success} |",
             "| `next.done` | | true in the last frame of a throw |",
@@ -180,7 +180,7 @@ def _compute_frames(
         "observation.environment_state": np.hstack(
             [signals[name] for name in ("ball_position_m", "ball_velocity_mps", *throw.target)]
         ),
-        "action": signals["command_position_rad"],
+        "action": throw.find_actions(source.rate_hz),
         "next.reward": done * throw.succeeded,
         "next.success": done * throw.succeeded,
         "next.done": done,

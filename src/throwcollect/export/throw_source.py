@@ -19,7 +19,7 @@ from throwcollect.errors import DatasetError
 from throwcollect.export.resampling import count_resampled, resample
 from throwcollect.export.signals import Signal, list_signals, unit_of
 from throwcollect.progress_log import ProgressLog
-from throwcollect.robots.quintic_curve import sample_quintic
+from throwcollect.robots.quintic_curve import sample_positions, sample_quintic
 from throwcollect.robots.trajectory import JointTrajectory
 from throwcollect.tasks.task import trajectory_of
 
@@ -65,6 +65,14 @@ class ThrowSeries:
         done = np.zeros(len(self))
         done[-1] = 1
         return done
+
+    def find_actions(self, rate_hz: int) -> NDArray[np.float64]:
+        """Find the positions commanded one sample later ``(n_samples, n_moving)`` [rad]: the action of each sample.
+
+        The last sample has one, too, as the trajectory goes on behind it, and after its end stays at its last point.
+        """
+        time_s = self.signals["time_s"]
+        return sample_positions(self.trajectory, np.append(time_s[1:], time_s[-1] + 1 / rate_hz))
 
 
 @dataclass(frozen=True)

@@ -97,6 +97,18 @@ def throws_of(directory: Path, step: int = 1) -> Iterator[tuple[int, Arrays]]:
         )
 
 
+def actions_of(directory: Path, step: int = 1, recorded_hz: int = 250) -> list[np.ndarray]:
+    """The action of each sample of each throw: what its trajectory commands one sample later."""
+    plan = Dataset.open(directory).plan
+    return [
+        sample_quintic(
+            task_of(plan.config_of(plan.trials[trial])).trajectory(),
+            np.append(signals["time_s"][1:], signals["time_s"][-1] + step / recorded_hz),
+        )[0]
+        for trial, signals in throws_of(directory, step)
+    ]
+
+
 def moving_columns() -> list[int]:
     return [TALOS.joints.index(joint) for joint in MOVING]
 

@@ -16,6 +16,7 @@ from tests.unit.export.conftest import (
     WITH_EPISODE,
     Arrays,
     Export,
+    actions_of,
     moving_columns,
     table_of,
     throws_of,
@@ -51,7 +52,8 @@ def frames_of(source: Path, step: int = 1, rate_hz: int = 250) -> list[Arrays]:
     moving = moving_columns()
     episodes: list[Arrays] = []
     first = 0
-    for number, (trial, signals) in enumerate(throws_of(source, step)):
+    throws = zip(throws_of(source, step), actions_of(source, step), strict=True)
+    for number, ((trial, signals), actions) in enumerate(throws):
         count = len(signals["time_s"])
         last = np.arange(count) == count - 1
         episodes.append(
@@ -63,7 +65,7 @@ def frames_of(source: Path, step: int = 1, rate_hz: int = 250) -> list[Arrays]:
                 "observation.environment_state": np.hstack(
                     [signals["ball_position_m"], signals["ball_velocity_mps"]]
                 ).astype(np.float32),
-                "action": signals["command_position_rad"].astype(np.float32),
+                "action": actions.astype(np.float32),
                 "next.reward": (last * (trial != HELD)).astype(np.float32),
                 "next.success": last & (trial != HELD),
                 "next.done": last,
@@ -117,6 +119,17 @@ def test_exported_frames_equal_the_samples_of_the_dataset(
     assert dict(zip(table.schema.names, table.schema.types, strict=True)) == types
     for name, values in join(frames_of(source, step, rate_hz or 250)).items():
         assert np.array_equal(values_of(table[name]), values), name
+
+
+def test_a_model_of_lerobot_actions_that_stands_still_has_the_loss_of_the_motion(exported: Export) -> None:
+    table = pq.read_table(exported("lerobot", 25) / "data")
+    episode = values_of(table["episode_index"])
+    for number in range(4):
+        frames = table.filter(episode == number)
+        position = values_of(frames["observation.state"])[:, : len(MOVING)]
+        loss, motion = np.std(values_of(frames["action"]) - position), np.std(np.diff(position, axis=0))
+        assert loss == pytest.approx(motion, rel=0.02)
+        assert motion > 0.01
 
 
 def test_every_episode_is_one_row_group(exported: Export) -> None:
