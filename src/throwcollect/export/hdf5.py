@@ -9,10 +9,12 @@ from typing import Any
 
 import numpy as np
 import pyarrow as pa
+from numpy.typing import NDArray
 
 from throwcollect.export.exporter import Exporter
 from throwcollect.export.npz import to_array
 from throwcollect.export.readme import Layout, tabulate_signals
+from throwcollect.export.signals import Signal
 from throwcollect.export.throw_source import ExportSource, ThrowSeries, read_metadata
 from throwcollect.extras import lazily
 from throwcollect.files import write_all
@@ -20,9 +22,10 @@ from throwcollect.interruption import hold_stop_signals
 
 h5py = lazily("h5py")
 
-ACTION = "command_position_rad"
-_BESIDE = ("time_s", "command_velocity_radps", "command_acceleration_radps2")
+_COMMAND = "command_position_rad"
+_BESIDE = ("time_s", _COMMAND, "command_velocity_radps", "command_acceleration_radps2")
 """Signals that are neither an observation nor an action, so they are stored next to both."""
+_LATER = " One sample later."
 _COMPRESSION = {"compression": "gzip", "compression_opts": 1, "shuffle": True}
 _GYM = 2
 """robomimic's number for environments that are not of robosuite."""
@@ -46,11 +49,13 @@ file = h5py.File("throws.hdf5")
 ball_position_m = file["data/demo_{source.entries[0].trial}/obs/ball_position_m"][:]
 {measure} = file["throws/{measure}"][:]""",
         notes=(
-            "The layout is that of robomimic. Each group of a throw has `obs/` with what is measured, `actions`, the "
-            f"commanded positions of the moving joints, `rewards`, 1 in the last sample of a throw that {success}, and "
-            "`dones`, 1 in the last sample; and beside them `time_s` and the commanded velocities and accelerations. "
+            "The layout is that of robomimic. Each group of a throw has `obs/` with what is measured, `next_obs/`, the "
+            "same one sample later (in the last sample, that of the sample itself), `actions`, the commanded positions "
+            f"of the moving joints one sample later, `rewards`, 1 in the last sample of a throw that {success}, and "
+            "`dones`, 1 in the last sample; and beside them `time_s` and what is commanded in the samples themselves. "
             "Every dataset has the attributes `unit` and `description`, and `components` where it has several columns.",
-            "In robomimic, set `train.hdf5_load_next_obs` to false, as next observations are not stored twice. "
+            "Actions are in radians, and robomimic's policies put out numbers between -1 and 1, so set "
+            '`train.action_config.actions.normalization` to "min_max" there (version 0.5.0). '
             "`env_args` names no environment that robomimic could make.",
         ),
         over_time=tabulate_signals(source),
@@ -128,12 +133,23 @@ def _add_throw(group: Any, throw: ThrowSeries, source: ExportSource) -> None:
     group["dones"] = throw.done.astype(np.int64)
     group["rewards"] = throw.done * throw.succeeded
     for signal in source.signals:
-        name = signal.name if signal.name in _BESIDE else "actions" if signal.name == ACTION else f"obs/{signal.name}"
-        stored = group.create_dataset(name, data=throw.signals[signal.name], **_COMPRESSION)
-        stored.attrs["unit"] = signal.unit
-        stored.attrs["description"] = signal.description
-        if signal.components:
-            stored.attrs["components"] = list(signal.components)
+        values = throw.signals[signal.name]
+        if signal.name in _BESIDE:
+            _add_signal(group, signal.name, signal, values)
+        else:
+            _add_signal(group, f"obs/{signal.name}", signal, values)
+            # As in robomimic's own conversions, the last observation is followed by itself.
+            _add_signal(group, f"next_obs/{signal.name}", signal, np.concatenate([values[1:], values[-1:]]), _LATER)
+        if signal.name == _COMMAND:
+            _add_signal(group, "actions", signal, throw.find_actions(source.rate_hz), _LATER)
+
+
+def _add_signal(group: Any, name: str, signal: Signal, values: NDArray[np.float64], when: str = "") -> None:
+    stored = group.create_dataset(name, data=values, **_COMPRESSION)
+    stored.attrs["unit"] = signal.unit
+    stored.attrs["description"] = signal.description + when
+    if signal.components:
+        stored.attrs["components"] = list(signal.components)
 
 
 def _add_table(group: Any, table: pa.Table, text: Any) -> None:
