@@ -34,7 +34,7 @@ def place(source: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
             result = CliRunner().invoke(app, command, catch_exceptions=False)
             assert result.exit_code == 0, result.output
             assert re.fullmatch(
-                rf"{command[3]}: 4 throws of 6 trials, \d+ samples at \d+ Hz, \d\.\d MB\n", result.output
+                rf"{command[3]}: 4 throws of 6 trials, \d+ samples at \d+ Hz, \d\.\d MB\n", result.stdout
             )
     return place
 
