@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 import io
+import re
+import shlex
 import struct
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -54,6 +58,29 @@ def test_rosbags_and_mcap_read_the_same_messages(full: Path) -> None:
         theirs = [(connection.topic, stamp, bytes(data)) for connection, stamp, data in reader.messages()]
     assert sorted(ours) == sorted(theirs)
     assert {topic for topic, _, _ in ours} == set(TYPES)
+
+
+def test_the_command_of_the_page_on_viewing_converts_a_dataset_for_older_releases_of_ros(
+    full: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    page = (Path(__file__).parents[3] / "docs" / "viewing.md").read_text(encoding="utf-8")
+    (command,) = re.findall(r"^rosbags-convert (.*)$", page, re.MULTILINE)
+    monkeypatch.chdir(full.parent)
+    Path("datasets").mkdir()
+    full.rename("datasets/quickstart")
+    subprocess.run([sys.executable, "-m", "rosbags.convert", *shlex.split(command)], check=True)
+    contents = []
+    for bag_directory in ("datasets/quickstart", "bags/quickstart"):
+        with Reader(bag_directory) as reader:
+            messages = [(each.topic, each.msgtype, stamp, bytes(data)) for each, stamp, data in reader.messages()]
+            contents.append((sorted(messages), {each.topic: each.ext for each in reader.connections}))
+    assert contents[0] == contents[1]
+    assert set(contents[1][1]) == set(TYPES)
+    metadata = YAML(typ="safe").load(Path("bags/quickstart/metadata.yaml"))[BAG_SECTION]
+    assert metadata["version"] == 8
+    # Up to version 8, profiles are a string whose policies are numbers.
+    profiles = metadata["topics_with_message_count"][0]["topic_metadata"]["offered_qos_profiles"]
+    assert YAML(typ="safe").load(profiles)[0]["reliability"] == 1
 
 
 def test_every_message_decodes_to_what_was_recorded(full: Path, make_collection: Any) -> None:
