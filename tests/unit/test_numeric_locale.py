@@ -1,3 +1,5 @@
+"""With a decimal comma in the locale of the process, worlds, pictures and throws are the same."""
+
 import ctypes
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
