@@ -96,7 +96,7 @@ class BodyJoint:
         parent: Name of the link that it hangs on.
         child: Name of the link that it moves.
         placement: Pose in the parent of the child's frame, while the joint is at 0.
-        axis: Direction in the child's frame of any length but 0.
+        axis: Unit vector in the child's frame.
         limits: Lowest and highest position [rad or m], highest speed [rad/s or m/s] and effort [Nm or N]; None if it
             has none.
         damping: Viscous friction [Nms/rad or Ns/m].

@@ -27,7 +27,7 @@ _LEAST_THICKNESS = 1e-6
 """Least extent of a solid in its thinnest direction, as a share of its extent in the longest."""
 
 _HEADER, _RECORD = 84, 50
-_VERTEX = re.compile(rb"\bvertex\s+(\S+)\s+(\S+)\s+(\S+)")
+_VERTEX = re.compile(rb"\bvertex\s+(\S+)\s+(\S+)\s+(\S+)", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
@@ -92,11 +92,12 @@ def _read_stl(path: Path) -> Triangles:
     content = path.read_bytes()
     count = int.from_bytes(content[_HEADER - 4 : _HEADER], "little")
     # The length tells a binary file, because some of them begin with `solid`, as all text files do.
-    if len(content) >= _HEADER and len(content) == _HEADER + count * _RECORD:
+    rest, is_text = len(content) - _HEADER - count * _RECORD, content.lstrip()[:5].lower() == b"solid"
+    if len(content) >= _HEADER and (rest == 0 or (rest > 0 and not is_text)):
         corners: Triangles = np.frombuffer(content, STL, count, _HEADER)["corners"]
         return corners
-    if not content.lstrip().startswith(b"solid"):
-        raise ValueError(f"{len(content)} bytes are no STL of {count} triangles")
+    if not is_text or b"endsolid" not in content.lower():
+        raise ValueError(f"{len(content)} bytes are no whole STL of {count} triangles, and no whole one in text")
     return np.array(_VERTEX.findall(content)).astype(np.float32).reshape(-1, 3, 3)
 
 

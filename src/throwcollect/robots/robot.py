@@ -172,23 +172,17 @@ class Robot:
             raise ConfigError(f"{path}: joint {missing[0]} is missing")
         if self.hand not in urdf.links:
             raise ConfigError(f"{path}: link {self.hand} is missing")
-        moving = {joint.name: joint for joint in urdf.model.joints if joint.moves}
-        if more := [
-            f"{joint.name} ({f'mimics {joint.mimics}' if joint.mimics else joint.kind})"
-            for name, joint in moving.items()
-            if name not in self.joints
-        ]:
+        moving = [joint.name for joint in urdf.model.joints if joint.moves]
+        kinds = {name: f"mimics {joint.mimics}" if joint.mimics else joint.kind for name, joint in urdf.joints.items()}
+        if more := [f"{name} ({kinds[name]})" for name in moving if name not in self.joints]:
             raise ConfigError(
                 f"{path}: joints that move, but have no controller of {self.title}: {', '.join(more)}",
                 hint='make them type="fixed" in a copy of the URDF, or add them to a controller if they are revolute',
             )
-        if others := [
-            f"{name} is {urdf.joints[name].kind}"
-            for name in self.joints
-            if name not in moving or moving[name].kind != "revolute"
-        ]:
+        if others := [name for name in self.joints if kinds[name] != "revolute"]:
             raise ConfigError(
-                f"{path}: joints of controllers should be revolute; {', '.join(others)}",
+                f"{path}: joints of controllers should be revolute; "
+                + ", ".join(name + (" " if urdf.joints[name].mimics else " is ") + kinds[name] for name in others),
                 hint='a continuous joint becomes type="revolute" with a <limit> that has lower and upper',
             )
         return urdf

@@ -247,8 +247,10 @@ class _Reader:
         if kind != "fixed":
             if (element := joint.find("axis")) is not None:
                 axis = _as_vector(self._read_numbers(element, "xyz", 3, of=joint))
-            if math.hypot(*axis) < _LEAST_AXIS:
+            if (length := math.hypot(*axis)) < _LEAST_AXIS:
                 self._fail(f"joint {name}: its axis {' '.join(f'{each:g}' for each in axis)} has no direction")
+            if not math.isclose(length, 1.0):
+                axis = _as_vector([each / length for each in axis])
             limits = self._read_limits(joint, kind)
             if (dynamics := joint.find("dynamics")) is not None:
                 (damping,), (friction,) = (

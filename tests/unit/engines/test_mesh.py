@@ -13,13 +13,18 @@ ASCII = "solid x\n" + "".join(
 
 def test_binary_stl_is_read(tmp_path):
     facets = b"".join(bytes(12) + corners.tobytes() + bytes(2) for corners in CORNERS)
-    (tmp_path / "mesh.STL").write_bytes(bytes(80) + len(CORNERS).to_bytes(4, "little") + facets)
-    assert Mesh(tmp_path / "mesh.STL").triangles.tolist() == CORNERS.tolist()
+    whole = bytes(80) + len(CORNERS).to_bytes(4, "little") + facets
+    # Some programs write more behind the triangles.
+    for content in (whole, whole + b"color"):
+        (tmp_path / "mesh.STL").write_bytes(content)
+        assert Mesh(tmp_path / "mesh.STL").triangles.tolist() == CORNERS.tolist()
 
 
 def test_stl_as_text_is_read(tmp_path):
     (tmp_path / "mesh.stl").write_text(ASCII + "endsolid x\n")
-    assert Mesh(tmp_path / "mesh.stl").triangles.tolist() == CORNERS.tolist()
+    (tmp_path / "upper.stl").write_text((ASCII + "endsolid x\n").upper())
+    for name in ("mesh.stl", "upper.stl"):
+        assert Mesh(tmp_path / name).triangles.tolist() == CORNERS.tolist()
 
 
 def test_faces_of_obj_are_split_into_triangles(tmp_path):
@@ -36,17 +41,18 @@ def test_faces_of_obj_are_split_into_triangles(tmp_path):
     [
         ("mesh.dae", b"<COLLADA/>", "cannot be read as a mesh"),
         ("mesh.ply", b"ply", ".stl or .obj or .dae"),
-        ("mesh.stl", b"", "0 bytes are no STL"),
+        ("mesh.stl", b"", "0 bytes are no whole STL"),
         ("mesh.stl", bytes(84), "without triangles"),
+        ("mesh.stl", ASCII.encode(), "no whole one in text"),
         (
             "mesh.stl",
             bytes(80) + b"\xff\xff\xff\xff" + bytes(50),
-            "no STL of 4294967295 triangles",
+            "no whole STL of 4294967295 triangles",
         ),
-        ("mesh.stl", b"solid x\nvertex 0 0 0\n", "cannot be read as a mesh"),
-        ("mesh.stl", b"solid x\nvertex a b c\n", "cannot be read as a mesh"),
-        ("mesh.stl", ASCII.replace("2.5", "nan").encode(), "coordinates beyond 1e\\+06"),
-        ("mesh.stl", ASCII.replace("2.5", "1e30").encode(), "coordinates beyond 1e\\+06"),
+        ("mesh.stl", b"solid x\nvertex 0 0 0\nendsolid", "cannot be read as a mesh"),
+        ("mesh.stl", b"solid x\nvertex a b c\nendsolid", "cannot be read as a mesh"),
+        ("mesh.stl", (ASCII.replace("2.5", "nan") + "endsolid").encode(), "coordinates beyond 1e\\+06"),
+        ("mesh.stl", (ASCII.replace("2.5", "1e30") + "endsolid").encode(), "coordinates beyond 1e\\+06"),
         ("mesh.obj", b"v 0 0 0\nf 1 2 9\n", "a face uses vertex 2 of 1"),
         ("mesh.obj", b"v 0 0 0\nf 0 0 0\n", "a face uses vertex 0 of 1"),
         ("mesh.obj", b"v 0 0 0\nf -1 -2 -1\n", "a face uses vertex -2 of 1"),

@@ -139,6 +139,11 @@ def test_a_flat_body_has_the_largest_moment_that_there_can_be(tmp_path: Path) ->
         ('name="elbow_joint" type="revolute"', 'name="elbow_joint" type="hinge"', "unknown type 'hinge'"),
         ('name="hand_joint" type="fixed"', 'name="hand_joint" type="continuous"', r"hand_joint \(continuous\)"),
         (
+            'name="elbow_joint" type="revolute">',
+            'name="elbow_joint" type="revolute"><mimic joint="x"/>',
+            "elbow_joint mimics x",
+        ),
+        (
             'name="hand_joint" type="fixed">',
             'name="hand_joint" type="continuous"><mimic joint="elbow_joint"/>',
             r"no controller of the arm: hand_joint \(mimics elbow_joint\)",
