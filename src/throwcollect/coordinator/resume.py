@@ -24,7 +24,7 @@ from throwcollect.coordinator.prepare import (
 from throwcollect.dataset.configuration import read_config, unfitting_plan
 from throwcollect.dataset.directory import CONFIG, METADATA, PLAN, SHARD_SUFFIX, SOURCES, TRIALS, config_path
 from throwcollect.dataset.lock import hold_lock
-from throwcollect.dataset.manifest import is_as_written
+from throwcollect.dataset.manifest import is_as_written, is_begun
 from throwcollect.dataset.recovery import remove_unfinished
 from throwcollect.dataset.throws_table import read_throws
 from throwcollect.dataset.verify import find_damage
@@ -39,11 +39,6 @@ from throwcollect.wording import command
 
 _MUCH_BYTES = 50_000_000
 """Size of recordings from which on the search is announced: a core takes a second to look through so many bytes."""
-
-
-def is_begun(directory: Path) -> bool:
-    """Whether a directory holds a dataset that was at least created."""
-    return (directory / CONFIG).is_file() or (directory / PLAN).is_file()
 
 
 def resume(
@@ -155,9 +150,9 @@ def _write(plan: Plan, directory: Path, stored: Config | None, old: Plan | None,
     replanned = old is None or plan.trials != old.trials or kept.without_run() != old.config.without_run()
     if stored != kept:
         if replanned:
-            # Were this process killed here, the plan must not lie beside another configuration. If it is missing, it
-            # is made again.
-            remove(directory / PLAN)
+            # Were this process killed here, the plan must not lie beside another configuration. If it is empty, it is
+            # made again, and the directory still holds a dataset.
+            write_file(directory / PLAN, b"")
         write_file(directory / CONFIG, dump_yaml(kept).encode())
     if replanned or replan:
         plan.write(directory / PLAN)

@@ -11,6 +11,7 @@ from throwcollect.config.schema import Config
 from throwcollect.dataset.bag import MOST_FILES
 from throwcollect.dataset.directory import CONFIG, PLAN, TRIALS
 from throwcollect.dataset.lock import hold_lock
+from throwcollect.dataset.manifest import is_begun
 from throwcollect.errors import ConfigError, Problem
 from throwcollect.files import write_file
 from throwcollect.sweep.plan import Plan
@@ -69,11 +70,11 @@ def refuse_taken(directory: Path) -> None:
     except OSError as error:
         raise _make_unusable_error(directory, error) from error
     if taken:
-        begun = PLAN in taken or CONFIG in taken
         raise ConfigError(
             f"{directory}: holds {', '.join(taken[:3])}{' and more' if taken[3:] else ''}",
             expected="a directory that is new or empty",
-            hint="choose another one with --output" + (f", or go on: {command('resume', directory)}" if begun else ""),
+            hint="choose another one with --output"
+            + (f", or go on: {command('resume', directory)}" if is_begun(directory) else ""),
         )
 
 
@@ -94,6 +95,8 @@ def _fill(directory: Path, plan: Plan, listed: Points | None, *, made: bool) -> 
     with ExitStack() as undo:
         undo.callback(remove_plan, directory, made=made)
         write_file(directory / CONFIG, dump_yaml(plan.config).encode())
+        # An empty plan marks the dataset and is made again, so a collection that is killed in the meantime can go on.
+        write_file(directory / PLAN, b"")
         if listed is not None:
             write_file(directory / TRIALS, encode_points(listed))
         plan.write(directory / PLAN)

@@ -58,8 +58,8 @@ def path_of_part(path: Path) -> Path:
 
 
 def has_files(directory: Path) -> bool:
-    """Whether any file of a dataset is in a directory."""
-    own = (CONFIG, MANIFEST, METADATA, PLAN, THROWS)
+    """Whether a directory holds any file that only datasets have; exports have a configuration and a table, too."""
+    own = (MANIFEST, METADATA, PLAN)
     return any(path.name in own or SHARD_SUFFIX in path.suffixes for path in directory.glob("*"))
 
 

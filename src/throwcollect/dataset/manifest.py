@@ -16,7 +16,17 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from throwcollect.dataset.directory import CONFIG, MANIFEST, METADATA, PLAN, SHARD_SUFFIX, SOURCES, THROWS, TRIALS
+from throwcollect.dataset.directory import (
+    CONFIG,
+    JOURNAL,
+    MANIFEST,
+    METADATA,
+    PLAN,
+    SHARD_SUFFIX,
+    SOURCES,
+    THROWS,
+    TRIALS,
+)
 from throwcollect.dataset.findings import Finding
 from throwcollect.errors import DatasetError
 from throwcollect.files import is_there, open_regular, read_text, unreadable
@@ -163,6 +173,16 @@ def read_named_manifest(directory: Path) -> tuple[str, tuple[FileEntry, ...]]:
     if text != manifest_text(name, entries) or len({entry.path for entry in entries}) < len(entries):
         raise DatasetError("is not written as the manifest of a dataset is", path=path)
     return name, entries
+
+
+def is_begun(directory: Path) -> bool:
+    """Whether a directory holds a dataset that was at least created; exports and models have a ``config.yaml``, too."""
+    if (directory / PLAN).is_file():
+        return True
+    try:
+        return (directory / CONFIG).is_file() and ((directory / JOURNAL).is_file() or bool(read_manifest(directory)))
+    except DatasetError:
+        return False
 
 
 def is_as_written(directory: Path, name: str) -> bool:

@@ -7,13 +7,14 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from throwcollect.arguments import read_path, refuse_argument
-from throwcollect.dataset.directory import CARD, CONFIG
+from throwcollect.dataset.directory import CARD, CONFIG, TRIALS
 from throwcollect.export.exporter import Exporter
 from throwcollect.export.readme import render_card
 from throwcollect.export.throw_source import ExportSource
 from throwcollect.extras import require
-from throwcollect.files import StrPath, new_directory
+from throwcollect.files import StrPath, new_directory, write_file
 from throwcollect.members import explain_failure, load_member, names_of
+from throwcollect.sweep.point_file import encode_points
 
 
 @dataclass(frozen=True)
@@ -58,6 +59,8 @@ def export(directory: StrPath, output: StrPath, *, to: str, rate_hz: int | None 
             _check_written(beside)
             card = render_card(source, chosen.describe(source))
         shutil.copyfile(directory / CONFIG, beside / CONFIG)
+        if source.dataset.config.sweep.file is not None:
+            write_file(beside / TRIALS, encode_points(source.dataset.plan.trials.points))
         (beside / CARD).write_text(card, encoding="utf-8")
         size = sum(path.stat().st_size for path in beside.rglob("*") if path.is_file())
     return Exported(
@@ -73,7 +76,7 @@ def export(directory: StrPath, output: StrPath, *, to: str, rate_hz: int | None 
 
 
 def _check_written(directory: Path) -> None:
-    """Make sure that a format has written files, and none in the place of the data card or the configuration.
+    """Make sure that a format has written files, and none in the place of those that `export` adds.
 
     Raises:
         ValueError: If it has not.
@@ -81,5 +84,5 @@ def _check_written(directory: Path) -> None:
     names = {path.name for path in directory.iterdir()} if directory.is_dir() else set()
     if not names:
         raise ValueError("write should leave files in the directory, which is empty")
-    if taken := names & {CARD, CONFIG}:
+    if taken := names & {CARD, CONFIG, TRIALS}:
         raise ValueError(f"write should leave out {', '.join(sorted(taken))}, which every export has")

@@ -12,7 +12,7 @@ from throwcollect.config.schema import Config
 from throwcollect.config.target_columns import is_target
 from throwcollect.dataset.bag import to_yaml
 from throwcollect.dataset.data_card import outcome_lines
-from throwcollect.dataset.directory import CONFIG
+from throwcollect.dataset.directory import CONFIG, TRIALS
 from throwcollect.export.throw_source import ExportSource, read_metadata
 from throwcollect.robots.description import robot_of
 from throwcollect.version import __version__
@@ -56,6 +56,7 @@ def render_card(source: ExportSource, layout: Layout) -> str:
         "",
         *(f"- `{name}`: {text}" for name, text in layout.files.items()),
         f"- `{CONFIG}`: the configuration of the collection; collecting with it again yields the same data.",
+        *([f"- `{TRIALS}`: the list of points that the configuration reads."] if config.sweep.file else []),
         "",
         f"```{layout.language}",
         layout.loading,

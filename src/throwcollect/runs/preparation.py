@@ -17,6 +17,7 @@ from throwcollect.coordinator.onlooker import SILENT, Onlooker
 from throwcollect.dataset.configuration import read_config, refuse_damaged_config, refuse_lost_config
 from throwcollect.dataset.directory import config_path
 from throwcollect.dataset.lock import hold_lock
+from throwcollect.dataset.manifest import is_begun
 from throwcollect.errors import ConfigError, Problem
 from throwcollect.ros.middleware import Middleware
 from throwcollect.runs.prepared_run import PreparedRun
@@ -139,8 +140,6 @@ def resume(
         WorkerError: If the runtime that is asked for cannot be used.
         DatasetError: If its configuration is lost or damaged, or it cannot be written.
     """
-    from throwcollect.coordinator.resume import is_begun
-
     started = datetime.now(timezone.utc)
     directory = read_path("directory", directory)
     file = None if config is None else read_path("config", config)

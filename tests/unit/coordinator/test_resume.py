@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import shutil
+from itertools import count
 from pathlib import Path
 from typing import Any
 
 import pytest
+from tests.unit.dataset.kills import KilledAt
 
 from throwcollect.config.loader import load
 from throwcollect.config.schema import Config
 from throwcollect.coordinator.prepare import prepare
-from throwcollect.coordinator.resume import has_all_trials, is_begun, resume
+from throwcollect.coordinator.resume import has_all_trials, prepare_or_resume, resume
+from throwcollect.dataset.manifest import entry_of_file, is_begun, manifest_text
+from throwcollect.dataset.writer import DatasetWriter
 from throwcollect.errors import ConfigError, DatasetError
 
 SETTINGS: dict[str, Any] = {
@@ -138,9 +143,52 @@ def test_a_dataset_with_damaged_plan_and_configuration_is_refused(directory: Pat
         resume(config_with(), directory, sweep_directory=directory)
 
 
-def test_an_empty_directory_is_not_a_begun_dataset(directory: Path, tmp_path_factory: pytest.TempPathFactory) -> None:
+def test_only_files_that_datasets_alone_have_make_a_directory_a_dataset(directory: Path, tmp_path: Path) -> None:
     assert is_begun(directory)
-    assert not is_begun(tmp_path_factory.mktemp("empty"))
+    other = tmp_path / "other"
+    other.mkdir()
+    assert not is_begun(other)
+    (other / "config.yaml").write_bytes((directory / "config.yaml").read_bytes())
+    (other / "datapackage.json").write_text('{"name": "of another program", "resources": []}')
+    assert not is_begun(other)
+    (other / "datapackage.json").write_text(manifest_text("small", [entry_of_file(other / "config.yaml")]))
+    assert is_begun(other)
+
+
+def test_a_collection_of_which_only_recordings_and_journal_are_left_beside_the_configuration_goes_on(
+    directory: Path, prepared: dict[str, bytes]
+) -> None:
+    DatasetWriter.open(directory).close()
+    (directory / "plan.parquet").unlink()
+    prepare_or_resume(directory / "config.yaml", directory)
+    assert (directory / "plan.parquet").read_bytes() == prepared["plan.parquet"]
+
+
+@pytest.mark.parametrize("begun", [False, True])
+def test_a_kill_at_any_moment_of_planning_leaves_a_dataset_that_can_go_on(listed: Path, begun: bool) -> None:
+    """The trials are those of a list; if the dataset was begun, its plan gets one more."""
+    text = "name: listed\nsweep: {{sampler: list, file: lists/points.csv}}\ntrials: {}\n"
+    few, more = listed / "few.yaml", listed / "more.yaml"
+    few.write_text(text.format(2))
+    more.write_text(text.format(3))
+    prepare_or_resume(few, listed / "begun")
+    wanted = prepare_or_resume(more, listed / "wanted")
+    # A file takes more calls than these steps, so the process dies before and after each.
+    for call in count(step=3):
+        directory = listed / f"data-{call}"
+        if begun:
+            shutil.copytree(listed / "begun", directory)
+        with KilledAt(call) as kill:
+            prepare_or_resume(more, directory)
+        if not kill.died:
+            break
+        # Until then, there is nothing but the configuration, and nothing to go on with.
+        if begun or (directory / "plan.parquet").exists():
+            assert prepare_or_resume(more, directory) == wanted
+            assert contents(directory) == contents(listed / "wanted")
+        else:
+            assert not (directory / "trials.parquet").exists()
+    assert call > 10
 
 
 def test_a_dataset_without_metadata_is_not_finished(directory: Path) -> None:

@@ -18,13 +18,19 @@ from typer.testing import CliRunner
 
 from throwcollect import members
 from throwcollect.cli.main import app
+from throwcollect.config.loader import load
+from throwcollect.coordinator.prepare import prepare as prepare_plan
+from throwcollect.coordinator.resume import prepare_or_resume
 from throwcollect.dataset.inspect import info
+from throwcollect.dataset.reader import Dataset
+from throwcollect.derive.selection import sample
 from throwcollect.errors import ConfigError, DatasetError, MemberError
 from throwcollect.export.export import export
 from throwcollect.export.exporter import Exporter
 from throwcollect.export.signals import unit_of
 from throwcollect.extras import MissingExtraError
 from throwcollect.members import load_member
+from throwcollect.runs.preparation import prepare, resume
 
 PLUGINS = Path(__file__).parents[2] / "plugins"
 
@@ -46,6 +52,39 @@ def test_every_format_has_a_card_with_digest_units_configuration_and_all_files(
     assert sorted(listed) == sorted(
         f"{path.name}/" if path.is_dir() else path.name for path in directory.iterdir() if path.name != "README.md"
     )
+
+
+@pytest.mark.parametrize("to", FORMATS)
+def test_an_export_is_taken_for_no_dataset_and_stays_as_it_is(
+    to: str, exported: Export, source: Path, tmp_path: Path
+) -> None:
+    directory = exported(to)
+    before = {path: path.read_bytes() for path in directory.rglob("*") if path.is_file()}
+    with pytest.raises(ConfigError, match="holds no dataset"):
+        resume(directory)
+    with pytest.raises(ConfigError, match="holds no dataset"):
+        resume(directory, config=source / "config.yaml")
+    for freeze in (prepare_or_resume, lambda config, output: prepare(config, output=output)):
+        with pytest.raises(ConfigError, match="expected: a directory that is new or empty") as caught:
+            freeze(source / "config.yaml", directory)
+        assert caught.value.hint == "choose another one with --output"
+    for arguments in (["repair", str(tmp_path / "new")], ["rebuild"], ["info"], ["verify"]):
+        done = CliRunner().invoke(app, ["dataset", arguments[0], str(directory), *arguments[1:]])
+        assert (done.exit_code, str(done.exception)) == (1, f"{directory}: holds no dataset")
+    assert {path: path.read_bytes() for path in directory.rglob("*") if path.is_file()} == before
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("to", FORMATS)
+def test_the_configuration_in_an_export_of_a_list_gives_the_same_trials(to: str, source: Path, tmp_path: Path) -> None:
+    sample(source, tmp_path / "sample", count=3)
+    (tmp_path / "sample" / "trials.parquet").unlink()
+    export(tmp_path / "sample", tmp_path / "export", to=to)
+    plan = prepare_plan(
+        load(tmp_path / "export" / "config.yaml"), tmp_path / "again", sweep_directory=tmp_path / "export"
+    )
+    assert plan == Dataset.open(tmp_path / "sample").plan
+    assert "- `trials.parquet`: " in (tmp_path / "export" / "README.md").read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize("to", ["parquet", "lerobot"])
@@ -239,6 +278,7 @@ def test_an_error_in_a_format_of_another_package_names_the_package(
     [
         ((), "write should leave files in the directory, which is empty"),
         (("throws.csv", "README.md"), "write should leave out README.md, which every export has"),
+        (("trials.parquet",), "write should leave out trials.parquet, which every export has"),
     ],
 )
 def test_a_format_that_writes_nothing_or_the_card_is_refused(
